@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from spinepipe.calibrate.solvers import AtRest, Seen, Settling, held_against
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
-from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
+from spinepipe.model import MeasuredCase, RefusedModel, SpineModel, leading_to
 from spinepipe.statics import (
     Course,
     FreeParameter,
@@ -299,11 +299,15 @@ def needed(problem: Problem) -> tuple[MeasuredCase, ...]:
 
 
 def _steps_needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
-    """The case without the steps that neither carry a reading nor a path to those that do."""
-    if measured.zeroed or any(s.effect.kind is Kind.PATH for s in problem.model.effects):
+    """The case without the steps that neither carry a reading nor lead to those that do."""
+    kinds = {scoped.effect.kind for scoped in problem.model.effects}
+    if measured.zeroed or Kind.PATH in kinds:
         return measured
-    read = np.any(_used(measured, problem.weights), axis=(1, 2)).tolist()
-    steps = tuple(step for step, here in zip(measured.case.steps, read, strict=True) if here)
+    read = np.flatnonzero(np.any(_used(measured, problem.weights), axis=(1, 2))).tolist()
+    if problem.course is None:  # steps that settle begin from rest, each for itself
+        pressed = bool(np.any(problem.model.gravity)) or Kind.LOAD in kinds
+        read = leading_to(measured.case, read, pressed)
+    steps = tuple(measured.case.steps[place] for place in read)
     return replace(
         measured, case=replace(measured.case, steps=steps), measured=measured.measured[read]
     )

@@ -30,6 +30,7 @@ class BendingRotationCoupling:
     name: ClassVar[str] = "bending_rotation_coupling"
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
+    straight_over: ClassVar[float] = np.inf
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"pair": pair} for pair in combinations(COORDINATES, 2)),
         spreads=PER_JOINT,

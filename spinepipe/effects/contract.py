@@ -250,6 +250,16 @@ class JointLaw(Effect, Protocol):
         """(J, 6, P) derivative of the load by the parameters at fixed q and carried load."""
 
 
+STRAIGHT_OVER = 0.05
+"""rad, 1 cm counts as 1 rad: within a motion of this size a law that does not say otherwise, by an
+attribute ``straight_over``, is not softer than at both ends. Laws that are linear have no end."""
+
+
+def straight_over(effect: Effect) -> float:
+    """How often along a step the tangent of a law or a geometry effect has to be looked at, rad."""
+    return float(getattr(effect, "straight_over", STRAIGHT_OVER))
+
+
 @runtime_checkable
 class LoadEffect(Effect, Protocol):
     """A load on the chain besides those listed in the cohort.

@@ -30,6 +30,7 @@ class LevelDependence(CarriedShare):
     name: ClassVar[str] = "level_dependence"
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
+    straight_over: ClassVar[float] = np.inf
     trial: ClassVar[Trial] = Trial(
         variants=tuple({"coordinate": c} for c in (*COORDINATES, ALL_ROTATIONS, ALL)),
         spreads=(Spread.BY_JOINT,),

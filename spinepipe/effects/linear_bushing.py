@@ -48,6 +48,7 @@ class LinearBushing:
     name: ClassVar[str] = "linear_bushing"
     kind: ClassVar[Kind] = Kind.JOINT_LAW
     per_joint: ClassVar[bool] = True
+    straight_over: ClassVar[float] = np.inf
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
         _stiffness(c, s) for c, s in zip(COORDINATES, STIFFNESS_COLUMNS, strict=True)
     )

@@ -21,6 +21,9 @@ ITSELF = "itself"
 ROUNDED = 0.05
 """Share of the reach, to each side of a knot, over which the corner is rounded."""
 
+SEEN = 0.1
+"""Share of the reach within which the tangent is looked at along a step: no stretch is shorter."""
+
 FURTHEST = 10.0
 """Times the usual reach at most."""
 
@@ -76,6 +79,11 @@ class TabulatedLaw:
     def furthest(self) -> float:
         """The reach, m or rad."""
         return self.reach or self._usual
+
+    @property
+    def straight_over(self) -> float:
+        """rad: where it may fall between two knots that is seen."""
+        return SEEN * self.furthest * (_REACH_RAD / _REACH_M if self.along in TRANSLATIONS else 1.0)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -1,11 +1,18 @@
-"""Equilibrium by Newton with the exact tangent, continued along the load; is it stable?
+"""Which equilibrium a load leads to: Newton, a certificate of its step, else the load in halves.
+
+The pose of a load step is the end of the path of stable equilibria along which the loads come on as
+stated: steps in order, in proportion within a step, from the neutral pose. Where stability is lost
+on the way (a fork, a limit point) the step is `unstable`, however large the steps are.
+
+- *Newton* with the exact tangent, from the pose of the step before. Where a step leads to more work
+  than half of what was gained it is cut back to where the work along it is least: loads grow along
+  every direction, and steps over a corner (friction, a stop) arrive.
+- *Certificate.* The tangent is linear in the load, so a step is a piece of the path if the tangent
+  is positive at its start under the load after it, at its end under the load before it, and in
+  between: looked at where the step is long, or Newton's first step told little of it.
+- *Halves.* A step that is not certified is halved, until stability is seen to be lost.
 
 The LU factors of a tangent serve the step, the determinant and the sensitivities.
-
-Across corners in a path law Newton is held back by a line search. Friction meets a joint that turns
-on and one that turns back with different slopes, and full steps may jump to and fro between them.
-The load is still continuous and grows along every direction, so the work along a step has a least
-value; steps that stop near it arrive.
 
 Stability is decided by the linearised damped motion M x'' + C x' + K x = 0. K is not symmetric
 under a constant moment, so its symmetric part alone decides nothing. Cheap sufficient tests come
@@ -15,14 +22,15 @@ first; the 2n eigenvalues are computed only when these leave a doubt.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eigvals
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf
-from scipy.optimize import brentq
 
-from spinepipe.effects.contract import Array, Indices
+from spinepipe.effects.contract import Array, Indices, straight_over
 from spinepipe.statics.holding import States
 from spinepipe.statics.system import Loading, System
 from spinepipe.status import Status
+from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 
 
@@ -38,16 +46,11 @@ class Factored:
     pivots: Array
     sign: int
 
-    def solve(self, right: Array) -> Array:
-        """K^-1 times (n,) or (n, m)."""
-        solution, _ = dgetrs(self.lu, self.pivots, right)
+    def solve(self, right: Array, transposed: bool = False) -> Array:
+        """K^-1 times (n,) or (n, m), or that of K'."""
+        solution, _ = dgetrs(self.lu, self.pivots, right, trans=int(transposed))
         return solution
 
-
-MOST_STEPS = 60
-
-NEAR = np.array([1e-9] * 3 + [1e-7] * 3)
-"""m and rad: a step this small ends on the pose's side of every corner that matters."""
 
 ROUNDING = 1e-9
 """Growth slower than this share of the stiffness (damping is one) is rounding error."""
@@ -61,13 +64,22 @@ class Stability:
     symmetric_part_positive: bool
 
 
-MOST_ITERATIONS = 12
+MOST_ITERATIONS = 40
+"""Newton's, steps that were cut back among them."""
+
+OVERSHOT, LEAST_SHARE = 0.5, 0.1
+"""A step is cut back where the load against it is more than this share of what drove it; to the
+zero of the straight line between both, but to no less than this share."""
+
+LONGEST_STEP = 0.5
+"""rad: no joint turns further in one step of Newton, for its tangent tells nothing so far off."""
 
 FIRST_INCREMENT = 0.25
 """Fraction of a load that is tried when it does not come on at once."""
 
-SMALLEST_FRACTION = 1.0 / 1024.0
-"""Continuation gives up when a load increment this small does not contract."""
+SMALLEST_FRACTION = 2.0**-20
+"""Stability is lost where a load increment this small is not certified. A column that is pushed
+aside by 1e-9 of its stiffness still finds its way past its critical load."""
 
 LARGEST_ROTATION = np.deg2rad(80.0)
 """Rotations beyond this are no joint motion and near the singularity of Z, X', Y''."""
@@ -76,8 +88,20 @@ NOT_POSITIVE = (
     "stable, though the tangent's symmetric part is not positive definite (large constant moment)"
 )
 
+PAST_CRITICAL = "past a critical load: under it the neutral pose would not be stable"
+
 # Newton squares its error: once a step is below these, the next would be below rounding.
 STEP_TOLERANCE = np.array([1e-11] * 3 + [1e-9] * 3)
+
+RADIANS = STEP_TOLERANCE[5] / STEP_TOLERANCE
+"""By which lengths are held against angles: 1 cm counts as 1 rad."""
+
+SPACING = 0.25
+"""rad: the tangent is looked at so often along a step, or as often as a law asks for."""
+
+STRAIGHT, FEWEST, MOST = 0.5, 3, 60
+"""A step from which Newton's first differs by more than this share is not longer than `SPACING`,
+and is looked at so many times at least; and at most."""
 
 
 @dataclass(frozen=True)
@@ -100,151 +124,248 @@ class Equilibrium:
 
 
 @dataclass(frozen=True)
-class _Newton:
+class Way:
+    """How Newton went.
+
+    Attributes
+    ----------
+    q : (n,) where it ended. arrived : whether that is an equilibrium, if any joint's motion goes
+        so far. factored, tangent : there.
+    first : (n,) its first step. at_start : tangent (n, n) where it began.
+    """
+
     q: Array
-    factored: Factored
+    arrived: bool
+    factored: Factored | None
     tangent: Array
     iterations: int
+    first: Array
+    at_start: Array
+
+    @property
+    def within_motion(self) -> bool:
+        """Whether no joint turns further than joints do."""
+        return bool(np.abs(self.q.reshape(-1, 6)[:, 3:]).max() <= LARGEST_ROTATION)
 
 
 def solve(
-    system: System, start: Array, loading_from: Loading, loading_to: Loading, states: States
-) -> Equilibrium:
-    """Equilibrium under ``loading_to``, starting from the one at ``start`` under ``loading_from``.
-
-    The full increment is tried first; if Newton does not contract or ends unstable, it is held back
-    across the corners of path laws where there are any; at last the load is
-    continued in fractions that halve on failure and double on success.
-    """
-    direct = _newton(system, start, loading_to, states)
-    if direct is not None and (verdict := _stability(system, direct)).stable:
-        return _converged(direct, direct.iterations, verdict)
-    if system.paths and (near := approach(system, start, loading_to, states)) is not None:
-        held_back = _newton(system, near, loading_to, states)
-        if held_back is not None and (verdict := _stability(system, held_back)).stable:
-            return _converged(held_back, held_back.iterations, verdict)
-    return _continue(system, start, loading_from, loading_to, states)
-
-
-def _continue(
-    system: System, start: Array, loading_from: Loading, loading_to: Loading, states: States
-) -> Equilibrium:
-    reached, increment, iterations = 0.0, FIRST_INCREMENT, 0
-    last: _Newton | None = None
-    verdict: Stability | None = None
-    while reached < 1.0:
-        target = min(1.0, reached + increment)
-        loading = loading_from.towards(loading_to, target)
-        q = start if last is None else last.q
-        found = _newton(system, q, loading, states)
-        iterations += MOST_ITERATIONS if found is None else found.iterations
-        if found is not None and (here := _stability(system, found)).stable:
-            verdict, last, reached, increment = here, found, target, 2.0 * increment
-        elif increment > SMALLEST_FRACTION:
-            increment *= 0.5
-        else:
-            turned_too_far = found is None and _stands_beyond_motion(system, q, loading, states)
-            return _stopped(q, found, turned_too_far, reached, iterations)
-    assert last is not None
-    assert verdict is not None
-    return _converged(last, iterations, verdict)
-
-
-def _converged(found: _Newton, iterations: int, verdict: Stability) -> Equilibrium:
-    """A stable pose; a tangent whose symmetric part is not positive is worth a warning."""
-    warning = "" if verdict.symmetric_part_positive else NOT_POSITIVE
-    return Equilibrium(found.q, found.factored, Status.CONVERGED, warning, iterations, 1.0)
-
-
-def _stopped(
-    q: Array, found: _Newton | None, turned_too_far: bool, reached: float, iterations: int
-) -> Equilibrium:
-    """Continuation stalled: past the last stable pose there is an unstable one, or none near."""
-    share = f"{100.0 * reached:.1f} % of the load increment"
-    message = f"no equilibrium near the last one beyond {share}: it tips over or snaps"
-    if found is not None:
-        message = f"the segment loses stability beyond {share}"
-    elif turned_too_far:
-        limit = f"{np.rad2deg(LARGEST_ROTATION):.0f} degrees"
-        message = f"a joint turns beyond {limit}, the limit of joint motion, beyond {share}"
-    return Equilibrium(q, None, Status.UNSTABLE, message, iterations, reached)
-
-
-def _stands_beyond_motion(system: System, start: Array, loading: Loading, states: States) -> bool:
-    """Whether there is a stable pose nearby, but one that no joint reaches."""
-    found = _newton(system, start, loading, states, largest=np.inf)
-    return found is not None and _stability(system, found).stable
-
-
-def _newton(
     system: System,
-    start: Array,
-    loading: Loading,
+    origin: Array,
+    loading_from: Loading,
+    loading_to: Loading,
     states: States,
-    largest: float = LARGEST_ROTATION,
-) -> _Newton | None:
-    """Newton from ``start``; None unless the steps contract onto a pose within joint motion.
+    guess: Array | None = None,
+    step: int = 0,
+) -> Equilibrium:
+    """Equilibrium to which a load leads from the one at ``origin`` (n,) under ``loading_from``.
 
-    A step beyond the ends of a law, where it carries without limit, is halved. ``largest`` is the
-    rotation where joint motion ends, rad.
+    Parameters
+    ----------
+    guess : (n,) pose close to it, where Newton starts. step : number of the step, for messages.
     """
-    q, last = system.start(start, loading), np.inf
-    step: Array | None = None
+    q, reached, increment, iterations = origin, 0.0, 1.0, 0
+    before, start = loading_from, guess
+    while True:
+        target = min(1.0, reached + increment)
+        after = loading_to if target == 1.0 else loading_from.towards(loading_to, target)
+        way = newton(system, q if start is None else start, after, states)
+        iterations += way.iterations
+        verdict = certified(system, q, before, after, states, way, start is not None)
+        if verdict is not None:
+            q, before, reached, increment = way.q, after, target, 2.0 * increment
+            if reached == 1.0:
+                assert way.factored is not None
+                warning = "" if verdict.symmetric_part_positive else NOT_POSITIVE
+                if _past_critical(system, loading_to):
+                    warning = PAST_CRITICAL
+                return Equilibrium(q, way.factored, Status.CONVERGED, warning, iterations, reached)
+        elif start is None:
+            increment = min(FIRST_INCREMENT, 0.5 * increment)
+            if increment < SMALLEST_FRACTION:
+                turned = way.arrived and not way.within_motion
+                ahead = loading_from.towards(loading_to, min(1.0, reached + SMALLEST_FRACTION))
+                message = _lost(system, q, before, ahead, states, turned, step)
+                message = f"{message} beyond {100.0 * reached:.1f} % of the load increment"
+                return Equilibrium(q, None, Status.UNSTABLE, message, iterations, reached)
+        start = None
+
+
+def certified(
+    system: System,
+    origin: Array,
+    before: Loading,
+    after: Loading,
+    states: States,
+    way: Way,
+    guessed: bool,
+) -> Stability | None:
+    """How stable the end of Newton is, if a path of stable equilibria leads there from an origin.
+
+    Parameters
+    ----------
+    origin : (n,) equilibrium under ``before``. guessed : whether Newton did not start there.
+    """
+    if not (way.arrived and way.within_motion):
+        return None
+    assert way.factored is not None
+    verdict = stability(system.chain, way.q, way.tangent, way.factored.sign, system.free)
+    if not verdict.stable:
+        return None
+    begin, first, tangent = system.start(origin, after), way.first, way.at_start
+    if guessed:
+        balance = system.balance(begin, after, states)
+        tangent = balance.tangent
+        try:
+            first = factor(tangent).solve(-balance.residual)
+        except SingularTangent:
+            return None
+    if not stands(system, tangent):
+        return None
+    effects = [active.effect for active in (*system.laws, *system.geometry)]
+    spacing = np.array([min([SPACING, *map(straight_over, effects)])])
+    begun, ended, told = (one.reshape(1, -1, 6) for one in (begin, way.q, first))
+    near, _, shares = places_between(begun, ended, told, spacing)
+    if not near.all():
+        return None
+    between = begin + shares[:, None] * (way.q - begin)
+    looks = [(there, after) for there in between]
+    if before.share > 0.0 or before.forces.any() or before.moments.any():
+        looks += [(there, before) for there in (way.q, *between)]
+    for there, loading in looks:
+        if not stands(system, system.balance(there, loading, states).tangent):
+            return None
+    return verdict
+
+
+def places_between(
+    begin: Array, end: Array, first: Array, spacing: Array
+) -> tuple[NDArray[np.bool_], Indices, Array]:
+    """Which steps of N lanes are near enough, (N,), and where these are looked at.
+
+    Parameters
+    ----------
+    begin, end, first : (N, J, 6) poses, and Newton's first step from the one.
+    spacing : (N,) rad, places are at most as far apart.
+
+    Returns
+    -------
+    Beside the former: lanes and shares (K,) of their way.
+    """
+    way = end - begin
+    length = np.abs(way * RADIANS).max(axis=(1, 2))
+    bent = np.abs((way - first) * RADIANS).max(axis=(1, 2)) > STRAIGHT * length
+    near = ~bent | (length <= SPACING)
+    count = np.ceil(length / spacing).astype(np.int64) - 1
+    count = np.clip(np.where(bent, np.maximum(count, FEWEST), count), 0, MOST)
+    count = np.where(near, count, 0)
+    lanes = np.repeat(np.arange(len(count)), count)
+    places = np.arange(len(lanes)) - np.repeat(np.cumsum(count) - count, count)
+    return near, lanes, (places + 1) / (count[lanes] + 1)
+
+
+def stands(system: System, tangent: Array) -> bool:
+    """Whether a chain without inertia would not move away from a pose with this tangent (n, n)."""
+    free = system.free
+    own = tangent if free is None else tangent[np.ix_(free, free)]
+    if _positive(own + own.T):
+        return True
+    if not np.isfinite(own).all() or np.array_equal(own, own.T):
+        return False
+    scale = 1.0 / np.sqrt(system.chain.model.damping.ravel())
+    scale = scale if free is None else scale[free]
+    return decays(np.zeros_like(own), own * scale[:, None] * scale)
+
+
+def _past_critical(system: System, loading: Loading) -> bool:
+    """Whether the neutral pose would move away under forces."""
+    heavy = loading.share > 0.0 and bool(np.any(system.model.gravity))
+    if not (heavy or loading.forces.any()):
+        return False
+    loading = system.unloaded().towards(loading, 1.0 - ROUNDING)
+    neutral = system.start(np.zeros(system.chain.n), loading)
+    tangent = system.balance(neutral, loading, system.initial_states()).tangent
+    return not stands(system, tangent)
+
+
+def _lost(
+    system: System,
+    q: Array,
+    before: Loading,
+    ahead: Loading,
+    states: States,
+    turned: bool,
+    step: int,
+) -> str:
+    """How a path ends at q (n,): it tips over at a fork, where the load does no work, or snaps.
+
+    The coordinate that gives way has the largest part in the motion that nothing resists; few
+    steps of inverse iteration tell it, for the tangent is all but singular.
+    """
+    if turned:
+        limit = f"{np.rad2deg(LARGEST_ROTATION):.0f} degrees"
+        return f"a joint turns beyond {limit}, the limit of joint motion, under step {step},"
+    try:
+        factored = factor(system.balance(q, before, states).tangent)
+    except SingularTangent:
+        return f"tips over or snaps under the load of step {step}: it loses stability"
+    motion, work = np.random.default_rng(0).normal(size=(2, len(q)))
+    for _ in range(8):
+        motion, work = factored.solve(motion), factored.solve(work, transposed=True)
+        motion, work = motion / np.linalg.norm(motion), work / np.linalg.norm(work)
+    parts = np.abs(motion * np.tile(RADIANS, len(q) // 6))
+    joint, at = divmod(int(np.argmax(parts)), 6)
+    missing = system.balance(q, ahead, states).residual
+    fork = abs(work @ missing) < FORK * np.linalg.norm(missing)
+    how = "tips over" if fork else "snaps"
+    where = f"{COORDINATES[at].replace('_', ' ')} of {system.model.joints[joint]}"
+    return f"{how} under the load of step {step}: {where} loses stability"
+
+
+FORK = 1e-6
+"""At a fork the load does no more than this share of its work along the motion that is free."""
+
+
+def newton(system: System, start: Array, loading: Loading, states: States) -> Way:
+    """Newton with a line search, from ``start`` (n,).
+
+    A step is cut back where the load against it has grown to more than half of what drove it, or
+    is infinite beyond the ends of a law. It is given up where the tangent's determinant is not
+    positive: there the path has been left.
+    """
+    q = system.start(start, loading)
+    step, drive = np.zeros(len(q)), 0.0
+    first, at_start = step, np.zeros((len(q), len(q)))
+    factored: Factored | None = None
     for iteration in range(1, MOST_ITERATIONS + 1):
         balance = system.balance(q, loading, states)
-        if step is not None and not np.isfinite(balance.residual).all():
-            step = 0.5 * step
-            q = q - step
+        work = float(balance.residual @ step)
+        if not work <= OVERSHOT * drive:
+            if drive <= 0.0:
+                break
+            share = float(np.clip(drive / (drive + work), LEAST_SHARE, 0.5))
+            share = share if np.isfinite(work) else 0.5
+            q = q - (1.0 - share) * step
+            step, drive = share * step, share * drive
             continue
         try:
             factored = factor(balance.tangent)
         except SingularTangent:
-            return None
+            break
         step = factored.solve(-balance.residual)
+        if iteration == 1:
+            first, at_start = step, balance.tangent
+        if factored.sign < 0:
+            break
         size = float((np.abs(step).reshape(-1, 6) / STEP_TOLERANCE).max())
+        step = step * min(1.0, LONGEST_STEP / max(np.abs(step.reshape(-1, 6)[:, 3:]).max(), 1e-300))
         q = q + step
-        if not size < 4.0 * last or np.abs(q.reshape(-1, 6)[:, 3:]).max() > largest:
-            return None
+        drive = -float(balance.residual @ step)
+        drive = drive if drive > 0.0 else np.inf
         if size < 1.0:
-            return _Newton(q, factored, balance.tangent, iteration)
-        last = size
-    return None
-
-
-def _stability(system: System, found: _Newton) -> Stability:
-    return stability(system.chain, found.q, found.tangent, found.factored.sign, system.free)
-
-
-def approach(system: System, start: Array, loading: Loading, states: States) -> Array | None:
-    """Pose (n,) next to the equilibrium under a loading, or None when the way there is lost."""
-    q = system.start(start, loading)
-    for _ in range(MOST_STEPS):
-        balance = system.balance(q, loading, states)
-        try:
-            step = factor(balance.tangent).solve(-balance.residual)
-        except SingularTangent:
-            return None
-        if not balance.residual @ step < 0.0:
-            return None
-        step = step * _share(system, q, step, loading, states, float(balance.residual @ step))
-        q = q + step
-        if (np.abs(step).reshape(-1, 6) < NEAR).all():
-            return q
-    return None
-
-
-def _share(
-    system: System, q: Array, step: Array, loading: Loading, states: States, slope: float
-) -> float:
-    """Share of a step at which the work along it is near its least, or the whole step."""
-
-    def work(share: float) -> float:
-        return float(system.residual(q + share * step, loading, states) @ step)
-
-    if not work(1.0) > -0.5 * slope:
-        return 1.0
-    share: float = brentq(work, 0.0, 1.0, xtol=1e-9, rtol=0.1)
-    return share
+            return Way(q, True, factored, balance.tangent, iteration, first, at_start)
+        if not np.abs(q.reshape(-1, 6)[:, 3:]).max() < np.pi:
+            break
+    return Way(q, False, factored, at_start, iteration, first, at_start)
 
 
 def factor(tangent: Array) -> Factored:

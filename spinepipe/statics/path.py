@@ -11,7 +11,6 @@ from spinepipe.model import LoadStep
 from spinepipe.statics.equilibrium import Equilibrium, Factored, solve
 from spinepipe.statics.holding import States, states_after
 from spinepipe.statics.system import Loading, System
-from spinepipe.status import Status
 
 
 @dataclass(frozen=True)
@@ -69,10 +68,8 @@ def follow(system: System, guesses: list[Array] | None = None) -> list[SolvedSte
             equilibrium = replace(solved[-1].equilibrium, message="an earlier load step failed")
             solved.append(SolvedStep(step, loading, equilibrium, states, {}))
             continue
-        start = q if guesses is None else guesses[number]
-        equilibrium = solve(system, start, before, loading, states)
-        if equilibrium.status is not Status.CONVERGED and guesses is not None:
-            equilibrium = solve(system, q, before, loading, states)
+        guess = None if guesses is None else guesses[number]
+        equilibrium = solve(system, q, before, loading, states, guess, step.step)
         advances = _advance(system, equilibrium.q, states)
         solved.append(SolvedStep(step, loading, equilibrium, states, advances))
         q, before = equilibrium.q, loading

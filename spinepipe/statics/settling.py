@@ -196,7 +196,8 @@ def settle(
     if end.status is Status.REFUSED:
         return end
     final = program.at(duration)
-    equilibrium = solve(system, end.q, system.slots.unloaded(), final, NO_STATES)
+    neutral = np.zeros(system.chain.n)
+    equilibrium = solve(system, neutral, system.slots.unloaded(), final, NO_STATES, end.q)
     if equilibrium.status is Status.CONVERGED:
         return replace(end, remaining=equilibrium.q - end.q)
     if not end.status.usable:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from spinepipe.cohort.load_tests import peak_step
-from spinepipe.model import LoadCase, LoadStep
+from spinepipe.model import LoadCase, LoadStep, leading_to
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class AskedTest:
 def asked(case: LoadCase, pressed: bool, all_steps: bool, subtracted: bool = True) -> AskedTest:
     """What is computed of a test: all of its load steps, or that of the largest load only.
 
-    Joints have no memory, so the largest load can be computed without the steps before it.
+    Joints have no memory, so of the steps before the largest load those are computed where the load
+    turns.
 
     Parameters
     ----------
@@ -43,13 +44,13 @@ def asked(case: LoadCase, pressed: bool, all_steps: bool, subtracted: bool = Tru
         pose, which need not be computed.
     """
     from_first = subtracted and (pressed or _loaded(case.steps[0]))
-    largest = case.steps[peak_step(case)]
+    peak = peak_step(case)
+    largest = case.steps[peak].step
     if all_steps:
-        return AskedTest(case, from_first, largest.step, slice(None))
-    if not from_first or largest is case.steps[0]:
-        return AskedTest(replace(case, steps=(largest,)), from_first, largest.step, slice(None))
-    both = replace(case, steps=(case.steps[0], largest))
-    return AskedTest(both, from_first, largest.step, slice(1, None))
+        return AskedTest(case, from_first, largest, slice(None))
+    places = leading_to(case, {0, peak} if from_first else {peak}, pressed)
+    steps = tuple(case.steps[place] for place in places)
+    return AskedTest(replace(case, steps=steps), from_first, largest, slice(len(steps) - 1, None))
 
 
 def first_cycles(cases: Iterable[LoadCase]) -> tuple[LoadCase, ...]:

@@ -191,7 +191,7 @@ def test_loads_that_do_not_come_on_at_once(
         else:
             assert np.isnan(found.q[lanes]).all()
     assert 4 <= standing < len(drawn)
-    assert any(continued)
+    assert any(continued) or n_joints == 1  # where one joint stands, one step brings it there
     assert not all(continued)
 
 

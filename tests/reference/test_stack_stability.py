@@ -108,9 +108,10 @@ def test_what_is_proven_is_what_decays(
     rng = np.random.default_rng(100 + n_joints)
     made = [loaded(rng, n_joints, size, soft) for soft in np.linspace(softest, 1.0, 24)]
     stack = stack_of(made)
-    q, tangents, arrived = newton(
+    way = newton(
         stack.chains, stack.loads, lambda some: stack.bound(some, {}), np.zeros((24, n_joints, 6))
     )
+    q, tangents, arrived = way.q, way.tangents, way.arrived
     there = np.flatnonzero(arrived)
     loads = part(stack.loads, there)
     stands = np.array([decays(*by_pybullet(made[n], q[n])) for n in there.tolist()])

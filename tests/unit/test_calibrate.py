@@ -18,6 +18,7 @@ from example_effects import (
     scoped,
     spine,
 )
+from sweeps import sweep
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
 from spinepipe.calibrate.fit import stand_up
@@ -330,20 +331,24 @@ def test_scatter_stands_in_for_undeclared_noise() -> None:
     assert np.ptp(ratio) < 1e-9
 
 
-def test_unread_steps_and_unweighted_readings_change_nothing() -> None:
-    model = spine(2)
+@sweep("order, kept", [((2, 0, 1), [0, 2]), ((0, 1, 2), [0, 1, 2])])
+def test_unread_steps_and_unweighted_readings_change_nothing(order, kept: list[int]) -> None:
+    """Loads of 0.3, 0.6 and 1.0 go straight through the second step, of 0.6, 1.0 and 0.3 turn."""
+    model = replace(spine(2), gravity=np.zeros(3))
     free, truth = rotations(model), np.array([0.2, -0.3, 0.4])
     problem = problem_of(model, free, truth)
-    measured = problem.cases[0].measured.copy()
+    one = problem.cases[0]
+    measured = one.measured[list(order)]
     measured[1] = np.nan
     measured[2, 0, :3] = 17.0  # nonsense, but its weight is zero
     weights = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+    case = replace(one.case, steps=tuple(one.case.steps[place] for place in order))
     found = fit(
-        replace(problem, cases=(replace(problem.cases[0], measured=measured),), weights=weights)
+        replace(problem, cases=(replace(one, case=case, measured=measured),), weights=weights)
     )
     np.testing.assert_allclose(found.x, truth, rtol=0, atol=1e-6)
-    assert len(found.poses[0]) == len(found.cases[0].case.steps) == 2
-    np.testing.assert_array_equal(found.cases[0].measured, measured[[0, 2]])
+    assert len(found.poses[0]) == len(found.cases[0].case.steps) == len(kept)
+    np.testing.assert_array_equal(found.cases[0].measured, measured[kept])
 
 
 def test_steps_on_the_way_are_kept_for_path_effects() -> None:

@@ -12,8 +12,6 @@ from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
 from spinepipe.effects import Wrench, create
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect
 from spinepipe.statics import Slots, System, follow
-from spinepipe.statics import equilibrium as damped
-from spinepipe.statics.equilibrium import approach
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -71,19 +69,6 @@ def test_what_tips_over_does_so_with_path_effects_too(effect: str) -> None:
     assert stood.usable
     assert [step.equilibrium.status for step in after] == [Status.UNSTABLE] * 3
     np.testing.assert_array_equal(after[2].equilibrium.q, after[0].equilibrium.q)
-
-
-def test_the_way_held_back_ends_where_newton_does_or_nowhere(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    system = tipping()
-    stood, fell, *_ = follow(system)
-    near = approach(system, np.zeros(12), stood.loading, stood.states)
-    np.testing.assert_allclose(near, stood.equilibrium.q, rtol=0, atol=1e-10)
-    assert approach(system, stood.equilibrium.q, fell.loading, fell.states) is None
-    assert approach(system, np.full(12, np.nan), stood.loading, stood.states) is None
-    monkeypatch.setattr(damped, "MOST_STEPS", 1)
-    assert approach(system, np.zeros(12), stood.loading, stood.states) is None
 
 
 def test_unloading_without_path_effects_returns_to_where_it_was() -> None:

@@ -10,12 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.equilibrium import FIRST_INCREMENT, SMALLEST_FRACTION
+from spinepipe.statics.equilibrium import SMALLEST_FRACTION
 from spinepipe.statics.many.bound import Bound
-from spinepipe.statics.many.newton import settled
+from spinepipe.statics.many.newton import Before, settled
 from spinepipe.statics.many.survey import Chains, Loads, part
 
 Flags = NDArray[np.bool_]
+
+SIDE_BY_SIDE, GROWTH = 16, 4.0
+"""Parts of an increment that did not come on, which are tried at once; its growth after success."""
+
+MOST_ROUNDS = 300
+"""A lane that is not there after so many trials is given up."""
 
 Laws = Callable[[Indices, Array], Bound]
 """What is at work on some of the lanes, and the share (N,) of it that is on."""
@@ -59,40 +65,49 @@ def _scaled(loads: Loads, lanes: Indices, share: Array) -> Loads:
 
 
 def continued(
-    chains: Chains, increment: Increment, laws: Laws, start: Array
+    chains: Chains, increment: Increment, laws: Laws, spacing: Array, start: Array
 ) -> tuple[Array, Flags]:
-    """Poses (N, J, 6) under the whole load, and which lanes got there by stable equilibria."""
+    """Poses (N, J, 6) under the whole load, and which lanes got there by certified steps."""
     q, count = start.copy(), len(start)
-    reached, size = np.zeros(count), np.full(count, FIRST_INCREMENT)
-    going, lost = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
-    while going.any():
+    reached, size = np.zeros(count), np.ones(count)
+    going, lost = np.ones(count, dtype=bool), np.ones(count, dtype=bool)
+    for _ in range(MOST_ROUNDS):
         lanes, sizes = _tried(np.flatnonzero(going), size, lost)
         target = np.minimum(1.0, reached[lanes] + sizes)
-        share = increment.share(lanes, target)
         own, loads = increment.on(chains, lanes, target)
-        found, good = settled(own, loads, _on(laws, lanes, share), q[lanes])
+        carried = ~increment.first[lanes] | (reached[lanes] > 0.0)
+        at = np.where(carried, np.arange(len(lanes)), -1)
+        before = Before(*increment.on(chains, lanes, reached[lanes]), at)
+        on = _on(laws, lanes, increment.share(lanes, target))
+        found, good = settled(own, before, loads, on, spacing[lanes], q[lanes])
         there, first = np.unique(lanes[good], return_index=True)
         best = np.flatnonzero(good)[first]
         missed = np.setdiff1d(lanes, there)
-        going[missed] = ~lost[missed] & (size[missed] > SMALLEST_FRACTION)
-        lost[missed], lost[there] = True, False
-        q[there], reached[there], size[there] = found[best], target[best], 2.0 * sizes[best]
-        size[missed] *= 0.5
-        going &= reached < 1.0
+        going[missed] = ~lost[missed]
+        lost[there], lost[missed] = sizes[best] < size[there], True
+        size[there] = np.where(lost[there], 2.0 / SIDE_BY_SIDE, GROWTH) * size[there]
+        q[there], reached[there] = found[best], target[best]
+        size = np.minimum(size, 1.0 - reached)
+        going &= (reached < 1.0) & (size > SMALLEST_FRACTION)
+        if not going.any():
+            break
     return q, reached >= 1.0
 
 
 def _tried(going: Indices, size: Array, lost: Flags) -> tuple[Indices, Array]:
     """Lanes, and the increments that each tries side by side, the largest first.
 
-    One: the size of the lane; of a lane that was just lost that and all its halves in turn, which
-    start from the same pose. A few lanes more cost less than one trial after the other.
+    One: the size of the lane; of a lane that was just lost that and its sixteenths, and below these
+    halves in turn, which all start from the same pose. A few lanes more cost less than one trial
+    after the other.
     """
-    halves = size[going, None] * 0.5 ** np.arange(-np.log2(SMALLEST_FRACTION) + 1)
-    tried = lost[going, None] & (2.0 * halves > SMALLEST_FRACTION)
+    finest = np.log2(1.0 / (SIDE_BY_SIDE * SMALLEST_FRACTION))
+    shares = np.append(np.arange(SIDE_BY_SIDE, 1.0, -1.0), 0.5 ** np.arange(finest + 1.0))
+    increments = size[going, None] * shares / SIDE_BY_SIDE
+    tried = lost[going, None] & (increments > SMALLEST_FRACTION)
     tried[:, 0] = True
     row, column = np.nonzero(tried)
-    return going[row], halves[row, column]
+    return going[row], increments[row, column]
 
 
 def _on(laws: Laws, lanes: Indices, share: Array) -> Callable[[Indices], Bound]:

@@ -31,6 +31,9 @@ Flags = NDArray[np.bool_]
 
 NONE = np.zeros((0, 0, 0, 0))
 
+POSITIVE = 2
+"""Sign of a tangent that is positive as far as its elimination tells."""
+
 
 class Changes(NamedTuple):
     """m changes of each of N lanes.
@@ -82,6 +85,24 @@ def _eliminate(matrix: Array, right: Array) -> int:
             for c in range(m):
                 right[r, c] -= f * right[k, c]
     return sign
+
+
+@compiled
+def _holds(matrix: Array, lower: Array) -> bool:
+    """Whether a matrix (6, 6) has a positive symmetric part: it has a Cholesky factor ``lower``."""
+    for k in range(6):
+        pivot = matrix[k, k]
+        for i in range(k):
+            pivot -= lower[k, i] * lower[k, i]
+        if not pivot > 0.0:
+            return False
+        inverse = 1.0 / np.sqrt(pivot)
+        for r in range(k + 1, 6):
+            value = 0.5 * (matrix[r, k] + matrix[k, r])
+            for i in range(k):
+                value -= lower[r, i] * lower[k, i]
+            lower[r, k] = value * inverse
+    return True
 
 
 @compiled
@@ -159,19 +180,22 @@ def _hold(fixed: Flags, matrix: Array, right: Array) -> None:
 
 
 @compiled
-def _carry(seen: Plain, fixed: Flags, changes: Plain, rates: Array, signs: Indices) -> None:
-    """Fill rates (N, J, 6, m) and the signs (N,) of the tangents' determinants, 0 for no answer."""
+def _carry(
+    seen: Plain, fixed: Flags, changes: Plain, asked: bool, rates: Array, signs: Indices
+) -> None:
+    """Fill rates (N, J, 6, m) and the signs (N,), see `eliminated`."""
     every_axes, _, rows, blocks, every_slopes, _, _ = seen
     sources, pushes, lower, upper = changes
     joints, m = sources.shape[1], sources.shape[3]
     pushed, displaced, held = pushes.shape[3] > 0, lower.shape[3] > 0, len(fixed) > 0
     matrix, gains = np.empty((6, 6)), np.empty((joints, 6, 6 + m))  # u = gains (xi, 1)
     slope, passed, twist = np.empty((3, 6)), np.empty((6, m)), np.empty((6, m))
+    root = np.empty((6, 6))
     for lane in range(len(sources)):
         axes, slopes = every_axes[lane], every_slopes[lane]
         slope[:] = 0.0
         passed[:] = 0.0
-        sign = 1
+        sign, positive = 1, asked
         for j in range(joints - 1, -1, -1):
             right = gains[j]
             for r in range(3):
@@ -190,13 +214,14 @@ def _carry(seen: Plain, fixed: Flags, changes: Plain, rates: Array, signs: Indic
             _add_product(axes[j], passed, right[:, 6:])
             if held:
                 _hold(fixed[lane, j], matrix, right)
+            positive = positive and _holds(matrix, root)
             sign *= _eliminate(matrix, right)
             if sign == 0:
                 break
             _hand_down(axes[j], right, slope, passed)
             if displaced:
                 _add_product(slope, lower[lane, j], passed)
-        signs[lane] = sign
+        signs[lane] = POSITIVE if positive else sign
         rates[lane] = 0.0
         if sign == 0:
             continue
@@ -232,11 +257,23 @@ def missing(seen: Survey, rates: Array, pushes: Array = NONE) -> Array:
     return found
 
 
+def eliminated(seen: Survey, changes: Changes, asked: bool = False) -> tuple[Array, Indices]:
+    """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; and signs (N,).
+
+    A sign is that of the tangent's determinant, 0 where there is no answer. Where ``asked``, it is
+    `POSITIVE` if each joint's own matrix has a positive symmetric part: so has every one of them
+    where the whole tangent's is positive (Schur complements), and without constant moments only
+    there.
+    """
+    rates, signs = np.empty(changes.sources.shape), np.empty(len(changes.sources), dtype=np.int64)
+    _carry(seen.numbers, seen.fixed, tuple(changes), asked, rates, signs)
+    lost = (signs == 0) | ~np.isfinite(rates).all(axis=(1, 2, 3))
+    if lost.any():
+        rates[lost], signs[lost] = 0.0, 0
+    return rates, signs
+
+
 def answers(seen: Survey, changes: Changes) -> tuple[Array, Flags]:
     """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; where there is."""
-    rates, signs = np.empty(changes.sources.shape), np.empty(len(changes.sources), dtype=np.int64)
-    _carry(seen.numbers, seen.fixed, tuple(changes), rates, signs)
-    good: Flags = (signs != 0) & np.isfinite(rates).all(axis=(1, 2, 3))
-    if not good.all():
-        rates[~good] = 0.0
-    return rates, good
+    rates, signs = eliminated(seen, changes)
+    return rates, signs != 0

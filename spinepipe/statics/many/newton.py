@@ -1,14 +1,31 @@
-"""Newton on many lanes at once: stable equilibria near the poses where it starts."""
+"""Newton on many lanes at once, and which of their ends the load leads to.
+
+A step of the load is taken where it is certified to be a piece of a path of stable equilibria, see
+`spinepipe.statics.equilibrium`: the tangent is positive under the whole load at its start, under
+the load before at its end, and in between where it is long or bent. What is not certified is
+halved (`continuation`).
+"""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.equilibrium import LARGEST_ROTATION, MOST_ITERATIONS, STEP_TOLERANCE
+from spinepipe.statics.equilibrium import (
+    LARGEST_ROTATION,
+    LEAST_SHARE,
+    LONGEST_STEP,
+    MOST_ITERATIONS,
+    OVERSHOT,
+    STEP_TOLERANCE,
+    decays,
+    places_between,
+)
 from spinepipe.statics.many.bound import Bound
-from spinepipe.statics.many.elimination import Changes, answers
+from spinepipe.statics.many.dynamics import tangents_of
+from spinepipe.statics.many.elimination import POSITIVE, Changes, eliminated
 from spinepipe.statics.many.stability import surely_stable
 from spinepipe.statics.many.survey import Chains, Loads, part, survey
 
@@ -18,63 +35,167 @@ Laws = Callable[[Indices], Bound]
 """What is at work on some of the lanes."""
 
 
-def settled(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Array, Flags]:
-    """Poses (N, J, 6) of lanes from poses near by, and which are stable equilibria for sure."""
-    q, tangents, arrived = newton(chains, loads, laws, start)
-    there = np.flatnonzero(arrived)
-    arrived[there] = surely_stable(chains, part(loads, there), q[there], tangents[there])
-    return q, arrived
+FEW = 40
+"""Lanes that are kept until half of them have arrived: to look again at their laws takes longer."""
 
 
-def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> tuple[Array, Array, Flags]:
-    """Poses (N, J, 6), tangents there (N, J, 6, 6), and which lanes have arrived (N,).
+class Way(NamedTuple):
+    """How Newton went on N lanes.
 
-    A lane whose steps do not contract, or that leaves joint motion, is given up. A step beyond the
-    ends of a law, where it carries without limit, is halved.
+    Attributes
+    ----------
+    start, q : (N, J, 6) where it began and ended. tangents : (N, J, 6, 6) of the joints there.
+    arrived : (N,) whether q is an equilibrium.
+    first : (N, J, 6) its first step. signs : (N,) of the tangent at the start, see
+        `elimination.eliminated`.
     """
-    q = loads.supports.on(start)
-    tangents = np.zeros((*q.shape, 6))
-    arrived = np.zeros(len(q), dtype=bool)
-    left: Indices = np.arange(len(q))
-    last, taken = np.full(len(q), np.inf), np.zeros_like(q)
-    bound, acting = laws(left), loads
-    for _ in range(MOST_ITERATIONS):
-        here = q[left]
-        held = bound.held(here)
-        step, solved = newton_step(chains, acting, here, held.load, held.tangent)
-        beyond = _without_limit(held.load)
-        some_beyond = beyond.any()
-        if some_beyond:
-            step[beyond], solved[beyond] = -0.5 * taken[beyond], taken[beyond].any(axis=(1, 2))
-        q[left] = here = here + step
-        size = (np.abs(step) / STEP_TOLERANCE).max(axis=(1, 2))
-        inside = np.abs(here[..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
-        going = solved & inside & (size < 4.0 * last)
-        there = going & (size < 1.0) & ~beyond
-        arrived[left[there]] = True
-        tangents[left[there]] = held.tangent[there]
-        going &= ~there
-        if not going.any():
-            break
-        if some_beyond:
-            step[beyond] *= -1.0  # as much of the step before is left
-        last, taken = np.where(beyond, last, size)[going], step[going]
-        if not going.all():
-            left = left[going]
-            bound, acting = laws(left), part(loads, left)
-    return q, tangents, arrived
+
+    start: Array
+    q: Array
+    tangents: Array
+    arrived: Flags
+    first: Array
+    signs: Indices
 
 
-def _without_limit(load: Array) -> Flags:
-    """(N,) lanes with a joint that holds without limit, of loads (N, J, 6)."""
-    found: Flags = np.logical_not(np.isfinite(load).all(axis=(1, 2)))
+class Before(NamedTuple):
+    """What N lanes carry before a step, ``at`` (N,) of some loads; -1 where it needs no look."""
+
+    chains: Chains
+    loads: Loads
+    at: Indices
+
+
+def settled(
+    chains: Chains, before: Before, loads: Loads, laws: Laws, spacing: Array, origin: Array
+) -> tuple[Array, Flags]:
+    """Poses (N, J, 6) of lanes, and which are certified to be where the load leads, see there."""
+    way = newton(chains, loads, laws, origin)
+    return way.q, certified(chains, before, loads, laws, spacing, origin, way)
+
+
+def certified(
+    chains: Chains,
+    before: Before,
+    loads: Loads,
+    laws: Laws,
+    spacing: Array,
+    origin: Array,
+    way: Way,
+) -> Flags:
+    """(N,) which ends of Newton are the ends of a path of stable equilibria from an origin.
+
+    Parameters
+    ----------
+    spacing : (N,) rad, see `places_between`. origin : (N, J, 6) pose under the load
+        before, from which Newton need not have started.
+    """
+    good, begin, first, signs = way.arrived.copy(), loads.supports.on(origin), way.first, way.signs
+    good[good] = surely_stable(
+        chains, part(loads, np.flatnonzero(good)), way.q[good], way.tangents[good]
+    )
+    if way.start is not origin:
+        held = laws(np.arange(len(begin))).held(begin)
+        first, signs, _ = _step(chains, loads, begin, held.load, held.tangent)
+    doubt = np.flatnonzero(good & (signs != POSITIVE))
+    if len(doubt):
+        tangents = laws(doubt).held(begin[doubt]).tangent
+        good[doubt] = stands(chains, part(loads, doubt), begin[doubt], tangents)
+    if not good.any():
+        return good
+    # the end under the load before, and places between under both loads
+    ends = np.flatnonzero(good)
+    near, lanes, shares = places_between(begin[ends], way.q[ends], first[ends], spacing[ends])
+    lanes = ends[lanes]
+    good[ends] = near
+    between = begin[lanes] + shares[:, None, None] * (way.q - begin)[lanes]
+    tangents = way.tangents[:0]
+    if len(lanes):
+        tangents = laws(lanes).held(between).tangent
+        good[lanes[~stands(chains, part(loads, lanes), between, tangents)]] = False
+    rows = np.append(ends, lanes)
+    there = np.flatnonzero(before.at[rows] >= 0)
+    if len(there):
+        rows, carried = rows[there], part(before.loads, before.at[rows[there]])
+        q = np.concatenate([way.q[ends], between])[there]
+        tangents = np.concatenate([way.tangents[ends], tangents])[there]
+        good[rows[~stands(before.chains, carried, q, tangents)]] = False
+    return good
+
+
+def stands(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
+    """(N,) from which poses q (N, J, 6) lanes without inertia would not move away.
+
+    Where a pivot is not positive and the determinant is, constant moments may be why: the tangent's
+    own eigenvalues tell.
+    """
+    seen = survey(chains, loads, q, tangents)
+    _, signs = eliminated(seen, Changes(np.empty((*q.shape, 0))), asked=True)
+    found: Flags = signs == POSITIVE
+    for lane in np.flatnonzero(signs == 1):
+        scale = 1.0 / np.sqrt(chains.damping[loads.chain[lane]].ravel())
+        tangent = tangents_of(seen.part(np.array([lane])))[0] * scale[:, None] * scale
+        if len(seen.fixed):
+            free = ~seen.fixed[lane].ravel()
+            tangent = tangent[free][:, free]
+        found[lane] = decays(np.zeros_like(tangent), tangent)
     return found
 
 
-def newton_step(
-    chains: Chains, loads: Loads, q: Array, held: Array, tangents: Array
-) -> tuple[Array, Flags]:
-    """Newton steps (N, J, 6) from q, and on which lanes there is one."""
+def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
+    """Newton with a line search, see `spinepipe.statics.equilibrium.newton`."""
+    q = loads.supports.on(start)
+    tangents, first = np.zeros((*q.shape, 6)), np.zeros_like(q)
+    arrived, signs = np.zeros(len(q), dtype=bool), np.zeros(len(q), dtype=np.int64)
+    left: Indices = np.arange(len(q))
+    bound, acting = laws(left), loads
+    going = np.ones(len(q), dtype=bool)
+    step, drive = np.zeros_like(q), np.zeros(len(q))
+    for iteration in range(MOST_ITERATIONS):
+        here = q[left]
+        held = bound.held(here)
+        new, sign, missing = _step(
+            chains, acting, here, held.load, held.tangent, asked=iteration == 0
+        )
+        if iteration == 0:
+            first, signs = new.copy(), sign.copy()
+        moved = np.abs(new)
+        size, length = (moved / STEP_TOLERANCE).max(axis=(1, 2)), moved[..., 3:].max(axis=(1, 2))
+        if length.max(initial=0.0) > LONGEST_STEP:
+            new *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, LONGEST_STEP))[:, None, None]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            work = np.einsum("njk,njk->n", missing, step)
+            over = going & ~(work <= OVERSHOT * drive)
+            driven = -np.einsum("njk,njk->n", missing, new)
+            if over.any():  # the step before is cut back: as much of it is left as its work tells
+                share = np.clip(drive / (drive + work), LEAST_SHARE, 0.5)
+                share = np.where(np.isfinite(work), share, 0.5)[over]
+                sign[over] = drive[over] > 0.0
+                here[over] -= step[over]
+                new[over], driven[over] = step[over] * share[:, None, None], share * drive[over]
+                size[over] = np.inf
+        ended = here + new
+        q[left[going]] = ended[going]
+        there = going & (size < 1.0) & (sign > 0)
+        arrived[left[there]] = True
+        tangents[left[there]] = held.tangent[there]
+        turned = np.abs(ended[..., 3:]).max(axis=(1, 2))
+        going &= (sign > 0) & ~there & (turned < np.pi)
+        if not going.any():
+            break
+        step, drive = new, np.where(driven > 0.0, driven, np.inf)
+        if 2 * np.count_nonzero(going) <= len(going) or (len(going) > FEW and not going.all()):
+            left, step, drive = left[going], step[going], drive[going]
+            bound, acting, going = laws(left), part(loads, left), going[going]
+    arrived &= np.abs(q[..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
+    return Way(start, q, tangents, arrived, first, signs)
+
+
+def _step(
+    chains: Chains, loads: Loads, q: Array, held: Array, tangents: Array, asked: bool = True
+) -> tuple[Array, Indices, Array]:
+    """Newton steps (N, J, 6) from q, signs (N,) of the tangents, and what is missing (N, J, 6)."""
     seen = survey(chains, loads, q, tangents)
-    rates, good = answers(seen, Changes((seen.applied - held)[..., None]))
-    return rates[..., 0], good
+    missing = held - seen.applied
+    rates, signs = eliminated(seen, Changes(-missing[..., None]), asked)
+    return rates[..., 0], signs, missing

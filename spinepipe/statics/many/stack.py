@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf
 
 from spinepipe.effects import Kind
-from spinepipe.effects.contract import Array, Indices, Neutral
+from spinepipe.effects.contract import Array, Indices, Neutral, straight_over
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
-from spinepipe.statics.equilibrium import NOT_POSITIVE
+from spinepipe.statics.equilibrium import NOT_POSITIVE, PAST_CRITICAL, ROUNDING, SPACING
 from spinepipe.statics.many.bound import Bound, PathStates
 from spinepipe.statics.many.continuation import Increment, continued
 from spinepipe.statics.many.dead import with_dead_loads
 from spinepipe.statics.many.dynamics import tangents_of
 from spinepipe.statics.many.lanes import Acting, Effects
-from spinepipe.statics.many.newton import settled
+from spinepipe.statics.many.newton import Before, certified, newton, stands
 from spinepipe.statics.many.survey import FREE, Chains, Loads, Supports, part, survey
 from spinepipe.statics.path import follow
 from spinepipe.statics.system import System
@@ -71,6 +71,8 @@ class Stack:
     chains : their numbers. listed, loads : of every lane, without and with load effects.
     run, first : (L,) run of each lane, (R + 1,) lanes before each run.
     seconds : (L,) duration of each step.
+    released : (L,) steps in which a force is other than it was, and not only more of the same.
+    spacing : (R,) rad, how often along a step the tangent is looked at.
     remembers, alone : (R,) runs with laws that have a state, and those for the engine.
     """
 
@@ -83,6 +85,8 @@ class Stack:
     run: Indices
     first: Indices
     seconds: Array
+    released: Flags
+    spacing: Array
     remembers: Flags
     alone: Flags
 
@@ -124,6 +128,8 @@ class Stack:
             run,
             np.concatenate([[0], np.cumsum(steps)]),
             np.concatenate(seconds),
+            _released(listed, chains, run, bool(effects.dead)),
+            _spacing([*effects.laws, *effects.geometry], len(steps)),
             _runs_with(paths, len(steps)),
             _runs_with(effects.others, len(steps)),
         )
@@ -148,17 +154,17 @@ class Stack:
         why : whether the engine of record is asked about runs without memory that have none here.
         """
         q = np.full((len(self.run), self.joints, 6), np.nan)
-        open_ones = ~self.alone
+        open_ones, at_once = ~self.alone, np.zeros(len(q), dtype=bool)
         if guess is not None:
             near = open_ones & ~np.isnan(guess[self.first[:-1], 0, 0])
             for runs in self.chunks(np.flatnonzero(near & ~self.remembers)):
                 open_ones[runs] = ~self._at_once(runs, guess, q)
             for runs in self.chunks(np.flatnonzero(near & self.remembers), stepwise=True):
-                open_ones[runs] = ~self._step_by_step(runs, guess, q)
+                open_ones[runs] = ~self._step_by_step(runs, guess, q, at_once)
         for runs in self.chunks(np.flatnonzero(open_ones), stepwise=True):
-            open_ones[runs] = ~self._step_by_step(runs, None, q)
+            open_ones[runs] = ~self._step_by_step(runs, None, q, at_once)
         status = np.full(len(self.run), Status.CONVERGED.value, dtype="U20")
-        messages: dict[int, str] = {}
+        messages = self._past_critical(q, at_once) if why else {}
         by_engine = self.alone | (open_ones & (self.remembers | why))
         for number in np.flatnonzero(by_engine).tolist():
             self._by_engine(number, q, status, messages)
@@ -167,6 +173,35 @@ class Stack:
             status[lanes] = Status.UNSTABLE.value
             messages |= dict.fromkeys(lanes, NO_WAY)
         return Poses(q, status, messages, by_engine)
+
+    def _past_critical(self, q: Array, at_once: Flags) -> dict[int, str]:
+        """By lane with a pose q (L, J, 6) whose load would move the neutral pose away.
+
+        It is certified not to be so where one step brings there from the neutral pose, and in later
+        steps under the same forces.
+        """
+        bodies, points, forces = self.loads.bodies, self.loads.points, self.loads.forces
+        first = self.first[self.run]
+        at_once = at_once[first] & (bodies == bodies[first]).all(axis=1)
+        at_once &= (points == points[first]).all(axis=(1, 2))
+        at_once &= (forces == forces[first]).all(axis=(1, 2))
+        weight = np.abs(self.chains.gravity).sum(axis=1)[self.loads.chain]
+        pressed = np.abs(self.loads.forces).sum(axis=(1, 2)) + weight > 0.0
+        found: dict[int, str] = {}
+        less = 1.0 - ROUNDING
+        chains = self.chains._replace(gravity=less * self.chains.gravity)
+        for runs in self.chunks(np.arange(len(self.remembers))):
+            lanes = self.lanes(runs)
+            lanes = lanes[pressed[lanes] & ~at_once[lanes] & ~np.isnan(q[lanes, 0, 0])]
+            if not len(lanes):
+                continue
+            loads = part(self.loads, lanes)
+            loads = loads._replace(forces=less * loads.forces, moments=less * loads.moments)
+            neutral = loads.supports.on(np.zeros_like(q[lanes]))
+            bound = self.bound(lanes, self.initial_states(), np.full(len(lanes), less))
+            stood = stands(chains, loads, neutral, bound.held(neutral).tangent)
+            found |= dict.fromkeys(lanes[~stood].tolist(), PAST_CRITICAL)
+        return found
 
     def warnings(self, q: Array) -> dict[int, str]:
         """By lane at a stable pose q (L, J, 6), what the engine of record would warn of.
@@ -202,27 +237,33 @@ class Stack:
 
     def _at_once(self, runs: Indices, guess: Array, q: Array) -> Flags:
         """Enter the poses of runs without memory, all steps together; which runs are solved."""
-        lanes = self.lanes(runs)
-        found, good = self._settled(lanes, guess[lanes], self.initial_states())
+        lanes, states = self.lanes(runs), self.initial_states()
+        found, good = self._settled(lanes, states, guess[lanes])
         whole: Flags = np.logical_and.reduceat(good, np.searchsorted(self.run[lanes], runs))
         there = np.repeat(whole, np.diff(self.first)[runs])
         q[lanes[there]] = found[there]
         return whole
 
-    def _step_by_step(self, runs: Indices, guess: Array | None, q: Array) -> Flags:
-        """Enter the poses of runs whose steps follow each other; which runs are solved."""
+    def _step_by_step(self, runs: Indices, guess: Array | None, q: Array, at_once: Flags) -> Flags:
+        """Enter the poses of runs whose steps follow each other; which runs are solved.
+
+        And which lanes (L,) a single step brings there from the neutral pose.
+        """
         good = np.ones(len(runs), dtype=bool)
         last = np.zeros((len(self.remembers), *q.shape[1:]))
         states = self.initial_states()
         for live, lanes in self.steps(runs):
             going = good[live]
             live, lanes = live[going], lanes[going]
-            start = last[runs[live]] if guess is None else guess[lanes]
-            found, arrived = self._settled(lanes, start, states)
-            if guess is None:
-                lost = np.flatnonzero(~arrived)
-                if len(lost):
-                    found[lost], arrived[lost] = self._continued(lanes[lost], start[lost], states)
+            if not len(lanes):
+                break
+            origin = last[runs[live]]
+            start = origin if guess is None else guess[lanes]
+            found, arrived = self._settled(lanes, states, start, origin)
+            at_once[lanes] = arrived & (self.first[runs[live]] == lanes)
+            lost = np.flatnonzero(~arrived)
+            if len(lost):
+                found[lost], arrived[lost] = self._continued(lanes[lost], origin[lost], states)
             good[live] = arrived
             q[lanes], last[runs[live]] = found, found
             if self.remembers[runs].any():
@@ -267,13 +308,28 @@ class Stack:
         """Where the M chains are in their neutral pose."""
         return Neutral(self.chains.rotations, self.chains.origins, self.chains.coms)
 
-    def _settled(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
-        """Poses (N, J, 6) of lanes from poses near by, and which are stable equilibria for sure."""
+    def _settled(
+        self, lanes: Indices, states: PathStates, start: Array, origin: Array | None = None
+    ) -> tuple[Array, Flags]:
+        """Poses (N, J, 6) of lanes, and which are certified to be where the loads lead.
+
+        Parameters
+        ----------
+        start : (N, J, 6) where Newton starts. origin : (N, J, 6) poses of the steps before;
+            without them, all steps of a run are among the lanes.
+        """
 
         def laws(some: Indices) -> Bound:
             return self.bound(lanes[some], states)
 
-        return settled(self.chains, part(self.loads, lanes), laws, start)
+        loads = part(self.loads, lanes)
+        way = newton(self.chains, loads, laws, start)
+        follows = self.first[self.run[lanes]] < lanes
+        if origin is None:
+            origin = np.where(follows[:, None, None], np.roll(way.q, 1, axis=0), 0.0)
+        before = Before(self.chains, self.loads, np.where(self.released[lanes], lanes - 1, -1))
+        spacing = self.spacing[self.run[lanes]]
+        return way.q, certified(self.chains, before, loads, laws, spacing, origin, way)
 
     def _continued(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
         """The same from the steps before, the load in fractions."""
@@ -287,7 +343,7 @@ class Stack:
         def laws(some: Indices, share: Array) -> Bound:
             return self.bound(lanes[some], states, share)
 
-        return continued(self.chains, increment, laws, start)
+        return continued(self.chains, increment, laws, self.spacing[self.run[lanes]], start)
 
     def _by_engine(
         self, number: int, q: Array, status: NDArray[np.str_], messages: dict[int, str]
@@ -363,6 +419,30 @@ def durations(case: LoadCase) -> Array:
         found.append(time - clock)
         clock = time
     return np.array(found)
+
+
+def _released(listed: Loads, chains: Chains, run: Indices, dead: bool) -> Flags:
+    """(L,) see `Stack`; ``dead``: whether effects add loads that stay."""
+    now, count = listed.forces, len(run)
+    last = np.roll(now, 1, axis=0)
+    follows = np.append(False, run[1:] == run[:-1])[:count]
+    same_places = (listed.bodies == np.roll(listed.bodies, 1, axis=0)).all(axis=1)
+    same_places &= (listed.points == np.roll(listed.points, 1, axis=0)).all(axis=(1, 2))
+    squares = np.sum(now * now, axis=(1, 2))
+    share = np.sum(now * last, axis=(1, 2)) / np.where(squares > 0.0, squares, 1.0)
+    more = (last == share[:, None, None] * now).all(axis=(1, 2)) & (share >= 0.0) & (share <= 1.0)
+    if dead or chains.gravity.any():
+        more &= share == 1.0
+    found: Flags = follows & ~(same_places & (more | ~last.any(axis=(1, 2))))
+    return found
+
+
+def _spacing(effects: Sequence[Acting], count: int) -> Array:
+    """(R,) rad, as often as any law or geometry effect of a run asks for."""
+    found = np.full(count, SPACING)
+    for one in effects:
+        np.minimum.at(found, one.run, straight_over(one.effect))
+    return found
 
 
 def _runs_with(effects: Sequence[Acting], count: int) -> Flags:
