@@ -30,7 +30,7 @@ class Column:
     kind : text, number (decimal point) or integer.
     required : the column must be there and no cell of it may be empty.
     low, high : range of a number.
-    open_low : whether the lower limit itself is outside the range.
+    open_low, open_high : whether the limit itself is outside the range.
     names : whether texts are names, though they are no key: of groups, say.
     """
 
@@ -41,6 +41,7 @@ class Column:
     low: float = -inf
     high: float = inf
     open_low: bool = False
+    open_high: bool = False
     names: bool = False
 
     @property
@@ -50,7 +51,7 @@ class Column:
         if self.low > -inf:
             parts.append(f"{'above' if self.open_low else 'at least'} {self.low:g}")
         if self.high < inf:
-            parts.append(f"at most {self.high:g}")
+            parts.append(f"{'below' if self.open_high else 'at most'} {self.high:g}")
         return " and ".join(parts)
 
 

@@ -174,7 +174,7 @@ def _is_wrong(numbers: NDArray[np.float64], column: Column) -> NDArray[np.bool_]
         if column.kind == "integer":
             wrong |= numbers != np.trunc(numbers)
         wrong |= numbers <= column.low if column.open_low else numbers < column.low
-        wrong |= numbers > column.high
+        wrong |= numbers >= column.high if column.open_high else numbers > column.high
     return wrong
 
 
