@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from spinepipe.calibrate.solvers import AtRest, Seen, Settling, held_against
 from spinepipe.effects import Kind
 from spinepipe.effects.contract import Array
-from spinepipe.model import MeasuredCase, RefusedModel, SpineModel, leading_to
+from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
 from spinepipe.statics import (
     Course,
     FreeParameter,
@@ -306,7 +306,7 @@ def _steps_needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
     read = np.flatnonzero(np.any(_used(measured, problem.weights), axis=(1, 2))).tolist()
     if problem.course is None:  # steps that settle begin from rest, each for itself
         pressed = bool(np.any(problem.model.gravity)) or Kind.LOAD in kinds
-        read = leading_to(measured.case, read, pressed)
+        read = measured.case.leading_to(read, pressed)
     steps = tuple(measured.case.steps[place] for place in read)
     return replace(
         measured, case=replace(measured.case, steps=steps), measured=measured.measured[read]

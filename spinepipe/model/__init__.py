@@ -1,6 +1,5 @@
 """The model room: what a spine model is, its YAML, its URDF and its OpenSim export."""
 
-from spinepipe.model.load_path import leading_to
 from spinepipe.model.spine import (
     MOST_JOINTS,
     STANDARD_GRAVITY,
@@ -25,5 +24,4 @@ __all__ = [
     "ScopedEffect",
     "SpineModel",
     "Support",
-    "leading_to",
 ]

@@ -1,5 +1,6 @@
 """The spine model: rigid vertebrae on six-coordinate joints, with named effects. SI throughout."""
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,6 +18,8 @@ STANDARD_GRAVITY = np.array([0.0, -9.81, 0.0])
 MOST_JOINTS = 20
 """Beyond 120 coordinates PyBullet's answers are silently wrong."""
 
+STRAIGHT = 1e-6
+"""Share of a load by which files round it."""
 
 ORTHONORMAL = 1e-9
 ROUNDING = 1e-9
@@ -133,6 +136,47 @@ class LoadCase:
     def fixed(self) -> list[int]:
         """Places of the coordinates that a rig fixes, among the n of a model."""
         return [support.place for step in self.steps[:1] for support in step.supports]
+
+    def leading_to(self, wanted: Sequence[int], pressed: bool) -> list[int]:
+        """Places of the wanted steps, and of those before them at which the load turns.
+
+        From step to step the load goes in proportion.
+
+        Parameters
+        ----------
+        wanted : their places. pressed : whether weight, or a load that no step lists, comes on
+            first.
+        """
+        loads, kept = self._loads(pressed), set(wanted)
+        last, found = np.zeros(loads.shape[1]), []
+        for place in range(max(kept) + 1):
+            if place in kept or not _straight(last, loads[place], loads[place + 1]):
+                found.append(place)
+                last = loads[place]
+        return found
+
+    def _loads(self, pressed: bool) -> Array:
+        """(T, n) all that a step states, N, N m, m and rad, and whether anything else presses."""
+        rows: list[dict[tuple[object, ...], float]] = []
+        for step in self.steps:
+            row: dict[tuple[object, ...], float] = {("pressed",): float(pressed)}
+            for wrench in step.wrenches:
+                numbers = (*wrench.force.tolist(), *wrench.moment.tolist())
+                for at, number in enumerate(numbers):
+                    key = (wrench.body, *wrench.point.tolist(), at)
+                    row[key] = row.get(key, 0.0) + number
+            row |= {(one.joint, one.coordinate): one.value for one in step.supports}
+            rows.append(row)
+        keys = dict.fromkeys(key for row in rows for key in row)
+        return np.array([[row.get(key, 0.0) for key in keys] for row in rows])
+
+
+def _straight(start: Array, middle: Array, end: Array) -> bool:
+    """Whether a load lies on the straight way between two others."""
+    way, done = end - start, middle - start
+    share = float(np.clip(done @ way / max(float(way @ way), 1e-300), 0.0, 1.0))
+    off = np.abs(done - share * way).max(initial=0.0)
+    return bool(off <= STRAIGHT * max(np.abs(way).max(initial=0.0), np.abs(done).max(initial=0.0)))
 
 
 @dataclass(frozen=True)

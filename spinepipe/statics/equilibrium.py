@@ -124,7 +124,7 @@ class Equilibrium:
 
 
 @dataclass(frozen=True)
-class Way:
+class NewtonResult:
     """How Newton went.
 
     Attributes
@@ -168,21 +168,23 @@ def solve(
     while True:
         target = min(1.0, reached + increment)
         after = loading_to if target == 1.0 else loading_from.towards(loading_to, target)
-        way = newton(system, q if start is None else start, after, states)
-        iterations += way.iterations
-        verdict = certified(system, q, before, after, states, way, start is not None)
+        result = newton(system, q if start is None else start, after, states)
+        iterations += result.iterations
+        verdict = certified(system, q, before, after, states, result, start is not None)
         if verdict is not None:
-            q, before, reached, increment = way.q, after, target, 2.0 * increment
+            q, before, reached, increment = result.q, after, target, 2.0 * increment
             if reached == 1.0:
-                assert way.factored is not None
+                assert result.factored is not None
                 warning = "" if verdict.symmetric_part_positive else NOT_POSITIVE
                 if _past_critical(system, loading_to):
                     warning = PAST_CRITICAL
-                return Equilibrium(q, way.factored, Status.CONVERGED, warning, iterations, reached)
+                return Equilibrium(
+                    q, result.factored, Status.CONVERGED, warning, iterations, reached
+                )
         elif start is None:
             increment = min(FIRST_INCREMENT, 0.5 * increment)
             if increment < SMALLEST_FRACTION:
-                turned = way.arrived and not way.within_motion
+                turned = result.arrived and not result.within_motion
                 ahead = loading_from.towards(loading_to, min(1.0, reached + SMALLEST_FRACTION))
                 message = _lost(system, q, before, ahead, states, turned, step)
                 message = f"{message} beyond {100.0 * reached:.1f} % of the load increment"
@@ -196,7 +198,7 @@ def certified(
     before: Loading,
     after: Loading,
     states: States,
-    way: Way,
+    result: NewtonResult,
     guessed: bool,
 ) -> Stability | None:
     """How stable the end of Newton is, if a path of stable equilibria leads there from an origin.
@@ -205,13 +207,13 @@ def certified(
     ----------
     origin : (n,) equilibrium under ``before``. guessed : whether Newton did not start there.
     """
-    if not (way.arrived and way.within_motion):
+    if not (result.arrived and result.within_motion):
         return None
-    assert way.factored is not None
-    verdict = stability(system.chain, way.q, way.tangent, way.factored.sign, system.free)
+    assert result.factored is not None
+    verdict = stability(system.chain, result.q, result.tangent, result.factored.sign, system.free)
     if not verdict.stable:
         return None
-    begin, first, tangent = system.start(origin, after), way.first, way.at_start
+    begin, first, tangent = system.start(origin, after), result.first, result.at_start
     if guessed:
         balance = system.balance(begin, after, states)
         tangent = balance.tangent
@@ -223,14 +225,14 @@ def certified(
         return None
     effects = [active.effect for active in (*system.laws, *system.geometry)]
     spacing = np.array([min([SPACING, *map(straight_over, effects)])])
-    begun, ended, told = (one.reshape(1, -1, 6) for one in (begin, way.q, first))
+    begun, ended, told = (one.reshape(1, -1, 6) for one in (begin, result.q, first))
     near, _, shares = places_between(begun, ended, told, spacing)
     if not near.all():
         return None
-    between = begin + shares[:, None] * (way.q - begin)
+    between = begin + shares[:, None] * (result.q - begin)
     looks = [(there, after) for there in between]
     if before.share > 0.0 or before.forces.any() or before.moments.any():
-        looks += [(there, before) for there in (way.q, *between)]
+        looks += [(there, before) for there in (result.q, *between)]
     for there, loading in looks:
         if not stands(system, system.balance(there, loading, states).tangent):
             return None
@@ -325,7 +327,7 @@ FORK = 1e-6
 """At a fork the load does no more than this share of its work along the motion that is free."""
 
 
-def newton(system: System, start: Array, loading: Loading, states: States) -> Way:
+def newton(system: System, start: Array, loading: Loading, states: States) -> NewtonResult:
     """Newton with a line search, from ``start`` (n,).
 
     A step is cut back where the load against it has grown to more than half of what drove it, or
@@ -362,10 +364,10 @@ def newton(system: System, start: Array, loading: Loading, states: States) -> Wa
         drive = -float(balance.residual @ step)
         drive = drive if drive > 0.0 else np.inf
         if size < 1.0:
-            return Way(q, True, factored, balance.tangent, iteration, first, at_start)
+            return NewtonResult(q, True, factored, balance.tangent, iteration, first, at_start)
         if not np.abs(q.reshape(-1, 6)[:, 3:]).max() < np.pi:
             break
-    return Way(q, False, factored, at_start, iteration, first, at_start)
+    return NewtonResult(q, False, factored, at_start, iteration, first, at_start)
 
 
 def factor(tangent: Array) -> Factored:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from spinepipe.cohort.load_tests import peak_step
-from spinepipe.model import LoadCase, LoadStep, leading_to
+from spinepipe.model import LoadCase, LoadStep
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def asked(case: LoadCase, pressed: bool, all_steps: bool, subtracted: bool = Tru
     largest = case.steps[peak].step
     if all_steps:
         return AskedTest(case, from_first, largest, slice(None))
-    places = leading_to(case, {0, peak} if from_first else {peak}, pressed)
+    places = case.leading_to([0, peak] if from_first else [peak], pressed)
     steps = tuple(case.steps[place] for place in places)
     return AskedTest(replace(case, steps=steps), from_first, largest, slice(len(steps) - 1, None))
 

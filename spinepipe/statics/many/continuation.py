@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.equilibrium import SMALLEST_FRACTION
 from spinepipe.statics.many.bound import Bound
-from spinepipe.statics.many.newton import Before, settled
+from spinepipe.statics.many.newton import Before, certified, newton
 from spinepipe.statics.many.survey import Chains, Loads, part
 
 Flags = NDArray[np.bool_]
@@ -38,8 +38,8 @@ class Increment:
     def on(self, chains: Chains, lanes: Indices, reached: Array) -> tuple[Chains, Loads]:
         """Lanes with a fraction (N,) of the increment; each has a chain of its own."""
         before, after = (
-            _scaled(self.before, lanes, 1.0 - reached),
-            _scaled(self.after, lanes, reached),
+            scaled(self.before, lanes, 1.0 - reached),
+            scaled(self.after, lanes, reached),
         )
         loads = Loads(
             np.arange(len(lanes)),
@@ -58,7 +58,7 @@ class Increment:
         return np.where(self.first[lanes], reached, 1.0)
 
 
-def _scaled(loads: Loads, lanes: Indices, share: Array) -> Loads:
+def scaled(loads: Loads, lanes: Indices, share: Array) -> Loads:
     """A share (N,) of the loads of some lanes."""
     some, on = part(loads, lanes), share[:, None, None]
     return some._replace(forces=some.forces * on, moments=some.moments * on)
@@ -79,14 +79,15 @@ def continued(
         at = np.where(carried, np.arange(len(lanes)), -1)
         before = Before(*increment.on(chains, lanes, reached[lanes]), at)
         on = _on(laws, lanes, increment.share(lanes, target))
-        found, good = settled(own, before, loads, on, spacing[lanes], q[lanes])
+        results = newton(own, loads, on, q[lanes])
+        good = certified(own, before, loads, on, spacing[lanes], q[lanes], results)
         there, first = np.unique(lanes[good], return_index=True)
         best = np.flatnonzero(good)[first]
         missed = np.setdiff1d(lanes, there)
         going[missed] = ~lost[missed]
         lost[there], lost[missed] = sizes[best] < size[there], True
         size[there] = np.where(lost[there], 2.0 / SIDE_BY_SIDE, GROWTH) * size[there]
-        q[there], reached[there] = found[best], target[best]
+        q[there], reached[there] = results.q[best], target[best]
         size = np.minimum(size, 1.0 - reached)
         going &= (reached < 1.0) & (size > SMALLEST_FRACTION)
         if not going.any():

@@ -39,18 +39,17 @@ FEW = 40
 """Lanes that are kept until half of them have arrived: to look again at their laws takes longer."""
 
 
-class Way(NamedTuple):
+class NewtonResults(NamedTuple):
     """How Newton went on N lanes.
 
     Attributes
     ----------
-    start, q : (N, J, 6) where it began and ended. tangents : (N, J, 6, 6) of the joints there.
+    q : (N, J, 6) where it ended. tangents : (N, J, 6, 6) of the joints there.
     arrived : (N,) whether q is an equilibrium.
     first : (N, J, 6) its first step. signs : (N,) of the tangent at the start, see
         `elimination.eliminated`.
     """
 
-    start: Array
     q: Array
     tangents: Array
     arrived: Flags
@@ -66,14 +65,6 @@ class Before(NamedTuple):
     at: Indices
 
 
-def settled(
-    chains: Chains, before: Before, loads: Loads, laws: Laws, spacing: Array, origin: Array
-) -> tuple[Array, Flags]:
-    """Poses (N, J, 6) of lanes, and which are certified to be where the load leads, see there."""
-    way = newton(chains, loads, laws, origin)
-    return way.q, certified(chains, before, loads, laws, spacing, origin, way)
-
-
 def certified(
     chains: Chains,
     before: Before,
@@ -81,20 +72,22 @@ def certified(
     laws: Laws,
     spacing: Array,
     origin: Array,
-    way: Way,
+    results: NewtonResults,
+    guessed: bool = False,
 ) -> Flags:
     """(N,) which ends of Newton are the ends of a path of stable equilibria from an origin.
 
     Parameters
     ----------
     spacing : (N,) rad, see `places_between`. origin : (N, J, 6) pose under the load
-        before, from which Newton need not have started.
+        before. guessed : whether Newton started elsewhere.
     """
-    good, begin, first, signs = way.arrived.copy(), loads.supports.on(origin), way.first, way.signs
+    good, begin = results.arrived.copy(), loads.supports.on(origin)
+    first, signs = results.first, results.signs
     good[good] = surely_stable(
-        chains, part(loads, np.flatnonzero(good)), way.q[good], way.tangents[good]
+        chains, part(loads, np.flatnonzero(good)), results.q[good], results.tangents[good]
     )
-    if way.start is not origin:
+    if guessed:
         held = laws(np.arange(len(begin))).held(begin)
         first, signs, _ = _step(chains, loads, begin, held.load, held.tangent)
     doubt = np.flatnonzero(good & (signs != POSITIVE))
@@ -105,11 +98,11 @@ def certified(
         return good
     # the end under the load before, and places between under both loads
     ends = np.flatnonzero(good)
-    near, lanes, shares = places_between(begin[ends], way.q[ends], first[ends], spacing[ends])
+    near, lanes, shares = places_between(begin[ends], results.q[ends], first[ends], spacing[ends])
     lanes = ends[lanes]
     good[ends] = near
-    between = begin[lanes] + shares[:, None, None] * (way.q - begin)[lanes]
-    tangents = way.tangents[:0]
+    between = begin[lanes] + shares[:, None, None] * (results.q - begin)[lanes]
+    tangents = results.tangents[:0]
     if len(lanes):
         tangents = laws(lanes).held(between).tangent
         good[lanes[~stands(chains, part(loads, lanes), between, tangents)]] = False
@@ -117,8 +110,8 @@ def certified(
     there = np.flatnonzero(before.at[rows] >= 0)
     if len(there):
         rows, carried = rows[there], part(before.loads, before.at[rows[there]])
-        q = np.concatenate([way.q[ends], between])[there]
-        tangents = np.concatenate([way.tangents[ends], tangents])[there]
+        q = np.concatenate([results.q[ends], between])[there]
+        tangents = np.concatenate([results.tangents[ends], tangents])[there]
         good[rows[~stands(before.chains, carried, q, tangents)]] = False
     return good
 
@@ -142,7 +135,7 @@ def stands(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
     return found
 
 
-def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
+def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> NewtonResults:
     """Newton with a line search, see `spinepipe.statics.equilibrium.newton`."""
     q = loads.supports.on(start)
     tangents, first = np.zeros((*q.shape, 6)), np.zeros_like(q)
@@ -188,7 +181,7 @@ def newton(chains: Chains, loads: Loads, laws: Laws, start: Array) -> Way:
             left, step, drive = left[going], step[going], drive[going]
             bound, acting, going = laws(left), part(loads, left), going[going]
     arrived &= np.abs(q[..., 3:]).max(axis=(1, 2)) <= LARGEST_ROTATION
-    return Way(start, q, tangents, arrived, first, signs)
+    return NewtonResults(q, tangents, arrived, first, signs)
 
 
 def _step(

@@ -17,7 +17,7 @@ from spinepipe.effects.contract import Array, Indices, Neutral, straight_over
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
 from spinepipe.statics.equilibrium import NOT_POSITIVE, PAST_CRITICAL, ROUNDING, SPACING
 from spinepipe.statics.many.bound import Bound, PathStates
-from spinepipe.statics.many.continuation import Increment, continued
+from spinepipe.statics.many.continuation import Increment, continued, scaled
 from spinepipe.statics.many.dead import with_dead_loads
 from spinepipe.statics.many.dynamics import tangents_of
 from spinepipe.statics.many.lanes import Acting, Effects
@@ -195,10 +195,10 @@ class Stack:
             lanes = lanes[pressed[lanes] & ~at_once[lanes] & ~np.isnan(q[lanes, 0, 0])]
             if not len(lanes):
                 continue
-            loads = part(self.loads, lanes)
-            loads = loads._replace(forces=less * loads.forces, moments=less * loads.moments)
+            share = np.full(len(lanes), less)
+            loads = scaled(self.loads, lanes, share)
             neutral = loads.supports.on(np.zeros_like(q[lanes]))
-            bound = self.bound(lanes, self.initial_states(), np.full(len(lanes), less))
+            bound = self.bound(lanes, self.initial_states(), share)
             stood = stands(chains, loads, neutral, bound.held(neutral).tangent)
             found |= dict.fromkeys(lanes[~stood].tolist(), PAST_CRITICAL)
         return found
@@ -238,7 +238,7 @@ class Stack:
     def _at_once(self, runs: Indices, guess: Array, q: Array) -> Flags:
         """Enter the poses of runs without memory, all steps together; which runs are solved."""
         lanes, states = self.lanes(runs), self.initial_states()
-        found, good = self._settled(lanes, states, guess[lanes])
+        found, good = self._settled(lanes, states, guess[lanes], None)
         whole: Flags = np.logical_and.reduceat(good, np.searchsorted(self.run[lanes], runs))
         there = np.repeat(whole, np.diff(self.first)[runs])
         q[lanes[there]] = found[there]
@@ -258,8 +258,8 @@ class Stack:
             if not len(lanes):
                 break
             origin = last[runs[live]]
-            start = origin if guess is None else guess[lanes]
-            found, arrived = self._settled(lanes, states, start, origin)
+            near = None if guess is None else guess[lanes]
+            found, arrived = self._settled(lanes, states, near, origin)
             at_once[lanes] = arrived & (self.first[runs[live]] == lanes)
             lost = np.flatnonzero(~arrived)
             if len(lost):
@@ -309,27 +309,31 @@ class Stack:
         return Neutral(self.chains.rotations, self.chains.origins, self.chains.coms)
 
     def _settled(
-        self, lanes: Indices, states: PathStates, start: Array, origin: Array | None = None
+        self, lanes: Indices, states: PathStates, guess: Array | None, origin: Array | None
     ) -> tuple[Array, Flags]:
         """Poses (N, J, 6) of lanes, and which are certified to be where the loads lead.
 
         Parameters
         ----------
-        start : (N, J, 6) where Newton starts. origin : (N, J, 6) poses of the steps before;
-            without them, all steps of a run are among the lanes.
+        guess : (N, J, 6) where Newton starts. origin : (N, J, 6) poses of the steps before. One of
+            them may be missing: Newton starts at the origin, or all steps are among the lanes.
         """
 
         def laws(some: Indices) -> Bound:
             return self.bound(lanes[some], states)
 
         loads = part(self.loads, lanes)
-        way = newton(self.chains, loads, laws, start)
-        follows = self.first[self.run[lanes]] < lanes
+        start = origin if guess is None else guess
+        assert start is not None
+        results = newton(self.chains, loads, laws, start)
         if origin is None:
-            origin = np.where(follows[:, None, None], np.roll(way.q, 1, axis=0), 0.0)
+            follows = self.first[self.run[lanes]] < lanes
+            origin = np.where(follows[:, None, None], np.roll(results.q, 1, axis=0), 0.0)
         before = Before(self.chains, self.loads, np.where(self.released[lanes], lanes - 1, -1))
         spacing = self.spacing[self.run[lanes]]
-        return way.q, certified(self.chains, before, loads, laws, spacing, origin, way)
+        guessed = guess is not None
+        good = certified(self.chains, before, loads, laws, spacing, origin, results, guessed)
+        return results.q, good
 
     def _continued(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
         """The same from the steps before, the load in fractions."""
