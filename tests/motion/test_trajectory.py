@@ -86,7 +86,7 @@ def test_a_bordered_band_is_solved_as_the_whole_matrix_is() -> None:
     band.border[:] = whole[:size, size:].reshape(count, COUNT, shared)
     band.slope[:] = right[:size].reshape(count, COUNT)
     assert (whole_of(band) == whole[:size, :size]).all(), "nothing reaches further than three"
-    factor = Factor.of(band, 0.3, 1e-3)
+    factor = Factor.of(band, 0.3 * band.diagonal + 1e-3)
     square = whole[size:, size:].copy()
     (step,), params = bordered_step([band], [factor], square, right[size:])
     whole[range(size), range(size)] += 0.3 * np.diag(whole)[:size] + 1e-3
