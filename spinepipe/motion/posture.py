@@ -73,24 +73,24 @@ def postures(
 def _from_neighbours(
     ask: Ask, watched: Watched, found: Postures, ratios: Array | None, most_steps: int
 ) -> Postures:
-    """Each frame sought anew from its neighbours' postures, until none is better there."""
-    cost, last = _cost(ask, watched, found.q), len(found.q) - 1
-    q, settled, steps = found.q.copy(), found.settled.copy(), found.steps
-    moved = np.arange(len(q))
+    """Each frame sought anew from where its neighbours settled, until none is better there."""
+    cost, q, settled = _cost(ask, watched, found.q), found.q.copy(), found.settled.copy()
+    moved = np.flatnonzero(settled)
     while len(moved):
-        frames = np.concatenate([moved - 1, moved + 1])
-        start = np.tile(moved, 2)[(frames >= 0) & (frames <= last)]
-        frames = frames[(frames >= 0) & (frames <= last)]
-        other = _rounds(ask, watched.at(frames), q[start], ratios, most_steps)
-        there = _cost(ask, watched.at(frames), other.q)
-        steps += other.steps
-        # where both neighbours lead lower, the lower one is written last
-        order = np.argsort(-there, kind="stable")
-        lower = order[there[order] < (1.0 - LOWER) * cost[frames[order]]]
-        for of, kept in ((other.q, q), (other.settled, settled), (there, cost)):
-            kept[frames[lower]] = of[lower]
-        moved = np.unique(frames[lower])
-    return Postures(q, settled, steps)
+        frames, start = np.concatenate([moved - 1, moved + 1]), np.tile(moved, 2)
+        inside = (frames >= 0) & (frames < len(q))
+        frames, start = frames[inside], start[inside]
+        if not len(frames):
+            break
+        seen = watched.at(frames)
+        other = _rounds(ask, seen, q[start], ratios, most_steps)
+        there = _cost(ask, seen, other.q)
+        better = np.flatnonzero(other.settled & (there < (1.0 - LOWER) * cost[frames]))
+        better = better[np.argsort(-there[better])]  # of two, the lower one is written last
+        moved = np.unique(frames[better])
+        q[frames[better]], cost[frames[better]] = other.q[better], there[better]
+        settled[moved] = True
+    return Postures(q, settled, found.steps)
 
 
 def _first_place(watched: Watched) -> Array:
