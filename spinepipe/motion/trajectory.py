@@ -38,6 +38,7 @@ POOR = 0.25
 """Share of the predicted gain below which a model is a poor one (Dennis and Schnabel 1983)."""
 
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-9, 1e9
+_FOUND = "the least cost is found"
 _MOST_EASED = 0.1
 """Of the damping, after a step as good as predicted; Nielsen's third takes twice the steps down."""
 
@@ -123,11 +124,10 @@ def solve(
         steps += 1
         found = _stepped(problem, found)
         say(f"step {steps}, cost {found.costs.total:.5g}")
-    done = found.ended == "converged"
-    message = found.ended or f"still falling after {steps} steps"
+    done = found.ended == _FOUND
     return Solved(
         Status.CONVERGED if done else Status.NOT_CONVERGED,
-        "" if done else message,
+        "" if done else found.ended or f"still falling after {steps} steps",
         found.state.coefficients,
         found.state.parameters,
         law_of(ask, found.state.parameters),
@@ -170,43 +170,53 @@ class _Search:
 
 
 def _stepped(problem: "Trajectory", now: _Search) -> _Search:
-    """One step downhill, damped as much as it takes; or second derivatives for the next; or the end.
-
-    The end is where an undamped step with second derivatives, which has to be definite, is
-    predicted to gain nearly nothing; it is taken if it gains.
-    """
+    """One step downhill, damped as much as it takes; or second derivatives for the next; or the end."""
     asked = problem.normal(now.state, now.newton)
+    exact = now.newton or not problem.ask.loads
     damping, growth, looked, lost = now.damping, 2.0, False, ""
     while damping < _MOST_DAMPING:
         try:
             move, shared, gain = problem.step(asked, damping)
-            lost = "no step lowers the cost, though its slope says that one would"
-            if gain < SMALL and not looked:
-                if problem.ask.loads and not now.newton:
-                    return replace(now, newton=True)
-                looked = True
-                last, last_shared, least = problem.step(asked, 0.0)
-                if least < SMALL:
-                    there = now.state.moved(last, last_shared)
-                    found = problem.costs(there)
-                    better = _Search(there, found, damping) if found.total < now.costs.total else now
-                    return replace(better, ended="converged")
         except LinAlgError:
-            if not looked:
-                lost = "the equations of a step are not definite"
-                damping, growth = damping * growth, 2.0 * growth
-                continue
+            damping, growth = damping * growth, 2.0 * growth
+            lost = "the equations of a step are not definite"
+            continue
+        lost = "no step lowers the cost, though its slope says that one would"
+        if gain < SMALL and not exact:
+            return replace(now, newton=True)
+        if gain < SMALL and not looked:
+            looked = True
+            if (least := _least(problem, now, asked)) is not None:
+                return least
         there = now.state.moved(move, shared)
         found = problem.costs(there)
         ratio = (now.costs.total - found.total) / gain if np.isfinite(found.total) else -1.0
-        newton = now.newton or (problem.ask.loads and ratio < POOR)
+        newton = now.newton or (not exact and ratio < POOR)
         if ratio > 0.0:
             eased = max(_MOST_EASED, 1.0 - (2.0 * ratio - 1.0) ** 3)
             return _Search(there, found, max(eased * damping, _LEAST_DAMPING), newton)
         if newton and not now.newton:
             return replace(now, newton=True)
         damping, growth = damping * growth, 2.0 * growth
-    return replace(now, damping=damping, ended=lost)
+    return replace(now, ended=lost)
+
+
+def _least(problem: "Trajectory", now: _Search, asked: _Asked) -> _Search | None:
+    """The end of a search, if an undamped step is predicted to gain nearly nothing.
+
+    It is taken if it gains at all. Equations that are not definite are those of no least cost.
+    """
+    try:
+        move, shared, gain = problem.step(asked, 0.0)
+    except LinAlgError:
+        return None
+    if gain >= SMALL:
+        return None
+    there = now.state.moved(move, shared)
+    found = problem.costs(there)
+    if found.total < now.costs.total:
+        return replace(now, state=there, costs=found, ended=_FOUND)
+    return replace(now, ended=_FOUND)
 
 
 @dataclass(frozen=True, eq=False)
