@@ -27,13 +27,6 @@ def with_slopes(
     return places, found
 
 
-def curvatures(skeleton: Skeleton, markers: MarkerSet, q: Array, pull: Array) -> Array:
-    """(F, 108, 108) second derivatives of markers' places, times a pull (F, K, 3) on each marker."""
-    found, on_body = np.zeros((len(q), COUNT, COUNT)), np.ascontiguousarray(markers.at)
-    _curve(np.ascontiguousarray(q), *joints_of(skeleton), markers.body, on_body, pull, found)
-    return found
-
-
 def joints_of(skeleton: Skeleton) -> tuple[Array, Array]:
     """Rotations (18, 3, 3) and origins (18, 3) m of joints in the body below, of the pelvis too."""
     steps = skeleton.steps
@@ -112,49 +105,3 @@ def _place(
                     slopes[f, k, 0, column + 3] = w[1] * z - w[2] * y
                     slopes[f, k, 1, column + 3] = w[2] * x - w[0] * z
                     slopes[f, k, 2, column + 3] = w[0] * y - w[1] * x
-
-
-@njit(cache=True)
-def _curve(
-    q: Array,
-    turned: Array,
-    apart: Array,
-    body: NDArray[np.int64],
-    on_body: Array,
-    pull: Array,
-    found: Array,
-) -> None:
-    """Hessian of a chain's points: a rotation about w turns the slope u of what comes after it.
-
-    So a pull f feels f (w x u) = w (u x f), and the sum of u x f over markers is made once for each
-    coordinate; a translation turns nothing.
-    """
-    bodies = len(turned)
-    turns, origins, axes = np.empty((bodies, 3, 3)), np.empty((bodies, 3)), np.empty((bodies, 6, 3))
-    moment, p, u = np.empty((bodies, 6, 3)), np.empty(3), np.empty(3)
-    for f in range(len(q)):
-        chain(q[f], turned, apart, turns, origins, axes)
-        moment[:] = 0.0
-        for k in range(len(body)):
-            for i in range(3):
-                p[i] = origins[body[k], i]
-                for j in range(3):
-                    p[i] += turns[body[k], i, j] * on_body[k, j]
-            for b in range(body[k] + 1):
-                for j in range(6):
-                    w = axes[b, j]
-                    for i in range(3):
-                        y, z = (i + 1) % 3, (i + 2) % 3
-                        u[i] = w[i]
-                        if j >= 3:
-                            u[i] = w[y] * (p[z] - origins[b, z]) - w[z] * (p[y] - origins[b, y])
-                    for i in range(3):
-                        y, z = (i + 1) % 3, (i + 2) % 3
-                        moment[b, j, i] += u[y] * pull[f, k, z] - u[z] * pull[f, k, y]
-        for b in range(bodies):
-            for j in range(3, 6):
-                first, w = 6 * b + j, axes[b, j]
-                for other in range(first, 6 * bodies):
-                    m = moment[other // 6, other % 6]
-                    total = w[0] * m[0] + w[1] * m[1] + w[2] * m[2]
-                    found[f, first, other] = found[f, other, first] = total

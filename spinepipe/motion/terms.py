@@ -13,7 +13,7 @@ from numba import njit
 from spinepipe.effects.contract import Array
 from spinepipe.motion.asked import SHAPE, Ask, Watched
 from spinepipe.motion.passive import PassiveLaw
-from spinepipe.motion.points import COUNT, curvatures, marker_places, with_slopes
+from spinepipe.motion.points import COUNT, marker_places, with_slopes
 from spinepipe.motion.rigid_body import RigidBodies, bodies_of
 from spinepipe.motion.skeleton import JOINTS
 
@@ -39,19 +39,11 @@ class Markers:
         off = (at - self.watched.places).reshape(len(q), -1, 1)
         return self._weighed(off)[..., 0], self._weighed(slopes.reshape(len(q), -1, COUNT))
 
-    def second_order(self, q: Array) -> Array:
-        """(F, 108, 108) residuals times their second derivatives."""
-        off = self.residuals(q)[..., None]
-        pull = self._weighed(off, back=True).reshape(len(q), -1, 3)
-        return curvatures(self.watched.skeleton, self.watched.markers, q, pull)
-
-    def _weighed(self, rows: Array, back: bool = False) -> Array:
-        """(F, 3 K, n) over their sizes; back: by what weighs them, transposed."""
+    def _weighed(self, rows: Array) -> Array:
+        """(F, 3 K, n) over their sizes."""
         seen, size = self.watched, self.ask.sizes.marker_m
-        if seen.shares is None:
-            found: Array = rows * np.repeat(np.sqrt(seen.weight), 3, axis=1)[..., None]
-        else:
-            found = (np.swapaxes(seen.shares, 1, 2) if back else seen.shares) @ rows
+        share = np.repeat(np.sqrt(seen.weight), 3, axis=1)[..., None]
+        found: Array = rows * share if seen.shares is None else seen.shares @ rows
         found /= size
         return found
 

@@ -2,11 +2,10 @@
 
 Levenberg-Marquardt on the band of normal equations (`banded`), damped by the ratio of what a step
 gains to what was predicted (Nielsen 1999; Madsen, Nielsen and Tingleff 2004, section 3.2). The
-equations are Gauss and Newton's until a step gains little of it: residuals stay large where skin
-slides, and passive elements are exponentials of what is fitted. From then on residuals count times
-their second derivatives too, as in NL2SOL (Dennis, Gay and Welsch 1981), but exactly: those of
-markers and of passive elements; those of the loads of bodies in motion, which bend little, are left
-out. Trials that share their passive elements are solved together.
+equations are Gauss and Newton's until a step gains little of it: loads that are left stay large,
+and passive elements are exponentials of what is fitted. From then on loads count times the second
+derivatives of passive elements too, as in NL2SOL (Dennis, Gay and Welsch 1981), but exactly. Trials
+that share their passive elements are solved together.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,11 +26,11 @@ from spinepipe.motion.terms import Loads, Markers, beyond
 from spinepipe.status import Status
 
 MOST_STEPS = 200
-SMALL = 1e-4
+SMALL = 1e-3
 """What an undamped step may still be predicted to gain.
 
 A cost is a sum of squares over SD: no number that is asked for is then farther than the root of
-this, a hundredth of its own SD, from where it costs least (Bates and Watts 1981 stop likewise).
+this, 0.03 of its own SD, from where the model costs least (Bates and Watts 1981 stop likewise).
 """
 
 POOR = 0.25
@@ -159,7 +158,7 @@ class _Search:
 
     Attributes
     ----------
-    newton : whether second derivatives count. ended : why it goes no further; empty if it does.
+    newton : whether second derivatives of passive elements count. ended : why it goes no further; empty if it does.
     """
 
     state: _State
@@ -172,7 +171,7 @@ class _Search:
 def _stepped(problem: "Trajectory", now: _Search) -> _Search:
     """One step downhill, damped as much as it takes; or second derivatives for the next; or the end."""
     asked = problem.normal(now.state, now.newton)
-    exact = now.newton or not problem.ask.loads
+    exact = now.newton or problem.ask.passive is None or not problem.ask.loads
     damping, growth, looked, lost = now.damping, 2.0, False, ""
     while damping < _MOST_DAMPING:
         try:
@@ -266,7 +265,7 @@ class Trajectory:
             band, own_square, own_slope, active = self._band(trial, coefficients, law)
             scales.append(band.diagonal.copy())
             scale = scale + own_square.diagonal()
-            if newton:
+            if newton and law is not None:
                 self._second_order(band, own_square, trial, coefficients, law, active)
             bands.append(band)
             square, slope = square + own_square, slope + own_slope
@@ -327,36 +326,34 @@ class Trajectory:
         square: Array,
         trial: Watched,
         coefficients: Array,
-        law: PassiveLaw | None,
+        law: PassiveLaw,
         active: Array,
     ) -> None:
-        """Adds residuals times second derivatives, of markers and of passive elements."""
-        free, worth, curve = self._free, self._worth(trial), trial.grid.weights[0]
-        q = trial.grid.at_nodes(coefficients)[0]
-        nodes, fitted = len(q), np.flatnonzero(self.ask.fitted)
-        turned = worth * Markers(trial, self.ask).second_order(q)
-        if law is not None and self.ask.loads:
-            pull = worth * Loads.of(trial, self.ask).pulls(active)
-            force, stiffness, by_shape, bends, by_both, by_shapes = (
-                one.reshape(nodes, -1) * pull
-                for one in (*law.with_slopes(q[:, 1:]), *law.curvatures(q[:, 1:]))
-            )
-            np.einsum("fii->fi", turned)[:, COUNT - bends.shape[1] :] += bends
-            # of each fitted element: by its coordinate and its two logarithms, and by these
-            at = np.searchsorted(free, fitted + COUNT - bends.shape[1])
-            size, shape = np.arange(len(fitted)), len(fitted) + np.arange(len(fitted))
-            for j, share in enumerate(curve):
-                band.border[j : j + nodes, at, size] += share * stiffness[:, fitted]
-                band.border[j : j + nodes, at, shape] += share * by_both[:, fitted]
-            mixed = by_shape[:, fitted].sum(axis=0)
-            square[size, size] += force[:, fitted].sum(axis=0)
-            square[shape, shape] += by_shapes[:, fitted].sum(axis=0)
-            square[size, shape] += mixed
-            square[shape, size] += mixed
-        turned = turned[:, free[:, None], free]
+        """Adds loads that are left, times second derivatives of passive elements."""
+        free, curve, nodes = self._free, trial.grid.weights[0], len(active)
+        pull = self._worth(trial) * Loads.of(trial, self.ask).pulls(active)
+        q = trial.grid.at_nodes(coefficients)[0][:, 1:]
+        force, stiffness, by_shape, bends, by_both, by_shapes = (
+            one.reshape(nodes, -1) * pull for one in (*law.with_slopes(q), *law.curvatures(q))
+        )
+        turned = np.zeros((nodes, COUNT))
+        turned[:, COUNT - bends.shape[1] :] = bends
+        diagonal = np.arange(len(free))
         for j in range(REACH):
             for i in range(j, REACH):
-                band.blocks[j : j + nodes, i - j] += curve[i] * curve[j] * turned
+                share = curve[i] * curve[j] * turned[:, free]
+                band.blocks[j : j + nodes, i - j, diagonal, diagonal] += share
+        # of each fitted element: by its coordinate and its two logarithms, and by these
+        fitted = np.flatnonzero(self.ask.fitted)
+        at = np.searchsorted(free, fitted + COUNT - bends.shape[1])
+        size, shape = np.arange(len(fitted)), len(fitted) + np.arange(len(fitted))
+        for j, share in enumerate(curve):
+            band.border[j : j + nodes, at, size] += share * stiffness[:, fitted]
+            band.border[j : j + nodes, at, shape] += share * by_both[:, fitted]
+        square[size, size] += force[:, fitted].sum(axis=0)
+        square[shape, shape] += by_shapes[:, fitted].sum(axis=0)
+        for one, other in ((size, shape), (shape, size)):
+            square[one, other] += by_shape[:, fitted].sum(axis=0)
 
     def _placed(self, band: Band, trial: Watched, q: Array) -> None:
         """Markers and ranges: what hangs on places alone."""

@@ -53,9 +53,9 @@ class Slope:
         self,
         ends: Callable[[float], float | None],
         gains: Callable[[float], float] = lambda _: 1.0,
-        loads: bool = True,
+        elements: bool = True,
     ) -> None:
-        self.ends, self.gains, self.ask = ends, gains, Ask(loads=loads)
+        self.ends, self.gains, self.ask = ends, gains, Ask(passive=law() if elements else None)
         self.tried = list[float]()
 
     def normal(self, state: _State, newton: bool) -> None:
@@ -119,8 +119,8 @@ def test_second_derivatives_count_once_a_step_gains_little(end: float, cost: flo
     assert (found.costs.total, slope.tried) == (cost, [1e-3])
 
 
-def test_without_loads_second_derivatives_never_count() -> None:
-    slope = Slope(lambda d: 1.0 if d < 5e-3 else -0.1, loads=False)
+def test_without_passive_elements_second_derivatives_never_count() -> None:
+    slope = Slope(lambda d: 1.0 if d < 5e-3 else -0.1, elements=False)
     found = one_step(slope, newton=False)
     assert not found.newton
     assert found.costs.total == -0.1
