@@ -60,7 +60,7 @@ class PassiveLaw:
 
         Those with the logarithm of both A are the first derivatives themselves.
         """
-        force, stiffness, by_shape = self.with_slopes(q)
+        _, stiffness, by_shape = self.with_slopes(q)
         q = q - self.rest
         side = (q < 0.0).astype(np.int64)[..., None]
         b = np.take_along_axis(np.broadcast_to(self.b, (*q.shape, 2)), side, axis=-1)[..., 0]

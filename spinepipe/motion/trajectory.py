@@ -158,7 +158,8 @@ class _Search:
 
     Attributes
     ----------
-    newton : whether second derivatives of passive elements count. ended : why it goes no further; empty if it does.
+    newton : whether second derivatives of passive elements count. ended : why it goes no further;
+        empty if it does.
     """
 
     state: _State
@@ -169,7 +170,11 @@ class _Search:
 
 
 def _stepped(problem: "Trajectory", now: _Search) -> _Search:
-    """One step downhill, damped as much as it takes; or second derivatives for the next; or the end."""
+    """One step downhill, damped as much as it takes; or the end.
+
+    Or no step, where Gauss and Newton's equations have led uphill or end, and second derivatives
+    are to count from now on.
+    """
     asked = problem.normal(now.state, now.newton)
     exact = now.newton or problem.ask.passive is None or not problem.ask.loads
     damping, growth, looked, lost = now.damping, 2.0, False, ""
