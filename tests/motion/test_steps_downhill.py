@@ -47,7 +47,7 @@ def solved(ask: Ask, on: MarkerSet, off_m: float = 0.0, **more: Any) -> Solved:
 
 
 class Slope:
-    """A cost of one number: each damping, as told, fails or leads to a cost, and predicts a gain."""
+    """A cost of one number: a damping fails, or leads to a cost and predicts a gain, as told."""
 
     def __init__(
         self,
