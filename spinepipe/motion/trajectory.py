@@ -118,11 +118,16 @@ def solve(
     shared = np.zeros(ask.parameters) if parameters is None else parameters
     state = _State(tuple(np.where(ask.free, one, 0.0) for one in starts), shared)
     found = _Search(state, problem.costs(state), _FIRST_DAMPING)
-    steps = 0
+    steps, begun = 0, np.inf
     while steps < MOST_STEPS and not found.ended:
         steps += 1
         found = _stepped(problem, found)
         say(f"step {steps}, cost {found.costs.total:.5g}")
+        if found.ended == _FOUND and begun - found.costs.total > SMALL:
+            # begun again at its answer it has to stay: Gauss and Newton's longer steps lead out of
+            # hollows in which second derivatives hold it
+            begun = found.costs.total
+            found = _Search(found.state, found.costs, _FIRST_DAMPING)
     done = found.ended == _FOUND
     return Solved(
         Status.CONVERGED if done else Status.NOT_CONVERGED,

@@ -70,7 +70,7 @@ def test_a_calibration_ends_where_it_costs_least() -> None:
 def test_begun_at_its_own_answer_it_stays() -> None:
     ask, seen, _, solved = calibrated()
     again = solve(ask, [seen], solved.coefficients, solved.parameters)
-    assert again.steps <= 3
+    assert again.steps <= 6
     alike(again, solved)
 
 
