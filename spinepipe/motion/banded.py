@@ -60,8 +60,8 @@ class Factor:
     blocks: Array
 
     @classmethod
-    def of(cls, band: Band, damping: float, least: float) -> "Factor":
-        """Block Cholesky, each diagonal grown by a share of itself and by `least`.
+    def of(cls, band: Band, grown: Array) -> "Factor":
+        """Block Cholesky, the diagonal larger by `grown` (C, n).
 
         Raises
         ------
@@ -69,7 +69,6 @@ class Factor:
             Of a matrix that is not positive definite.
         """
         size = band.blocks.shape[-1]
-        grown = damping * band.diagonal + least
         # two coefficients past the end, with which nothing hangs together, spare the loop its ends
         found = np.zeros((len(grown) + REACH - 1, *band.blocks.shape[1:]))
         for k, own in enumerate(band.blocks):

@@ -54,6 +54,21 @@ class PassiveLaw:
         by_shape = a * grown * exponent
         return np.sign(q) * size, a * b * grown, np.sign(q) * by_shape
 
+    def curvatures(self, q: Array) -> tuple[Array, Array, Array]:
+        """(F, 17, 6) each, second derivatives of forces: by the coordinate twice, by it and the
+        logarithm of both B, and by that logarithm twice.
+
+        Those with the logarithm of both A are the first derivatives themselves.
+        """
+        _, stiffness, by_shape = self.with_slopes(q)
+        q = q - self.rest
+        side = (q < 0.0).astype(np.int64)[..., None]
+        b = np.take_along_axis(np.broadcast_to(self.b, (*q.shape, 2)), side, axis=-1)[..., 0]
+        exponent = b * np.abs(q)
+        bends = exponent < STRAIGHT
+        by_both = 1.0 + bends * exponent
+        return np.sign(q) * b * stiffness * bends, stiffness * by_both, by_shape * by_both
+
     def stiffness_at(self, load: Array) -> Array:
         """(17, 6, 2) N/m and N m/rad, slope where a side resists with a load: B (F + A)."""
         straight = self.a * (np.exp(STRAIGHT) - 1.0)

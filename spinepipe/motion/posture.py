@@ -2,7 +2,8 @@
 
 Levenberg-Marquardt on all frames at once. What no marker tells about stays where it was, since
 steps are as short as can be (a small damping); ratios between joints are a linear map of fewer
-numbers to all coordinates (Christophy 2012, Bruno 2015).
+numbers to all coordinates (Christophy 2012, Bruno 2015). A frame may have several least costs: each
+is sought from the postures of both its neighbours as well, and the least is taken.
 """
 
 from dataclasses import dataclass, replace
@@ -22,6 +23,10 @@ SHORTEST = 1e-7
 
 SMALL = 1e-10
 """share of the cost by which it changed that."""
+
+LOWER = 1e-6
+"""share of a frame's cost by which another posture has to be better: what no marker tells, which
+costs nothing, stays as it was found."""
 
 _RIDGE = 1e-8
 """Of the largest diagonal: what is not seen does not move."""
@@ -60,9 +65,32 @@ def postures(
     alone = np.zeros(SHAPE, dtype=bool)
     alone[PELVIS] = True
     stiff = replace(ask, free=alone, loads=False, passive=None)
-    q, _, _ = _rounds(stiff, watched, q, None, most_steps)
-    q, steps, settled = _rounds(ask, watched, q, ratios, most_steps)
-    return Postures(q, settled, steps)
+    q = _rounds(stiff, watched, q, None, most_steps).q
+    found = _rounds(ask, watched, q, ratios, most_steps)
+    return _from_neighbours(ask, watched, found, ratios, most_steps)
+
+
+def _from_neighbours(
+    ask: Ask, watched: Watched, found: Postures, ratios: Array | None, most_steps: int
+) -> Postures:
+    """Each frame sought anew from where its neighbours settled, until none is better there."""
+    cost, q, settled = _cost(ask, watched, found.q), found.q.copy(), found.settled.copy()
+    moved = np.flatnonzero(settled)
+    while len(moved):
+        frames, start = np.concatenate([moved - 1, moved + 1]), np.tile(moved, 2)
+        inside = (frames >= 0) & (frames < len(q))
+        frames, start = frames[inside], start[inside]
+        if not len(frames):
+            break
+        seen = watched.at(frames)
+        other = _rounds(ask, seen, q[start], ratios, most_steps)
+        there = _cost(ask, seen, other.q)
+        better = np.flatnonzero(other.settled & (there < (1.0 - LOWER) * cost[frames]))
+        better = better[np.argsort(-there[better])]  # of two, the lower one is written last
+        moved = np.unique(frames[better])
+        q[frames[better]], cost[frames[better]] = other.q[better], there[better]
+        settled[moved] = True
+    return Postures(q, settled, found.steps)
 
 
 def _first_place(watched: Watched) -> Array:
@@ -79,7 +107,7 @@ def _first_place(watched: Watched) -> Array:
 
 def _rounds(
     ask: Ask, watched: Watched, q: Array, ratios: Array | None, most_steps: int
-) -> tuple[Array, int, Array]:
+) -> Postures:
     """Steps of each frame until they are short; each frame has its own damping."""
     damping, q = np.full(len(q), 1e-4), q.copy()
     cost, settled = _cost(ask, watched, q), np.zeros(len(q), dtype=bool)
@@ -106,7 +134,7 @@ def _rounds(
         q[left[better]], cost[left[better]] = there[better], found[better]
         by = np.where(better, 0.2, 10.0) * damping[left]
         damping[left] = np.clip(by, 1e-12, 1e8)
-    return q, steps, settled
+    return Postures(q, settled, steps)
 
 
 def _cost(ask: Ask, watched: Watched, q: Array) -> Array:

@@ -127,6 +127,11 @@ class Loads:
             own = (loads[0, _PELVIS:] + force[k], force[k], by_shape[k])
             yield LoadSlopes(each, weighed, *(one / whole_size for one in own))
 
+    def pulls(self, active: Array) -> Array:
+        """(F, 102) half of what a cost falls by each N and N m, of loads (F, 102) over sizes."""
+        found: Array = active @ self.metric / np.tile(self.ask.sizes.of_loads, len(JOINTS))
+        return found
+
     @property
     def metric(self) -> Array:
         """(102, 102) by which loads over their sizes are multiplied before they meet each other."""

@@ -1,11 +1,15 @@
 """A motion over all its time at once: the least sum of squares of markers, loads and accelerations.
 
-Levenberg-Marquardt on the band of normal equations (`banded`); trials that share their passive
-elements are solved together.
+Levenberg-Marquardt on the band of normal equations (`banded`), damped by the ratio of what a step
+gains to what was predicted (Nielsen 1999; Madsen, Nielsen and Tingleff 2004, section 3.2). The
+equations are Gauss and Newton's until a step gains little of it: loads that are left stay large,
+and passive elements are exponentials of what is fitted. From then on loads count times the second
+derivatives of passive elements too, as in NL2SOL (Dennis, Gay and Welsch 1981), but exactly. Trials
+that share their passive elements are solved together.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -21,11 +25,21 @@ from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.terms import Loads, Markers, beyond
 from spinepipe.status import Status
 
-MOST_STEPS = 80
-SMALL = 1e-4
-"""Share of the cost by which a last step changes it."""
+MOST_STEPS = 200
+SMALL = 1e-3
+"""What an undamped step may still be predicted to gain.
+
+A cost is a sum of squares over SD: no number that is asked for is then farther than the root of
+this, 0.03 of its own SD, from where the model costs least (Bates and Watts 1981 stop likewise).
+"""
+
+POOR = 0.25
+"""Share of the predicted gain below which a model is a poor one (Dennis and Schnabel 1983)."""
 
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-9, 1e9
+_FOUND = "the least cost is found"
+_MOST_EASED = 0.1
+"""Of the damping, after a step as good as predicted; Nielsen's third takes twice the steps down."""
 
 
 @dataclass(frozen=True)
@@ -103,58 +117,115 @@ def solve(
     problem = Trajectory(ask, tuple(trials), held)
     shared = np.zeros(ask.parameters) if parameters is None else parameters
     state = _State(tuple(np.where(ask.free, one, 0.0) for one in starts), shared)
-    costs, damping, steps, lost = problem.costs(state), _FIRST_DAMPING, 0, ""
-    while steps < MOST_STEPS:
+    found = _Search(state, problem.costs(state), _FIRST_DAMPING)
+    steps, begun = 0, np.inf
+    while steps < MOST_STEPS and not found.ended:
         steps += 1
-        asked = problem.normal(state)
-        before = costs.total
-        state, costs, damping, lost = _stepped(problem, state, costs, asked, damping)
-        say(f"step {steps}, cost {costs.total:.5g}")
-        if lost or before - costs.total < SMALL * costs.total:
-            break
-    done = steps < MOST_STEPS and not lost
+        found = _stepped(problem, found)
+        say(f"step {steps}, cost {found.costs.total:.5g}")
+        if found.ended == _FOUND and begun - found.costs.total > SMALL:
+            # begun again at its answer it has to stay: Gauss and Newton's longer steps lead out of
+            # hollows in which second derivatives hold it
+            begun = found.costs.total
+            found = _Search(found.state, found.costs, _FIRST_DAMPING)
+    done = found.ended == _FOUND
     return Solved(
         Status.CONVERGED if done else Status.NOT_CONVERGED,
-        lost or ("" if done else f"still falling after {steps} steps"),
-        state.coefficients,
-        state.parameters,
-        law_of(ask, state.parameters),
-        costs,
+        "" if done else found.ended or f"still falling after {steps} steps",
+        found.state.coefficients,
+        found.state.parameters,
+        law_of(ask, found.state.parameters),
+        found.costs,
         steps,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """Normal equations about a state."""
+    """Equations of a step about a state.
+
+    Attributes
+    ----------
+    scales, scale : diagonals of Gauss and Newton's equations, which damping is a share of: (C, n)
+        of each band and (P,); those with second derivatives may be negative.
+    """
 
     bands: list[Band]
     square: Array
     slope: Array
+    scales: list[Array]
+    scale: Array
 
 
-def _stepped(
-    problem: "Trajectory", state: _State, costs: Costs, asked: _Asked, damping: float
-) -> tuple[_State, Costs, float, str]:
-    """One step downhill, damped as much as it takes; the last text says why there is none.
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Where a search is, and how it goes on.
 
-    Where all steps lead uphill the cost is at its least, up to rounding, and there is no text.
+    Attributes
+    ----------
+    newton : whether second derivatives of passive elements count. ended : why it goes no further;
+        empty if it does.
     """
-    lost = ""
+
+    state: _State
+    costs: Costs
+    damping: float
+    newton: bool = False
+    ended: str = ""
+
+
+def _stepped(problem: "Trajectory", now: _Search) -> _Search:
+    """One step downhill, damped as much as it takes; or the end.
+
+    Or no step, where Gauss and Newton's equations have led uphill or end, and second derivatives
+    are to count from now on.
+    """
+    asked = problem.normal(now.state, now.newton)
+    exact = now.newton or problem.ask.passive is None or not problem.ask.loads
+    damping, growth, looked, lost = now.damping, 2.0, False, ""
     while damping < _MOST_DAMPING:
         try:
-            steps, shared = problem.step(asked, damping)
+            move, shared, gain = problem.step(asked, damping)
         except LinAlgError:
-            damping, lost = 10.0 * damping, "the equations of a step are not definite"
+            damping, growth = damping * growth, 2.0 * growth
+            lost = "the equations of a step are not definite"
             continue
-        lost = ""
-        there = state.moved(steps, shared)
+        lost = "no step lowers the cost, though its slope says that one would"
+        if gain < SMALL and not exact:
+            return replace(now, newton=True)
+        if gain < SMALL and not looked:
+            looked = True
+            if (least := _least(problem, now, asked)) is not None:
+                return least
+        there = now.state.moved(move, shared)
         found = problem.costs(there)
-        if np.isfinite(found.total) and found.total <= costs.total:
-            eased = max(0.2 * damping, _LEAST_DAMPING)
-            return there, found, eased, ""
-        damping *= 5.0
-    return state, costs, damping, lost
+        ratio = (now.costs.total - found.total) / gain if np.isfinite(found.total) else -1.0
+        newton = now.newton or (not exact and ratio < POOR)
+        if ratio > 0.0:
+            eased = max(_MOST_EASED, 1.0 - (2.0 * ratio - 1.0) ** 3)
+            return _Search(there, found, max(eased * damping, _LEAST_DAMPING), newton)
+        if newton and not now.newton:
+            return replace(now, newton=True)
+        damping, growth = damping * growth, 2.0 * growth
+    return replace(now, ended=lost)
+
+
+def _least(problem: "Trajectory", now: _Search, asked: _Asked) -> _Search | None:
+    """The end of a search, if an undamped step is predicted to gain nearly nothing.
+
+    It is taken if it gains at all. Equations that are not definite are those of no least cost.
+    """
+    try:
+        move, shared, gain = problem.step(asked, 0.0)
+    except LinAlgError:
+        return None
+    if gain >= SMALL:
+        return None
+    there = now.state.moved(move, shared)
+    found = problem.costs(there)
+    if found.total < now.costs.total:
+        return replace(now, state=there, costs=found, ended=_FOUND)
+    return replace(now, ended=_FOUND)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,14 +265,18 @@ class Trajectory:
         half = self.ask.parameters // 2
         return np.repeat([self.ask.sizes.size, self.ask.sizes.shape], half)
 
-    def normal(self, state: _State) -> _Asked:
-        """Normal equations about a state."""
+    def normal(self, state: _State, newton: bool = False) -> _Asked:
+        """Equations of a step about a state; newton : with second derivatives."""
         law, count = law_of(self.ask, state.parameters), self.ask.parameters
         square = np.diag(1.0 / self._prior**2) if count else np.zeros((0, 0))
         slope = state.parameters / self._prior**2 if count else np.zeros(0)
-        bands = []
+        bands, scales, scale = [], [], square.diagonal()
         for trial, coefficients in zip(self.trials, state.coefficients, strict=True):
-            band, own_square, own_slope = self._band(trial, coefficients, law)
+            band, own_square, own_slope, active = self._band(trial, coefficients, law)
+            scales.append(band.diagonal.copy())
+            scale = scale + own_square.diagonal()
+            if newton and law is not None:
+                self._second_order(band, own_square, trial, coefficients, law, active)
             bands.append(band)
             square, slope = square + own_square, slope + own_slope
         if self.held is not None:
@@ -211,7 +286,7 @@ class Trajectory:
                 band.border[..., held] = 0.0
             square[held], square[:, held], slope[held] = 0.0, 0.0, 0.0
             square[held, held] = 1.0
-        return _Asked(bands, square, slope)
+        return _Asked(bands, square, slope, scales, scale)
 
     @property
     def _free(self) -> NDArray[np.int64]:
@@ -220,7 +295,8 @@ class Trajectory:
 
     def _band(
         self, trial: Watched, coefficients: Array, law: PassiveLaw | None
-    ) -> tuple[Band, Array, Array]:
+    ) -> tuple[Band, Array, Array, Array]:
+        """With the square and slope of what is shared, and loads (N + 1, 102) over their sizes."""
         shared, worth, free = self.ask.parameters, self._worth(trial), self._free
         band = Band.empty(trial.grid.coefficients, shared, len(free))
         motion, weights = trial.grid.at_nodes(coefficients), trial.grid.weights
@@ -228,9 +304,9 @@ class Trajectory:
         self._smoothed(band, trial, motion[2])
         square, slope = np.zeros((shared, shared)), np.zeros(shared)
         if not self.ask.loads:
-            return band, square, slope
+            return band, square, slope, np.zeros((0, 0))
         loads, fitted = Loads.of(trial, self.ask), np.flatnonzero(self.ask.fitted)
-        own = []
+        own, left = [], []
         for k, node in enumerate(loads.by_node(law, motion, weights)):
             each, weighed = node.each, node.weighed
             if len(free) < COUNT:
@@ -244,13 +320,50 @@ class Trajectory:
                 by = np.append(node.by_size[fitted], node.by_shape[fitted])
                 twice = np.concatenate([weighed[:, fitted]] * 2, axis=1)
                 band.border[k : k + REACH] += worth * np.swapaxes(by[:, None] * twice, 1, 2)
-                own.append((by, node.active))
+                own.append(by)
+            left.append(node.active)
+        active = np.array(left)
         if shared:
-            by, active = (np.array(one) for one in zip(*own, strict=True))
+            by = np.array(own)
             rows = loads.metric[np.tile(fitted, 2)]
             square = worth * rows[:, np.tile(fitted, 2)] * (by.T @ by)
             slope = worth * (by * (active @ rows.T)).sum(axis=0)
-        return band, square, slope
+        return band, square, slope, active
+
+    def _second_order(
+        self,
+        band: Band,
+        square: Array,
+        trial: Watched,
+        coefficients: Array,
+        law: PassiveLaw,
+        active: Array,
+    ) -> None:
+        """Adds loads that are left, times second derivatives of passive elements."""
+        free, curve, nodes = self._free, trial.grid.weights[0], len(active)
+        pull = self._worth(trial) * Loads.of(trial, self.ask).pulls(active)
+        q = trial.grid.at_nodes(coefficients)[0][:, 1:]
+        force, stiffness, by_shape, bends, by_both, by_shapes = (
+            one.reshape(nodes, -1) * pull for one in (*law.with_slopes(q), *law.curvatures(q))
+        )
+        turned = np.zeros((nodes, COUNT))
+        turned[:, COUNT - bends.shape[1] :] = bends
+        diagonal = np.arange(len(free))
+        for j in range(REACH):
+            for i in range(j, REACH):
+                share = curve[i] * curve[j] * turned[:, free]
+                band.blocks[j : j + nodes, i - j, diagonal, diagonal] += share
+        # of each fitted element: by its coordinate and its two logarithms, and by these
+        fitted = np.flatnonzero(self.ask.fitted)
+        at = np.searchsorted(free, fitted + COUNT - bends.shape[1])
+        size, shape = np.arange(len(fitted)), len(fitted) + np.arange(len(fitted))
+        for j, share in enumerate(curve):
+            band.border[j : j + nodes, at, size] += share * stiffness[:, fitted]
+            band.border[j : j + nodes, at, shape] += share * by_both[:, fitted]
+        square[size, size] += force[:, fitted].sum(axis=0)
+        square[shape, shape] += by_shapes[:, fitted].sum(axis=0)
+        for one, other in ((size, shape), (shape, size)):
+            square[one, other] += by_shape[:, fitted].sum(axis=0)
 
     def _placed(self, band: Band, trial: Watched, q: Array) -> None:
         """Markers and ranges: what hangs on places alone."""
@@ -282,15 +395,20 @@ class Trajectory:
             for j, second in enumerate(curve[: i + 1]):
                 band.blocks[j : j + frames, i - j, diagonal, diagonal] += first * second * share
 
-    def step(self, asked: _Asked, damping: float) -> tuple[list[Array], Array]:
-        """Damped step (C, 108) of each trial's coefficients, and of the parameters."""
+    def step(self, asked: _Asked, damping: float) -> tuple[list[Array], Array, float]:
+        """Damped step (C, 108) of each trial's coefficients, and of the parameters; the gain that
+        is predicted.
+        """
         # every diagonal gets a little besides: what nothing asks about stays where it is
         factors = [
-            Factor.of(band, damping, 1e-9 * float(band.diagonal.max())) for band in asked.bands
+            Factor.of(band, damping * scale + 1e-9 * float(scale.max()))
+            for band, scale in zip(asked.bands, asked.scales, strict=True)
         ]
-        square = asked.square + damping * np.diag(np.diag(asked.square))
+        square = asked.square + damping * np.diag(asked.scale)
         found, shared = bordered_step(asked.bands, factors, square, asked.slope)
+        gain = float(damping * asked.scale @ shared**2 - asked.slope @ shared)
         steps = [np.zeros((len(one), COUNT)) for one in found]
-        for step, one in zip(steps, found, strict=True):
+        for step, one, band, scale in zip(steps, found, asked.bands, asked.scales, strict=True):
+            gain += float(np.sum((damping * scale * one - band.slope) * one))
             step[:, self._free] = one
-        return steps, shared
+        return steps, shared, gain

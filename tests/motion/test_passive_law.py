@@ -55,3 +55,20 @@ def test_scaling_is_of_all_sides_and_each_coordinate_by_itself() -> None:
     np.testing.assert_array_equal(found.a[3, 4], 2.0 * A)
     np.testing.assert_array_equal(found.b[5, 1], 3.0 * B)
     assert (found.a != LAW.a).sum() == (found.b != LAW.b).sum() == 2
+
+
+@pytest.mark.parametrize("q", [0.1, -0.1, 0.3, -0.4])
+def test_second_derivatives_are_differences(q: float) -> None:
+    """Below and beyond the fifth power of e, which 0.17 and -0.25 reach."""
+    once, small = LAW.curvatures(np.full((1, 17, 6), q)), 1e-6
+
+    def by(step: float, log: float) -> np.ndarray:
+        scaled = LAW.scaled(np.ones((17, 6)), np.full((17, 6), np.exp(log)))
+        return np.array([one[0, 0, 0] for one in scaled.with_slopes(np.full((1, 17, 6), q + step))])
+
+    along = (by(small, 0.0) - by(-small, 0.0)) / (2.0 * small)
+    bent = (by(0.0, small) - by(0.0, -small)) / (2.0 * small)
+    found = [one[0, 0, 0] for one in once]
+    expected = [along[1], along[2], bent[2]]
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-4)
+    assert bent[1] == pytest.approx(found[1], rel=1e-6)

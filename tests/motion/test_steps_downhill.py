@@ -12,7 +12,17 @@ from spinepipe.motion import trajectory
 from spinepipe.motion.asked import SHAPE, Ask, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import MarkerSet, Trial
-from spinepipe.motion.trajectory import Costs, Solved, _State, _stepped, law_of, solve
+from spinepipe.motion.trajectory import (
+    _FOUND,
+    SMALL,
+    Costs,
+    Solved,
+    _Search,
+    _State,
+    _stepped,
+    law_of,
+    solve,
+)
 from spinepipe.status import Status
 
 NODES = 3
@@ -37,70 +47,126 @@ def solved(ask: Ask, on: MarkerSet, off_m: float = 0.0, **more: Any) -> Solved:
 
 
 class Slope:
-    """A cost of one number: each damping, as told, fails, leads up, down or nowhere."""
+    """A cost of one number: a damping fails, or leads to a cost and predicts a gain, as told."""
 
-    def __init__(self, ends: Callable[[float], float | None]) -> None:
-        self.ends, self.tried = ends, list[float]()
+    def __init__(
+        self,
+        ends: Callable[[float], float | None],
+        gains: Callable[[float], float] = lambda _: 1.0,
+        elements: bool = True,
+    ) -> None:
+        self.ends, self.gains, self.ask = ends, gains, Ask(passive=law() if elements else None)
+        self.tried = list[float]()
 
-    def step(self, asked: object, damping: float) -> tuple[list[np.ndarray], np.ndarray]:
+    def normal(self, state: _State, newton: bool) -> None:
+        """Nothing hangs on it here."""
+
+    def step(self, asked: object, damping: float) -> tuple[list[np.ndarray], np.ndarray, float]:
         self.tried.append(damping)
         end = self.ends(damping)
         if end is None:
             raise LinAlgError("not definite")
-        return [np.array([end])], np.zeros(0)
+        return [np.array([end])], np.zeros(0), self.gains(damping)
 
     def costs(self, state: _State) -> Costs:
         return Costs(float(state.coefficients[0][0]), 0.0, 0.0, 0.0, 0.0)
 
 
-def one_step(ends: Callable[[float], float | None], damping: float) -> tuple[Slope, Any]:
+def one_step(slope: Slope, damping: float = 1e-3, newton: bool = True) -> _Search:
     """From a cost of 0; where a step ends is what it costs."""
-    slope = Slope(ends)
     begin = _State((np.zeros(1),), np.zeros(0))
-    return slope, _stepped(slope, begin, slope.costs(begin), None, damping)  # type: ignore[arg-type]
+    return _stepped(slope, _Search(begin, slope.costs(begin), damping, newton))  # type: ignore[arg-type]
 
 
-def test_a_step_that_leads_down_is_taken_and_eases_damping() -> None:
-    slope, (state, costs, damping, lost) = one_step(lambda _: -2.0, 1e-3)
-    assert (costs.total, state.coefficients[0].tolist(), lost) == (-2.0, [-2.0], "")
-    assert slope.tried == [1e-3]
-    assert damping == pytest.approx(2e-4)
+@pytest.mark.parametrize(
+    ("gained", "eased"),
+    [(1.0, 0.1), (1.4, 0.1), (0.75, 0.875), (0.5, 1.0), (0.3, 1.064), (1e-9, 2.0)],
+)
+def test_damping_follows_the_share_of_the_predicted_gain(gained: float, eased: float) -> None:
+    """Nielsen's 1 - (2 r - 1)^3, a tenth at least."""
+    slope = Slope(lambda _: -gained)
+    found = one_step(slope)
+    assert (found.costs.total, found.ended, slope.tried) == (-gained, "", [1e-3])
+    assert found.damping == pytest.approx(1e-3 * eased)
 
 
 def test_damping_is_eased_to_a_billionth_at_least() -> None:
-    assert one_step(lambda _: -1.0, 2e-9)[1][2] == pytest.approx(1e-9)
-    assert one_step(lambda _: -1.0, 1e-8)[1][2] == pytest.approx(2e-9)
+    assert one_step(Slope(lambda _: -1.0), 2e-9).damping == pytest.approx(1e-9)
+    assert one_step(Slope(lambda _: -1.0), 2e-8).damping == pytest.approx(2e-9)
 
 
-def test_a_step_that_costs_the_same_is_taken() -> None:
-    slope, _ = one_step(lambda _: 0.0, 1e-3)
-    assert len(slope.tried) == 1
+@pytest.mark.parametrize("uphill", [0.0, 1.0, float("nan"), float("inf"), float("-inf")])
+def test_steps_that_gain_nothing_are_damped_twice_and_then_more_and_more(uphill: float) -> None:
+    slope = Slope(lambda d: uphill if d < 0.1 else -1.0)
+    found = one_step(slope)
+    np.testing.assert_allclose(slope.tried, [1e-3, 2e-3, 8e-3, 64e-3, 1.024])
+    assert found.costs.total == -1.0
 
 
-@pytest.mark.parametrize("uphill", [1.0, float("nan"), float("inf"), float("-inf")])
-def test_a_step_that_leads_up_or_nowhere_is_damped_five_times_as_much(uphill: float) -> None:
-    slope, (_, costs, _, _) = one_step(lambda d: uphill if d < 0.1 else -1.0, 1e-3)
-    np.testing.assert_allclose(slope.tried, [1e-3, 5e-3, 25e-3, 125e-3])
-    assert costs.total == -1.0
+def test_a_matrix_that_is_not_definite_is_damped_more() -> None:
+    slope = Slope(lambda d: None if d < 5e-3 else -1.0)
+    found = one_step(slope)
+    np.testing.assert_allclose(slope.tried, [1e-3, 2e-3, 8e-3])
+    assert (found.costs.total, found.ended) == (-1.0, "")
 
 
-def test_a_matrix_that_is_not_definite_is_damped_ten_times_as_much() -> None:
-    slope, (_, costs, _, lost) = one_step(lambda d: None if d < 0.05 else -1.0, 1e-3)
-    np.testing.assert_allclose(slope.tried, [1e-3, 1e-2, 1e-1])
-    assert (costs.total, lost) == (-1.0, "")
+@pytest.mark.parametrize(("end", "cost"), [(-0.2, -0.2), (-0.3, -0.3), (1.0, 0.0)])
+def test_second_derivatives_count_once_a_step_gains_little(end: float, cost: float) -> None:
+    """Less than a quarter of what was predicted; a step uphill is not damped before they do."""
+    slope = Slope(lambda _: end)
+    found = one_step(slope, newton=False)
+    assert found.newton is (end > -0.25)
+    assert (found.costs.total, slope.tried) == (cost, [1e-3])
 
 
-def test_where_every_step_leads_up_nothing_moves_and_nothing_is_lost() -> None:
-    """A least cost, up to rounding."""
-    slope, (state, costs, damping, lost) = one_step(lambda _: 1.0, 1.0)
-    assert (costs.total, state.coefficients[0].tolist(), lost) == (0.0, [0.0], "")
-    assert damping >= 1e9 > max(slope.tried) > 1e8
+def test_without_passive_elements_second_derivatives_never_count() -> None:
+    slope = Slope(lambda d: 1.0 if d < 5e-3 else -0.1, elements=False)
+    found = one_step(slope, newton=False)
+    assert not found.newton
+    assert found.costs.total == -0.1
+
+
+@pytest.mark.parametrize(("end", "cost"), [(-1e-5, -1e-5), (1e-9, 0.0)])
+def test_the_end_is_where_an_undamped_step_would_gain_nearly_nothing(
+    end: float, cost: float
+) -> None:
+    """It is taken where it gains."""
+    slope = Slope(lambda _: end, lambda _: 0.9 * SMALL)
+    found = one_step(slope)
+    assert (found.ended, found.costs.total) == (_FOUND, cost)
+    assert slope.tried == [1e-3, 0.0]
+
+
+def test_a_step_that_is_short_for_its_damping_alone_is_no_end() -> None:
+    slope = Slope(lambda _: -1e-5, lambda d: 0.1 * SMALL if d else 2.0 * SMALL)
+    found = one_step(slope, 1.0)
+    assert (found.ended, found.costs.total) == ("", -1e-5)
+    assert slope.tried == [1.0, 0.0]
+
+
+def test_equations_without_damping_have_to_be_definite_at_the_end() -> None:
+    slope = Slope(lambda d: -1e-5 if d else None, lambda _: 0.1 * SMALL)
+    assert one_step(slope).ended == ""
+
+
+def test_second_derivatives_are_asked_before_the_end() -> None:
+    slope = Slope(lambda _: -1e-5, lambda _: 0.1 * SMALL)
+    found = one_step(slope, newton=False)
+    assert (found.newton, found.ended, found.costs.total) == (True, "", 0.0)
+
+
+def test_where_every_step_leads_up_against_its_slope_that_is_told() -> None:
+    slope = Slope(lambda _: 1.0)
+    found = one_step(slope, 1.0)
+    assert (found.costs.total, found.state.coefficients[0].tolist()) == (0.0, [0.0])
+    assert "though its slope" in found.ended
+    assert 1e9 > max(slope.tried) > 1e6
 
 
 def test_where_no_damping_gives_a_step_that_is_told() -> None:
-    _, (state, _, _, lost) = one_step(lambda _: None, 1.0)
-    assert state.coefficients[0].tolist() == [0.0]
-    assert "definite" in lost
+    found = one_step(Slope(lambda _: None), 1.0)
+    assert found.state.coefficients[0].tolist() == [0.0]
+    assert "definite" in found.ended
 
 
 def test_equations_that_cannot_be_solved_are_no_least_cost(monkeypatch) -> None:

@@ -86,7 +86,7 @@ def test_a_bordered_band_is_solved_as_the_whole_matrix_is() -> None:
     band.border[:] = whole[:size, size:].reshape(count, COUNT, shared)
     band.slope[:] = right[:size].reshape(count, COUNT)
     assert (whole_of(band) == whole[:size, :size]).all(), "nothing reaches further than three"
-    factor = Factor.of(band, 0.3, 1e-3)
+    factor = Factor.of(band, 0.3 * band.diagonal + 1e-3)
     square = whole[size:, size:].copy()
     (step,), params = bordered_step([band], [factor], square, right[size:])
     whole[range(size), range(size)] += 0.3 * np.diag(whole)[:size] + 1e-3
@@ -179,6 +179,56 @@ def test_curvatures_are_products_of_differences(force_cost: str) -> None:
     )
 
 
+def test_with_second_derivatives_curvatures_are_differences_of_slopes() -> None:
+    """Of what passive elements do, the rest being straight: these bodies have no mass, and markers
+    count nothing."""
+    masses = spine().masses
+    weightless = replace(masses, kg=0.0 * masses.kg, about_com=0.0 * masses.about_com)
+    fitted = np.zeros((17, 6), dtype=bool)
+    fitted[3:5, 3] = fitted[8, 1] = True
+    free = np.ones((18, 6), dtype=bool)
+    free[6, :3] = False
+    ask = Ask(free=free, passive=law(), force_cost="level_difference", fitted=fitted)
+    seen = watched(replace(spine(), masses=weightless), markers(), trial_of(bent(4), markers()), 3)
+    seen = replace(seen, weight=np.zeros_like(seen.weight))
+    rng, size, shared = np.random.default_rng(3), seen.grid.coefficients * COUNT, ask.parameters
+    state = _State(
+        (rng.normal(0.0, 1e-2, (seen.grid.coefficients, 18, 6)) * ([0.1] * 3 + [1.0] * 3) * free,),
+        rng.normal(0.0, 0.2, shared),
+    )
+    problem, small = Trajectory(ask, (seen,)), 1e-6
+    asked, plain = problem.normal(state, newton=True), problem.normal(state)
+    assert (asked.scales[0] == plain.bands[0].diagonal).all()
+    assert (asked.scale == np.diag(plain.square)).all()
+
+    def slopes(there: _State) -> np.ndarray:
+        found = problem.normal(there)
+        return np.concatenate([found.bands[0].slope.ravel(), found.slope])
+
+    count = int(free.sum())
+    places = np.flatnonzero(np.tile(free.ravel(), seen.grid.coefficients))
+    for k in [*rng.choice(len(places), 10, replace=False), *len(places) + np.arange(shared)]:
+        move, turn = np.zeros(size), np.zeros(shared)
+        if k < len(places):
+            move[places[k]] = small
+        else:
+            turn[k - len(places)] = small
+        ahead = slopes(state.moved([move], turn))
+        expected = (ahead - slopes(state.moved([-move], -turn))) / (2.0 * small)
+        band, column = asked.bands[0], k - len(places)
+        if column < 0:
+            node, at = divmod(int(k), count)
+            found = np.zeros((seen.grid.coefficients, count))
+            for below in range(min(3, seen.grid.coefficients - node)):
+                found[node + below] = band.blocks[node, below][:, at]
+            for above in range(1, min(3, node + 1)):
+                found[node - above] = band.blocks[node - above, above][at]
+            whole = np.concatenate([found.ravel(), band.border[node, at]])
+        else:
+            whole = np.concatenate([band.border[..., column].ravel(), asked.square[:, column]])
+        np.testing.assert_allclose(whole, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
+
+
 @pytest.mark.numeric
 @pytest.mark.parametrize("held", [None, (False, True, False, True)])
 @pytest.mark.parametrize("damping", [0.0, 0.3])
@@ -207,11 +257,14 @@ def test_a_step_is_that_of_the_whole_damped_matrix(
     expected = np.zeros(size + 4)
     down = np.concatenate([band.slope.ravel(), asked.slope])
     expected[moves] = -np.linalg.solve(whole[np.ix_(moves, moves)], down[moves])
-    (step,), shared = problem.step(asked, damping)
+    (step,), shared, gain = problem.step(asked, damping)
     # beside what nothing asks about, which is 1e9 times as soft
     found = np.concatenate([step.ravel(), shared])
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
     assert not shared[~loose].any()
+    # what the quadratic form falls by: half slopes and half curvatures both count twice
+    whole[range(size + 4), range(size + 4)] -= damping / (1.0 + damping) * np.diag(whole)
+    assert gain == pytest.approx(-2.0 * down @ expected - expected @ whole @ expected, rel=1e-4)
 
 
 def test_what_markers_show_is_found_when_nothing_else_costs() -> None:

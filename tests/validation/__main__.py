@@ -22,6 +22,7 @@ from tests.validation import (
     pooled_coverage,
     posterior_coverage,
     tracking,
+    tracking_starts,
     trunk_pressures,
     wrong_inputs,
 )
@@ -49,6 +50,9 @@ def main() -> None:
         "sparse": _sparse,
         "tracking": _tracking,
         "tracking_profiles": _tracking_profiles,
+        "tracking_starts": lambda: _write(
+            "tracking_starts", tracking_starts.HEAD, tracking_starts.table()
+        ),
         "trunk_pressures": _trunk_pressures,
         "wrong_inputs": _wrong_inputs,
         "discrepancy": discrepancy.main,
