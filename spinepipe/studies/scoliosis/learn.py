@@ -11,14 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.progress import Progress
-from spinepipe.statics.prescribed import Ask, answered
-from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, NoFit, Told, weighed_with
+from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, Told, fit_alike, weighed_with
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import Population, assumed, learned
 from spinepipe.studies.scoliosis.population_table import Learned, population_rows
@@ -75,15 +73,9 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) ->
 def _fits(
     patients: Mapping[str, Patient], sd: Array, population: Population, before: Mapping[str, Fitted]
 ) -> Iterator[tuple[str, Fitted]]:
-    """The patients that can be fitted, each from its fit before."""
-
-    def fitted(name: str, ask: Ask) -> Fitted | None:
-        try:
-            return FilmFit(patients[name], sd, ask).fit(population, before.get(name))
-        except NoFit:
-            return None
-
-    found = in_lockstep([partial(fitted, name) for name in patients], answered)
+    """The patients that can be fitted, each from its fit before or, without one, from all starts."""
+    problems = [FilmFit(patient, sd) for patient in patients.values()]
+    found = fit_alike(problems, population, [before.get(name) for name in patients])
     return ((name, one) for name, one in zip(patients, found, strict=True) if one is not None)
 
 
