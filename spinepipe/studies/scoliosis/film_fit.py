@@ -8,9 +8,7 @@ as the population has it; the spread of what is left is the curvature at the opt
 The uppermost vertebra, too, is read with error, and what holds it would pass the error on to the
 segment below: where it was on each film is fitted along, near where it was read.
 
-The cost has several optima, so that a fit has several starts. Trial poses are sought from those of
-the trial before; what is told of an optimum is that of the poses that its model takes from neutral
-(`statics.prescribed.hold_at`), and where these are others it is fitted anew with such poses alone.
+The cost has several optima, so that a fit has several starts (`optima`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,16 +19,17 @@ from itertools import islice
 import numpy as np
 from scipy.stats import norm, qmc
 
-from spinepipe.calibrate.descent import Descent, Point, Settled, descend, once
+from spinepipe.calibrate.descent import Descent, Point, Settled, descend
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.statics.prescribed import Ask, Held, alone, answered
-from spinepipe.status import Ended
+from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.held_spine import BENDING, with_laws
-from spinepipe.studies.scoliosis.personal import Patient, Personal
+from spinepipe.studies.scoliosis.optima import Limits, Optimum, best, optimum
+from spinepipe.studies.scoliosis.personal import Fitting, Patient, Personal
 from spinepipe.studies.scoliosis.population import Known, Population, assumed
 from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, Ends
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -48,19 +47,6 @@ SETTLED = Settled(cost=1e-4, step=1e-4, slope=1e-8, evaluations=100)
 DRAWN_STARTS = 4
 """Starts drawn from the population, and as many with the two ends of each segment exchanged, so
 that a mirrored patient has mirrored starts."""
-
-SAME_POSE = 1e-6
-"""Rad: by which poses of one path differ at most."""
-
-SAME_OPTIMUM = 0.1
-"""SD of the population: optima that differ by less are one, as fits settle in a few hundredths."""
-
-COST_TIE = 1e-3
-"""Share of the cost, for the same reason: of optima that tie the first is taken."""
-
-STILL_FALLS = 1e-2
-"""Slope of the cost by a number's SD, as a share of the cost: beyond it, steps ended where poses
-leave for another path, and at no optimum."""
 
 LEVEL = 0.95
 """Of the intervals of ratios."""
@@ -115,10 +101,15 @@ class Fitted:
     unknowns: Array
     told: Told
     known: Known
-    arrived: bool
+    status: Status
     poses: Mapping[str, Held]
-    cost: float = np.nan
-    n_optima: int = 1
+    cost: float
+    n_optima: int
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the fit settled."""
+        return self.status.usable
 
     @property
     def decided(self) -> float:
@@ -195,10 +186,12 @@ class FilmFit:
             raise NoFit(NO_POSE)
         return found
 
-    def starts(self, population: Population) -> list[list[Array]]:
+    def starts(
+        self, population: Population, drawn: int = DRAWN_STARTS, seed: int = 0
+    ) -> list[list[Array]]:
         """Where fits begin: each a list of unknowns, of which the first that has poses is taken."""
         s = self.segments
-        draws = qmc.LatinHypercube(3 * s, rng=np.random.default_rng(0)).random(DRAWN_STARTS)
+        draws = qmc.LatinHypercube(3 * s, rng=np.random.default_rng(seed)).random(drawn)
         exchanged = np.concatenate([draws[:, :s], draws[:, 2 * s :], draws[:, s : 2 * s]], axis=1)
         numbers = population.mean + population.sd * norm.ppf(np.vstack([draws, exchanged]))
         further = (self._beyond_films(one, BEYOND_THE_FILM[0]) for one in numbers)
@@ -207,66 +200,25 @@ class FilmFit:
             *([np.append(one, np.zeros(TOPS))] for one in further),
         ]
 
-    def descent(
-        self,
-        population: Population,
-        begin: Sequence[Array],
-        near: Mapping[str, Held],
-        from_neutral: bool = False,
-    ) -> Descent | None:
-        """A fit from the first of some unknowns that has poses; None where none has.
-
-        Parameters
-        ----------
-        near : poses near by. from_neutral : whether each trial has the poses from neutral.
-        """
-        self.near = dict(near)
-        point, (low, high, scale) = self._point(population, from_neutral), _limits(population)
-        within = (np.clip(one, low + 1e-9, high - 1e-9) for one in begin)
-        start = next((one for one in within if point(one) is not None), None)
-        if start is None:
-            return None
-        size = 2 * 3 * (self.segments - 1) + len(start)
-        ended = descend(point, start, (low, high), scale, size, SETTLED)
-        if from_neutral and ended.arrived:
-            errors, slopes = point(ended.x) or (np.zeros(0), np.zeros((0, len(start))))
-            inside = (ended.x - low > 1e-6) & (high - ended.x > 1e-6)
-            slope = 2.0 * np.abs(errors @ slopes * scale)[inside].max(initial=0.0)
-            ended = replace(ended, arrived=bool(slope <= STILL_FALLS * 2.0 * ended.half_cost))
-        return ended
-
-    def at(self, population: Population, ended: Descent) -> Fitted | None:
-        """What an end of a fit comes to with the poses that its model takes from neutral."""
-        self.near = {}
-        found = self._point(population)(ended.x)
-        if found is None:
-            return None
-        films = 2 * 3 * (self.segments - 1)
-        told = _told(found[0][:films], found[1][:films], ended.x)
-        known = replace(told.known(population), mean=ended.x[:-TOPS])
-        cost = float(found[0] @ found[0])
-        return Fitted(ended.x, told, known, ended.arrived, dict(self.near), cost)
-
-    def _point(self, population: Population, from_neutral: bool = False) -> Point:
+    def point(self, population: Population) -> Point:
         """Errors of the films, and of the numbers in the population, in their SDs."""
         middle = np.append(population.mean, np.zeros(TOPS))
         drawn = np.eye(len(middle))
         drawn[: len(population.mean), : len(population.mean)] = population.root
 
-        def point(unknowns: Array) -> tuple[Array, Array] | None:
-            if from_neutral:
-                self.near = {}
-            found = self.missed(unknowns)
-            if found is None:
+        def found(unknowns: Array) -> tuple[Array, Array] | None:
+            films = self.missed(unknowns)
+            if films is None:
                 return None
             away = drawn @ (unknowns - middle)
-            return np.append(found[0], away), np.vstack([found[1], drawn])
+            return np.append(films[0], away), np.vstack([films[1], drawn])
 
-        return once(point)
+        return found
 
     def personal(self, fitted: Fitted) -> Personal:
         """The model of a fit."""
-        return self._personal(fitted.known, fitted.decided)
+        found = self._personal(fitted.known, fitted.decided)
+        return replace(found, fitting=Fitting(fitted.status, fitted.n_optima))
 
     def unfitted(self, population: Population) -> Personal:
         """The model of a patient of whom no film was fitted."""
@@ -349,18 +301,23 @@ class FilmFit:
 
 
 def fit_alike(
-    fits: Sequence[FilmFit], population: Population, before: Sequence[Fitted | None]
+    fits: Sequence[FilmFit],
+    population: Population,
+    before: Sequence[Fitted | None],
+    drawn: int = DRAWN_STARTS,
+    seed: int = 0,
 ) -> list[Fitted | None]:
     """Fits of patients with equally many segments, all starts in lockstep; None without a pose.
 
     Parameters
     ----------
     before : a fit near by of each, from which alone it begins; None for all starts.
+    drawn : starts drawn from the population, with that seed; as many more are their mirror image.
     """
     begins = [
         [([near.unknowns], near.poses)]
         if near is not None
-        else [(one, {}) for one in fit.starts(population)]
+        else [(one, {}) for one in fit.starts(population, drawn, seed)]
         for fit, near in zip(fits, before, strict=True)
     ]
     searches = [
@@ -369,7 +326,7 @@ def fit_alike(
         for begin in each
     ]
     ends = iter(in_lockstep(searches, answered))
-    return [_best(list(islice(ends, len(each))), population) for each in begins]
+    return [_fitted(list(islice(ends, len(each))), population) for each in begins]
 
 
 def _search(
@@ -378,38 +335,31 @@ def _search(
     begin: Sequence[Array],
     near: Mapping[str, Held],
     ask: Ask = alone,
-) -> Fitted | None:
-    """The end of a fit whose model takes its poses from neutral, from one start."""
+) -> Optimum | None:
+    """The end of a fit from one start."""
     fit = FilmFit(fit.patient, fit.sd, ask)
-    ended = fit.descent(population, begin, near)
-    if ended is None:
+    return optimum(fit, fit.point(population), begin, near, _limits(population), _descend)
+
+
+def _descend(point: Point, start: Array, limits: Limits) -> Descent:
+    low, high, scale = limits
+    found = point(start)
+    size = 0 if found is None else len(found[0])
+    return descend(point, start, (low, high), scale, size, SETTLED)
+
+
+def _fitted(ends: Sequence[Optimum | None], population: Population) -> Fitted | None:
+    """The best end, and what the films say near it."""
+    found, n_optima = best(ends, _limits(population)[2])
+    if found is None:
         return None
-    trials, found = fit.near, fit.at(population, ended)
-    if found is not None and all(
-        np.abs(found.poses[name].q - trials[name].q).max() < SAME_POSE for name in trials
-    ):
-        return found
-    ended = fit.descent(population, [ended.x, *begin], {}, from_neutral=True)
-    return None if ended is None else fit.at(population, ended)
+    films = len(found.residual) - len(found.x)  # the rest is of the population
+    told = _told(found.residual[:films], found.jacobian[:films], found.x)
+    known = replace(told.known(population), mean=found.x[:-TOPS])
+    return Fitted(found.x, told, known, found.status, found.poses, found.cost, n_optima)
 
 
-def _best(ends: Sequence[Fitted | None], population: Population) -> Fitted | None:
-    """The end of least cost, of those that settled if any did, and how many there are."""
-    there = [one for one in ends if one is not None]
-    if not there:
-        return None
-    some = [one for one in there if one.arrived] or there
-    least = min(one.cost for one in some)
-    best = next(one for one in some if one.cost <= (1.0 + COST_TIE) * least)
-    scale, distinct = _limits(population)[2], list[Fitted]()
-    for one in some:
-        apart = [np.abs((one.unknowns - other.unknowns) / scale).max() for other in distinct]
-        if min(apart, default=np.inf) > SAME_OPTIMUM:
-            distinct.append(one)
-    return replace(best, n_optima=len(distinct))
-
-
-def _limits(population: Population) -> tuple[Array, Array, Array]:
+def _limits(population: Population) -> Limits:
     """(3 S + 6,) each: least and largest unknowns, and their SD in the population."""
     middle = np.append(population.mean, np.zeros(TOPS))
     scale = np.append(population.sd, np.ones(TOPS))

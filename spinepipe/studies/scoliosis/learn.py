@@ -25,7 +25,7 @@ from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import POPULATION
 from spinepipe.tables import from_rows, write
 
-MOST_ROUNDS = 5
+MOST_ROUNDS = 20
 LAST_ROUND = 0.03
 """Rounds end when no mean of a logarithm and no spread changes by more."""
 
@@ -67,13 +67,13 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) ->
         if change < LAST_ROUND or not fits:
             break
     unfitted = tuple(name for name in patients if name not in fits)
-    return Learned(population, rounds, change, len(fits), unfitted)
+    return Learned(population, rounds, change, len(fits), unfitted, change < LAST_ROUND)
 
 
 def _fits(
     patients: Mapping[str, Patient], sd: Array, population: Population, before: Mapping[str, Fitted]
 ) -> Iterator[tuple[str, Fitted]]:
-    """The patients that can be fitted, each from its fit before or, without one, from all starts."""
+    """The patients that can be fitted, from the fits before or, without these, from all starts."""
     problems = [FilmFit(patient, sd) for patient in patients.values()]
     found = fit_alike(problems, population, [before.get(name) for name in patients])
     return ((name, one) for name, one in zip(patients, found, strict=True) if one is not None)

@@ -111,7 +111,9 @@ def test_the_largest_change_counts_up_or_down() -> None:
 def test_a_table_tells_means_with_the_interval_of_patients() -> None:
     """Of a normal logarithm: exp(mean -+ 1.96 SD); ends in degrees."""
     usual = assumed(2)
-    rows = list(population_rows(Learned(usual, 4, np.inf, 3, ()), ("a", "b"), np.full(3, 0.002)))
+    rows = list(
+        population_rows(Learned(usual, 4, np.inf, 3, (), True), ("a", "b"), np.full(3, 0.002))
+    )
     assert [(row["quantity"], row["joint"]) for row in rows] == [
         (quantity, joint) for quantity in ("ratio", "lower_end", "upper_end") for joint in "ab"
     ]
