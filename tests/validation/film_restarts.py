@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -39,7 +40,7 @@ def table() -> pd.DataFrame:
     return pd.DataFrame([*_tangents(patients, sd, everyone), *_regions(patients)])
 
 
-def _tangents(patients: list[Patient], sd: Array, everyone: Population) -> Iterator[dict]:
+def _tangents(patients: list[Patient], sd: Array, everyone: Population) -> Iterator[dict[str, Any]]:
     fits = [FilmFit(one, sd) for one in patients]
     usual = fit_alike(fits, everyone, [None] * len(fits))
     again = fit_alike(fits, everyone, [None] * len(fits), DRAWN, SEED)
@@ -50,7 +51,7 @@ def _tangents(patients: list[Patient], sd: Array, everyone: Population) -> Itera
         yield _row("tangent_fitted", patient, 1 + 2 * DRAWN, *ends)
 
 
-def _regions(patients: list[Patient]) -> Iterator[dict]:
+def _regions(patients: list[Patient]) -> Iterator[dict[str, Any]]:
     for patient in patients:
         (_, one, n), (fit, other, more) = region_optimum(patient), region_optimum(patient, SHARES)
         if one is not None and other is not None:
@@ -60,7 +61,7 @@ def _regions(patients: list[Patient]) -> Iterator[dict]:
 
 def _row(
     model: str, patient: Patient, starts: int, usual: tuple[float, int], again: tuple[float, int]
-) -> dict:
+) -> dict[str, Any]:
     least, seen = again
     return {
         "model": model,

@@ -314,7 +314,7 @@ def fit_alike(
     before : a fit near by of each, from which alone it begins; None for all starts.
     drawn : starts drawn from the population, with that seed; as many more are their mirror image.
     """
-    begins = [
+    begins: list[list[tuple[Sequence[Array], Mapping[str, Held]]]] = [
         [([near.unknowns], near.poses)]
         if near is not None
         else [(one, {}) for one in fit.starts(population, drawn, seed)]

@@ -171,7 +171,9 @@ def optima(study: Scoliosis, results: Results) -> Iterator[str]:
         (several, "found several optima; the one of least error is taken, and there may be others"),
     ):
         if len(some):
-            places = [f"{one.specimen}, {IN_WORDS[one.model]}" for one in some.itertuples()]
+            places = [
+                f"{one['specimen']}, {IN_WORDS[one['model']]}" for one in some.to_dict("records")
+            ]
             yield f"{len(some)} of {count(len(fits), 'fit')} to films {told}: {_some(places)}."
 
 

@@ -15,6 +15,7 @@ from spinepipe.calibrate.descent import Descent, Point, once
 from spinepipe.effects.contract import Array
 from spinepipe.statics.prescribed import Held
 from spinepipe.status import Status
+from spinepipe.studies.scoliosis.tangent_laws import Flags
 
 SAME_POSE = 1e-6
 """Rad: by which poses of one path differ at most."""
@@ -60,7 +61,7 @@ class Optimum:
     jacobian: Array
     poses: Mapping[str, Held]
     status: Status
-    at_bound: Array
+    at_bound: Flags
 
     @property
     def cost(self) -> float:
