@@ -19,7 +19,7 @@ Newton asks for one step at a time. Whoever holds many chains may answer many su
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import NamedTuple, cast
+from typing import NamedTuple, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,18 @@ MOST_ITERATIONS = 40
 PUSH_TOLERANCE, SMALL_PUSH = 1e-9, 1.0
 """Newton has arrived when pushes change by less than this share of the largest; N and N m."""
 
+LONGEST_CORRECTION = 0.1 / STEP_TOLERANCE[3]
+"""Newton's first step from a prediction is no longer than 0.1 rad, in its tolerances."""
+
+CONTRACTION = 0.5
+"""Each further one is so much shorter, as Newton's are near a solution,"""
+
+ROUNDED = 100.0
+"""unless it is so few tolerances long that it may be rounding."""
+
+SMALLEST_STEP = 2.0**-10
+"""Share of the way: where the chain snaps is told to a thousandth."""
+
 SOFTEST, HARDEST = 1e4, 1e-4
 """Compliances of a holder: units squared that it gives way per N m of work."""
 
@@ -58,6 +70,10 @@ REACHED = 0.1
 
 UNREACHABLE = "no pose has all that is prescribed"
 UNSTABLE = "the spine buckles out of what is prescribed"
+SNAPS = (
+    "the spine snaps at {:.1f} % of the straight way to its place: the pose is one of several that "
+    "stand there"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -424,18 +440,37 @@ def alone(trial: Trial) -> NewtonStep | None:
 def hold_at(chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask = alone) -> Held:
     """The pose in which a chain is held.
 
+    It is the end of the path of stable poses along which all that is prescribed comes on in
+    proportion, from the neutral pose. Where the chain snaps on that way the message says so, and
+    the pose is one that stands where it is wanted: Newton's from the last pose of the path, else
+    from the neutral pose.
+
     Parameters
     ----------
     wanted : (k,) m and rad, value of each prescription.
-    start : a pose near by, with its pushes; the neutral pose without.
+    start : a pose near by, with its pushes, for searches: Newton's from there is taken, which may
+        be on another path; without, or where Newton leads nowhere, the above.
     """
     problem = _Problem(chain, ask)
     rest = Held(np.zeros(len(chain.free)), np.zeros(len(wanted)), wanted, Ended.CONVERGED, "", 0)
-    for near in filter(None, (start, rest)):
-        found = problem.newton(near, wanted, 0.0)
-        if found is not None and found.status is Ended.CONVERGED:
+    if start is not None:
+        found = problem.newton(start, wanted, 0.0)
+        if _stood(found):
             return found
-    return problem.led(rest, wanted)
+    last, share = problem.followed(rest, wanted)
+    if share == 1.0:
+        return last
+    snaps = SNAPS.format(100.0 * share)
+    for near in (last, rest):
+        found = problem.newton(near, wanted, 0.0)
+        if _stood(found):
+            return replace(found, message=snaps)
+    found = problem.led(rest, wanted)
+    return replace(found, message=snaps) if _stood(found) else found
+
+
+def _stood(found: Held | None) -> TypeGuard[Held]:
+    return found is not None and found.status is Ended.CONVERGED
 
 
 class _Problem:
@@ -447,18 +482,31 @@ class _Problem:
         self.tolerance = np.tile(STEP_TOLERANCE, len(chain.free) // 6)[chain.free]
         self.units = chain.units
 
-    def newton(self, start: Held, wanted: Array, compliance: float) -> Held | None:
-        """From a pose near by; None where the steps lead nowhere."""
+    def newton(
+        self, start: Held, wanted: Array, compliance: float, on_path: bool = False
+    ) -> Held | None:
+        """From a pose near by; None where the steps lead nowhere.
+
+        Parameters
+        ----------
+        on_path : whether the start is on the path but for a small error, so that Newton contracts.
+        """
         q, pushes = start.q.copy(), start.pushes.copy()
-        step = np.zeros(self.count + len(wanted))
+        step, allowed = np.zeros(self.count + len(wanted)), LONGEST_CORRECTION
         for iteration in range(1, MOST_ITERATIONS + 1):
             found = self.ask(Trial(self.chain, q, pushes, wanted, compliance))
+            if found is None and on_path:
+                return None
             if found is None:  # beyond the ends of a law
                 step = 0.5 * step
                 q[self.free] -= step[: self.count]
                 pushes -= step[self.count :]
                 continue
             step = found.step
+            size = float((np.abs(step[: self.count]) / self.tolerance).max(initial=0.0))
+            if on_path and not size <= allowed:
+                return None
+            allowed = max(CONTRACTION * size, ROUNDED)
             q[self.free] += step[: self.count]
             pushes += step[self.count :]
             if not np.abs(q.reshape(-1, 6)[:, 3:]).max() < LARGEST_ROTATION:
@@ -496,6 +544,30 @@ class _Problem:
         except np.linalg.LinAlgError:
             return False
         return True
+
+    def followed(self, rest: Held, wanted: Array) -> tuple[Held, float]:
+        """The last pose of the path on which what is wanted comes on, and the share that did.
+
+        Predictor along the tangent, Newton as corrector. A step is a piece of the path where Newton
+        contracts from its first step on and the end stands (Deuflhard 2011, chapter 5,
+        doi:10.1007/978-3-642-23899-4); it is halved until it is.
+        """
+        first = self.chain.reached(rest.q)
+        last, share, step = self.newton(rest, first, 0.0), 0.0, FIRST_INCREMENT
+        if not _stood(last):
+            return rest, 0.0
+        while share < 1.0 and step > SMALLEST_STEP:
+            target = min(1.0, share + step)
+            assert last.answers is not None  # a pose that stands has them
+            onward = (target - share) * (wanted - first)
+            q, pushes = last.answers.to(np.zeros((len(last.q), 1)), onward[:, None])
+            ahead = replace(last, q=last.q + q[:, 0], pushes=last.pushes + pushes[:, 0])
+            found = self.newton(ahead, first + target * (wanted - first), 0.0, on_path=True)
+            if _stood(found):
+                last, share, step = found, target, 2.0 * step
+            else:
+                step *= 0.5
+        return last, share
 
     def led(self, rest: Held, wanted: Array) -> Held:
         """What is wanted in fractions, from the neutral pose; the nearest where the way ends."""

@@ -21,6 +21,9 @@ from spinepipe.tables import from_rows
 from spinepipe.tables.schema import Table
 
 FREE = dict(zip(MODELS, (43, 43, 2, 15, 0), strict=True))
+FITTED = ("tangent_fitted", "linear_regions")
+"""Models that are fitted through the simulator."""
+
 ERRORS = dict(zip(MODELS, (0.4, 0.3, 0.6, 0.5, 0.8), strict=True))
 """Error of every rotation, deg, by model."""
 
@@ -152,6 +155,8 @@ def _rows(
         law = {"at_rest_nm_per_rad": 50.0 + at, "ratio": 1.0, "ratio_low": None}
         law |= {"lower_end_deg": -5.0 if ends else None, "upper_end_deg": 6.0 if ends else None}
         law |= _by_films(model, at)
+        law |= {"fit_status": "converged" if model in FITTED else None}
+        law |= {"n_optima": 1 if model in FITTED else None}
         law |= {"ratio_high": None, "opposite": at == 13, "constrained": ends and at == 13}
         found["laws"].append(
             known | {"joint": joint} | law | taken | {"scale_from": "apical_moment"}

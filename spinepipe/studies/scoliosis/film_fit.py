@@ -7,23 +7,29 @@ as the population has it; the spread of what is left is the curvature at the opt
 
 The uppermost vertebra, too, is read with error, and what holds it would pass the error on to the
 segment below: where it was on each film is fitted along, near where it was read.
+
+The cost has several optima, so that a fit has several starts (`optima`).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import norm, qmc
 
-from spinepipe.calibrate.descent import Settled, descend, once
+from spinepipe.calibrate.descent import Descent, Point, Settled, descend
+from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
-from spinepipe.statics.prescribed import Ask, Held, alone
-from spinepipe.status import Ended
+from spinepipe.statics.prescribed import Ask, Held, alone, answered
+from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.held_spine import BENDING, with_laws
-from spinepipe.studies.scoliosis.personal import Patient, Personal
+from spinepipe.studies.scoliosis.optima import Limits, Optimum, best, optimum
+from spinepipe.studies.scoliosis.personal import Fitting, Patient, Personal
 from spinepipe.studies.scoliosis.population import Known, Population, assumed
 from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, Ends
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -37,6 +43,10 @@ these at which the chain has a pose."""
 
 SETTLED = Settled(cost=1e-4, step=1e-4, slope=1e-8, evaluations=100)
 """A ten-thousandth of a number's logarithm is far within its spread."""
+
+DRAWN_STARTS = 4
+"""Starts drawn from the population, and as many with the two ends of each segment exchanged, so
+that a mirrored patient has mirrored starts."""
 
 LEVEL = 0.95
 """Of the intervals of ratios."""
@@ -82,15 +92,24 @@ class Fitted:
     unknowns : (3 S + 6,), the likeliest: the numbers, then by how many SD the uppermost vertebra
         lay off where the right and the left film have it.
     known : the numbers and their covariance.
-    poses : by position, those of the films.
+    poses : by position, those of the films, as the model takes them from neutral.
     decided : of how many the films, not the population, decided.
+    cost : sum of squares of errors and of what the population holds against the numbers, in SDs.
+    n_optima : distinct optima found from all starts.
     """
 
     unknowns: Array
     told: Told
     known: Known
-    arrived: bool
+    status: Status
     poses: Mapping[str, Held]
+    cost: float
+    n_optima: int
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the fit settled."""
+        return self.status.usable
 
     @property
     def decided(self) -> float:
@@ -162,38 +181,44 @@ class FilmFit:
         ------
         NoFit : where no pose begins the fit.
         """
-        root, tops = population.root, np.zeros(TOPS)
-        middle = np.concatenate([population.mean, tops])
-        scale = np.concatenate([population.sd, tops + 1.0])
-        low, high = middle - FARTHEST * scale, middle + FARTHEST * scale
-        drawn = np.eye(len(middle))
-        drawn[: len(root), : len(root)] = root
-        self.near = {} if start is None else dict(start.poses)
+        (found,) = fit_alike([self], population, [start])
+        if found is None:
+            raise NoFit(NO_POSE)
+        return found
 
-        @once
-        def point(unknowns: Array) -> tuple[Array, Array] | None:
-            found = self.missed(unknowns)
-            if found is None:
+    def starts(
+        self, population: Population, drawn: int = DRAWN_STARTS, seed: int = 0
+    ) -> list[list[Array]]:
+        """Where fits begin: each a list of unknowns, of which the first that has poses is taken."""
+        s = self.segments
+        draws = qmc.LatinHypercube(3 * s, rng=np.random.default_rng(seed)).random(drawn)
+        exchanged = np.concatenate([draws[:, :s], draws[:, 2 * s :], draws[:, s : 2 * s]], axis=1)
+        numbers = population.mean + population.sd * norm.ppf(np.vstack([draws, exchanged]))
+        further = (self._beyond_films(one, BEYOND_THE_FILM[0]) for one in numbers)
+        return [
+            list(self._guesses(population)),
+            *([np.append(one, np.zeros(TOPS))] for one in further),
+        ]
+
+    def point(self, population: Population) -> Point:
+        """Errors of the films, and of the numbers in the population, in their SDs."""
+        middle = np.append(population.mean, np.zeros(TOPS))
+        drawn = np.eye(len(middle))
+        drawn[: len(population.mean), : len(population.mean)] = population.root
+
+        def found(unknowns: Array) -> tuple[Array, Array] | None:
+            films = self.missed(unknowns)
+            if films is None:
                 return None
             away = drawn @ (unknowns - middle)
-            return np.append(found[0], away), np.vstack([found[1], drawn])
+            return np.append(films[0], away), np.vstack([films[1], drawn])
 
-        guesses = self._guesses(population) if start is None else [start.unknowns]
-        within = (np.clip(one, low + 1e-9, high - 1e-9) for one in guesses)
-        begin = next((one for one in within if point(one) is not None), None)
-        if begin is None:
-            raise NoFit(NO_POSE)
-        size = 2 * 3 * (self.segments - 1) + len(begin)
-        ended = descend(point, begin, (low, high), scale, size, SETTLED)
-        found = self.missed(ended.x)
-        assert found is not None  # a descent ends where there is a pose
-        told = _told(*found, ended.x)
-        known = replace(told.known(population), mean=ended.x[:-TOPS])
-        return Fitted(ended.x, told, known, ended.arrived, self.near)
+        return found
 
     def personal(self, fitted: Fitted) -> Personal:
         """The model of a fit."""
-        return self._personal(fitted.known, fitted.decided)
+        found = self._personal(fitted.known, fitted.decided)
+        return replace(found, fitting=Fitting(fitted.status, fitted.n_optima))
 
     def unfitted(self, population: Population) -> Personal:
         """The model of a patient of whom no film was fitted."""
@@ -273,6 +298,72 @@ class FilmFit:
         most = np.maximum(pairs.right, pairs.left)
         reached = beyond * np.maximum(np.concatenate([least, most]), SMALLEST_END)
         return np.concatenate([numbers[:s], np.maximum(numbers[s:], np.log(reached))])
+
+
+def fit_alike(
+    fits: Sequence[FilmFit],
+    population: Population,
+    before: Sequence[Fitted | None],
+    drawn: int = DRAWN_STARTS,
+    seed: int = 0,
+) -> list[Fitted | None]:
+    """Fits of patients with equally many segments, all starts in lockstep; None without a pose.
+
+    Parameters
+    ----------
+    before : a fit near by of each, from which alone it begins; None for all starts.
+    drawn : starts drawn from the population, with that seed; as many more are their mirror image.
+    """
+    begins: list[list[tuple[Sequence[Array], Mapping[str, Held]]]] = [
+        [([near.unknowns], near.poses)]
+        if near is not None
+        else [(one, {}) for one in fit.starts(population, drawn, seed)]
+        for fit, near in zip(fits, before, strict=True)
+    ]
+    searches = [
+        partial(_search, fit, population, *begin)
+        for fit, each in zip(fits, begins, strict=True)
+        for begin in each
+    ]
+    ends = iter(in_lockstep(searches, answered))
+    return [_fitted(list(islice(ends, len(each))), population) for each in begins]
+
+
+def _search(
+    fit: FilmFit,
+    population: Population,
+    begin: Sequence[Array],
+    near: Mapping[str, Held],
+    ask: Ask = alone,
+) -> Optimum | None:
+    """The end of a fit from one start."""
+    fit = FilmFit(fit.patient, fit.sd, ask)
+    return optimum(fit, fit.point(population), begin, near, _limits(population), _descend)
+
+
+def _descend(point: Point, start: Array, limits: Limits) -> Descent:
+    low, high, scale = limits
+    found = point(start)
+    size = 0 if found is None else len(found[0])
+    return descend(point, start, (low, high), scale, size, SETTLED)
+
+
+def _fitted(ends: Sequence[Optimum | None], population: Population) -> Fitted | None:
+    """The best end, and what the films say near it."""
+    found, n_optima = best(ends, _limits(population)[2])
+    if found is None:
+        return None
+    films = len(found.residual) - len(found.x)  # the rest is of the population
+    told = _told(found.residual[:films], found.jacobian[:films], found.x)
+    known = replace(told.known(population), mean=found.x[:-TOPS])
+    return Fitted(found.x, told, known, found.status, found.poses, found.cost, n_optima)
+
+
+def _limits(population: Population) -> Limits:
+    """(3 S + 6,) each: least and largest unknowns, and their SD in the population."""
+    middle = np.append(population.mean, np.zeros(TOPS))
+    scale = np.append(population.sd, np.ones(TOPS))
+    return middle - FARTHEST * scale, middle + FARTHEST * scale, scale
 
 
 def weighed_with(reading_mm: float, reading_deg: float, model_mm: float, model_deg: float) -> Array:

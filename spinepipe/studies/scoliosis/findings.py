@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.report.page.document import Results, judged
 from spinepipe.report.words import capital, count, fixed, listed, number, percent, plain
-from spinepipe.status import Ended
+from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis.headline import DECIDING, SIGNIFICANT, Standing, p_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables_of_errors import GROUPS, MEASURES
@@ -158,6 +158,25 @@ def constrained(study: Scoliosis, results: Results) -> Iterator[str]:
     )
 
 
+def optima(study: Scoliosis, results: Results) -> Iterator[str]:
+    """Fits that depend on where they start, or did not settle."""
+    rows = results.table("laws")
+    if rows.empty:
+        return
+    fits = rows.dropna(subset=["fit_status"]).drop_duplicates(["specimen", "model"])
+    lost = fits[fits["fit_status"] == Status.NOT_CONVERGED.value]
+    several = fits[fits["n_optima"] > 1]
+    for some, told in (
+        (lost, "did not settle"),
+        (several, "found several optima; the one of least error is taken, and there may be others"),
+    ):
+        if len(some):
+            places = [
+                f"{one['specimen']}, {IN_WORDS[one['model']]}" for one in some.to_dict("records")
+            ]
+            yield f"{len(some)} of {count(len(fits), 'fit')} to films {told}: {_some(places)}."
+
+
 def ratios(study: Scoliosis, results: Results) -> Iterator[str]:
     """What films do not tell, where it comes from, and how much hangs on it."""
     rows = results.table("positions")
@@ -292,6 +311,6 @@ def beside_the_paper(study: Scoliosis, results: Results) -> Iterator[str]:
 
 
 MAKERS: tuple[Finding, ...] = (
-    *(ended, errors, both_ways, opposite, constrained, ratios, by_films, enlargement),
-    *(parameters, beyond, sizes, beside_the_paper),
+    *(ended, errors, both_ways, opposite, constrained, optima, ratios),
+    *(by_films, enlargement, parameters, beyond, sizes, beside_the_paper),
 )

@@ -4,14 +4,14 @@ It hangs on rotations of segments, pooled over held-out films and patients; diff
 models are tested over patients (table ``statistics``).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import pandas as pd
 
 from spinepipe.report.page.document import Headline, Results
 from spinepipe.report.words import capital, count, number
-from spinepipe.status import Ended
+from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis.errors import REFERENCE
 from spinepipe.studies.scoliosis.words import TOLD
 
@@ -77,7 +77,10 @@ def headline(results: Results) -> Headline:
     """The answer, how sure it is, and what casts doubt on it."""
     accuracy, positions = results.table("accuracy"), results.table("positions")
     held_out = Standing.of(accuracy, "held_out", DECIDING)
-    doubts = tuple(_doubts(positions, held_out))
+    doubts = (
+        *_doubts(positions, held_out),
+        *_of_fits(results.table("laws"), results.table("population")),
+    )
     if not held_out.models:
         fitted = Standing.of(accuracy, "fitted", DECIDING)
         return Headline(_without(positions), _of_fitted(fitted), doubts)
@@ -214,3 +217,18 @@ def _doubts(positions: pd.DataFrame, held_out: Standing) -> list[str]:
             f"of {counts[-1]}."
         )
     return doubts
+
+
+def _of_fits(laws: pd.DataFrame, population: pd.DataFrame) -> Iterator[str]:
+    """Fits that ended where they were not free to end, or before they had."""
+    if "fit_status" in laws:
+        fits = laws[laws["model"] == REFERENCE].drop_duplicates("specimen")
+        held = int((fits["fit_status"] == Status.CONVERGED_AT_BOUND.value).sum())
+        if held:
+            yield (
+                f"In {held} of {count(len(fits), 'patient')} {TOLD[REFERENCE]} ends at the bound "
+                "of its multipliers, a factor of 10: what others are compared with is decided by "
+                "the bound there."
+            )
+    if "status" in population and (population["status"] == Status.NOT_CONVERGED.value).any():
+        yield "The population of tangent_fitted did not stand still within its rounds."

@@ -11,14 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.progress import Progress
-from spinepipe.statics.prescribed import Ask, answered
-from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, NoFit, Told, weighed_with
+from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, Told, fit_alike, weighed_with
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import Population, assumed, learned
 from spinepipe.studies.scoliosis.population_table import Learned, population_rows
@@ -27,7 +25,7 @@ from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import POPULATION
 from spinepipe.tables import from_rows, write
 
-MOST_ROUNDS = 5
+MOST_ROUNDS = 20
 LAST_ROUND = 0.03
 """Rounds end when no mean of a logarithm and no spread changes by more."""
 
@@ -69,21 +67,15 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) ->
         if change < LAST_ROUND or not fits:
             break
     unfitted = tuple(name for name in patients if name not in fits)
-    return Learned(population, rounds, change, len(fits), unfitted)
+    return Learned(population, rounds, change, len(fits), unfitted, change < LAST_ROUND)
 
 
 def _fits(
     patients: Mapping[str, Patient], sd: Array, population: Population, before: Mapping[str, Fitted]
 ) -> Iterator[tuple[str, Fitted]]:
-    """The patients that can be fitted, each from its fit before."""
-
-    def fitted(name: str, ask: Ask) -> Fitted | None:
-        try:
-            return FilmFit(patients[name], sd, ask).fit(population, before.get(name))
-        except NoFit:
-            return None
-
-    found = in_lockstep([partial(fitted, name) for name in patients], answered)
+    """The patients that can be fitted, from the fits before or, without these, from all starts."""
+    problems = [FilmFit(patient, sd) for patient in patients.values()]
+    found = fit_alike(problems, population, [before.get(name) for name in patients])
     return ((name, one) for name, one in zip(patients, found, strict=True) if one is not None)
 
 

@@ -6,20 +6,22 @@ the geometric mean over segments of the stiffness at rest, comes from outside (`
 is one for all models, so that they differ by what they make of the films alone.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.descent import Settled, descend, once
+from spinepipe.calibrate.descent import Descent, Point, Settled, descend
 from spinepipe.calibrate.profile import Reach
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.statics.prescribed import Held
-from spinepipe.status import Ended
+from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis.curve_angles import Curve, curves, lumbar_apex
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, Film, Read, read_films
 from spinepipe.studies.scoliosis.held_spine import (
@@ -29,6 +31,7 @@ from spinepipe.studies.scoliosis.held_spine import (
     with_laws,
     with_springs,
 )
+from spinepipe.studies.scoliosis.optima import Limits, Optimum, best, optimum
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
     Ends,
@@ -41,6 +44,9 @@ from spinepipe.studies.scoliosis.tangent_laws import (
 
 FARTHEST_MULTIPLIER = np.log(10.0)
 """Petit 2004 reports multipliers of regions up to 10."""
+
+START_SHARES = (-0.5, 0.5)
+"""Multipliers that a fit starts from, as logarithms over the farthest; and all alike."""
 
 SETTLED = Settled(cost=1e-6, step=1e-4, slope=1e-10, evaluations=50)
 """Multipliers to a ten-thousandth."""
@@ -85,6 +91,13 @@ class Patient:
         return curves(self.erect)
 
 
+class Fitting(NamedTuple):
+    """How a fit to the films ended, and how many distinct optima its starts have found."""
+
+    status: Status
+    n_optima: int
+
+
 @dataclass(frozen=True)
 class Personal:
     """A personalised model.
@@ -98,6 +111,7 @@ class Personal:
     decided : of how many the films decided; all, where the model draws them to no population.
     ratio_range : (2, S) 95 % interval of the segments' ratios; none where the model gives none.
     by_films : (S,) how far the films let each ratio go; none where they were not asked.
+    fitting : none where nothing is fitted through the simulator.
     """
 
     model: SpineModel
@@ -108,6 +122,7 @@ class Personal:
     decided: float
     ratio_range: Array | None = None
     by_films: tuple[Reach, ...] | None = None
+    fitting: Fitting | None = None
 
     @property
     def ratio(self) -> Array:
@@ -206,22 +221,49 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
 
     With the uppermost vertebra held in place only ratios of the multipliers count.
     """
-    regions = _regions(patient)
-    count = int(regions.max()) + 1
-    best = np.zeros(count - 1)
-    fit = _RegionFit(patient, regions)
-    if count > 1:
-        reach = np.full(count - 1, FARTHEST_MULTIPLIER)
-        size = 2 * len(patient.curves)
-        best = descend(once(fit.missed), best, (-reach, reach), np.ones(count - 1), size, SETTLED).x
-    return _springs(patient, fit.stiffness(best), count - 1)
+    fit, found, n_optima = region_optimum(patient)
+    free = fit.by_logs.shape[1]
+    if not free:
+        return _springs(patient, patient.springs[:, BENDING], free)
+    if found is None:  # no start has poses with the uppermost vertebra where the films have it
+        lost = _springs(patient, patient.springs[:, BENDING], free)
+        return replace(lost, fitting=Fitting(Status.NOT_CONVERGED, n_optima))
+    held = np.append(found.at_bound, found.at_bound.any())  # multipliers are over the last region's
+    personal, fitting = (
+        _springs(patient, fit.stiffness(found.x), free),
+        Fitting(found.status, n_optima),
+    )
+    return replace(personal, constrained=held[fit.regions], fitting=fitting)
 
 
-class _RegionFit:
+def region_optimum(
+    patient: Patient, shares: Sequence[float] = START_SHARES
+) -> tuple["RegionFit", Optimum | None, int]:
+    """The best of all optima of the multipliers, and how many distinct ones were found.
+
+    Parameters
+    ----------
+    shares : of the farthest multiplier, as logarithms, which starts combine.
+    """
+    fit = RegionFit(patient, _regions(patient))
+    free = fit.by_logs.shape[1]
+    reach = np.full(free, FARTHEST_MULTIPLIER)
+    limits, descending = (-reach, reach, np.ones(free)), partial(_descend, 2 * len(patient.curves))
+    starts = [np.zeros(free), *(reach * one for one in product(shares, repeat=free))]
+    ends = [optimum(fit, fit.missed, [one], {}, limits, descending) for one in starts if free]
+    return fit, *best(ends, limits[2])
+
+
+def _descend(size: int, point: Point, start: Array, limits: Limits) -> Descent:
+    return descend(point, start, limits[:2], limits[2], size, SETTLED)
+
+
+class RegionFit:
     """Ferguson angles of both bending films as a least squares problem."""
 
     def __init__(self, patient: Patient, regions: Regions) -> None:
         self.patient, self.start = patient, patient.springs[:, BENDING]
+        self.regions = regions
         own = np.eye(int(regions.max()) + 1)[regions]
         self.by_logs = (own - own.mean(axis=0))[:, :-1]  # (S, k - 1) of the segments' logarithms
         self.spine = patient.held(with_springs(patient.chain, patient.springs))

@@ -10,6 +10,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.status import Status
 from spinepipe.studies.scoliosis.curve_angles import region
 from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.film_regions import regions
@@ -28,6 +29,8 @@ from spinepipe.units import DEG_PER_RAD, MM_PER_M
 Row = dict[str, Any]
 
 NOT_ARRIVED = "the fit to the films did not settle"
+AT_BOUND = "the fit to the films ended at a bound of what may be"
+UNSETTLED = "the population did not stand still within its rounds"
 
 REGION = ("films_low", "films_high", "open_below", "open_above")
 """Columns of what films say of a ratio."""
@@ -78,8 +81,12 @@ def rows_of(
         "decided_parameters": personal.decided,
         "scale_from": settings.scale.of,
     }
+    fitting: Row = {
+        "fit_status": personal.fitting and personal.fitting.status.value,
+        "n_optima": personal.fitting and personal.fitting.n_optima,
+    }
     found: dict[str, list[Row]] = {
-        LAWS.name: [known | row | taken for row in _laws(patient, personal)],
+        LAWS.name: [known | row | taken | fitting for row in _laws(patient, personal)],
         POSITIONS.name: [],
         DISPLACEMENTS.name: [],
         CURVES.name: [],
@@ -110,17 +117,30 @@ def _personal(
 ) -> tuple[Personal, str]:
     """The model, and what is to be said of how it was come by."""
     if population is None:
-        return WAYS[model](patient, settings), ""
+        personal = WAYS[model](patient, settings)
+        return personal, _of_fit(personal)
     everyone, sd = population_of(population)
     fit = FilmFit(patient, sd)
     try:
         fitted = fit.fit(everyone)
     except NoFit as why:
         return fit.unfitted(everyone), f"not fitted: {why}; stiffness is that of the population"
-    personal, told = fit.personal(fitted), "" if fitted.arrived else NOT_ARRIVED
+    personal = fit.personal(fitted)
+    unsettled = UNSETTLED if "not_converged" in set(population["status"].dropna()) else ""
+    told = joined(unsettled, _of_fit(personal))
     if not settings.film_regions:
         return personal, told
     return replace(personal, by_films=regions(fit, everyone, fitted)), told
+
+
+def _of_fit(personal: Personal) -> str:
+    """What is to be said of a fit to the films."""
+    if personal.fitting is None:
+        return ""
+    status, n_optima = personal.fitting
+    told = {Status.NOT_CONVERGED: NOT_ARRIVED, Status.CONVERGED_AT_BOUND: AT_BOUND}.get(status, "")
+    several = f"{n_optima} optima: the answer depends on the start" if n_optima > 1 else ""
+    return joined(told, several)
 
 
 def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:

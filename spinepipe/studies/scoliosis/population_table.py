@@ -9,7 +9,9 @@ import pandas as pd
 from scipy.stats import norm
 
 from spinepipe.effects.contract import Array
+from spinepipe.status import Status
 from spinepipe.studies.scoliosis.population import PER_SEGMENT, Population
+from spinepipe.tables.shared import joined
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 
@@ -20,6 +22,7 @@ class Learned:
     Attributes
     ----------
     change : of the last round. unfitted : patients without a fit, which have no part in it.
+    settled : whether that is little enough.
     """
 
     population: Population
@@ -27,6 +30,7 @@ class Learned:
     change: float
     patients: int
     unfitted: tuple[str, ...]
+    settled: bool
 
 
 def population_rows(found: Learned, joints: Sequence[str], sd: Array) -> Iterator[dict[str, Any]]:
@@ -52,8 +56,17 @@ def population_rows(found: Learned, joints: Sequence[str], sd: Array) -> Iterato
                 "last_change": found.change if np.isfinite(found.change) else None,
                 "place_sd_mm": MM_PER_M * float(sd[0]),
                 "tilt_sd_deg": DEG_PER_RAD * float(sd[2]),
-                "message": _without(found.unfitted),
+                "message": joined(
+                    _without(found.unfitted), "" if found.settled else _moving(found)
+                ),
+                "status": (Status.CONVERGED if found.settled else Status.NOT_CONVERGED).value,
             }
+
+
+def _moving(found: Learned) -> str:
+    if not found.patients:
+        return ""
+    return f"after {found.rounds} rounds a logarithm still changed by {found.change:.2g}"
 
 
 def _without(names: tuple[str, ...]) -> str:

@@ -1,6 +1,6 @@
 """Tables of studies of kind scoliosis."""
 
-from spinepipe.status import Ended
+from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis.population import PER_SEGMENT
 from spinepipe.studies.scoliosis.settings import MODELS
 from spinepipe.tables.schema import JOINT, MESSAGE, SPECIMEN, Column, Table
@@ -27,6 +27,8 @@ NO_POSE = "the solve found no pose"
 _LINEAR = "the law is linear"
 _NO_INTERVAL = "the model gives none"
 _NO_REGION = "no region was looked for"
+_NOT_FITTED = "the model is not fitted through the simulator, or was made by an earlier version"
+_EARLIER = "made by an earlier version"
 _OPEN = "the films leave this end open, or no region was looked for"
 
 
@@ -86,6 +88,21 @@ LAWS = Table(
         FREE,
         DECIDED,
         SCALE_FROM,
+        Column(
+            "fit_status",
+            "text",
+            "how the fit to the bending films ended, with the poses that the model takes from the "
+            "erect one",
+            null=_NOT_FITTED,
+            allowed=(Status.CONVERGED, Status.CONVERGED_AT_BOUND, Status.NOT_CONVERGED),
+        ),
+        Column(
+            "n_optima",
+            "integer",
+            "distinct optima found from all starts",
+            null=_NOT_FITTED,
+            low=0,
+        ),
     ),
 )
 
@@ -127,6 +144,13 @@ POPULATION = Table(
         ),
         angle("tilt_sd_deg", "SD of a tilt on a film less the model's, as weighed"),
         MESSAGE,
+        Column(
+            "status",
+            "text",
+            "whether the population stood still before the rounds were over",
+            null=_EARLIER,
+            allowed=(Status.CONVERGED, Status.NOT_CONVERGED),
+        ),
     ),
 )
 

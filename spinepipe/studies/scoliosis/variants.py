@@ -85,7 +85,7 @@ def _times(patient: Patient, model: SpineModel, factor: float) -> SpineModel:
 def _held(patient: Patient, spine: HeldSpine, usual: dict[str, Posed]) -> Iterator[Row]:
     """A row for each film."""
     for position, film in _others(patient):
-        posed = spine.at(film.top, usual[position].held)
+        posed = spine.at(film.top)
         there = posed.held.status in POSED and usual[position].held.status in POSED
         moved = np.abs(posed.r - usual[position].r).max()
         miss = miss_of(patient, position, posed)

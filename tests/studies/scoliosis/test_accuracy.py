@@ -41,7 +41,7 @@ def cohort(tmp_path_factory: pytest.TempPathFactory) -> cohorts.Cohort:
 
 @pytest.fixture(scope="module")
 def tables(cohort: cohorts.Cohort) -> dict[str, pd.DataFrame]:
-    usual = Learned(assumed(len(cohort.joint_names)), 1, 0.0, 0, ())
+    usual = Learned(assumed(len(cohort.joint_names)), 1, 0.0, 0, (), True)
     population = from_rows(
         POPULATION, list(population_rows(usual, cohort.joint_names, np.array([1e-3, 1e-3, 0.01])))
     )

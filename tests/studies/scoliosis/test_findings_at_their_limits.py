@@ -166,6 +166,8 @@ def identifiable(patients: int) -> pd.DataFrame:
             "joint": joint,
             "opposite": False,
             "constrained": False,
+            "fit_status": None,
+            "n_optima": None,
             "identifiable": joint == "a" or n < patients,
             "open_below": not (joint == "a" or n < patients),
             "open_above": n == 3 and joint == "b",

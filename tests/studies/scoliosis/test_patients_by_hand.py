@@ -3,20 +3,29 @@
 Would catch wrong arms, sizes, chains and units of rows, where no whole patient is solved.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from sweeps import sweep
 
 from spinepipe.calibrate.profile import Reach
-from spinepipe.status import Ended
+from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis import personal, personalise
 from spinepipe.studies.scoliosis.curve_angles import Curve
 from spinepipe.studies.scoliosis.films import Film
 from spinepipe.studies.scoliosis.held_spine import BENDING, geometry, with_laws, with_springs
-from spinepipe.studies.scoliosis.personal import Patient, Personal, arms, geometric_mean, size_of
+from spinepipe.studies.scoliosis.personal import (
+    Fitting,
+    Patient,
+    Personal,
+    arms,
+    geometric_mean,
+    size_of,
+)
 from spinepipe.studies.scoliosis.settings import Profile, Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
     Ends,
@@ -168,7 +177,7 @@ def test_regions_of_segments_change_at_the_ends_between_curves() -> None:
 def test_multipliers_of_regions_keep_the_geometric_mean() -> None:
     """Of three regions two logarithms are free; the last one is one."""
     regions = np.array([0, 0, 1, 2, 2])
-    made: Any = object.__new__(personal._RegionFit)
+    made: Any = object.__new__(personal.RegionFit)
     own = np.eye(3)[regions]
     made.start = np.full(5, 80.0)
     made.by_logs = (own - own.mean(axis=0))[:, :-1]
@@ -195,7 +204,9 @@ class Fit:
 
     def personal(self, fitted: Any) -> Personal:
         nothing: Any = None
-        return Personal(nothing, np.ones(2), None, np.zeros(2, dtype=bool), 0, 0.0)
+        ended = Fitting(Status.CONVERGED if self.arrived else Status.NOT_CONVERGED, 1)
+        made = Personal(nothing, np.ones(2), None, np.zeros(2, dtype=bool), 0, 0.0)
+        return replace(made, fitting=ended)
 
 
 @sweep("regions", [True, False])
@@ -215,8 +226,8 @@ def test_films_are_asked_of_ratios_where_the_study_wants_it(
     assert told == ("" if arrived else "the fit to the films did not settle")
 
 
-TABLE: Any = object()
-"""A population's table, which nobody here looks at."""
+TABLE: Any = pd.DataFrame({"status": ["converged"]})
+"""A population's table, of which nobody here looks at more."""
 
 
 def person(by_films: tuple[Reach, ...] | None, **more: Any) -> Personal:

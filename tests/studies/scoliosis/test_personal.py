@@ -14,6 +14,7 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
+from spinepipe.studies.scoliosis.film_fit import TOPS, FilmFit
 from spinepipe.studies.scoliosis.films import ERECT, FILMS, LEFT, PATIENTS, RIGHT, Read
 from spinepipe.studies.scoliosis.held_spine import geometry, with_laws
 from spinepipe.studies.scoliosis.personal import (
@@ -23,6 +24,7 @@ from spinepipe.studies.scoliosis.personal import (
     patient_of,
     tangent,
 )
+from spinepipe.studies.scoliosis.population import assumed
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import Pairs
 
@@ -126,3 +128,15 @@ def test_segments_that_the_films_turn_backwards_are_named(cohort: Cohort, tmp_pa
     assert patient.pairs.opposite.any()
     personal = tangent(patient, STUDY)
     assert set(np.flatnonzero(personal.constrained)) <= set(np.flatnonzero(patient.pairs.opposite))
+
+
+def test_a_mirrored_patient_has_the_mirrored_fit(patient: Patient) -> None:
+    """The fit to films: ratios alike, ends exchanged, as many optima."""
+    population = assumed(patient.chain.n_joints)
+    one, other = (FilmFit(p, np.array([1e-3, 1e-3, 0.01])) for p in (patient, mirrored(patient)))
+    fits = one.fit(population), other.fit(population)
+    assert fits[0].n_optima == fits[1].n_optima
+    assert fits[0].cost == pytest.approx(fits[1].cost, rel=1e-3)
+    ratio, lower, upper = fits[0].unknowns[:-TOPS].reshape(3, -1)
+    turned = np.concatenate([ratio, upper, lower])
+    np.testing.assert_allclose(fits[1].unknowns[:-TOPS], turned, rtol=0, atol=0.01)

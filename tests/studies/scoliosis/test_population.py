@@ -98,7 +98,7 @@ def test_patients_of_whom_nothing_is_known_change_no_spread() -> None:
 
 def test_a_population_comes_back_from_its_table() -> None:
     population, sd = made(), np.array([1.1e-3, 1.1e-3, 0.01])
-    told = Learned(population, 3, 0.01, 7, ("p05",))
+    told = Learned(population, 3, 0.01, 7, ("p05",), True)
     rows = from_rows(POPULATION, list(population_rows(told, JOINTS, sd))).to_pandas()
     found, weights = population_of(rows)
     np.testing.assert_allclose(found.mean, population.mean, atol=1e-12)

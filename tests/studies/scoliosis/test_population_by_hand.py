@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal
 from sweeps import sweep
 
 from spinepipe.progress import Progress
+from spinepipe.status import Status
 from spinepipe.studies.scoliosis import learn as learning
 from spinepipe.studies.scoliosis.film_fit import (
     TOPS,
@@ -71,8 +72,8 @@ def moved(by: float) -> Any:
     return again
 
 
-@sweep("by, rounds", [(0.029, 1), (-0.029, 1), (0.031, 5), (-0.031, 5)])
-def test_rounds_end_when_the_population_stands_still_or_after_five(
+@sweep("by, rounds", [(0.029, 1), (-0.029, 1), (0.031, 20), (-0.031, 20)])
+def test_rounds_end_when_the_population_stands_still_or_after_twenty(
     by: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told = SimpleNamespace(told=None)
@@ -84,6 +85,7 @@ def test_rounds_end_when_the_population_stands_still_or_after_five(
     found = learning.learn(study, cohort, np.ones(3), SILENT)
     assert (found.rounds, found.patients, found.unfitted) == (rounds, 1, ("p2",))
     assert found.change == pytest.approx(abs(by))
+    assert found.settled is (rounds < 20)
 
 
 @sweep("by, steps", [(0.99e-4, 1), (1.01e-4, 500)])
@@ -111,7 +113,9 @@ def test_the_largest_change_counts_up_or_down() -> None:
 def test_a_table_tells_means_with_the_interval_of_patients() -> None:
     """Of a normal logarithm: exp(mean -+ 1.96 SD); ends in degrees."""
     usual = assumed(2)
-    rows = list(population_rows(Learned(usual, 4, np.inf, 3, ()), ("a", "b"), np.full(3, 0.002)))
+    rows = list(
+        population_rows(Learned(usual, 4, np.inf, 3, (), True), ("a", "b"), np.full(3, 0.002))
+    )
     assert [(row["quantity"], row["joint"]) for row in rows] == [
         (quantity, joint) for quantity in ("ratio", "lower_end", "upper_end") for joint in "ab"
     ]
@@ -158,7 +162,7 @@ def test_a_patient_of_a_population_is_between_the_films_and_the_population() -> 
     known = told.known(population)
     np.testing.assert_allclose(known.mean, population.mean + 0.75)
     np.testing.assert_allclose(known.covariance, np.linalg.inv(population.precision) / 4.0)
-    fitted = Fitted(np.zeros(9), told, known, True, {})
+    fitted = Fitted(np.zeros(9), told, known, Status.CONVERGED, {}, 0.0, 1)
     assert fitted.decided == pytest.approx(3.0 * 0.75)
 
 

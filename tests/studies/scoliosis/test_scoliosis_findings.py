@@ -231,3 +231,28 @@ def test_published_quantities_are_told_once_they_are_judged() -> None:
     assert "published quantities" not in told(Size())
     judged = pd.DataFrame({"verdict": ["inside", "outside", "contradicted"], "limit": "wide"})
     assert "Of 3 published quantities" in told(Size(), against_jalalian_2017=judged)
+
+
+def test_fits_at_a_bound_lost_or_of_several_optima_are_told() -> None:
+    size = Size()
+    laws = tables_of(size)["laws"]
+    usual = told(size)
+    assert "optima" not in usual
+    assert "did not settle" not in usual
+    assert answer(size).warnings == ()
+    regions, fitted = laws["model"] == "linear_regions", laws["model"] == "tangent_fitted"
+    first = laws["specimen"] == "p01"
+    laws.loc[regions & first, "fit_status"] = "converged_at_bound"
+    laws.loc[fitted & first, "fit_status"] = "not_converged"
+    laws.loc[fitted & ~first, "n_optima"] = 3
+    said = told(size, laws=laws)
+    assert "1 of 6 fits to films did not settle: p01, tangent, fitted." in said
+    assert "2 of 6 fits to films found several optima" in said
+    (doubt,) = answer(size, laws=laws).warnings
+    assert doubt.startswith("In 1 of 3 patients the model that is linear by region ends at the")
+
+
+def test_a_population_that_still_moves_casts_doubt() -> None:
+    moving = pd.DataFrame({"status": ["not_converged"]})
+    (doubt,) = answer(Size(), population=moving).warnings
+    assert "did not stand still" in doubt

@@ -14,7 +14,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT
 from spinepipe.studies.scoliosis.held_spine import with_laws
-from spinepipe.studies.scoliosis.personal import Patient, _RegionFit, _regions, patient_of, tangent
+from spinepipe.studies.scoliosis.personal import Patient, RegionFit, _regions, patient_of, tangent
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables_of_errors import VARIANTS, VARIATION
 from spinepipe.studies.scoliosis.variants import variant_rows
@@ -124,7 +124,7 @@ def test_ferguson_angles_change_with_places_as_told(patient: Patient) -> None:
 
 
 def test_regions_are_fitted_with_exact_derivatives(patient: Patient) -> None:
-    fit, logs = _RegionFit(patient, _regions(patient)), np.array([0.2, -0.3])
+    fit, logs = RegionFit(patient, _regions(patient)), np.array([0.2, -0.3])
     found = fit.missed(logs)
     assert found is not None
     for number, step in enumerate(1e-5 * np.eye(2)):

@@ -1,0 +1,139 @@
+"""Optima of fits to films, whose poses are those that the model takes from neutral.
+
+Trial poses are sought from those of the trial before, which is cheap and may follow a path that the
+model does not take from neutral (`statics.prescribed.hold_at`). What is told of an optimum is that
+of the poses from neutral; where these are others it is fitted anew with such poses alone.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from spinepipe.calibrate.descent import Descent, Point, once
+from spinepipe.effects.contract import Array
+from spinepipe.statics.prescribed import Held
+from spinepipe.status import Status
+from spinepipe.studies.scoliosis.tangent_laws import Flags
+
+SAME_POSE = 1e-6
+"""Rad: by which poses of one path differ at most."""
+
+STILL_FALLS = 1e-2
+"""Slope of the cost by an unknown's scale, as a share of the cost. A fit with poses from neutral
+may end where they leave for another path, its steps cut to nothing: beyond this, it did."""
+
+AT_BOUND = 1e-4
+"""Unknowns' scales: descents keep inside their bounds, and come so near where these hold them."""
+
+SAME_OPTIMUM = 0.1
+"""Unknowns' scales: optima that differ by less are one, as fits settle in a few hundredths."""
+
+COST_TIE = 1e-3
+"""Share of the cost, for the same reason: of optima that tie the first is taken."""
+
+
+class Holder(Protocol):
+    """Who holds a spine in its films, from poses near by."""
+
+    near: dict[str, Held]
+
+
+Limits = tuple[Array, Array, Array]
+"""(m,) each: least and largest unknowns, and their scale."""
+
+Descend = Callable[[Point, Array, Limits], Descent]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where one start ended.
+
+    Attributes
+    ----------
+    x : (m,) unknowns. residual, jacobian : (N,) and (N, m) there, with the poses from neutral.
+    poses : these, by position. at_bound : (m,) bool.
+    """
+
+    x: Array
+    residual: Array
+    jacobian: Array
+    poses: Mapping[str, Held]
+    status: Status
+    at_bound: Flags
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares."""
+        return float(self.residual @ self.residual)
+
+
+def optimum(
+    holder: Holder,
+    point: Point,
+    begin: Sequence[Array],
+    near: Mapping[str, Held],
+    limits: Limits,
+    descend: Descend,
+) -> Optimum | None:
+    """The end of a fit from the first of some unknowns that has poses; None where none has.
+
+    Parameters
+    ----------
+    point : residuals by unknowns, whose poses begin from the holder's. near : such poses at first.
+    """
+
+    def from_neutral(x: Array) -> tuple[Array, Array] | None:
+        holder.near = {}
+        return point(x)
+
+    holder.near = dict(near)
+    ended = _ended(once(point), begin, limits, descend)
+    if ended is None:
+        return None
+    trials = holder.near
+    found = from_neutral(ended.x)
+    led = found is not None and all(
+        np.abs(holder.near[name].q - trials[name].q).max() < SAME_POSE for name in trials
+    )
+    if not led:
+        ended = _ended(once(from_neutral), [ended.x, *begin], limits, descend)
+        found = None if ended is None else from_neutral(ended.x)
+    if ended is None or found is None:
+        return None
+    low, high, scale = limits
+    at_bound = (ended.x - low < AT_BOUND * scale) | (high - ended.x < AT_BOUND * scale)
+    slope = 2.0 * np.abs(found[0] @ found[1] * scale)[~at_bound].max(initial=0.0)
+    status = Status.CONVERGED_AT_BOUND if at_bound.any() else Status.CONVERGED
+    if not ended.arrived or not (led or slope <= STILL_FALLS * float(found[0] @ found[0])):
+        status = Status.NOT_CONVERGED
+    return Optimum(ended.x, *found, dict(holder.near), status, at_bound)
+
+
+def _ended(
+    point: Point, begin: Sequence[Array], limits: Limits, descend: Descend
+) -> Descent | None:
+    low, high, _ = limits
+    within = (np.clip(one, low + 1e-9, high - 1e-9) for one in begin)
+    start = next((one for one in within if point(one) is not None), None)
+    return None if start is None else descend(point, start, limits)
+
+
+def best(ends: Sequence[Optimum | None], scale: Array) -> tuple[Optimum | None, int]:
+    """The optimum of least cost, the first of those that tie, and how many distinct ones there are.
+
+    Ends that are none count where there is no optimum.
+    """
+    there = [one for one in ends if one is not None]
+    some = [one for one in there if one.status.usable]
+    if not there:
+        return None, 0
+    least = min(one.cost for one in some or there)
+    first = next(one for one in some or there if one.cost <= (1.0 + COST_TIE) * least)
+    distinct: list[Optimum] = []
+    for one in some:
+        apart = [np.abs((one.x - other.x) / scale).max() for other in distinct]
+        if min(apart, default=np.inf) > SAME_OPTIMUM:
+            distinct.append(one)
+    return first, len(distinct)
