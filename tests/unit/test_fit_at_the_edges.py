@@ -70,6 +70,21 @@ def test_a_coordinate_that_is_not_fitted_and_gives_way_is_named() -> None:
     assert member.result(np.zeros(1), np.eye(1), 0.0).message == found.message
 
 
+@pytest.mark.parametrize(("above_mm", "stiffness"), [(0.0, 149.0), (20.0, 107.0)])
+def test_translations_are_those_of_the_origin(above_mm: float, stiffness: float) -> None:
+    """As docs/cohort-format.md has it: a point above it moves by what the joint turns, too."""
+    model, push = joint(), np.array([10.0, 0.0, 0.0])
+    values = np.array([[149e3, 1e6, 1e5, 152.0, 20.0, 20.0]])
+    model = replace(model, effects=(model.effects[0].with_values(values),))
+    wrench = Wrench(0, np.array([0.0, 0.02, 0.0]), push, np.zeros(3))
+    measured = np.full((1, 1, 6), np.nan)
+    measured[0, 0, 0] = 10.0 / 149e3 + 10.0 * 0.02 / 152.0 * above_mm / 1e3  # m
+    case = MeasuredCase(LoadCase("shear", 1, (LoadStep(0, (wrench,)),)), measured)
+    free = free_parameters(model, 0, ["anterior_n_per_m"], "per_specimen")
+    found = fit(Problem(model, (case,), free, 1.0 - ANGLES, np.array([-3.0]), np.array([3.0])))
+    assert found.values[0] / 1e3 == pytest.approx(stiffness, abs=0.5)
+
+
 def test_further_starts_are_a_latin_hypercube_that_hangs_on_the_seed() -> None:
     """One in each slice of what bounds leave of a factor of 30, for every unknown."""
     model, many = joint(), 8
