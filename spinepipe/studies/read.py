@@ -237,8 +237,11 @@ def read_selection(root: Path) -> Selection:
     path = root / CONFIG
     file = displayed(path, root)
     if not path.is_file():
-        allowed = "a file with `studies: [...]`"
-        raise InputError([Problem(file, None, None, "no such file", allowed, "add it")])
+        found, allowed, remedy = "no such file", "a file with `studies: [...]`", "add it"
+        if not path.parent.is_dir():  # a run that was started elsewhere
+            found = f"no such file in {root}, nor a folder for it"
+            remedy = "go to the folder of the project, or name it: `snakemake -d FOLDER`"
+        raise InputError([Problem(file, None, None, found, allowed, remedy)])
     document, problems = read_yaml(path, file)
     if document is None:
         raise InputError(problems)

@@ -126,6 +126,14 @@ def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path)
     assert any(case.says in str(problem) for problem in here), listing
 
 
+def test_a_run_that_was_started_elsewhere_is_sent_to_the_project(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=rf"no such file in {tmp_path}, nor.*`snakemake -d FOLDER`"):
+        studies.read_selection(tmp_path)
+    (tmp_path / "config").mkdir()
+    with pytest.raises(InputError, match=r"found no such file; allowed: .*; add it$"):
+        studies.read_selection(tmp_path)
+
+
 def test_a_folder_that_no_cohort_can_be_is_to_be_renamed(tmp_path: Path) -> None:
     root = project(tmp_path, STUDY.replace("cohort: small", "cohort: My-Cohort"))
     (root / "config/cohorts/small").rename(root / "config/cohorts/My-Cohort")
