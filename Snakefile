@@ -47,6 +47,7 @@ rule full:
 
 
 onstart:
+    check_environment()
     check_engine()
     check_writable()
     warm_up_the_pool()

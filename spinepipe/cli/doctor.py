@@ -63,7 +63,10 @@ def _examine(name: str, check: Callable[[Path], str], root: Path) -> bool:
 
 def check_python(root: Path) -> str:
     """Whether this Python is one the package was made for."""
-    wanted = metadata("spinepipe")["Requires-Python"] or ""
+    try:
+        wanted = metadata("spinepipe")["Requires-Python"] or ""
+    except PackageNotFoundError:
+        raise Trouble("the package spinepipe is not installed", "run `make env`") from None
     for sign, number in re.findall(r"(>=|<)\s*([0-9.]+)", wanted):
         limit = tuple(int(part) for part in number.split("."))
         here = sys.version_info[: len(limit)]

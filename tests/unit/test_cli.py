@@ -5,6 +5,7 @@ Catches a command that prints another answer, writes elsewhere or ends well wher
 
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -20,6 +21,7 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.cli import doctor, main
 from spinepipe.cli.engine import relative_error
+from spinepipe.jobs import digest
 from spinepipe.studies.registry import every_kind
 from tests.generators import ais_films
 
@@ -344,6 +346,25 @@ def test_doctor_on_a_sound_folder(
         ["ok", name] for name in ("python", "libraries", "engine", "profile", "results", "cores")
     ]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["profiles", "requirements.lock"]
+
+
+def test_an_environment_without_the_package_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where `make env` was cut off: by the doctor, and by a run before its first job."""
+
+    def nothing(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor, "metadata", nothing)
+    with pytest.raises(doctor.Trouble, match="spinepipe is not installed; run `make env`"):
+        doctor.check_python(tmp_path)
+    monkeypatch.setattr(digest, "version", lambda name: name == "spinepipe" and nothing(name))
+    digest.versions.cache_clear()
+    with pytest.raises(
+        ImportError, match=r"the package spinepipe is not installed\. Run `make env`"
+    ):
+        digest.versions()
 
 
 def test_doctor_finds_wrong_libraries(tmp_path: Path) -> None:

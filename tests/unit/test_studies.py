@@ -127,7 +127,9 @@ def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path)
 
 
 def test_a_run_that_was_started_elsewhere_is_sent_to_the_project(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=rf"no such file in {tmp_path}, nor.*`snakemake -d FOLDER`"):
+    with pytest.raises(
+        InputError, match=rf"no such file in {tmp_path}, nor.*`snakemake -d FOLDER`"
+    ):
         studies.read_selection(tmp_path)
     (tmp_path / "config").mkdir()
     with pytest.raises(InputError, match=r"found no such file; allowed: .*; add it$"):

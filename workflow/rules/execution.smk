@@ -10,10 +10,19 @@ from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
 
 from spinepipe.jobs import code
+from spinepipe.jobs.digest import versions
 from spinepipe.jobs.pool import JobFailed, submit_and_wait, warm_up
 from spinepipe.jobs.time_left import TimeLeft, costs
 from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.registry import place_of
+
+
+def check_environment():
+    """Say so where a library is missing: each job would fail of it."""
+    try:
+        versions()
+    except ImportError as error:
+        stop(error)
 
 
 def check_engine():
