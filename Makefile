@@ -11,6 +11,13 @@ PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(T
 # Each job is a process: modules are to be compiled once, not at every start.
 unexport PYTHONDONTWRITEBYTECODE
 
+# Snakemake ends with a Python stack where it cannot keep its cache, as on nodes without a home folder.
+CACHE_HOME := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)
+ifneq ($(shell mkdir -p "$(CACHE_HOME)/snakemake" 2>/dev/null && test -w "$(CACHE_HOME)/snakemake" && echo yes),yes)
+export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
+export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
+endif
+
 .PHONY: all full test test-full test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
 
 all: env  ## build the studies that config/config.yaml chooses

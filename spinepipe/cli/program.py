@@ -11,6 +11,8 @@ from importlib import import_module
 from keyword import iskeyword
 from pathlib import Path
 
+from spinepipe.files import cache_home, cache_of_project, refusal
+
 COMMANDS = {
     "import": "make a cohort of a testing machine's files",
     "check": "say everything that is wrong with studies and cohorts",
@@ -58,6 +60,8 @@ def _run(command: str, rest: Sequence[str], root: Path) -> int:
     module.add_arguments(parser)
     options = parser.parse_args(rest)
     options.root = options.root.resolve()
+    if command != "doctor" and refusal(cache_home()):  # who is told so by the doctor
+        os.environ["MPLCONFIGDIR"] = str(cache_of_project(options.root) / "matplotlib")
     try:
         code: int = module.run(options)
     except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough

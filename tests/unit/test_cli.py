@@ -3,6 +3,8 @@
 Catches a command that prints another answer, writes elsewhere or ends well where it should not.
 """
 
+import os
+import shutil
 import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError
@@ -343,7 +345,8 @@ def test_doctor_on_a_sound_folder(
     code, out, _ = run(capsys, "--root", healthy(tmp_path), "doctor")
     assert code == 0
     assert [line.split()[:2] for line in out.splitlines()] == [
-        ["ok", name] for name in ("python", "libraries", "engine", "profile", "results", "cores")
+        ["ok", name]
+        for name in ("python", "libraries", "engine", "profile", "results", "cache", "cores")
     ]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["profiles", "requirements.lock"]
 
@@ -390,6 +393,28 @@ def test_doctor_finds_results_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "results").write_text("a file in the way")
     with pytest.raises(doctor.Trouble, match="cannot be written"):
         doctor.check_results(tmp_path)
+
+
+NOBODYS = "/proc/self/cache"
+"""A folder that nobody can make, not even root."""
+
+
+def test_a_home_that_cannot_be_written_gives_way_to_the_project(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`make` and `spinepipe` keep caches there, and the doctor says how Snakemake alone would."""
+    monkeypatch.setenv("XDG_CACHE_HOME", NOBODYS)
+    monkeypatch.setenv("MPLCONFIGDIR", "/proc/self/other")
+    own = tmp_path / ".snakemake/cache"
+    with pytest.raises(doctor.Trouble, match=rf"^{NOBODYS} cannot.*`export XDG_CACHE_HOME={own}`"):
+        doctor.check_cache(tmp_path)
+    run(capsys, "--root", tmp_path, "check")
+    assert os.environ["MPLCONFIGDIR"] == f"{own}/matplotlib"
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    asked = ["make", "-s", "--eval=told:\n\t@echo $$XDG_CACHE_HOME $$MPLCONFIGDIR", "told"]
+    for home, told in ((NOBODYS, f"{own} {own}/matplotlib\n"), (f"{tmp_path}/home", "\n")):
+        here = {"PATH": os.environ["PATH"], "HOME": home}
+        assert subprocess.check_output(asked, cwd=tmp_path, env=here, text=True) == told
 
 
 @pytest.mark.parametrize(
