@@ -58,7 +58,6 @@ onstart:
     look_at_few()
     keep_the_graph()
     tell_what_is_ahead()
-    logger.addFilter(to_the_point)
 
 
 onsuccess:

@@ -51,7 +51,7 @@ def tell_who_is_at_work():
     alive = [run for run in runs if f" on {run_lock.HOST}," in run]
     if alive and workflow.is_main_process and "--unlock" in sys.argv:
         stop(f"A run is at work in this folder: {'; '.join(alive)}. End it first.")
-    if runs and workflow.is_main_process and not workflow.dryrun:
+    if runs and workflow.is_main_process:
         print(
             f"warn  a run is at work in this folder: {'; '.join(runs)}. What it makes is locked until it "
             "ends: wait for it, do not use --unlock",
