@@ -11,6 +11,9 @@ PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(T
 # Each job is a process: modules are to be compiled once, not at every start.
 unexport PYTHONDONTWRITEBYTECODE
 
+# Names of folders and words of messages go beyond ASCII, whatever the locale says.
+export PYTHONUTF8 := 1
+
 # Snakemake ends with a Python stack where it cannot keep its cache, as on nodes without a home folder.
 CACHE_HOME := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)
 ifneq ($(shell mkdir -p "$(CACHE_HOME)/snakemake" 2>/dev/null && test -w "$(CACHE_HOME)/snakemake" && echo yes),yes)

@@ -25,6 +25,10 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 well, 1 a problem, 2 wrong usage."""
+    if arguments is None and sys.getfilesystemencoding() != "utf-8":
+        # Python decides at its start how it reads paths and what it can print: it starts anew.
+        anew = [sys.executable, *sys.orig_argv[1:]]
+        os.execve(sys.executable, anew, {**os.environ, "PYTHONUTF8": "1"})
     parser = argparse.ArgumentParser(
         prog="spinepipe",
         description="Spine models calibrated on measured motion.",

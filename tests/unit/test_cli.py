@@ -4,6 +4,7 @@ Catches a command that prints another answer, writes elsewhere or ends well wher
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -454,6 +455,21 @@ def test_docs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (code, out) == (0, "wrote docs/page.md\n")
     assert "linear_bushing" in page.read_text()
     assert run(capsys, "--root", tmp_path, "docs", "--check")[0] == 0
+
+
+def test_a_locale_of_ascii_alone_is_left_behind(tmp_path: Path) -> None:
+    """Folders, names and words go beyond it; Python decides at its start what it can print."""
+    root = tmp_path / "Rücken"
+    root.mkdir()
+    project(root, Size())
+    header = root / "config/cohorts/straight/cohort.yaml"
+    header.write_text(re.sub("(?m)^title:.*", "title: für Müller", header.read_text("utf-8")))
+    here = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [sys.executable, "-m", "spinepipe.cli", "--root", root, "show", "straight"]
+    ended = subprocess.run(command, env=here, capture_output=True, check=False)
+    assert ended.returncode == 0, ended.stderr.decode()
+    assert "für Müller" in ended.stdout.decode()
+    assert f"picture: {root}/results/show/straight.png" in ended.stdout.decode()
 
 
 def test_usage(capsys: pytest.CaptureFixture[str]) -> None:
