@@ -12,6 +12,7 @@ from cohort_cases import NAME, Change, add, cell, joints, line, motion, swap, te
 
 from spinepipe import cohort
 from spinepipe.cohort.columns import TABLES, Column, TableForm
+from spinepipe.cohort.specimen import load_cases
 
 LOADS_BY_CYCLE = """\
 specimen,test,cycle,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm
@@ -110,6 +111,18 @@ def test_cycles_and_loads_for_all_of_them(tmp_path: Path) -> None:
     read = cohort.read(folder)
     assert read.motion is not None
     assert read.motion["cycle"].tolist() == [1, 1, 2, 2, 1, 1, 3, 3]
+
+
+def test_a_test_has_its_own_cycles_only(tmp_path: Path) -> None:
+    loads = LOADS_BY_CYCLE + "b,twist,,0,L2,0,0,0,0,0,0\nb,twist,,1,L2,0,0,0,0,1,0\n"
+    moved = MOTION_BY_CYCLE + "b,twist,2,0,L3L4,0\nb,twist,2,1,L3L4,0.1\n"
+    folder = write(tmp_path / NAME, text("loads.csv", loads), text("motion.csv", moved))
+    cases = load_cases(cohort.read(folder), "b", ("bending", "twist"), np.zeros(3))
+    assert [(one.test, one.cycle) for one in cases] == [
+        ("bending", 1),
+        ("bending", 3),
+        ("twist", 2),
+    ]
 
 
 def test_twenty_joints_are_not_too_many(tmp_path: Path) -> None:

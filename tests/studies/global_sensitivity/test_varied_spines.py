@@ -242,7 +242,7 @@ def test_samples_are_the_same_alone_and_together(cohort: Cohort) -> None:
 @sweep(
     "zeroed, gravity, all_steps, computed, from_first, stored",
     [
-        (False, True, False, [2], False, (2,)),
+        (False, True, False, [0, 2], False, (2,)),  # the weight comes on first
         (True, True, False, [0, 2], True, (2,)),
         (True, False, False, [2], False, (2,)),  # nothing acts in step 0: it is the neutral pose
         (True, True, True, [0, 1, 2], True, (0, 1, 2)),
@@ -273,5 +273,5 @@ def test_a_load_in_step_0_counts_where_the_cohort_was_zeroed(tmp_path: Path) -> 
     changes = (loaded, weightless, zeroed, without("bodies.csv"), *point)
     cohort = cohorts.read(write(tmp_path / "small", *changes))
     (test,) = asked_tests(cohort, "a", cohort.tests, False)
-    assert [step.step for step in test.case.steps] == [0, 2]
+    assert [step.step for step in test.case.steps] == [0, 1, 2]  # at step 1 the load turns
     assert test.from_first
