@@ -11,10 +11,14 @@ PYTEST = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(T
 # Each job is a process: modules are to be compiled once, not at every start.
 unexport PYTHONDONTWRITEBYTECODE
 
-# pip, Snakemake and Matplotlib keep things in the home folder; a cluster may not let them.
-ifneq ($(shell test -w "$${XDG_CACHE_HOME:-$$HOME}" && echo writable),writable)
+# Names of folders and words of messages go beyond ASCII, whatever the locale says.
+export PYTHONUTF8 := 1
+
+# Snakemake ends with a Python stack where it cannot keep its cache, as on nodes without a home folder.
+CACHE_HOME := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)
+ifneq ($(shell mkdir -p "$(CACHE_HOME)/snakemake" 2>/dev/null && test -w "$(CACHE_HOME)/snakemake" && echo yes),yes)
 export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
-export XDG_CONFIG_HOME := $(XDG_CACHE_HOME)
+export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
 endif
 
 .PHONY: all full test test-full test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean

@@ -47,6 +47,7 @@ rule full:
 
 
 onstart:
+    check_environment()
     check_engine()
     check_writable()
     warm_up_the_pool()
@@ -57,7 +58,6 @@ onstart:
     look_at_few()
     keep_the_graph()
     tell_what_is_ahead()
-    logger.addFilter(to_the_point)
 
 
 onsuccess:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
 HOST = re.sub(r"[^A-Za-z0-9]+", "-", platform.node()) or "here"
 """Name of this machine, as files that are gone with a process are called by it."""
@@ -36,6 +37,27 @@ def appearing(path: str | Path) -> Iterator[Path]:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def refusal(folder: Path) -> str:
+    """Why nothing can be written into a folder, which is made if need be; empty where it can."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder) as probe:
+            probe.write(b"1")
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""
+
+
+def cache_home() -> Path:
+    """Where programs keep what they can make again, as Snakemake and Matplotlib look for it."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+
+
+def cache_of_project(root: Path) -> Path:
+    """Where they keep it instead if the home folder cannot be written; as in the Makefile."""
+    return root / ".snakemake" / "cache"
 
 
 def is_temporary(name: str) -> bool:

@@ -17,6 +17,7 @@ from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend, descend_
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, among, lead
 from spinepipe.calibrate.profile import Profile, Reach, profiles
+from spinepipe.calibrate.solvers import by_record
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
@@ -281,9 +282,9 @@ def _descend(evaluator: Evaluator, start: Array, at: At) -> Optimum:
     standing, stiffened = stand_up(problem, at, start)
     if standing is None:
         nowhere = Evaluation(None, None, (), evaluator.coordinate, evaluator.sharing)
-        x = problem.upper.copy()
+        x, why = problem.upper.copy(), tipped(problem, at, start)
         at_bound = np.ones(len(x), dtype=int)
-        return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, TIPPED, 0, stiffened)
+        return Optimum(x, at_bound, np.inf, nowhere, Status.UNSTABLE, why, 0, stiffened)
     return _least_squares(evaluator, at, standing, stiffened)
 
 
@@ -408,6 +409,20 @@ def stand_up(problem: Problem, at: At, start: Array) -> tuple[Array | None, int]
         start = np.minimum(start + step, problem.upper)
         stiffened += 1
     return start, stiffened
+
+
+def tipped(problem: Problem, at: At, start: Array) -> str:
+    """Why no stiffness within the bounds helped, and which coordinate gives way with the largest.
+
+    That may be one that is not fitted. At rest the engine of record tells it, a stack does not.
+    """
+    stiffness = np.array([parameter.logarithmic for parameter in problem.free])
+    x = np.where(stiffness, problem.upper, start)
+    why: object = at(x).message
+    if problem.course is None:
+        stiffest = moved(problem.model, problem.free, x)
+        why = by_record(stiffest, [measured.case for measured in problem.cases])
+    return f"{TIPPED} ({why})" if isinstance(why, str) else TIPPED
 
 
 def on_bounds(problem: Problem, x: Array) -> Array:

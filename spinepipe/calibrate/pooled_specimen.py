@@ -7,10 +7,10 @@ import numpy as np
 from spinepipe.calibrate.descent import OFF_THE_PATH
 from spinepipe.calibrate.fit import (
     AT_THE_BRINK,
-    TIPPED,
     bounds_reached,
     names_at_bound,
     stand_up,
+    tipped,
     values,
 )
 from spinepipe.calibrate.hierarchy import Hierarchy
@@ -92,9 +92,11 @@ class Member:
         self.problem = self.evaluator.problem
         begin = self.clipped(self.x) * self.scale
         standing, _ = stand_up(self.problem, self.evaluator.at, begin)
-        if standing is not None:
-            self.x, self.evaluation = standing / self.scale, self.evaluator.at(standing)
-            self.trial = (self.x, self.evaluation)
+        if standing is None:
+            self.refusal = tipped(self.problem, self.evaluator.at, begin)
+            return
+        self.x, self.evaluation = standing / self.scale, self.evaluator.at(standing)
+        self.trial = (self.x, self.evaluation)
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -215,7 +217,7 @@ class Member:
         if self.evaluator is None:
             return Status.REFUSED, self.refusal
         if self.evaluation is None:
-            return Status.UNSTABLE, TIPPED
+            return Status.UNSTABLE, self.refusal
         if not self.arrived:
             return Status.NOT_CONVERGED, AT_THE_BRINK if self.stuck else ON_THE_MOVE
         if self.evaluator.on_record(self.x * self.scale) is None:

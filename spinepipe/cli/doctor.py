@@ -4,15 +4,16 @@ import argparse
 import os
 import platform
 import re
+import shlex
 import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 
+from spinepipe.files import cache_home, cache_of_project, refusal
 from spinepipe.reference.licences import pinned
 
 LOCK = "requirements.lock"
@@ -46,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
         "engine": check_engine,
         "profile": check_profile,
         "results": check_results,
+        "cache": check_cache,
         "cores": check_cores,
     }
     sound = [_examine(name, check, options.root) for name, check in checks.items()]
@@ -63,7 +65,10 @@ def _examine(name: str, check: Callable[[Path], str], root: Path) -> bool:
 
 def check_python(root: Path) -> str:
     """Whether this Python is one the package was made for."""
-    wanted = metadata("spinepipe")["Requires-Python"] or ""
+    try:
+        wanted = metadata("spinepipe")["Requires-Python"] or ""
+    except PackageNotFoundError:
+        raise Trouble("the package spinepipe is not installed", "run `make env`") from None
     for sign, number in re.findall(r"(>=|<)\s*([0-9.]+)", wanted):
         limit = tuple(int(part) for part in number.split("."))
         here = sys.version_info[: len(limit)]
@@ -137,14 +142,21 @@ def check_results(root: Path) -> str:
     """Whether results can be written, and the room there is."""
     folder = root / "results"
     place = folder if folder.exists() else root
-    try:
-        with tempfile.TemporaryFile(dir=place) as probe:
-            probe.write(b"1")
-    except OSError as error:
+    if why := refusal(place):
         remedy = "make room, change its permissions, or work in another folder"
-        raise Trouble(f"{place} cannot be written: {error.strerror}", remedy) from None
+        raise Trouble(f"{place} cannot be written: {why}", remedy)
     free = shutil.disk_usage(place).free / 1e9
     return f"{folder} can be written, {free:.1f} GB free"
+
+
+def check_cache(root: Path) -> str:
+    """Whether Snakemake can keep its cache: where not, it ends with a Python stack."""
+    place = cache_home()
+    if why := refusal(place / "snakemake"):
+        own = shlex.quote(str(cache_of_project(root)))
+        remedy = f"before `snakemake`, run `export XDG_CACHE_HOME={own}` (`make` does so itself)"
+        raise Trouble(f"{place} cannot be written, where Snakemake keeps its cache: {why}", remedy)
+    return f"{place} can be written"
 
 
 def check_cores(root: Path) -> str:

@@ -11,6 +11,8 @@ from importlib import import_module
 from keyword import iskeyword
 from pathlib import Path
 
+from spinepipe.files import cache_home, cache_of_project, refusal
+
 COMMANDS = {
     "import": "make a cohort of a testing machine's files",
     "check": "say everything that is wrong with studies and cohorts",
@@ -23,6 +25,10 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 well, 1 a problem, 2 wrong usage."""
+    if arguments is None and sys.getfilesystemencoding() != "utf-8":
+        # Python decides at its start how it reads paths and what it can print: it starts anew.
+        anew = [sys.executable, *sys.orig_argv[1:]]
+        os.execve(sys.executable, anew, {**os.environ, "PYTHONUTF8": "1"})
     parser = argparse.ArgumentParser(
         prog="spinepipe",
         description="Spine models calibrated on measured motion.",
@@ -58,6 +64,8 @@ def _run(command: str, rest: Sequence[str], root: Path) -> int:
     module.add_arguments(parser)
     options = parser.parse_args(rest)
     options.root = options.root.resolve()
+    if command != "doctor" and refusal(cache_home()):  # who is told so by the doctor
+        os.environ["MPLCONFIGDIR"] = str(cache_of_project(options.root) / "matplotlib")
     try:
         code: int = module.run(options)
     except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough

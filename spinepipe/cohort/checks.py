@@ -13,7 +13,14 @@ from math import isnan
 
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.draft import AppliedLoad, Draft
-from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, look_alike, name_fault
+from spinepipe.documents.names import (
+    ALLOWED,
+    ALLOWED_FOLDER,
+    COHORT_NAME,
+    folder_fault,
+    look_alike,
+    name_fault,
+)
 from spinepipe.documents.yaml_text import Document
 from spinepipe.model import MOST_JOINTS
 from spinepipe.problems import Problem, Spelling
@@ -28,6 +35,8 @@ def check_header(document: Document, folder: str) -> Iterator[Problem]:
     if isinstance(name, str) and name != folder:
         place = (document.file, document.line_of("cohort"), "cohort")
         remedy = "rename the folder or change the key"
+        if not COHORT_NAME.fullmatch(folder):
+            remedy = "rename the folder: names of cohorts are of a-z, 0-9 and _"
         yield Problem(*place, f"'{name}'", f"the folder's name, '{folder}'", remedy)
     vertebrae = document.data.get("vertebrae")
     if isinstance(vertebrae, list):

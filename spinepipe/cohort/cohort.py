@@ -63,7 +63,7 @@ class CohortHeader(BaseModel):
     cohort: str = Field(
         pattern=r"^[a-z0-9_]+$",
         max_length=LONGEST_NAME,
-        description="the folder's name, [a-z0-9_]+",
+        description="the folder's name, of a-z, 0-9 and _ alone",
     )
     title: str = Field(
         min_length=1, max_length=300, description="one line that says what the cohort is"

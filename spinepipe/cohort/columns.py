@@ -240,7 +240,7 @@ MOTION = TableForm(
         *(
             Column(
                 f"{axis}_mm",
-                f"measured {axis} translation of the joint",
+                f"measured {axis} translation of the joint's origin (not of the load's point)",
                 low=-LARGEST_TRANSLATION_MM,
                 high=LARGEST_TRANSLATION_MM,
             )

@@ -27,12 +27,15 @@ ALLOWED = (
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 ALLOWED_FOLDER = (
-    f"at most {LONGEST_NAME} letters, digits, _ . - and a letter or digit first, no two dots in a "
-    "row, no dot at the end"
+    f"at most {LONGEST_NAME} letters A-Z a-z, digits, _ . - and a letter or digit first, no two "
+    "dots in a row, no dot at the end"
 )
 
 RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
 """Names that Windows keeps for devices."""
+
+COHORT_NAME = re.compile(r"[a-z0-9_]+")
+"""Names of cohorts: a study tells them from paths by their signs."""
 
 PLAIN = re.compile(rf"[A-Za-z0-9][A-Za-z0-9 _]{{0,{LONGEST_NAME - 1}}}")
 """Names that need no closer look, but for those that Windows keeps."""
@@ -60,7 +63,8 @@ def name_fault(name: str) -> str | None:
 def folder_fault(name: str) -> str | None:
     """What is wrong with a name that becomes a folder; None where nothing is."""
     if len(name) <= LONGEST_NAME and not FOLDER_NAME.fullmatch(name):
-        return look_alike(name) or f"'{name}'"
+        strange = next((c for c in name if not re.match(r"[A-Za-z0-9_.-]", c)), None)
+        return look_alike(name) or f"'{name}'" + (f" with {_shown(strange)}" if strange else "")
     return name_fault(name)
 
 

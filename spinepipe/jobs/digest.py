@@ -5,7 +5,7 @@ import json
 import platform
 from collections.abc import Mapping, Sequence
 from functools import cache, lru_cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from spinepipe.cohort import Cohort
@@ -40,8 +40,20 @@ _LIBRARIES = (
 
 @cache
 def versions() -> dict[str, str]:
-    """Version of Python and of each library that results depend on."""
-    found = {f"version_{name.lower()}": version(name) for name in _LIBRARIES}
+    """Version of Python and of each library that results depend on.
+
+    Raises
+    ------
+    ImportError
+        For one that is not installed, with what to do.
+    """
+    try:
+        found = {f"version_{name.lower()}": version(name) for name in _LIBRARIES}
+    except PackageNotFoundError as error:
+        raise ImportError(
+            f"The environment is incomplete: the package {error.name} is not installed. Run "
+            "`make env`; if it finds nothing to do, remove the folder .venv first"
+        ) from None
     return {"version_python": platform.python_version(), **found}
 
 

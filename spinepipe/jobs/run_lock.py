@@ -10,6 +10,7 @@ import fcntl
 import os
 import re
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -69,6 +70,22 @@ def abandoned(locks: Path) -> list[int]:
     notes = [found for path in _files(locks) if (found := _NOTE.fullmatch(path.name))]
     over = all(_is_over(locks, note) for note in notes)
     return [int(note[1]) for note in notes] if over else []
+
+
+def at_work(locks: Path) -> list[str]:
+    """Runs that hold this lock, or may: which process on which machine, and since when."""
+    notes = [found for path in _files(locks) if (found := _NOTE.fullmatch(path.name))]
+    return [
+        f"process {note[1]} on {note[2]}, since {_since(locks / note[0])}"
+        for note in notes
+        if not _is_over(locks, note)
+    ]
+
+
+def _since(note: Path) -> str:
+    with suppress(OSError):  # it has just ended
+        return time.strftime("%Y-%m-%d %H:%M", time.localtime(note.stat().st_mtime))
+    return "a while"
 
 
 def _files(locks: Path) -> list[Path]:

@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import TableForm
+from spinepipe.documents.names import COHORT_NAME
 from spinepipe.documents.settings import validate
 from spinepipe.documents.strays import files_in, folders_in, strays_in
 from spinepipe.documents.yaml_text import Document, read_yaml
@@ -179,11 +180,16 @@ def _cohort(
         return None, []
     folder = cohort_folder(name, root)
     if not folder.is_dir():
-        known = [path.name for path in folders_in(root / COHORTS)]
+        present = [path.name for path in folders_in(root / COHORTS)]
+        known = [other for other in present if COHORT_NAME.fullmatch(other)]
+        found = f"unknown cohort '{name}'"
         remedy = did_you_mean(name, known, f"add the folder {folder}")
+        if name in present:
+            found = f"'{name}', a folder whose name no cohort can have"
+            remedy = "rename it with a-z, 0-9 and _ alone, in its cohort.yaml and here too"
         allowed = f"{one_of(known)}, or the path of a folder"
         place = (document.file, document.line_of("cohort"), "cohort")
-        return None, [Problem(*place, f"unknown cohort '{name}'", allowed, remedy)]
+        return None, [Problem(*place, found, allowed, remedy)]
     try:
         return read_cohort(folder, _further(document)), []
     except InputError as error:
@@ -231,8 +237,11 @@ def read_selection(root: Path) -> Selection:
     path = root / CONFIG
     file = displayed(path, root)
     if not path.is_file():
-        allowed = "a file with `studies: [...]`"
-        raise InputError([Problem(file, None, None, "no such file", allowed, "add it")])
+        found, allowed, remedy = "no such file", "a file with `studies: [...]`", "add it"
+        if not path.parent.is_dir():  # a run that was started elsewhere
+            found = f"no such file in {root}, nor a folder for it"
+            remedy = "go to the folder of the project, or name it: `snakemake -d FOLDER`"
+        raise InputError([Problem(file, None, None, found, allowed, remedy)])
     document, problems = read_yaml(path, file)
     if document is None:
         raise InputError(problems)

@@ -1,17 +1,15 @@
 """What every study has, of whatever kind."""
 
-import re
 from pathlib import Path
 
 from pydantic import BaseModel, Field
 
-from spinepipe.documents.names import LONGEST_NAME
+from spinepipe.documents.names import COHORT_NAME, LONGEST_NAME
 from spinepipe.studies.parts import FORM
 
 __all__ = ["COHORTS", "STUDIES", "Study", "cohort_folder"]
 
 COHORTS, STUDIES = Path("config") / "cohorts", Path("config") / "studies"
-COHORT_NAME = re.compile(r"[a-z0-9_]+")
 
 
 def cohort_folder(cohort: str, root: Path) -> Path:

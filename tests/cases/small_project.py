@@ -146,7 +146,7 @@ class Project:
 
     def look(self, *arguments: str) -> tuple[set[str], str]:
         """The same of a run with these arguments, and what Snakemake said."""
-        done = self.snakemake("-n", *arguments, "--quiet", "host")
+        done = self.snakemake("-n", *arguments)
         assert done.returncode == 0, done.stdout
         lines = re.findall(r"^    output: (.*)$", done.stdout, re.MULTILINE)
         files = {name for line in lines for name in line.split(", ")}

@@ -162,6 +162,7 @@ def test_names_of_other_languages_are_allowed_and_look_alikes_named() -> None:
     assert "looks like 'L4'" in str(name_fault("Ｌ４"))
     for bad in ("", ".a", "-a", "a..b", "a.", "a/b", "a\\b", "C:\\a", "a{b}", "a=b", "nul.txt"):
         assert name_fault(bad) is not None, bad
+    assert folder_fault("Müller-1") == "'Müller-1' with 'ü' (latin small letter u with diaeresis)"
     for bad in ("a b", "ä", "com1", "a" * 61, "..", "a:b"):
         assert folder_fault(bad) is not None, bad
 

@@ -3,8 +3,12 @@
 Catches a command that prints another answer, writes elsewhere or ends well where it should not.
 """
 
+import os
+import re
+import shutil
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -20,6 +24,7 @@ from study_cases import STUDY, Size, project, results
 
 from spinepipe.cli import doctor, main
 from spinepipe.cli.engine import relative_error
+from spinepipe.jobs import digest
 from spinepipe.studies.registry import every_kind
 from tests.generators import ais_films
 
@@ -341,9 +346,29 @@ def test_doctor_on_a_sound_folder(
     code, out, _ = run(capsys, "--root", healthy(tmp_path), "doctor")
     assert code == 0
     assert [line.split()[:2] for line in out.splitlines()] == [
-        ["ok", name] for name in ("python", "libraries", "engine", "profile", "results", "cores")
+        ["ok", name]
+        for name in ("python", "libraries", "engine", "profile", "results", "cache", "cores")
     ]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["profiles", "requirements.lock"]
+
+
+def test_an_environment_without_the_package_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where `make env` was cut off: by the doctor, and by a run before its first job."""
+
+    def nothing(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor, "metadata", nothing)
+    with pytest.raises(doctor.Trouble, match="spinepipe is not installed; run `make env`"):
+        doctor.check_python(tmp_path)
+    monkeypatch.setattr(digest, "version", lambda name: name == "spinepipe" and nothing(name))
+    digest.versions.cache_clear()
+    with pytest.raises(
+        ImportError, match=r"the package spinepipe is not installed\. Run `make env`"
+    ):
+        digest.versions()
 
 
 def test_doctor_finds_wrong_libraries(tmp_path: Path) -> None:
@@ -369,6 +394,28 @@ def test_doctor_finds_results_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "results").write_text("a file in the way")
     with pytest.raises(doctor.Trouble, match="cannot be written"):
         doctor.check_results(tmp_path)
+
+
+NOBODYS = "/proc/self/cache"
+"""A folder that nobody can make, not even root."""
+
+
+def test_a_home_that_cannot_be_written_gives_way_to_the_project(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`make` and `spinepipe` keep caches there, and the doctor says how Snakemake alone would."""
+    monkeypatch.setenv("XDG_CACHE_HOME", NOBODYS)
+    monkeypatch.setenv("MPLCONFIGDIR", "/proc/self/other")
+    own = tmp_path / ".snakemake/cache"
+    with pytest.raises(doctor.Trouble, match=rf"^{NOBODYS} cannot.*`export XDG_CACHE_HOME={own}`"):
+        doctor.check_cache(tmp_path)
+    run(capsys, "--root", tmp_path, "check")
+    assert os.environ["MPLCONFIGDIR"] == f"{own}/matplotlib"
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    asked = ["make", "-s", "--eval=told:\n\t@echo $$XDG_CACHE_HOME $$MPLCONFIGDIR", "told"]
+    for home, told in ((NOBODYS, f"{own} {own}/matplotlib\n"), (f"{tmp_path}/home", "\n")):
+        here = {"PATH": os.environ["PATH"], "HOME": home}
+        assert subprocess.check_output(asked, cwd=tmp_path, env=here, text=True) == told
 
 
 @pytest.mark.parametrize(
@@ -408,6 +455,21 @@ def test_docs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (code, out) == (0, "wrote docs/page.md\n")
     assert "linear_bushing" in page.read_text()
     assert run(capsys, "--root", tmp_path, "docs", "--check")[0] == 0
+
+
+def test_a_locale_of_ascii_alone_is_left_behind(tmp_path: Path) -> None:
+    """Folders, names and words go beyond it; Python decides at its start what it can print."""
+    root = tmp_path / "Rücken"
+    root.mkdir()
+    project(root, Size())
+    header = root / "config/cohorts/straight/cohort.yaml"
+    header.write_text(re.sub("(?m)^title:.*", "title: für Müller", header.read_text("utf-8")))
+    here = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [sys.executable, "-m", "spinepipe.cli", "--root", root, "show", "straight"]
+    ended = subprocess.run(command, env=here, capture_output=True, check=False)
+    assert ended.returncode == 0, ended.stderr.decode()
+    assert "für Müller" in ended.stdout.decode()
+    assert f"picture: {root}/results/show/straight.png" in ended.stdout.decode()
 
 
 def test_usage(capsys: pytest.CaptureFixture[str]) -> None:

@@ -116,6 +116,7 @@ NAME_CASES = [
     Case("unknown specimen", cell(MOTION, 2, "specimen", "c"), MOTION, 2, "specimen", "unknown specimen 'c'", 2),
     Case("wildcard misplaced", cell(BODIES, 3, "specimen", "*"), BODIES, 3, "specimen", "unknown specimen '*'", 2),
     Case("no folder name", add(SPECIMENS, "b/2,,,,,"), SPECIMENS, 4, "specimen", "letter or digit first", 5),
+    Case("no letter of a folder", add(SPECIMENS, "Müller,,,,,"), SPECIMENS, 4, "specimen", "'ü' (latin small letter u with diaeresis); allowed: at most 60 letters A-Z a-z", 5),
     Case("unknown vertebra", add(LANDMARKS, "a,L9,tip,0,0,0,1"), LANDMARKS, 26, "vertebra", "unknown vertebra 'L9'"),
     Case("joint upside down", cell(MOTION, 7, "joint", "L3L2"), MOTION, 7, "joint", "upper vertebra first: 'L2L3'", 2),
     Case("specimen twice", add(SPECIMENS, "a,,,,,"), SPECIMENS, 4, None, "the other is line 2"),

@@ -3,11 +3,14 @@
 Catches a fit called good at the brink of stability, and a zeroed reading that counts.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from spinepipe.calibrate import MeasuredCase, Problem, fit
-from spinepipe.calibrate.fit import _start_points
+from spinepipe.calibrate.fit import TIPPED, _start_points
+from spinepipe.calibrate.pooled_specimen import Member
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel
@@ -50,6 +53,36 @@ def problem(case: LoadCase, extension_deg: list[float], zeroed: bool = False) ->
     free = free_parameters(model, 0, ["extension_nm_per_rad"], "per_specimen")
     reach = np.array([np.log(1000.0)])
     return Problem(model, (MeasuredCase(case, measured, zeroed),), free, ANGLES, -reach, reach)
+
+
+def test_a_coordinate_that_is_not_fitted_and_gives_way_is_named() -> None:
+    """100 N at 0.1 m bend more than 2 N m/rad bear, however stiff in extension the joint is."""
+    asked = problem(compression(0.1, 1.0), [0.2, 2.0])
+    soft = STIFFNESS.copy()
+    soft[4] = 2.0
+    bushing = asked.model.effects[0].with_values(soft[None])
+    asked = replace(asked, model=replace(asked.model, effects=(bushing,)))
+    gives_way = "(tips over under the load of step 1: right bending of L3L4 loses stability"
+    found = fit(asked)
+    assert found.status is Status.UNSTABLE
+    assert found.message.startswith(f"{TIPPED} {gives_way}")
+    member = Member(asked, np.zeros(1), None)
+    assert member.result(np.zeros(1), np.eye(1), 0.0).message == found.message
+
+
+@pytest.mark.parametrize(("above_mm", "stiffness"), [(0.0, 149.0), (20.0, 107.0)])
+def test_translations_are_those_of_the_origin(above_mm: float, stiffness: float) -> None:
+    """As docs/cohort-format.md has it: a point above it moves by what the joint turns, too."""
+    model, push = joint(), np.array([10.0, 0.0, 0.0])
+    values = np.array([[149e3, 1e6, 1e5, 152.0, 20.0, 20.0]])
+    model = replace(model, effects=(model.effects[0].with_values(values),))
+    wrench = Wrench(0, np.array([0.0, 0.02, 0.0]), push, np.zeros(3))
+    measured = np.full((1, 1, 6), np.nan)
+    measured[0, 0, 0] = 10.0 / 149e3 + 10.0 * 0.02 / 152.0 * above_mm / 1e3  # m
+    case = MeasuredCase(LoadCase("shear", 1, (LoadStep(0, (wrench,)),)), measured)
+    free = free_parameters(model, 0, ["anterior_n_per_m"], "per_specimen")
+    found = fit(Problem(model, (case,), free, 1.0 - ANGLES, np.array([-3.0]), np.array([3.0])))
+    assert found.values[0] / 1e3 == pytest.approx(stiffness, abs=0.5)
 
 
 def test_further_starts_are_a_latin_hypercube_that_hangs_on_the_seed() -> None:

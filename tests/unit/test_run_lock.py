@@ -7,12 +7,14 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from spinepipe.jobs.run_lock import noted, one_at_a_time, take_off
+from spinepipe.files import HOST
+from spinepipe.jobs.run_lock import at_work, noted, one_at_a_time, take_off
 
 HOLD = """
 import sys, time
@@ -54,6 +56,16 @@ def test_the_lock_of_a_killed_run_is_taken_off(locks: Path, run: "subprocess.Pop
     assert take_off(locks) == [run.pid]
     assert not locks.exists()
     assert take_off(locks) == []
+
+
+def test_who_is_at_work_is_told_with_the_hour(locks: Path, run: "subprocess.Popen[str]") -> None:
+    assert at_work(locks.parent) == []
+    (note,) = locks.glob("*.run")
+    os.utime(note, (hour := time.mktime((2026, 3, 1, 14, 5, 0, 0, 0, -1)), hour))
+    assert at_work(locks) == [f"process {run.pid} on {HOST}, since 2026-03-01 14:05"]
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    assert at_work(locks) == []
 
 
 def test_of_two_runs_one_that_lives_keeps_the_lock(

@@ -10,6 +10,7 @@ import pytest
 from cohort_cases import Change, cell, joints, line, swap, text, without, write
 from sweeps import sweep
 
+from spinepipe import cohort
 from spinepipe.problems import InputError, Problem
 from spinepipe.studies import read as studies
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
@@ -123,6 +124,27 @@ def test_fault_of_the_study_is_located_and_explained(case: Case, tmp_path: Path)
     listing = "\n".join(map(str, problems))
     here = [p for p in problems if (p.file, p.row, p.column) == (FILE, case.row, case.key)]
     assert any(case.says in str(problem) for problem in here), listing
+
+
+def test_a_run_that_was_started_elsewhere_is_sent_to_the_project(tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=rf"no such file in {tmp_path}, nor.*`snakemake -d FOLDER`"
+    ):
+        studies.read_selection(tmp_path)
+    (tmp_path / "config").mkdir()
+    with pytest.raises(InputError, match=r"found no such file; allowed: .*; add it$"):
+        studies.read_selection(tmp_path)
+
+
+def test_a_folder_that_no_cohort_can_be_is_to_be_renamed(tmp_path: Path) -> None:
+    root = project(tmp_path, STUDY.replace("cohort: small", "cohort: My-Cohort"))
+    (root / "config/cohorts/small").rename(root / "config/cohorts/My-Cohort")
+    (problem,) = complaints(root)
+    assert problem.found == "'My-Cohort', a folder whose name no cohort can have"
+    assert problem.allowed == "none, or the path of a folder"
+    assert problem.remedy.startswith("rename it with a-z, 0-9 and _ alone")
+    with pytest.raises(InputError, match=r"found 'small'.*rename the folder: names of cohorts are"):
+        cohort.read(root / "config/cohorts/My-Cohort")
 
 
 @sweep("about, changes, key, says", COHORT_CASES)

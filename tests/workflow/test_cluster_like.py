@@ -79,6 +79,28 @@ def test_submitted_jobs_make_the_same_files_and_start_snakemake_once(
 
 
 @pytest.mark.full
+def test_what_the_queue_refuses_is_told_once(eight: Project, tmp_path: Path) -> None:
+    """A group and a job by itself, each tried three times."""
+    cluster = with_queue(eight.copy(tmp_path / "project"))
+    shutil.rmtree(cluster.path("results/range_of_motion/jobs/specimen=b"))
+    cluster.path(f"results/{BLOCK}").unlink()
+    cluster.path("submit.sh").write_text("#!/bin/sh\necho invalid time limit\nexit 1\n")
+    for told in ("group moves", "rule range_of_motion_block"):
+        done = cluster.snakemake(
+            *(f"results/{BLOCK}", "--profile", "profiles/slurm", "--executor", "cluster-generic"),
+            *("--cluster-generic-submit-cmd", "./submit.sh", "--jobs", "2", "--cores", "2"),
+            *("--group-components", "moves=16", "--latency-wait", "1"),
+        )
+        assert done.returncode != 0
+        assert len(re.findall(f"Error in {told}", done.stdout)) == 1, done.stdout
+        assert f"{told}: 3 times in all" in done.stdout
+        assert ("invalid time limit" in done.stdout) == told.startswith("rule")
+        assert "Traceback" not in done.stdout
+        moved = "results/range_of_motion/jobs/specimen=b"
+        shutil.copytree(eight.path(moved), cluster.path(moved), dirs_exist_ok=True)
+
+
+@pytest.mark.full
 def test_a_whole_study_comes_out_the_same(eight: Project, tmp_path: Path) -> None:
     cluster = with_queue(eight.copy(tmp_path / "project"))
     shutil.rmtree(cluster.path("results/range_of_motion"))

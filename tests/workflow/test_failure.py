@@ -12,6 +12,9 @@ import pytest
 from small_project import Project
 from toy import SPECIMENS
 
+from spinepipe.files import HOST
+from spinepipe.jobs.run_lock import noted
+
 pytestmark = pytest.mark.slow
 
 ACCIDENTS = {
@@ -135,12 +138,26 @@ def test_a_second_run_at_the_same_time_is_told(toy_copy: Project) -> None:
     (locks / "0.output.lock").write_text("results/counted/joints.parquet\n")
     toy_copy.path(f"results/{job_file('b')}").write_bytes(b"")
     before = toy_copy.files()
-    ended = toy_copy.snakemake("-j2", "all")
+    with noted(locks):
+        ended = toy_copy.snakemake("-j2", "all")
     assert ended.returncode != 0
+    assert f"at work in this folder: process {os.getpid()} on {HOST}, since 2" in ended.stdout
     assert "cannot be locked" in ended.stdout
     assert "--unlock" in ended.stdout
     assert "Traceback" not in ended.stdout
     assert toy_copy.files() == before
+
+
+@pytest.mark.full
+def test_the_lock_of_a_living_run_is_not_taken_off(toy_copy: Project) -> None:
+    locks = toy_copy.path(".snakemake/locks")
+    with noted(locks):
+        ended = toy_copy.snakemake("--unlock")
+        assert (
+            f"Nothing was run. A run is at work in this folder: process {os.getpid()}"
+            in ended.stdout
+        )
+        assert list(locks.iterdir())
 
 
 def test_the_warm_pool_is_insisted_on(toy_copy: Project) -> None:

@@ -8,12 +8,23 @@ from pathlib import Path
 
 from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.logging import logger
+from snakemake.settings.enums import Quietness
+from snakemake_interface_logger_plugins.common import LogEvent
 
 from spinepipe.jobs import code
+from spinepipe.jobs.digest import versions
 from spinepipe.jobs.pool import JobFailed, submit_and_wait, warm_up
 from spinepipe.jobs.time_left import TimeLeft, costs
 from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.registry import place_of
+
+
+def check_environment():
+    """Say so where a library is missing: each job would fail of it."""
+    try:
+        versions()
+    except ImportError as error:
+        stop(error)
 
 
 def check_engine():
@@ -52,15 +63,60 @@ def share_a_process():
 share_a_process()
 
 
+PER_JOB = {
+    *(LogEvent.JOB_INFO, LogEvent.GROUP_INFO, LogEvent.SHELLCMD, LogEvent.JOB_FINISHED),
+    *(LogEvent.PROGRESS, LogEvent.RESOURCES_INFO, LogEvent.RUN_INFO),
+}
+"""What Snakemake tells of each job, and what the first line of a run tells better."""
+
+
 def to_the_point(record):
-    """Log filter: no two lines per job that starts, and of a failed job only its own words."""
-    text = str(record.msg)
+    """Log filter: no lines per job that starts, and of a failed job only its own words."""
+    text, event = str(record.msg), getattr(record, "event", None)
+    if workflow.dryrun:  # known when jobs are, not yet when rules are read
+        return True
+    # Who chooses what to be told is told it.
+    if workflow.output_settings.quiet == {Quietness.HOST}:
+        if event in (LogEvent.JOB_ERROR, LogEvent.GROUP_ERROR):
+            return not workflow.local_exec and is_news_of_the_queue(record)
+        if event in PER_JOB or getattr(record, "quietness", None) is Quietness.RULES:
+            return False
     if "JobFailed in file" in text:
         noise = ("RuleException", "JobFailed in file", '  File "')
         record.msg = "\n".join(
             line for line in text.splitlines() if not line.startswith(noise)
         )
     return not text.startswith(("Select jobs to execute", "Execute "))
+
+
+def is_news_of_the_queue(record):
+    """Whether a submitted job, or a group, of that rule is the first to fail: one of many alike.
+
+    Snakemake drops what was said when a group was refused, and lists its jobs instead, twice.
+    """
+    group = record.event is LogEvent.GROUP_ERROR
+    if not group and not record.rule_msg:
+        return False
+    name = f"group {record.groupid}" if group else f"rule {record.rule_name}"
+    if group:
+        submitted = getattr(record, "external_jobid", None)
+        record.event = None
+        record.msg = f"Error in {name} of {len(record.job_error_info)} jobs: " + (
+            f"submitted job {submitted} failed, see its log."
+            if submitted
+            else "it was not submitted. `--verbose` shows the call, which tells why if you run it; "
+            'remedies: docs/cluster.md, "What the queue refuses".'
+        )
+    NOT_DONE[name] += 1
+    return NOT_DONE[name] == 1
+
+
+NOT_DONE = Counter()
+"""How often submitted jobs failed or were refused, by rule or group."""
+
+
+if workflow.is_main_process:
+    logger.addFilter(to_the_point)
 
 
 def check_writable():
@@ -205,6 +261,9 @@ FAILED = []
 
 def tell_failed():
     """Name the jobs that failed once more at the end, of many the first ones: their words are far up."""
+    for name, times in NOT_DONE.items():
+        if times > 1:
+            print(f"{name}: {times} times in all", file=sys.stderr)
     if len(FAILED) < 2:
         return
     shown = FAILED[:MOST_FAILED_NAMED]

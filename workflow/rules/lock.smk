@@ -44,5 +44,21 @@ def locked_by_the_living(self):
     )
 
 
+def tell_who_is_at_work():
+    """Say who holds the lock, before Snakemake advises --unlock, which would take it off the living."""
+    runs = run_lock.at_work(Path(".snakemake/locks"))
+    # Whether a run on another machine still lives is for the user to judge.
+    alive = [run for run in runs if f" on {run_lock.HOST}," in run]
+    if alive and workflow.is_main_process and "--unlock" in sys.argv:
+        stop(f"A run is at work in this folder: {'; '.join(alive)}. End it first.")
+    if runs and workflow.is_main_process:
+        print(
+            f"warn  a run is at work in this folder: {'; '.join(runs)}. What it makes is locked until it "
+            "ends: wait for it, do not use --unlock",
+            file=sys.stderr,
+        )
+
+
 lock_of_snakemake, locked_of_snakemake = PersistenceBase.lock, PersistenceBase.locked
 lock_for_the_living()
+tell_who_is_at_work()

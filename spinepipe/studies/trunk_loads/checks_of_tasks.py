@@ -98,7 +98,7 @@ def task_problems(
 
 def _names(row: _Row, words: Mapping[str, Spelling]) -> Iterator[Problem]:
     if not PLAIN.fullmatch(str(row.cells["task"])):
-        allowed = "letters, digits, _ . - and a letter or digit first"
+        allowed = "letters A-Z a-z, digits, _ . - and a letter or digit first"
         yield row.problem("task", "a name for no file", allowed, "rename the task")
     for column, known in WORDS.items():
         word = row.word(column)
