@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
@@ -76,10 +78,20 @@ def tilted(*tilts: float) -> Film:
         ((0, 6, 12, 6, 0), [(0, 2), (2, 4)]),
         ((0, 6, 12, 8, 13), [(0, 4)]),  # a wave of 4 deg is none
         ((0, 6, 12, 6, 13), [(0, 2)]),  # of 6 deg it is one, if ends apart by one are no curve
-        ((0, 4, 0, -4, 0, 0), [(0, 5)]),  # all of it a wave: one curve from end to end
+        ((0, 4, 0, -1, 0, 0), [(0, 5)]),  # all of it a wave: one curve from end to end
+        ((0, 4, 0, -4, 0, 0), [(1, 3)]),
+        ((0, -4.5, -4.5, 0, 8, 16, 22, 18, 12, 8, 4, 2, 0), [(1, 6), (6, 12)]),
+        ((0, 2, 4, 6, 8, 12, 18, 22, 16, 8, 0, -4.5, -4.5), [(0, 7), (7, 12)]),
+        ((0, 5, 10, 5, 0), [(0, 2), (2, 4)]),
+        ((0, 5, 0), [(0, 2)]),  # 5 deg is a wave
+        ((0, 5.1, 0), []),  # ends apart by one
+        ((0, 6, 0, 6), []),
+        ((0, 0, 10), [(0, 2)]),
         ((0, 4, 6, 10, 3), [(0, 3)]),
         ((0, -6, -12, -5, 2), [(0, 2), (2, 4)]),
-        ((0, 8, 8, 8, 0), [(0, 3)]),  # as far tilted: the upper one
+        ((0, 8, 8, 8, 0), [(0, 3), (1, 4)]),  # as far tilted: the outermost of each curve
+        ((0, 8, 8, -10), [(0, 2), (1, 3)]),
+        ((0, 8, 6, 8, 0), [(0, 3), (1, 4)]),
         ((10, 0, 0), [(0, 2)]),
     ],
 )
@@ -87,6 +99,32 @@ def test_ends_lie_where_the_tilt_turns_back_by_more_than_five_degrees(
     tilts: tuple[float, ...], ends: list[tuple[int, int]]
 ) -> None:
     assert [(one.lower, one.upper) for one in curves(tilted(*tilts))] == ends
+
+
+STEPS = st.one_of(st.integers(-30, 30), st.integers(-300, 300).map(lambda tenths: tenths / 10))
+
+
+@given(st.lists(STEPS, min_size=2, max_size=18))
+@example([0, -4.5, -4.5, 0, 8, 16, 22, 18, 12, 8, 4, 2, 0])
+def test_upside_down_and_mirrored_a_film_has_the_same_curves(tilts: list[float]) -> None:
+    """And no two vertebrae of a curve have a larger angle, if the spine has one at all."""
+    erect, last = tilted(*tilts), len(tilts) - 1
+    rolled, mirrored = tilted(*tilts[::-1]), erect.mirrored()
+    found = [(one.lower, one.upper, one.cobb(erect)) for one in curves(erect)]
+    assert found == [(one.lower, one.upper, one.cobb(mirrored)) for one in curves(mirrored)]
+    turned = [(last - one.upper, last - one.lower, one.cobb(rolled)) for one in curves(rolled)]
+    assert found == turned[::-1]
+    for low, high, cobb in found:
+        within = erect.tilt[low : high + 1]
+        if np.ptp(erect.tilt) > np.deg2rad(5.001):
+            assert cobb == np.ptp(within) > np.deg2rad(5.0)
+
+
+def test_the_lowest_curve_begins_where_it_is_tilted_farthest() -> None:
+    """26.5 deg between the second vertebra and the seventh; from the lowest one it was 22."""
+    lowest, *_ = curves(tilted(0, -4.5, -4.5, 0, 8, 16, 22, 18, 12, 8, 4, 2, 0, 0, 0))
+    assert (lowest.lower, lowest.upper) == (1, 6)
+    assert np.rad2deg(lowest.cobb(tilted(0, -4.5, -4.5, 0, 8, 16, 22))) == pytest.approx(26.5)
 
 
 def test_a_spine_of_two_vertebrae_has_no_curve() -> None:
