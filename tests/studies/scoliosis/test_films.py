@@ -109,8 +109,10 @@ def test_readings_are_averaged_and_their_scatter_is_the_noise(tmp_path: Path) ->
                 turned = float(rng.uniform(-3.0, 3.0))
                 film = cornered(lean, turn_deg=turned)
                 for row in film:
-                    row |= {name: float(row[name]) + rng.normal(0.0, 0.25) for name in CORNERS}  # type: ignore[arg-type]
-                films[position] += [{**row, "observer": observer, "repeat": repeat} for row in read]
+                    row |= {"observer": observer, "repeat": repeat}
+                    for name in CORNERS:
+                        row[name] = float(row[name]) + rng.normal(0.0, 0.25)  # type: ignore[arg-type]
+                films[position] += film
     read = read_films(written(tmp_path, films), "p01")
     assert read.readings["erect"] == 80
     # the line between the centres of both endplates, 24 mm apart, each of two corners
