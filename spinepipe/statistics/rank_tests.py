@@ -251,14 +251,14 @@ def _tail_of_blocks(blocks: tuple[tuple[int, ...], ...]) -> Array | None:
         keys, at = np.unique(every[:, :-1] @ digits, return_inverse=True)
         one = np.empty(len(keys), dtype=np.int64)
         one[at] = np.arange(len(at))
-        sums, chance = every[one], np.bincount(at, np.repeat(chance, len(ways))) / len(ways)
+        sums, chance = every[one], np.bincount(at, np.repeat(chance / len(ways), len(ways)))
     if len(sums) * _orders(blocks[-1]) > 2 * MOST_SUMS:
         return None
     ways = np.array(list(set(permutations(blocks[-1]))))
     sums = sums.astype(np.int64)
     squares = np.sum(sums**2, axis=1)[:, None] + 2 * sums @ ways.T + sum(np.square(blocks[-1]))
     share = np.bincount(squares.ravel(), np.repeat(chance / len(ways), len(ways)))
-    found: Array = np.cumsum(share[::-1])[::-1]
+    found: Array = np.cumsum(share[::-1], dtype=np.float64)[::-1]
     return found
 
 

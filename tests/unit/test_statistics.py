@@ -113,7 +113,27 @@ def test_spearman_with_ties_is_pearson_of_mid_ranks_and_says_so() -> None:
     found = spearman(x, y)
     mid_ranks = [1, 2.5, 2.5, 5, 5, 5], [2.5, 1, 2.5, 4.5, 4.5, 6]
     assert found.effect == pytest.approx(np.corrcoef(*mid_ranks)[0, 1], abs=1e-12)
-    assert found.message == "ties: 5 of the first and 4 of the second values"
+    assert found.message == "exact p; ties: 5 of the first and 4 of the second values"
+
+
+def test_spearman_of_four_pairs_with_ties_is_never_certain() -> None:
+    """In two of 24 orderings the tied pairs meet so: one in twelve, to either side one in six."""
+    found = spearman([1, 1, 2, 3], [1, 1, 2, 3])
+    assert (found.effect, found.p) == (pytest.approx(1.0), pytest.approx(1.0 / 6.0))
+
+
+@given(st.integers(4, 6), st.integers(2, 5), st.integers(0, 10**6))
+def test_spearman_p_with_ties_is_the_share_of_orderings(n: int, levels: int, seed: int) -> None:
+    x, y = np.random.default_rng(seed).integers(0, levels, (2, n))
+    found = spearman(x, y)
+    if found.status is not Ended.DONE:
+        return
+    first, second = stats.rankdata(x), np.array(list(permutations(stats.rankdata(y))))
+    every, own = second @ first, first @ stats.rankdata(y)
+    tails = np.mean(every >= own - 1e-9), np.mean(every <= own + 1e-9)
+    assert found.p == pytest.approx(min(1.0, 2.0 * min(tails)))
+    for one, other in ((y, x), (x[::-1], y[::-1]), (-x, -y), (x, -y)):
+        assert spearman(one, other).p == pytest.approx(found.p)
 
 
 @sweep("test", CORRELATIONS)

@@ -97,9 +97,14 @@ def _left_out(proof: HeldOut) -> Iterator[LeftOut]:
     for kind, folds in proof.by_kind().items():
         if folds.base is None or folds.with_effects is None or folds.expected <= 0.0:
             continue
-        gaps = (one.against(folds.expected).gap for one in (folds.base, folds.with_effects))
-        of_gap = None if folds.closed is None else share_of_gap(folds.closed)
-        yield LeftOut(kind, len(folds.folds), *gaps, folds.closed, of_gap)
+        yield LeftOut(
+            kind,
+            len(folds.folds),
+            folds.base.against(folds.expected).gap,
+            folds.with_effects.against(folds.expected).gap,
+            folds.closed,
+            None if folds.closed is None else share_of_gap(folds.closed),
+        )
 
 
 def near_alone(candidates: Iterable[Candidate], margin: float) -> tuple[Candidate, ...]:
