@@ -251,7 +251,8 @@ def _tail_of_blocks(blocks: tuple[tuple[int, ...], ...]) -> Array | None:
         keys, at = np.unique(every[:, :-1] @ digits, return_inverse=True)
         one = np.empty(len(keys), dtype=np.int64)
         one[at] = np.arange(len(at))
-        sums, chance = every[one], np.bincount(at, np.repeat(chance / len(ways), len(ways)))
+        shares = np.bincount(at, np.repeat(chance / len(ways), len(ways)))
+        sums, chance = every[one], shares.astype(np.float64)
     if len(sums) * _orders(blocks[-1]) > 2 * MOST_SUMS:
         return None
     ways = np.array(list(set(permutations(blocks[-1]))))
