@@ -112,7 +112,11 @@ def in_words(said: Said) -> str:
     names = f" {', '.join(said.named)}" if said.named else ""
     evidence = "" if said.log_evidence is None else f"log evidence {said.log_evidence:.1f}, "
     before, after = said.held_out_gaps
-    closed = "" if said.closed is None else f", {100 * said.closed:.0f} % closed"
+    closed = (
+        ""
+        if said.closed is None
+        else f", {100 * said.closed:.0f} % of the excess misfit (chi squared)"
+    )
     return (
         f"{said.verdict}{names}: {evidence}threshold {said.threshold:.1f}; held-out gap "
         f"{before:.2f} to {after:.2f} noise SD{closed}; store {said.store_mib:.0f} MiB."

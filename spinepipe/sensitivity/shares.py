@@ -1,7 +1,7 @@
 """How much of the variation is due to rows, columns and both of a grid, or to specimens and draws.
 
 Intervals come from leaving out one row, and one column, of a grid at a time. Nested draws within
-specimens may share treatments.
+specimens may share treatments; what comes of a Latin hypercube is not taken for independent draws.
 """
 
 from dataclasses import dataclass
@@ -100,12 +100,17 @@ class MeanSquares:
     interaction: Array
 
 
-def variance_shares(grid: ArrayLike) -> Shares:
+def variance_shares(grid: ArrayLike, hypercubes: bool = False) -> Shares:
     """Shares of rows (joint poses) and columns (stiffness sets) in the variance of a full grid.
 
     Parameters
     ----------
     grid : (P, S) one finite value for every combination.
+    hypercubes : rows are one Latin hypercube, and columns another, not independent draws. Each
+        stands for all there is, whose means it has but for little: P rows vary by their sum of
+        squares over P (McKay 1979, doi:10.1080/00401706.1979.10489755), and over P - 1 they would
+        vary P / (P - 1) times too much. The interval is then a jackknife over rows alone, with the
+        columns as given: a few points of a hypercube cannot be left out one by one.
 
     Estimates are the unbiased variance components of the model with random rows and columns,
     negative ones set to 0. They speak of the populations that rows and columns are drawn from:
@@ -139,7 +144,7 @@ def variance_shares(grid: ArrayLike) -> Shares:
     if _constant_but_for_one_row(values) or _constant_but_for_one_row(values.T):
         message = "but for one row or column all values are the same"
         return _without(values, Ended.CONSTANT, message)
-    return _shares_of_table(values)
+    return _shares_of_table(values, hypercubes)
 
 
 def _constant_but_for_one_row(values: Array) -> bool:
@@ -153,16 +158,19 @@ def _without(values: Array, status: Ended, message: str) -> Shares:
     return Shares(rows, columns, status, message)
 
 
-def _shares_of_table(values: Array) -> Shares:
+def _shares_of_table(values: Array, hypercubes: bool) -> Shares:
     rows, columns = values.shape
     # a scale of 1 keeps the squares of tiny and of huge values
     values = (values - values.mean()) / np.abs(values - values.mean()).max()
-    raw = _raw_shares(mean_squares(values), rows, columns)
+    of = _shares_of_hypercubes if hypercubes else _raw_shares
+    raw = of(mean_squares(values), rows, columns)
     estimates = _estimates(raw)
-    by_row = _raw_shares(_leaving_out_rows(values), rows - 1, columns)
+    by_row = of(_leaving_out_rows(values), rows - 1, columns)
     swapped = _leaving_out_rows(values.T)
-    by_column = _raw_shares(
-        MeanSquares(swapped.column, swapped.row, swapped.interaction), rows, columns - 1
+    by_column = (
+        np.stack([raw, raw])  # columns as given
+        if hypercubes
+        else of(MeanSquares(swapped.column, swapped.row, swapped.interaction), rows, columns - 1)
     )
     low, high = share_intervals(raw, by_row, by_column)
     # an estimate set to 0 changes the others a little
@@ -207,7 +215,20 @@ def _raw_shares(squares: MeanSquares, rows: int, columns: int) -> Array:
     """(..., 5) row, column, interaction, totals; beyond 0 to 1 where chance has it."""
     row = (squares.row - squares.interaction) / columns
     column = (squares.column - squares.interaction) / rows
-    rest = squares.interaction
+    return _of_parts(row, column, squares.interaction)
+
+
+def _shares_of_hypercubes(squares: MeanSquares, rows: int, columns: int) -> Array:
+    """(..., 5) the same of rows and columns that stand for all there is: shares of the squares."""
+    return _of_parts(
+        (rows - 1) * squares.row,
+        (columns - 1) * squares.column,
+        (rows - 1) * (columns - 1) * squares.interaction,
+    )
+
+
+def _of_parts(row: Array, column: Array, rest: Array) -> Array:
+    """(..., 5) shares of three parts, and the totals of the first two."""
     parts = np.stack([row, column, rest, row + rest, column + rest], axis=-1)
     shares: Array = parts / (row + column + rest)[..., None]
     return shares
@@ -223,9 +244,6 @@ def _estimates(raw: Array) -> Array:
 def _message(raw: Array) -> str:
     names = [name for name, share in zip(("row", "column"), raw[:2], strict=True) if share < 0.0]
     return f"negative {' and '.join(names)} component set to 0" if names else ""
-
-
-_PARTS = ("specimen", "draw", "treatment")
 
 
 @dataclass(frozen=True)
@@ -253,14 +271,15 @@ def nested_shares(values: ArrayLike) -> NestedShares:
 
     Parameters
     ----------
-    values : (S, P, K) one finite value for every specimen, draw of it, and treatment. The p-th
-        draws of two specimens have nothing in common; the k-th treatment is the same for all.
+    values : (S, P, K) one finite value for every specimen, draw of it, and treatment. The draws of
+        each specimen are a Latin hypercube of their own, the p-th of two specimens have nothing in
+        common; the treatments are one hypercube, the k-th is the same for all.
 
-    Estimates are the unbiased variance components of the mixed classification with random factors
+    Estimates are the variance components of the mixed classification with random specimens
     (Searle, Casella & McCulloch 1992, Variance Components, chapter 4), negative ones set to 0.
-    Intervals are a jackknife over specimens with the treatments as given, see `share_intervals`:
-    they speak of other specimens and draws under the same treatments. A few treatments taken from
-    a Latin hypercube are no independent draws that could be left out one by one.
+    Draws and treatments stand for all there is, see `variance_shares`. Intervals are a jackknife
+    over specimens with the treatments as given, see `share_intervals`: they speak of other
+    specimens and draws under the same treatments.
 
     Raises
     ------
@@ -291,29 +310,23 @@ def _shares_of_grid(grid: Array) -> NestedShares:
     # an estimate set to 0 changes the others a little
     low, high = np.minimum(low, estimates), np.maximum(high, estimates)
     found = [Share(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
-    negative = [name for name, share in zip(_PARTS, raw, strict=False) if share < 0.0]
-    message = f"negative {' and '.join(negative)} component set to 0" if negative else ""
+    message = "negative treatment component set to 0" if raw[2] < 0.0 else ""
     return NestedShares(Ended.DONE, message, *found)
 
 
 def components(grid: Array) -> Array:
     """(4,) variance components of specimen, draw, treatment and rest; chance may have them < 0."""
-    specimens, draws, treatments = grid.shape
+    specimens = grid.shape[0]
     by_specimen, by_treatment = grid.mean(axis=(1, 2)), grid.mean(axis=(0, 1))
     by_draw, by_both = grid.mean(axis=2), grid.mean(axis=1)
-    specimen = draws * treatments * by_specimen.var(ddof=1)
-    treatment = specimens * draws * by_treatment.var(ddof=1)
-    draw = treatments * by_draw.var(axis=1, ddof=1).mean()
     both_rest = by_both - by_specimen[:, None] - by_treatment + grid.mean()
-    both = draws * np.sum(both_rest**2) / ((specimens - 1) * (treatments - 1))
+    both = np.sum(both_rest**2, axis=0).mean() / (specimens - 1)
     left = grid - by_draw[:, :, None] - by_both[:, None, :] + by_specimen[:, None, None]
-    scatter = np.sum(left**2) / (specimens * (draws - 1) * (treatments - 1))
-    together = (both - scatter) / draws
     return np.array(
         [
-            (specimen - draw - both + scatter) / (draws * treatments),
-            (draw - scatter) / treatments,
-            (treatment - both) / (specimens * draws),
-            together + scatter,
+            by_specimen.var(ddof=1),
+            by_draw.var(axis=1).mean(),
+            by_treatment.var() - both / specimens,  # what the specimens drawn add to the means
+            both + np.mean(left**2),
         ]
     )

@@ -21,11 +21,14 @@ def p_value(name: str, meaning: str) -> Column:
 
 STATISTICS = Table(
     "statistics",
-    "Tests of significance: one row per test. A family is what is corrected for together.",
+    "Tests of significance: one row per test. Corrected together are the rows of one family that "
+    "have the same test.",
     ("specimen", "family", "test", "joint", "response", "factor", "stratum"),
     (
         SPECIMEN,
-        Column("family", "text", "tests that are corrected together"),
+        Column(
+            "family", "text", "what is asked; its rows with the same test are corrected together"
+        ),
         Column("test", "text", "name of the test"),
         JOINT_OR_ALL,
         Column("response", "text", "what is tested, such as extension_error"),
@@ -37,9 +40,9 @@ STATISTICS = Table(
         Column("effect_name", "text", "what the effect size is called"),
         Column("effect", "number", "effect size", null=NO_RESULT),
         p_value("p", "p-value, uncorrected"),
-        p_value("p_bonferroni", "p-value times the size of the family"),
+        p_value("p_bonferroni", "p-value times family_size"),
         p_value("p_holm", "p-value corrected by Holm's method, never larger than Bonferroni's"),
-        Column("family_size", "integer", "tests of the family that have a p-value", low=0),
+        Column("family_size", "integer", "rows that were corrected together", low=0),
         ENDED,
         MESSAGE,
     ),

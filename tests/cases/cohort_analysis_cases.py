@@ -64,9 +64,13 @@ def series(*values: float, names: str = "abcdef") -> pd.Series:
     return pd.Series(values, index=list(names[: len(values)]))
 
 
-def fit(fitted_to: str, cost: float | None, readings: int, unknowns: int = 1) -> Row:
+def fit(
+    fitted_to: str, cost: float | None, readings: int, unknowns: int = 1, at_bounds: int = 0
+) -> Row:
+    freedom = None if cost is None else readings - unknowns + at_bounds
     row = {"specimen": "a", "representation": "per_joint", "fitted_to": fitted_to, "cost": cost}
-    return row | {"readings": readings, "unknowns": unknowns, "aicc": cost, "bic": cost}
+    row |= {"readings": readings, "unknowns": unknowns, "degrees_of_freedom": freedom}
+    return row | {"aicc": cost, "bic": cost}
 
 
 def stiff(specimen: str, joint: str, log: float, **more: Any) -> Row:

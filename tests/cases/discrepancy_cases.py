@@ -402,6 +402,7 @@ def _held_out(wide: bool, named: bool) -> Rows:
                 **{f"rms_{model}": value for model, value in rms.items()},
                 **_gaps_of(rms),
                 "closed": 0.97 if named else None,
+                "gap_closed": 0.83 if named else None,
                 **done,
             }
         )

@@ -8,6 +8,8 @@ from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 from sweeps import sweep
@@ -23,6 +25,7 @@ from spinepipe.statistics import (
     kendall,
     kolmogorov_smirnov_normality,
     lilliefors_normality,
+    rank_tests,
     spearman,
 )
 
@@ -110,7 +113,27 @@ def test_spearman_with_ties_is_pearson_of_mid_ranks_and_says_so() -> None:
     found = spearman(x, y)
     mid_ranks = [1, 2.5, 2.5, 5, 5, 5], [2.5, 1, 2.5, 4.5, 4.5, 6]
     assert found.effect == pytest.approx(np.corrcoef(*mid_ranks)[0, 1], abs=1e-12)
-    assert found.message == "ties: 5 of the first and 4 of the second values"
+    assert found.message == "exact p; ties: 5 of the first and 4 of the second values"
+
+
+def test_spearman_of_four_pairs_with_ties_is_never_certain() -> None:
+    """In two of 24 orderings the tied pairs meet so: one in twelve, to either side one in six."""
+    found = spearman([1, 1, 2, 3], [1, 1, 2, 3])
+    assert (found.effect, found.p) == (pytest.approx(1.0), pytest.approx(1.0 / 6.0))
+
+
+@given(st.integers(4, 6), st.integers(2, 5), st.integers(0, 10**6))
+def test_spearman_p_with_ties_is_the_share_of_orderings(n: int, levels: int, seed: int) -> None:
+    x, y = np.random.default_rng(seed).integers(0, levels, (2, n))
+    found = spearman(x, y)
+    if found.status is not Ended.DONE:
+        return
+    first, second = stats.rankdata(x), np.array(list(permutations(stats.rankdata(y))))
+    every, own = second @ first, first @ stats.rankdata(y)
+    tails = np.mean(every >= own - 1e-9), np.mean(every <= own + 1e-9)
+    assert found.p == pytest.approx(min(1.0, 2.0 * min(tails)))
+    for one, other in ((y, x), (x[::-1], y[::-1]), (-x, -y), (x, -y)):
+        assert spearman(one, other).p == pytest.approx(found.p)
 
 
 @sweep("test", CORRELATIONS)
@@ -155,10 +178,75 @@ def test_a_p_that_underflows_says_so() -> None:
 def test_friedman_gives_the_published_rounding_result() -> None:
     found = friedman(ROUNDING)
     assert found.statistic == pytest.approx(11.143, abs=5e-4)
-    assert found.p == pytest.approx(0.003805, abs=5e-7)
+    assert stats.chi2.sf(found.statistic, 2) == pytest.approx(0.003805, abs=5e-7)  # R's p
+    assert found.p == pytest.approx(0.003805, rel=0.2)  # 22 blocks are many
     assert found.effect == pytest.approx(11.143 / (22 * 2), abs=2e-5)
     assert found.n == 22
-    assert found.message == "ties: in 4 of 22 blocks"
+    assert found.message == "exact p, by chi-squared 0.0038; ties: in 4 of 22 blocks"
+
+
+@sweep(
+    "blocks, p, chi_squared",
+    [
+        ([[1, 2, 3], [1, 2, 3], [1, 3, 2]], 7 / 36, 0.097),
+        ([[1, 2, 3], [1, 3, 2], [1, 3, 2], [1, 2, 3]], 15 / 216, 0.0498),
+        ([[1, 2, 3]] * 5, 6**-4, 0.0067),
+        ([[1, 2, 3]] * 2, 1 / 6, 0.135),
+        ([[3, 2, 1], [1, 2, 3]], 1.0, 1.0),
+    ],
+)
+def test_friedman_s_p_is_counted_over_all_orders(blocks, p: float, chi_squared: float) -> None:
+    found = friedman(blocks)
+    assert found.p == pytest.approx(p, rel=1e-12)
+    assert found.message == f"exact p, by chi-squared {stats.chi2.sf(found.statistic, 2):.2g}"
+    assert stats.chi2.sf(found.statistic, 2) == pytest.approx(chi_squared, abs=5e-4)
+
+
+@given(st.integers(2, 4), st.integers(3, 4), st.integers(2, 5), st.integers(0, 10**6))
+def test_friedman_s_p_with_ties_is_the_share_of_orders(
+    blocks: int, treatments: int, levels: int, seed: int
+) -> None:
+    """Listed one by one; the order of the blocks, or of the treatments, is of no account."""
+    values = np.random.default_rng(seed).integers(0, levels, (blocks, treatments))
+    found = friedman(values)
+    if found.status is not Ended.DONE:
+        return
+    ranks = stats.rankdata(values, axis=1)
+    sums = ranks[0]
+    for block in ranks[1:]:
+        ways = np.array(list(permutations(block)))
+        sums = (sums[..., None, :] + ways).reshape(-1, treatments)
+    squares = np.sum(sums**2, axis=1)
+    share = np.mean(squares >= np.sum(ranks.sum(axis=0) ** 2) - 1e-9)
+    assert found.p == pytest.approx(share, rel=1e-9)
+    for same in (values[::-1], values[:, ::-1], -values):
+        assert friedman(same).p == pytest.approx(found.p, rel=1e-9)
+
+
+def test_what_cannot_be_counted_is_drawn_or_chi_squared() -> None:
+    rng = np.random.default_rng(3)
+    few, many = rng.random((6, 9)), rng.random((12, 9))
+    drawn, approximate = friedman(few), friedman(many)
+    assert drawn.message.startswith("p from 20000 random arrangements, by chi-squared 0.")
+    assert friedman(few[:, ::-1]).p == pytest.approx(drawn.p, abs=0.02)
+    assert approximate.message == "chi-squared p"
+    assert approximate.p == pytest.approx(stats.chi2.sf(approximate.statistic, 8))
+    alike = friedman([np.arange(9.0)] * 6)
+    assert alike.p == 1 / 20001  # as drawn: none of the others is as far out
+
+
+def test_drawn_and_counted_p_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = np.random.default_rng(12).random((4, 5)) + np.arange(5.0) / 6.0
+    counted = friedman(few)
+    monkeypatch.setattr(rank_tests, "MOST_SUMS", 0)
+    rank_tests._tail_of_blocks.cache_clear()
+    drawn = friedman(few)
+    rank_tests._tail_of_blocks.cache_clear()
+    assert "random" in drawn.message
+    # four SDs of a share of 20,000
+    sd = np.sqrt(counted.p * (1.0 - counted.p) / 20_000)
+    assert drawn.p == pytest.approx(counted.p, abs=4.0 * sd)
+    assert 0.001 < counted.p < 0.5
 
 
 def test_friedman_of_one_order_in_all_blocks_is_complete_concordance() -> None:

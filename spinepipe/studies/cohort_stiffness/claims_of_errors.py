@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from spinepipe.statistics import wilcoxon_signed_rank
+from spinepipe.statistics import corrected, wilcoxon_signed_rank
 from spinepipe.studies.cohort_stiffness.claims import (
     BY_CONSTRUCTION,
     CIRCULAR,
@@ -374,7 +374,8 @@ def error_spreads(statistics: pd.DataFrame, significance: float) -> Iterator[Row
                 f"{prefix}errors_differ_between_{what}",
                 f"With {described}, fitted, errors in the loaded coordinate differ between {what} "
                 "under some load case.",
-                "largest Kendall's W of Friedman tests over load cases; p smallest, Holm",
+                "largest Kendall's W of Friedman tests over load cases; p smallest, corrected "
+                "by Holm's method for these",
                 "",
             )
             family = statistics["family"] == f"between_{what}/{representation}/fitted"
@@ -385,13 +386,14 @@ def error_spreads(statistics: pd.DataFrame, significance: float) -> Iterator[Row
 
 def _errors_differ(claim: Claim, what: str, tests: pd.DataFrame, significance: float) -> Row:
     """Yes where a test is significant, else undecided: a small cohort cannot tell no difference."""
-    known = tests.dropna(subset="p_holm")
+    known = tests.dropna(subset="p")
     if tests.empty:
         return claim.not_asked(NO_SUCH_FITS)
     if known.empty:
         return claim.unknown(joined(*tests["message"].unique()))
-    p = float(known["p_holm"].min())
-    below = known.loc[known["p_holm"] < significance, "stratum"]
+    # for the tests of the claim alone: the family has those of all motion too
+    holm = np.array(corrected(known["p"].to_list(), "holm"), dtype=float)
+    p, below = float(holm.min()), known.loc[holm < significance, "stratum"]
     message = f"by itself under: {listed(list(below))}; {len(known)} load cases; no interval"
     value = float(known["effect"].max())
     holds = "yes" if p < significance else "undecided"
@@ -403,7 +405,7 @@ def _specimens_of(what: str, tests: pd.DataFrame) -> int | None:
 
     Friedman's statistic is W n (k - 1) for n blocks of k, which gives k but where W is 0.
     """
-    least = tests.sort_values("p_holm", kind="stable").iloc[0]
+    least = tests.sort_values("p", kind="stable").iloc[0]
     blocks, w = int(least["n"]), float(least["effect"])
     if what == "levels":
         return blocks

@@ -201,6 +201,7 @@ def _record(problem: Problem, found: Fit) -> Row:
         "n_optima": found.n_optima,
         "status": found.status.value,
         "message": joined(*notes),
+        "degrees_of_freedom": None if cost is None else found.uncertainty.degrees_of_freedom,
     }
 
 

@@ -137,6 +137,6 @@ def independent(problem: Problem) -> bool:
 def no_fit(status: str, message: str) -> dict[str, Any]:
     """The row of the table ``fits`` where there is none."""
     counts = ("readings", "unknowns", "iterations", "evaluations", "n_optima")
-    empty = dict.fromkeys(("effective_unknowns", "cost"))
+    empty = dict.fromkeys(("effective_unknowns", "cost", "degrees_of_freedom"))
     ended = {"status": status, "message": message}
     return {**dict.fromkeys(counts, 0), **empty, **criteria(None, 0, None), **ended}

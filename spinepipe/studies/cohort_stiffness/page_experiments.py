@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-import pandas as pd
 
 from spinepipe.experiment.double_sigmoid import Zone
 from spinepipe.report.page.document import Results
@@ -32,7 +31,10 @@ _WHY = {
 def ranges(study: CohortStiffness, results: Results) -> Iterator[str]:
     """How far joints move, and how far the fitted model does.
 
-    A curve agrees where the difference is within both 95 % intervals, added as independent.
+    A curve agrees where the difference is within its 95 % limit. The model was fitted to these
+    readings, so what it is unsure of is part of their noise: residuals of a least squares fit have
+    the variance of the readings less that of the model, not the sum (Cook and Weisberg, Residuals
+    and influence in regression, 1982, section 2.1).
     """
     rows = results.table("load_displacement")
     if rows.empty:
@@ -47,13 +49,13 @@ def ranges(study: CohortStiffness, results: Results) -> Iterator[str]:
         f"Range of motion, the model ({IN_WORDS[name]}) less the joint: median {number(middle, 2)}°"
         f" over {count(len(found), 'curve')}, middle half {number(low, 2)}° to {number(high, 2)}°"
     )
-    way = pd.Series(np.hypot(found["measured_way"], found["simulated_way"]), index=found.index)
-    known = way.notna()
+    square = found["measured_way"] ** 2 - found["simulated_way"] ** 2
+    known = square > 0.0  # where the model is as unsure as the readings, there is no limit
     if known.any():
-        agree = int((differences.abs() <= way)[known].sum())
+        agree = int((differences[known] ** 2 <= square[known]).sum())
         told += (
-            f"; {agree} of {int(known.sum())} are within both 95 % intervals, of which one expects "
-            "95 in 100 where only noise of readings is left"
+            f"; {agree} of {int(known.sum())} are within the 95 % limits of what noise of readings "
+            "leaves of a fit to them, and 95 in 100 would be where only that is left"
         )
     yield f"{told}. The stiffness was fitted to these readings, so this is no prediction."
 

@@ -189,6 +189,7 @@ class PooledRows:
             "iterations": self.found.iterations,
             "evaluations": own.evaluations,
             "n_optima": int(usable),
+            "degrees_of_freedom": None,
             **ended,
         }
 

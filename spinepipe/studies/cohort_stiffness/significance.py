@@ -221,12 +221,16 @@ def nested_fits(rows: pd.DataFrame) -> Outcome:
         return _without("a fit is missing")
     if len(single) < 2:
         return _without("one load case only: nothing to compare")
-    readings, unknowns = int(joint["readings"].sum()), int(joint["unknowns"].sum())
+    readings = int(joint["readings"].sum())
     if readings != int(single["readings"].sum()):
         return _without("the fits are not to the same readings")
-    free = readings - int(single["unknowns"].sum())
+    # an unknown at a bound is held there, and is none that the readings were fitted with
+    small, large = (int(part["degrees_of_freedom"].sum()) for part in (joint, single))
+    if small <= large:
+        return _without("the separate fits have no more unknowns inside their bounds")
     costs = float(joint["cost"].sum()), float(single["cost"].sum())
-    return f_test_nested(costs[0], readings - unknowns, costs[1], free)
+    outcome = f_test_nested(costs[0], small, costs[1], large)
+    return replace(outcome, n=readings) if outcome.status is Ended.DONE else outcome
 
 
 def _correlated(rows: pd.DataFrame) -> bool:

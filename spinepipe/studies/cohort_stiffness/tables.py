@@ -155,6 +155,12 @@ FITS = Table(
         Column("n_optima", "integer", "distinct optima found from all starts", low=0),
         status("fit"),
         MESSAGE,
+        Column(
+            "degrees_of_freedom",
+            "integer",
+            "readings, and priors, less unknowns inside their bounds",
+            null=f"{NO_FIT}, or a pooled one",
+        ),
     ),
 )
 

@@ -166,7 +166,7 @@ def formula_shown(formula: Formula | None) -> Shown:
         Column("term", "text", "what the coefficient multiplies; motions in ° and mm"),
         Column("coefficient", "text", "coefficient (one SD)"),
         Column("unit", "text", "unit of the coefficient"),
-        Column("explained", "number", "share of what is above the noise that it adds", "%"),
+        Column("explained", "number", "share of the excess misfit (chi squared) that it adds", "%"),
     )
     return pd.DataFrame(rows), columns
 

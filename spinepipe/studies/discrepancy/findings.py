@@ -19,7 +19,7 @@ from spinepipe.studies.discrepancy.unnamed_words import (
     why_not_all,
     without_a_name,
 )
-from spinepipe.studies.discrepancy.verdict import DECLARED, Answer, Missing, Verdict
+from spinepipe.studies.discrepancy.verdict import DECLARED, Answer, Missing, Verdict, share_of_gap
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import (
     called,
@@ -117,11 +117,31 @@ def _closed(verdict: Verdict) -> str:
     closed = verdict.gap.held_out_closed
     if closed is None or not (verdict.effects or verdict.candidates_in_set):
         return ""
-    share = f"{100.0 * closed:.0f} %" if closed < 0.995 else ">99 %"
-    share = "100 %" if closed >= 1.0 else share
     before, after = verdict.gap.held_out_base, verdict.gap.held_out_with_effects
-    sizes = "" if before is None or after is None else f", {fixed(before)} to {fixed(after)}"
-    return f"On motion held out of the fits {share} of the gap is closed{sizes}."
+    sizes = "" if before is None or after is None else f" from {fixed(before)} to {fixed(after)}"
+    told = [f"On motion held out of the fits the gap falls{sizes}: {_shares(closed)}."]
+    for one in verdict.left_out:
+        if len(verdict.left_out) > 1 and one.excess_closed is not None:
+            told.append(f"{TRAINED_ON[one.kind]}: {_shares(one.excess_closed)}.")
+    return " ".join(told)
+
+
+TRAINED_ON = {
+    "test": "Of tests left out, with fits to the other tests of the same specimens",
+    "specimen": "Of specimens left out, with their own stiffness and sizes fitted to the other "
+    "half of their load steps",
+    "steps": "Of load steps left out, with fits to every second one",
+}
+"""What the fits have seen of a specimen whose motion they predict, by the kind of fold."""
+
+
+def _shares(excess: float) -> str:
+    """Of the excess misfit, and of the gap."""
+    shares = [
+        "100 %" if share >= 1.0 else ">99 %" if share >= 0.995 else f"{100.0 * share:.0f} %"
+        for share in (excess, share_of_gap(excess))
+    ]
+    return f"{shares[0]} of the excess misfit (chi squared), {shares[1]} of the gap"
 
 
 def warnings(verdict: Verdict) -> tuple[str, ...]:

@@ -57,7 +57,7 @@ _TRIED = (
 _PROOF = (
     *("fold", "kind", "readings"),
     *(f"gap_{model}{end}" for model in ("base", "with_effects") for end in ("", "_low", "_high")),
-    *("gap_surrogate", "closed", "worse", "message"),
+    *("gap_surrogate", "closed", "gap_closed", "worse", "message"),
 )
 """Columns of the proof; residuals and one more interval are in the file."""
 
@@ -204,10 +204,10 @@ def _share(formula: Formula | None) -> str:
     """How much the whole formula says, in the fit and held out."""
     if formula is None:
         return ""
-    told = f" Together {100.0 * formula.explained:.0f}\u00a0% of what is above the noise"
+    told = f" Together {100.0 * formula.explained:.0f}\u00a0% of the excess misfit (chi squared)"
     if formula.held_out_closed is None:
         return f"{told}."
-    return f"{told}, and {100.0 * formula.held_out_closed:.0f}\u00a0% in readings left out."
+    return f"{told}, and {100.0 * formula.held_out_closed:.0f}\u00a0% of that of readings left out."
 
 
 def _from_verdict(verdict: Verdict) -> dict[str, Records]:

@@ -21,6 +21,7 @@ from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import Tried
 from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
+from spinepipe.studies.discrepancy.verdict import share_of_gap
 from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES, LOAD_UNITS
 
 Row = dict[str, Any]
@@ -337,6 +338,7 @@ def _fold_row(row: FoldRow) -> Row:
         **_held_out_gap("with_effects", row.with_effects, row.expected),
         **_held_out_gap("surrogate", row.surrogate, row.expected),
         "closed": row.closed,
+        "gap_closed": None if row.closed is None else share_of_gap(row.closed),
         "worse": row.worse,
         "status": Status.CONVERGED if row.base is not None else Status.NOT_CONVERGED,
         "message": row.message,

@@ -212,9 +212,13 @@ def _gaps(model: str, of: str, null: str) -> tuple[Column, ...]:
     )
 
 
+_NOTHING_TO_CLOSE = "no result, or the base's discrepancy is not above the noise"
+
 HELD_OUT = Table(
     "held_out",
-    "Proof on motion that no fit has seen: one row per specimen or test left out.",
+    "Proof on motion that was left out of the fits: one row per specimen or test left out. A test "
+    "is left out in all specimens, whose other tests are fitted; a specimen but for every second "
+    "of its load steps, to which its own stiffness and sizes of effects are fitted.",
     ("fold",),
     (
         Column("fold", "text", "specimen or test left out"),
@@ -229,8 +233,9 @@ HELD_OUT = Table(
         Column(
             "closed",
             "number",
-            "share of the base's discrepancy that the effects close; negative: they widen it",
-            null="no result, or the base's discrepancy is not above the noise",
+            "share of the base's excess misfit (chi squared) that the effects take away; negative: "
+            "they add to it",
+            null=_NOTHING_TO_CLOSE,
             high=1.0,
         ),
         Column(
@@ -240,6 +245,14 @@ HELD_OUT = Table(
         ),
         status("fits"),
         MESSAGE,
+        Column(
+            "gap_closed",
+            "number",
+            "share of the base's gap that the effects close: 1 less the root of what `closed` "
+            "leaves of 1; negative: they widen it",
+            null=_NOTHING_TO_CLOSE,
+            high=1.0,
+        ),
     ),
 )
 

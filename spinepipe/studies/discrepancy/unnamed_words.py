@@ -107,7 +107,13 @@ def described(verdict: Verdict) -> Iterator[str]:
         yield _formula(told.formula)
     table = verdict.tabulated
     if table is not None:
-        closed = "" if table.held_out_closed is None else _closed(table.held_out_closed)
+        share = table.held_out_closed
+        closed = (
+            ""
+            if share is None
+            else f", and takes away {fixed(100.0 * share, 0)} % of the excess misfit (chi squared) "
+            "of readings left out"
+        )
         yield (
             f"The model file with the effects has a table in the place of a name "
             f"({readable(table.place)}): it leaves a gap of {fixed(table.gap)} noise SD{closed}."
@@ -116,15 +122,16 @@ def described(verdict: Verdict) -> Iterator[str]:
 
 def _formula(formula: Formula) -> str:
     share = 100.0 * formula.explained
-    closed = "" if formula.held_out_closed is None else _closed(formula.held_out_closed)
+    held_out = formula.held_out_closed
+    closed = (
+        ""
+        if held_out is None
+        else f" and {fixed(100.0 * held_out, 0)} % of that of readings left out"
+    )
     return (
         f"A formula that describes it, and is no name: {formula_text(formula)}. It explains "
-        f"{fixed(share, 0)} % of what is above the noise{closed}."
+        f"{fixed(share, 0)} % of the excess misfit (chi squared){closed}."
     )
-
-
-def _closed(share: float) -> str:
-    return f", and closes {fixed(100.0 * share, 0)} % in readings left out"
 
 
 def _shape_is_told(verdict: Verdict) -> bool:

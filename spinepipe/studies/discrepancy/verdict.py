@@ -7,6 +7,7 @@ field of its own.
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -175,11 +176,42 @@ class Sizes:
     held_out_with_effects: float | None = None
 
 
+def share_of_gap(excess: float) -> float:
+    """Share of the gap that goes with this share of the excess misfit, whose root the gap is."""
+    return 1.0 - sqrt(max(0.0, 1.0 - excess))
+
+
 @dataclass(frozen=True)
 class Gaps(Sizes):
-    """The gap; ``held_out_closed`` is the share of it that the effects close held out."""
+    """The gap.
+
+    Attributes
+    ----------
+    held_out_closed : share of the excess misfit (chi2) that the effects take away held out.
+    held_out_gap_closed : share of the gap, which is the root of it, that they close.
+    """
 
     held_out_closed: float | None = None
+    held_out_gap_closed: float | None = None
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """What folds of one kind say together.
+
+    Attributes
+    ----------
+    kind : test, specimen or steps. folds : that were scored. base, with_effects : gaps, noise SD.
+    excess_closed, gap_closed : shares of the excess misfit (chi2), and of the gap; None where noise
+        may be all.
+    """
+
+    kind: str
+    folds: int
+    base: float
+    with_effects: float
+    excess_closed: float | None
+    gap_closed: float | None
 
 
 @dataclass(frozen=True)
@@ -229,6 +261,7 @@ class Verdict:
     imperfections : what those allowed for took up; None where the base has no fit.
     tabulated : of UNKNOWN and PART, what the model with effects has besides; None for nothing.
     withheld : effects that imperfections hide, one for each kind of imperfection that does.
+    left_out : what is told held out, tests and specimens apart.
     """
 
     cohort: str
@@ -250,6 +283,7 @@ class Verdict:
     imperfections: Imperfections | None = None
     tabulated: Tabulated | None = None
     withheld: tuple[WithheldEffect, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
 
     @property
     def named(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.curve_numbers import numbers_at
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart
+from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.beyond import Beyond
 from spinepipe.studies.discrepancy.search.gaps import Place, places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.hypothesis import Form
@@ -24,6 +25,7 @@ from spinepipe.studies.discrepancy.verdict import (
     Candidate,
     Estimate,
     Gaps,
+    LeftOut,
     Missing,
     Noise,
     Rival,
@@ -31,6 +33,7 @@ from spinepipe.studies.discrepancy.verdict import (
     Sizes,
     Threshold,
     Verdict,
+    share_of_gap,
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import Part, Unknown
 from spinepipe.units import BORDER_PER_SI
@@ -78,6 +81,7 @@ def verdict_found(
         gap=Gaps(
             **{name: gap.gap if gap else None for name, gap in gaps.items()},
             held_out_closed=proof.closed,
+            held_out_gap_closed=None if proof.closed is None else share_of_gap(proof.closed),
         ),
         smallest_detectable=told.smallest_detectable,
         unknown=_unknown(found, ended, final, stays),
@@ -85,7 +89,22 @@ def verdict_found(
         suspected_data_errors=investigation.errors,
         threshold=Threshold(screen.threshold, ready.study.false_alarm, screen.draws),
         families=told.families,
+        left_out=tuple(_left_out(proof)),
     )
+
+
+def _left_out(proof: HeldOut) -> Iterator[LeftOut]:
+    for kind, folds in proof.by_kind().items():
+        if folds.base is None or folds.with_effects is None or folds.expected <= 0.0:
+            continue
+        yield LeftOut(
+            kind,
+            len(folds.folds),
+            folds.base.against(folds.expected).gap,
+            folds.with_effects.against(folds.expected).gap,
+            folds.closed,
+            None if folds.closed is None else share_of_gap(folds.closed),
+        )
 
 
 def near_alone(candidates: Iterable[Candidate], margin: float) -> tuple[Candidate, ...]:

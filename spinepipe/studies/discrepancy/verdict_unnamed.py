@@ -27,7 +27,7 @@ class FormulaTerm:
     ----------
     joint, specimen : ``*`` for all. acts : load or reading. term : what the coefficient multiplies,
         in words; of : the motions that it is a product of, empty for other terms.
-    explained : share of what is above the noise that the term adds to those before it.
+    explained : share of the excess misfit (chi2) that the term adds to those before it.
     """
 
     specimen: str
@@ -48,8 +48,8 @@ class Formula:
 
     Attributes
     ----------
-    terms : as they entered. text : a line for each place. explained : share of what is above the
-        noise, in the fit. held_out_closed : of that in readings left out; None where none tells.
+    terms : as they entered. text : a line for each place. explained : share of the excess misfit
+        (chi2), in the fit. held_out_closed : of that in readings left out; None where none tells.
     threshold : drop of chi2 that noise alone seldom shows for the best of all terms.
     """
 
@@ -67,8 +67,8 @@ class Tabulated:
     Attributes
     ----------
     place : what is tabulated, and where, in words. gap : noise SD, in the fit with them.
-    held_out_closed : share of what is above the noise in readings left out that they close; None
-        where none tells.
+    held_out_closed : share of the excess misfit (chi2) in readings left out that they take away;
+        None where none tells.
     """
 
     place: str

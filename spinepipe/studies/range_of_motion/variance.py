@@ -57,7 +57,7 @@ def _complete(motion: Array) -> Array:
 def _own(grid: Grid, motion: Array) -> Iterator[dict[str, Any]]:
     """Rows of one specimen, joint by joint; motion (poses, K, J)."""
     for at, joint in enumerate(grid.joints):
-        found = variance_shares(motion[:, :, at])
+        found = variance_shares(motion[:, :, at], hypercubes=True)
         parts = {"pose": found.row, "stiffness": found.column, "rest": found.interaction}
         ended = (found.status, found.message)
         yield {"joint": joint, **_row(motion[None, :, :, at], ended, parts)}

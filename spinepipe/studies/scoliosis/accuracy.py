@@ -1,8 +1,9 @@
 """Job: errors of every model over all patients, beside what reading the films alone makes.
 
-A rotation since the erect film is made of four readings of tilt, so its error has twice their SD; a
-tilt on a film is one reading less that of the lowest vertebra. Models are held where the film has
-the top, whose own reading is theirs too: the floor is an upper one.
+A rotation since the erect film is made of four readings of tilt, so its error has twice the SD of
+one; a tilt on a film is one reading less that of the lowest vertebra. Places are seen from the
+lowest vertebra, whose error is in their SD. Models are held where the film has the top, whose own
+reading is theirs too: the floor is an upper one.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,8 +1,9 @@
 """Cobb and Ferguson angles of a spine's curves, chosen on the erect film and kept for all films.
 
-A curve lies between two end vertebrae, the ones tilted farthest to either side; its apex is the
-vertebra farthest from the line between their centres. Cobb's angle is between the tilts of the end
-vertebrae, Ferguson's between the lines from their centres to the apex's.
+A curve lies between two end vertebrae, the ones tilted farthest to either side, the outermost of
+equally tilted ones; its apex is the vertebra farthest from the line between their centres. Cobb's
+angle is between the tilts of the end vertebrae, Ferguson's between the lines from their centres to
+the apex's. Read upside down or mirrored a film has the same ends and Cobb angles.
 """
 
 from dataclasses import dataclass
@@ -13,8 +14,9 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.studies.scoliosis.films import Film
 
-LEAST_CURVE = float(np.deg2rad(5.0))
-"""Smaller changes of tilt are waves of the line, no curves."""
+LEAST_CURVE = float(np.deg2rad(5.0)) + 1e-9
+"""Changes of tilt up to 5 deg are waves of the line, no curves; rounding makes no curve of one that
+is read as 5 deg."""
 
 
 LOWEST_PROXIMAL, THORACOLUMBAR = 5, "T12"
@@ -69,10 +71,14 @@ def region(apex: str) -> str:
 
 
 def curves(erect: Film) -> tuple[Curve, ...]:
-    """The curves of a spine, caudal to cranial; adjacent ones share an end vertebra."""
-    ends = _turning_points(erect.tilt)
-    found = []
-    for lower, upper in pairwise(ends):
+    """The curves of a spine, caudal to cranial; adjacent ones share an end vertebra.
+
+    Where several are equally tilted between two curves, each curve has the outermost of them.
+    """
+    before, found = 0, []
+    for turn, upper in pairwise(_turning_points(erect.tilt)):
+        lower = before + int(np.argmax(erect.tilt[before:] == erect.tilt[turn]))
+        before = turn
         if upper - lower < 2:
             continue
         side = 1 if erect.tilt[lower] > erect.tilt[upper] else -1
@@ -98,21 +104,25 @@ _LAST = ("T12", "T11")
 
 
 def _turning_points(tilt: Array) -> list[int]:
-    """Vertebrae at which the tilt turns back, ends among them; small waves are none."""
-    points, way = [0], 0
-    extreme = 0
-    for at in range(1, len(tilt)):
-        gone = tilt[at] - tilt[extreme]
-        if way == 0:
-            if abs(gone) > LEAST_CURVE:
-                way, extreme = int(np.sign(gone)), at
-        elif way * gone >= 0.0:
+    """Vertebrae at which the tilt turns back, ends among them; small waves are none.
+
+    Of equally tilted ones the uppermost. Without a curve: the lowest and the uppermost vertebra.
+    """
+    risen, fallen = tilt - np.minimum.accumulate(tilt), np.maximum.accumulate(tilt) - tilt
+    gone = np.flatnonzero(np.maximum(risen, fallen) > LEAST_CURVE)
+    if not len(gone):
+        return [0, len(tilt) - 1]
+    extreme = int(gone[0])
+    way = 1 if risen[extreme] > fallen[extreme] else -1
+    points = [int(np.argmin(way * tilt[:extreme]))]
+    for at in range(extreme + 1, len(tilt)):
+        back = way * (tilt[extreme] - tilt[at])
+        if back <= 0.0:
             extreme = at
-        elif abs(gone) > LEAST_CURVE:
+        elif back > LEAST_CURVE:
             points.append(extreme)
             way, extreme = -way, at
-    points.append(extreme if way else len(tilt) - 1)
-    return points
+    return [*points, extreme]
 
 
 def _apex(erect: Film, lower: int, upper: int) -> int:

@@ -5,7 +5,7 @@ to the right negative. Here: to the right, up, tilt to the right; m and rad. Eac
 its own lowest vertebra, which then lies at nought and stands upright.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -134,7 +134,8 @@ class Read:
     ----------
     films : by position. sizes : by position, mean height of the vertebrae, m; none without corners.
     scales : by position, the factor that makes the film as large as the erect one.
-    sd : (3,) m, m and rad, SD of what is taken for right, up and tilt; NaN where none tells.
+    sd : (3,) m, m and rad, SD of one reading: of right and up as seen from the lowest vertebra, of
+        a vertebra's own tilt; NaN where none tells.
     readings : by position, how many were averaged.
     """
 
@@ -160,18 +161,17 @@ def read_films(cohort: Cohort, patient: str) -> Read:
     """The films of a patient; `checks` has seen to it that they are whole."""
     rows = cohort.further["films"]
     rows = rows[rows["specimen"] == patient]
-    films, sizes, readings, scatter = {}, {}, {}, []
+    every, sizes = {}, {}
     for position, film in rows.groupby("position", sort=False):
-        each = as_read(film, cohort.vertebrae)
-        films[str(position)], readings[str(position)] = Film(*each.mean(axis=0)), len(each)
-        if len(each) > 1:
-            scatter.append((each[:, :, 1:].var(axis=0, ddof=1).mean(axis=1), len(each)))
+        every[str(position)] = as_read(film, cohort.vertebrae)
         size = height(film)
         if size is not None:
             sizes[str(position)] = size
-    scales = _scales(films, sizes)
-    films = {name: film.scaled(scales[name]) for name, film in films.items()}
-    return Read(films, sizes, scales, _sd(scatter), readings)
+    scales = _scales(every, sizes)
+    every = {name: each * np.array([[scales[name]] * 2 + [1.0]]).T for name, each in every.items()}
+    films = {name: Film(*each.mean(axis=0)) for name, each in every.items()}
+    readings = {name: len(each) for name, each in every.items()}
+    return Read(films, sizes, scales, _sd(list(every.values())), readings)
 
 
 def by_reading(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
@@ -234,16 +234,24 @@ def height(rows: pd.DataFrame) -> float | None:
     return float(np.hypot(*axis.T).mean()) / MM_PER_M
 
 
-def _scales(films: Mapping[str, Film], sizes: Mapping[str, float]) -> dict[str, float]:
+def _scales(positions: Iterable[str], sizes: Mapping[str, float]) -> dict[str, float]:
     known = ERECT in sizes
-    return {name: sizes[ERECT] / sizes[name] if known and name in sizes else 1.0 for name in films}
+    return {
+        name: sizes[ERECT] / sizes[name] if known and name in sizes else 1.0 for name in positions
+    }
 
 
-def _sd(scatter: list[tuple[Array, int]]) -> Array:
-    """(3,) SD of a mean of readings, pooled over films."""
-    if not scatter:
+def _sd(films: Sequence[Array]) -> Array:
+    """(3,) SD of one reading, pooled over the films (K, 3, V) that were read more than once."""
+    repeated = [each for each in films if len(each) > 1]
+    if not repeated:
         return np.full(3, np.nan)
-    freedom = np.array([count - 1 for _, count in scatter], dtype=float)
-    variance = np.array([one / count for one, count in scatter])
-    found: Array = np.sqrt((freedom[:, None] * variance).sum(axis=0) / freedom.sum())
+    squares = np.zeros(3)
+    for each in repeated:
+        off = each - each.mean(axis=0)
+        # The lowest vertebra is at nought by definition, so its own error is in all the others.
+        # Tilts about the mean tilt of their reading are rid of it: V of them hold V - 1 errors.
+        off[:, 2] -= off[:, 2].mean(axis=1, keepdims=True)
+        squares += (off**2).sum(axis=(0, 2)) / (each.shape[2] - 1)
+    found: Array = np.sqrt(squares / sum(len(each) - 1 for each in repeated))
     return found

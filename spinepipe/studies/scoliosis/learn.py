@@ -51,7 +51,8 @@ def _say(study: str, line: str) -> None:
 def weights(settings: Scoliosis, cohort: Cohort) -> Array:
     """(3,) m, m and rad; films of which nothing tells how they were read count as exact."""
     place, tilt = np.nan_to_num(reading_noise(settings, cohort))
-    return weighed_with(float(place), float(tilt), settings.model_sd_mm, settings.model_sd_deg)
+    seen = float(place), float(np.sqrt(2.0) * tilt)  # a tilt less that of the lowest vertebra
+    return weighed_with(*seen, settings.model_sd_mm, settings.model_sd_deg)
 
 
 def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) -> Learned:

@@ -119,8 +119,16 @@ class Scoliosis(Study):
         "takes longer than all else of a patient",
     )
     tilt_sd_deg: float | None = Field(
-        default=None, gt=0, le=20, description="SD of a vertebra's tilt, where no repeats tell it"
+        default=None,
+        gt=0,
+        le=20,
+        description="SD of the reading of one vertebra's tilt, where no repeats tell it; a tilt "
+        "less that of another vertebra has 1.41 times as much",
     )
     place_sd_mm: float | None = Field(
-        default=None, gt=0, le=50, description="SD of a vertebra's place, where no repeats tell it"
+        default=None,
+        gt=0,
+        le=50,
+        description="SD, each way, of a vertebra's place as seen from the lowest one, whose own "
+        "error of reading is part of it, where no repeats tell it",
     )

@@ -98,7 +98,7 @@ def test_specimens_of_a_friedman_test_are_its_own(
                 "n": blocks,
                 "statistic": w * blocks * (groups - 1),
                 "effect": w,
-                "p_holm": 1e-6,
+                "p": 1e-6,
                 "message": "",
             }
         ]
@@ -350,3 +350,28 @@ def test_pooled_spreads_are_told_beside() -> None:
     rows = list(stiffness_spreads(pd.DataFrame(rated()), pd.DataFrame(unsettled), 0.05))
     assert "no pooled fit; they swing" in rows[0]["message"]
     assert "0.25" not in rows[0]["message"]
+
+
+def test_a_claim_of_errors_is_corrected_for_its_own_tests() -> None:
+    """Of three load cases, not also for those of all rotations: 0.015 times 3, not times 6."""
+    rows = [
+        {
+            "family": "between_levels/per_specimen/fitted",
+            "test": "Friedman",
+            "response": response,
+            "stratum": stratum,
+            "n": 4,
+            "statistic": 4.0,
+            "effect": 0.5,
+            "p": p,
+            "p_holm": 1.0,
+            "message": "",
+        }
+        for response in ("loaded_error", "rotation_error")
+        for stratum, p in (("flexion", 0.3), ("bend", 0.015), ("twist", 0.2))
+    ]
+    found = {row["finding"]: row for row in error_spreads(pd.DataFrame(rows), 0.05)}
+    row = found["errors_differ_between_levels"]
+    assert row["p"] == pytest.approx(3 * 0.015)
+    assert row["holds"] == "yes"
+    assert "under: bend; 3 load cases" in row["message"]

@@ -246,11 +246,42 @@ def test_sentences_follow_from_the_rows() -> None:
     assert told(load_displacement=frame("load_displacement", [])) == [axis_told]
 
 
-def test_ranges_agree_where_both_intervals_reach() -> None:
+RANGE = [f"range_of_motion_{part}deg" for part in ("", "low_", "high_")]
+
+
+def test_ranges_agree_within_the_noise_that_a_fit_leaves() -> None:
+    """Readings sure to 0.5 deg and a model of them to 0.3: their difference to 0.4, not 0.58."""
     rows = tables_of(Size(("a", "b")))["load_displacement"]
     model = rows["source"] == "simulated"
-    names = [f"range_of_motion_{part}deg" for part in ("", "low_", "high_")]
-    rows.loc[model, names] = rows.loc[~model, names].to_numpy() + 0.42  # intervals reach 0.424
+    middle = rows.loc[~model, RANGE[0]].to_numpy()
+    rows.loc[~model, RANGE] = middle[:, None] + np.array([0.0, -0.5, 0.5])
+    rows.loc[model, RANGE] = middle[:, None] + 0.39 + np.array([0.0, -0.3, 0.3])
     assert "24 of 24 are within" in told(load_displacement=rows)[0]
-    rows.loc[model, names] += 0.01
+    rows.loc[model, RANGE] += 0.02
     assert "0 of 24 are within" in told(load_displacement=rows)[0]
+    rows.loc[model, RANGE] = middle[:, None] + np.array([0.0, -0.5, 0.5])
+    assert "are within" not in told(load_displacement=rows)[0]
+
+
+def test_of_springs_fitted_to_their_readings_95_in_100_are_within_the_limit() -> None:
+    """Five loads to each side, noise of 0.1 deg: the limit of both as independent held all but 1 in
+    100. Four SDs of a share of 2,000."""
+    load = np.linspace(-1.0, 1.0, 11)
+    fresh = np.random.default_rng(38).normal(0.0, 0.1, (2000, 11)) + 4.0 * load
+    slope = fresh @ load / (load @ load)
+    ways = 1.96 * np.array([0.1 * np.sqrt(2.0), 0.1 * 2.0 / np.sqrt(load @ load)])
+    rows = pd.DataFrame(
+        [
+            {"source": source, "representation": name, "specimen": str(at), "joint": "L1L2"}
+            | {"test": "flexion", "cycle": 1}
+            | dict(zip(RANGE, (number, number - way, number + way), strict=True))
+            for at in range(len(fresh))
+            for source, name, number, way in (
+                ("measured", "", fresh[at, -1] - fresh[at, 0], ways[0]),
+                ("simulated", "per_joint", 2.0 * slope[at], ways[1]),
+            )
+        ]
+    )
+    (sentence,) = ranges(study_of(Size(("a", "b"))), Results({"load_displacement": rows}, {}, {}))
+    agree = int(sentence.split(" of 2000 are within")[0].split()[-1])
+    assert agree / 2000 == pytest.approx(0.95, abs=4.0 * np.sqrt(0.05 * 0.95 / 2000))

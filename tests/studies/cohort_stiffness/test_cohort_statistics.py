@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 from cohort_analysis_cases import Row, fit, only, seen, statistics_of
+from scipy import stats
 
 from spinepipe.studies.cohort_stiffness.significance import nested_fits
 from spinepipe.studies.cohort_stiffness.stages import of_joint_fits
@@ -96,6 +97,24 @@ def test_separate_fits_against_a_joint_one() -> None:
     assert outcome.statistic == pytest.approx(4.0)
     assert outcome.effect == pytest.approx(1 / 3)
     assert "F(1, 8)" in outcome.message
+    assert outcome.n == 10
+
+
+def test_unknowns_at_a_bound_are_no_degrees_of_freedom() -> None:
+    """54 unknowns of separate fits, two of them at a bound, against 18: 34 further ones."""
+    separate = [fit("x", 80.0, 100, 18), fit("y", 90.0, 100, 18, 2), fit("z", 70.0, 100, 18)]
+    outcome = nested_fits(pd.DataFrame([fit("all", 285.0, 300, 18), *separate]))
+    assert "F(34, 248)" in outcome.message
+    assert outcome.statistic == pytest.approx((45.0 / 34.0) / (240.0 / 248.0))
+    assert outcome.p == pytest.approx(stats.f.sf(outcome.statistic, 34, 248))
+    assert outcome.n == 300
+
+
+def test_separate_fits_all_at_bounds_are_no_larger_model() -> None:
+    rows = [fit("all", 30.0, 10, 2), fit("x", 12.0, 5, 2, 1), fit("y", 8.0, 5, 2, 1)]
+    outcome = nested_fits(pd.DataFrame(rows))
+    assert outcome.p is None
+    assert "no more unknowns inside their bounds" in outcome.message
 
 
 @pytest.mark.parametrize(

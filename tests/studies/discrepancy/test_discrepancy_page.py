@@ -169,7 +169,22 @@ def test_how_sure_a_name_is() -> None:
     assert how_sure(verdict_of(VERDICTS["NAMED"])) == (
         "Neutral zone: log evidence 88.0, 6.2 is needed; next best nonlinear stiffening, 17 "
         "behind. Residuals of 4.10 noise SD become 1.02 (1 is noise). On motion held out of the "
-        "fits 97 % of the gap is closed, 4.18 to 0.35."
+        "fits the gap falls from 4.18 to 0.35: 97 % of the excess misfit (chi squared), 83 % of "
+        "the gap."
+    )
+    apart = VERDICTS["NAMED"] | {
+        "left_out": [
+            {"kind": "test", "folds": 2, "base": 3.54, "with_effects": 2.69}
+            | {"excess_closed": 0.42, "gap_closed": 0.24},
+            {"kind": "specimen", "folds": 2, "base": 4.9, "with_effects": 2.8}
+            | {"excess_closed": 0.67, "gap_closed": 0.43},
+        ]
+    }
+    assert how_sure(verdict_of(apart)).endswith(
+        "Of tests left out, with fits to the other tests of the same specimens: 42 % of the excess "
+        "misfit (chi squared), 24 % of the gap. Of specimens left out, with their own stiffness "
+        "and sizes fitted to the other half of their load steps: 67 % of the excess misfit (chi "
+        "squared), 43 % of the gap."
     )
     assert "Its shape: one side only" in how_sure(verdict_of(VERDICTS["UNKNOWN"]))
 
@@ -495,5 +510,8 @@ def test_a_formula_describes_and_names_nothing() -> None:
     table = {"place": "load in right_bending at L4L5", "gap": 0.3, "held_out_closed": None}
     words = told("UNKNOWN", unknown=unknown, tabulated=table).replace("\u00a0", " ")
     assert "A formula that describes it, and is no name: moment in lateral bending at L4L5" in words
-    assert "explains 83 % of what is above the noise, and closes 70 % in readings left out" in words
+    assert (
+        "explains 83 % of the excess misfit (chi squared) and 70 % of that of readings left out"
+        in words
+    )
     assert "leaves a gap of 0.30 noise SD." in words

@@ -171,7 +171,7 @@ def test_a_fold_that_became_worse_is_marked(root: Path) -> None:
     figure = drawn("held_out_by_test", root, "NAMED", held_out=held)
     (marked,) = marked_worse(figure)
     assert marked.get_fontweight() == "bold"
-    assert "97 % closed" in said(figure)
+    assert "83 % of gap" in said(figure)
 
 
 def test_a_fold_that_noise_explains_is_no_proof(root: Path) -> None:
@@ -179,7 +179,7 @@ def test_a_fold_that_noise_explains_is_no_proof(root: Path) -> None:
     held["gap_base_low"] = 0.0
     words = said(drawn("held_out_by_test", root, "NAMED", held_out=held))
     assert "noise may be all" in words
-    assert "closed" not in words
+    assert "of gap" not in words
 
 
 def test_intervals_are_drawn_where_they_are(root: Path) -> None:

@@ -33,6 +33,7 @@ from spinepipe.studies.discrepancy.proof.held_out import (
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.store import at_once
+from spinepipe.studies.discrepancy.verdict import share_of_gap
 
 STEPS = len(MOMENTS_NM)
 EXTENSION, BENDING = 3, 4
@@ -220,6 +221,32 @@ def test_folds_are_pooled_by_their_sums() -> None:
     assert result.over_surrogate.chi2 == 42.0
     assert together(rows[:2], {}).over_base.se is None  # type: ignore[union-attr]
     assert together([], {}).over_base is None
+
+
+def test_tests_and_specimens_left_out_are_told_apart() -> None:
+    rows = [row("a", 100.0, 50.0, 30.0), row("b", 60.0, 30.0, 8.0)]
+    rows += [
+        replace(row("s", 80.0, 40.0, 30.0), kind="specimen"),
+        replace(rows[0], base=None, with_effects=None, surrogate=None),
+    ]
+    found = together(rows, {}).by_kind()
+    assert list(found) == ["test", "specimen"]
+    assert found["test"].closed == pytest.approx((160.0 - 80.0) / (160.0 - 22.0))
+    assert found["specimen"].closed == pytest.approx(40.0 / 69.0)
+    assert len(found["test"].folds) == 2
+
+
+@sweep("before, after, told", [(4.27, 2.83, 0.34), (1.31, 0.23, 0.82)])
+def test_a_share_of_the_excess_is_none_of_the_gap(before: float, after: float, told: float) -> None:
+    """The gap is the root of the excess over what is expected."""
+    base, effects = (10.0 * (1.0 + gap**2) for gap in (before, after))
+    one = replace(row("a", base, effects, 0.0), expected=10.0)
+    assert one.base is not None
+    assert one.base.against(10.0).gap == pytest.approx(before)
+    assert one.closed == pytest.approx(1.0 - (after / before) ** 2)
+    assert share_of_gap(one.closed) == pytest.approx(1.0 - after / before)
+    assert share_of_gap(one.closed) == pytest.approx(told, abs=0.005)
+    assert [share_of_gap(share) for share in (0.0, 1.0, -3.0)] == [0.0, 1.0, -1.0]
 
 
 def test_nothing_is_closed_where_the_base_misses_no_more_than_it_may() -> None:

@@ -4,7 +4,9 @@ Would catch rows of other films or models than asked for, cells that no table ta
 not where the study has them, and errors pooled over other rows.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,7 @@ from scoliosis_cases import write_shipped
 
 from spinepipe import cohort as cohorts
 from spinepipe.studies.scoliosis.accuracy import accuracy_rows
-from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
+from spinepipe.studies.scoliosis.films import CORNERS, FILMS, PATIENTS, read_films
 from spinepipe.studies.scoliosis.personalise import rows_of
 from spinepipe.studies.scoliosis.population import assumed
 from spinepipe.studies.scoliosis.population_table import Learned, population_rows
@@ -92,10 +94,61 @@ def test_errors_are_pooled_over_films_segments_and_patients(
     assert chosen["rmse"] == pytest.approx(float(np.sqrt(np.mean(error**2))))
     own = error.groupby(rows["specimen"]).apply(lambda one: float(np.sqrt(np.mean(one**2))))
     assert chosen["sd_of_patients"] == pytest.approx(own.std(ddof=1))
-    # a reading of tilt has an SD of 0.7 deg, the lowest vertebra's too, and two are averaged
-    assert chosen["reading_noise"] == pytest.approx(2.0 * 0.7, rel=0.3)
+    # a reading of tilt has an SD of 0.7 deg, two are averaged, and a rotation has four of the means
+    assert chosen["reading_noise"] == pytest.approx(2.0 * 0.7 / np.sqrt(2.0), rel=0.15)
     reference = found[found["model"] == "linear_regions"]
     np.testing.assert_allclose(reference["reduction_percent"], 0.0, atol=1e-12)
+
+
+@dataclass(frozen=True, eq=False)
+class Filmed:
+    """Films alone, in the form of a cohort."""
+
+    films: pd.DataFrame
+    vertebrae: tuple[str, ...]
+
+    @property
+    def further(self) -> dict[str, pd.DataFrame]:
+        return {"films": self.films}
+
+    @property
+    def specimen_names(self) -> tuple[str, ...]:
+        return tuple(self.films["specimen"].unique())
+
+
+def test_the_floor_is_the_error_that_reading_makes_whoever_tells_its_sd(
+    cohort: cohorts.Cohort, tables: dict[str, pd.DataFrame]
+) -> None:
+    """40 patients with 15 vertebrae, three readings a film with an SD of 0.7 deg, told and stated.
+
+    Rotations less those without error have four means of readings: 2 x 0.7 / sqrt(3) = 0.81 deg.
+    """
+    rng, names = np.random.default_rng(8), cohort.vertebrae
+    rows = [
+        {"specimen": f"p{patient}", "position": position, "vertebra": name, "repeat": repeat}
+        | {"y_mm": 0.0, "z_mm": 30.0 * at, "orientation_deg": float(rng.normal(0.0, 0.7))}
+        for patient in range(40)
+        for position in ("erect", "right_bending", "left_bending")
+        for repeat in (1, 2, 3)
+        for at, name in enumerate(names)
+    ]
+    film = pd.DataFrame(rows).assign(observer=None, **dict.fromkeys(CORNERS))
+    read: Any = Filmed(film, names)
+    errors = [
+        np.rad2deg(read_films(read, name).turned(position))
+        for name in read.specimen_names
+        for position in ("right_bending", "left_bending")
+    ]
+    true = float(np.sqrt(np.mean(np.square(errors))))
+    assert true == pytest.approx(2.0 * 0.7 / np.sqrt(3.0), rel=0.05)
+    once: Any = Filmed(film[film["repeat"] == 1], names)
+    stated = STUDY.model_copy(update={"tilt_sd_deg": 0.7 / np.sqrt(3.0)})
+    parts = (tables["positions"], tables["displacements"], tables["curves"])
+    for told in (reading_noise(STUDY, read), reading_noise(stated, once)):
+        floors = {row["measure"]: row["reading_noise"] for row in accuracy_rows(*parts, told)}
+        assert floors["rotation"] == pytest.approx(true, rel=0.05)
+        # of two: a tilt less that of the lowest vertebra, an angle between two of them
+        assert floors["tilt"] == floors["cobb"] == pytest.approx(true / np.sqrt(2.0), rel=0.05)
 
 
 def test_a_pose_that_is_not_there_takes_the_patient_out(

@@ -12,7 +12,7 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.studies.scoliosis.curve_angles import curves, lumbar_apex, main_curve
-from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, FILMS, PATIENTS, Film, read_films
+from spinepipe.studies.scoliosis.films import CORNERS, FILMS, PATIENTS, Film, _sd, read_films
 
 VERTEBRAE = ("L4", "L3", "L2", "L1")
 HEADER = """\
@@ -99,24 +99,42 @@ def test_corners_on_a_turned_and_enlarged_film_give_the_same(tmp_path: Path) -> 
 
 
 def test_readings_are_averaged_and_their_scatter_is_the_noise(tmp_path: Path) -> None:
+    """Errors of all vertebrae, the lowest among them, however much a reader turned the film."""
     rng = np.random.default_rng(4)
     films: dict[str, list[dict[str, object]]] = {}
     for position, lean in zip(POSITIONS, (0.0, 10.0, -8.0), strict=True):
         films[position] = []
         for observer in "ab":
             for repeat in range(1, 41):
-                for at, row in enumerate(centres(lean)):
-                    error = rng.normal(0.0, [0.4, 0.4, 0.9]) * (at > 0)
-                    read = {
-                        name: float(row[name]) + error[k]  # type: ignore[arg-type]
-                        for k, name in enumerate(CENTRE)
-                    }
-                    films[position].append({**row, **read, "observer": observer, "repeat": repeat})
+                turned = float(rng.uniform(-3.0, 3.0))
+                film = cornered(lean, turn_deg=turned)
+                for row in film:
+                    row |= {"observer": observer, "repeat": repeat}
+                    for name in CORNERS:
+                        row[name] = float(row[name]) + rng.normal(0.0, 0.25)  # type: ignore[arg-type]
+                films[position] += film
     read = read_films(written(tmp_path, films), "p01")
     assert read.readings["erect"] == 80
-    expected = np.array([4e-4, 4e-4, np.deg2rad(0.9)]) / np.sqrt(80)
-    np.testing.assert_allclose(read.sd, expected, rtol=0.1)
-    assert np.rad2deg(read.films["right_bending"].tilt[-1]) == pytest.approx(10.0, abs=0.5)
+    # the line between the centres of both endplates, 24 mm apart, each of two corners
+    tilt = 0.25 / 24.0
+    # where diagonals of 20 x 12 cross has the variance (20^2 + 12^2) / (2 x 12)^2 of a corner, here
+    # and at the lowest, which turns the rest: 30, 60 and 90 mm above it
+    centre = 0.25 * np.sqrt(2.0 * (20.0**2 + 12.0**2) / 24.0**2)
+    aside = np.hypot(centre, tilt * 30.0 * np.sqrt((1 + 4 + 9) / 3.0)) / 1e3
+    np.testing.assert_allclose(read.sd[[0, 2]], [aside, tilt], rtol=0.1)
+    assert np.rad2deg(read.films["right_bending"].tilt[-1]) == pytest.approx(10.0, abs=0.3)
+
+
+@pytest.mark.parametrize("vertebrae", [2, 3, 15])
+def test_a_tilt_s_own_sd_is_told_of_two_readings_of_few_vertebrae(vertebrae: int) -> None:
+    """Mean of the variance over many films of two readings; K readings hold K - 1 errors."""
+    rng = np.random.default_rng(vertebrae)
+    tilts = rng.normal(0.0, 0.7, (4000, 2, 1, vertebrae))
+    seen = np.repeat(tilts - tilts[..., :1], 3, axis=2)
+    assert _sd(list(seen))[2] == pytest.approx(0.7, rel=0.03)
+    every = [_sd([each])[2] ** 2 for each in seen]
+    assert np.mean(every) == pytest.approx(0.49, rel=0.05)
+    assert np.isnan(_sd([one[:1] for one in seen])).all()
 
 
 def test_without_corners_the_chord_tells_of_scale(tmp_path: Path) -> None:

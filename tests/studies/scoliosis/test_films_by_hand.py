@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
@@ -76,10 +78,20 @@ def tilted(*tilts: float) -> Film:
         ((0, 6, 12, 6, 0), [(0, 2), (2, 4)]),
         ((0, 6, 12, 8, 13), [(0, 4)]),  # a wave of 4 deg is none
         ((0, 6, 12, 6, 13), [(0, 2)]),  # of 6 deg it is one, if ends apart by one are no curve
-        ((0, 4, 0, -4, 0, 0), [(0, 5)]),  # all of it a wave: one curve from end to end
+        ((0, 4, 0, -1, 0, 0), [(0, 5)]),  # all of it a wave: one curve from end to end
+        ((0, 4, 0, -4, 0, 0), [(1, 3)]),
+        ((0, -4.5, -4.5, 0, 8, 16, 22, 18, 12, 8, 4, 2, 0), [(1, 6), (6, 12)]),
+        ((0, 2, 4, 6, 8, 12, 18, 22, 16, 8, 0, -4.5, -4.5), [(0, 7), (7, 12)]),
+        ((0, 5, 10, 5, 0), [(0, 2), (2, 4)]),
+        ((0, 5, 0), [(0, 2)]),  # 5 deg is a wave
+        ((0, 5.1, 0), []),  # ends apart by one
+        ((0, 6, 0, 6), []),
+        ((0, 0, 10), [(0, 2)]),
         ((0, 4, 6, 10, 3), [(0, 3)]),
         ((0, -6, -12, -5, 2), [(0, 2), (2, 4)]),
-        ((0, 8, 8, 8, 0), [(0, 3)]),  # as far tilted: the upper one
+        ((0, 8, 8, 8, 0), [(0, 3), (1, 4)]),  # as far tilted: the outermost of each curve
+        ((0, 8, 8, -10), [(0, 2), (1, 3)]),
+        ((0, 8, 6, 8, 0), [(0, 3), (1, 4)]),
         ((10, 0, 0), [(0, 2)]),
     ],
 )
@@ -87,6 +99,32 @@ def test_ends_lie_where_the_tilt_turns_back_by_more_than_five_degrees(
     tilts: tuple[float, ...], ends: list[tuple[int, int]]
 ) -> None:
     assert [(one.lower, one.upper) for one in curves(tilted(*tilts))] == ends
+
+
+STEPS = st.one_of(st.integers(-30, 30), st.integers(-300, 300).map(lambda tenths: tenths / 10))
+
+
+@given(st.lists(STEPS, min_size=2, max_size=18))
+@example([0, -4.5, -4.5, 0, 8, 16, 22, 18, 12, 8, 4, 2, 0])
+def test_upside_down_and_mirrored_a_film_has_the_same_curves(tilts: list[float]) -> None:
+    """And no two vertebrae of a curve have a larger angle, if the spine has one at all."""
+    erect, last = tilted(*tilts), len(tilts) - 1
+    rolled, mirrored = tilted(*tilts[::-1]), erect.mirrored()
+    found = [(one.lower, one.upper, one.cobb(erect)) for one in curves(erect)]
+    assert found == [(one.lower, one.upper, one.cobb(mirrored)) for one in curves(mirrored)]
+    turned = [(last - one.upper, last - one.lower, one.cobb(rolled)) for one in curves(rolled)]
+    assert found == turned[::-1]
+    for low, high, cobb in found:
+        within = erect.tilt[low : high + 1]
+        if np.ptp(erect.tilt) > np.deg2rad(5.001):
+            assert cobb == np.ptp(within) > np.deg2rad(5.0)
+
+
+def test_the_lowest_curve_begins_where_it_is_tilted_farthest() -> None:
+    """26.5 deg between the second vertebra and the seventh; from the lowest one it was 22."""
+    lowest, *_ = curves(tilted(0, -4.5, -4.5, 0, 8, 16, 22, 18, 12, 8, 4, 2, 0, 0, 0))
+    assert (lowest.lower, lowest.upper) == (1, 6)
+    assert np.rad2deg(lowest.cobb(tilted(0, -4.5, -4.5, 0, 8, 16, 22))) == pytest.approx(26.5)
 
 
 def test_a_spine_of_two_vertebrae_has_no_curve() -> None:
@@ -171,7 +209,7 @@ HEADER = "cohort: c\ntitle: t\nsource: made\nvertebrae: [L4, L3, L2]\ngravity: f
 
 def test_scatter_of_readings_is_pooled_by_how_many_there_are(tmp_path: Path) -> None:
     """Tilts of L3 and L2 read 1 deg apart twice on one film, and 3 deg apart two by two on one:
-    variances 1/2 and 3, of means a half and a quarter; freedoms 1 and 3."""
+    variances 1/2 and 3, freedoms 1 and 3."""
     tilts = {"erect": [0.0, 1.0], "right_bending": [3.0, 6.0, 3.0, 6.0], "left_bending": [-4.0]}
     rows = [
         {
@@ -195,7 +233,8 @@ def test_scatter_of_readings_is_pooled_by_how_many_there_are(tmp_path: Path) -> 
     pd.DataFrame(rows).to_csv(folder / "films.csv", index=False)
     read = read_films(cohorts.read(folder, (FILMS, PATIENTS)), "p1")
     assert read.readings == {"erect": 2, "right_bending": 4, "left_bending": 1}
-    expected = np.sqrt((1 * 0.5 / 2 + 3 * 3.0 / 4) / 4)
+    # off by (0, d, d) for the lowest is at nought: a third of d^2 about the mean, by V - 1
+    expected = np.sqrt((1 * 0.5 + 3 * 3.0) / 4 / 3)
     np.testing.assert_allclose(np.rad2deg(read.sd[2]), expected)
     np.testing.assert_allclose(read.sd[:2], 0.0, atol=1e-15)
     np.testing.assert_allclose(np.rad2deg(read.films["right_bending"].tilt), [0.0, -4.5, -4.5])
@@ -235,24 +274,43 @@ def test_a_pose_misses_a_film_by_root_mean_squares_above_the_lowest(status: Ende
     assert found["rotation_rmse_deg"] == pytest.approx(5.0)
 
 
+ONE = ((1,), (1, 1))
+"""Readings of the films of two patients."""
+
+
 @sweep(
-    "sds, stated, expected",
+    "sds, readings, stated, expected",
     [
-        ([(3e-3, 4e-3, 0.02), (3e-3, 4e-3, 0.04)], {}, (np.sqrt(12.5), np.rad2deg(np.sqrt(1e-3)))),
-        ([(np.nan,) * 3, (3e-3, 4e-3, 0.02)], {}, (np.sqrt(12.5), np.rad2deg(0.02))),
-        ([(np.nan,) * 3], {"place_sd_mm": 0.4, "tilt_sd_deg": 0.9}, (0.4, 0.9)),
-        ([(np.nan,) * 3], {"tilt_sd_deg": 0.9}, (np.nan, 0.9)),
+        (
+            [(3e-3, 4e-3, 0.02), (3e-3, 4e-3, 0.04)],
+            ((4, 4), (4,)),
+            {},
+            (np.sqrt(12.5) / 2.0, np.rad2deg(np.sqrt(1e-3)) / 2.0),
+        ),
+        # a film read once is read no better for the repeats of others: (1 + 1/2) / 2
+        (
+            [(np.nan,) * 3, (3e-3, 4e-3, 0.02)],
+            ((1,), (2,)),
+            {"tilt_sd_deg": 9.0},
+            (np.sqrt(12.5 * 0.75), np.rad2deg(0.02) * np.sqrt(0.75)),
+        ),
+        ([(np.nan,) * 3] * 2, ONE, {"place_sd_mm": 0.4, "tilt_sd_deg": 0.9}, (0.4, 0.9)),
+        ([(np.nan,) * 3] * 2, ONE, {"tilt_sd_deg": 0.9}, (np.nan, 0.9)),
     ],
 )
 def test_readings_tell_how_films_are_read_and_else_the_study(
     sds: list[tuple[float, ...]],
+    readings: tuple[tuple[int, ...], ...],
     stated: dict[str, float],
     expected: tuple[float, float],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Repetitions before what is stated; places each way, as up and right are read alike."""
-    told = {f"p{number}": np.array(sd) for number, sd in enumerate(sds)}
-    monkeypatch.setattr(noise_of, "read_films", lambda _, name: SimpleNamespace(sd=told[name]))
+    told = {
+        f"p{number}": SimpleNamespace(sd=np.array(sd), readings=dict(enumerate(counts)))
+        for number, (sd, counts) in enumerate(zip(sds, readings, strict=True))
+    }
+    monkeypatch.setattr(noise_of, "read_films", lambda _, name: told[name])
     study = Scoliosis.model_validate(STUDY | stated)
     cohort: Any = SimpleNamespace(specimen_names=tuple(told))
     np.testing.assert_allclose(reading_noise(study, cohort), expected)

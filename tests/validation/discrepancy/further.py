@@ -45,7 +45,7 @@ def _told(ask: Callable[..., Told]) -> Callable[..., Told]:
 
 @_told
 def held_out_told(proof: HeldOut) -> Told:
-    """Of tests and of specimens that were left out: share of the gap closed, and rms residual."""
+    """Of tests and specimens left out: share of the excess misfit (chi2) taken away, and rms."""
     return {
         "tests": _of_folds([row for row in proof.folds if row.kind == TEST]),
         "specimens": _of_folds([row for row in proof.folds if row.kind == SPECIMEN]),

@@ -1,4 +1,4 @@
-"""Figure: the gap on motion that no fit has seen, by left-out test and specimen."""
+"""Figure: the gap on motion left out of the fits, by left-out test and specimen."""
 
 from collections.abc import Mapping
 from textwrap import fill
@@ -17,6 +17,7 @@ from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import fixed, plain, short
 from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.verdict import share_of_gap
 from spinepipe.tables import Tables
 
 KINDS = {
@@ -96,7 +97,9 @@ def _change(row: Mapping[Any, Any]) -> tuple[str, dict[str, Any]]:
     closed = row["closed"]
     if not np.isfinite(closed) or row["gap_base_low"] <= 0.0:
         return "noise may be all", {"color": GREY}
-    return f"{fixed(100.0 * max(closed, 0.0), 0)} % closed" if closed > 0.0 else "no better", {}
+    if closed <= 0.0:
+        return "no better", {}
+    return f"{fixed(100.0 * share_of_gap(closed), 0)} % of gap", {}
 
 
 def _name(fold: str, kind: str) -> str:

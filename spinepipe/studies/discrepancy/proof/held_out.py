@@ -1,4 +1,4 @@
-"""Held-out proof: base, model with effects and surrogate on readings that no fit has seen.
+"""Held-out proof: base, model with effects and surrogate on readings left out of their fits.
 
 A fold is scored by what predictions miss of the readings left out, in noise SD; margins between
 models are summed over folds. By default folds are fitted in the linear models around the full fits,
@@ -94,7 +94,8 @@ class FoldRow:
 
     @property
     def closed(self) -> float | None:
-        """Share of the base's excess that the effects close; None where noise hides the excess."""
+        """Share of the base's excess misfit (chi2) that the effects take away; None where noise
+        hides the excess."""
         return closed(self.base, self.with_effects, self.expected)
 
 
@@ -133,8 +134,15 @@ class HeldOut:
 
     @property
     def closed(self) -> float | None:
-        """Share of the base's excess that the effects close; None where noise hides the excess."""
+        """Share of the base's excess misfit (chi2) that the effects take away; None where noise
+        hides the excess."""
         return closed(self.base, self.with_effects, self.expected)
+
+    def by_kind(self) -> Mapping[str, "HeldOut"]:
+        """Folds of each kind that were scored, together: their training knows other things."""
+        scored = [row for row in self.folds if row.base is not None]
+        kinds = dict.fromkeys(row.kind for row in scored)
+        return {kind: together([row for row in scored if row.kind == kind], {}) for kind in kinds}
 
     def of_base(self) -> "HeldOut":
         """The base in the place of the model with effects."""
@@ -348,7 +356,8 @@ def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -
 
 
 def closed(base: Gap | None, new: Gap | None, expected: float) -> float | None:
-    """(chi2 of base - chi2 of new) / (chi2 of base - expected), at most 1.
+    """Share of the excess misfit: (chi2 of base - chi2 of new) / (chi2 of base - expected), at most
+    1. It is no share of the gap, which is its root.
 
     None where noise, or nuisances that the training left open, may be all that the base misses.
     """

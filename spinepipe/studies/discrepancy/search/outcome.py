@@ -17,7 +17,7 @@ from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Standing
 from spinepipe.studies.discrepancy.search.lack_of_fit import FAMILIES, OWN
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
-from spinepipe.studies.discrepancy.verdict import Answer, SuspectedError
+from spinepipe.studies.discrepancy.verdict import Answer, SuspectedError, share_of_gap
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 UNEXPLAINED_SHARE = 0.1
@@ -33,7 +33,7 @@ WORSE_SHARE, WORSE = 0.05, 30.0
 """Unseen tests together may be predicted worse by this share of the base's excess, or so much."""
 
 CLOSED = 0.5
-"""Of what is above the noise in held-out readings: effects that close less are not all of it."""
+"""Of the excess misfit (chi2) of held-out readings: effects that take away less are not all."""
 
 ALONE = 0.25
 """Share of its evidence that an effect must have without the others.
@@ -307,7 +307,10 @@ def _left(found: Found, doubts: Sequence[_NoName], proof: HeldOut | None) -> tup
             if row.worse
         ]
         if proof.closed is not None and proof.closed < CLOSED:
-            said.append(f"held-out readings: only {100 * proof.closed:.0f} % of the gap closes")
+            said.append(
+                f"held-out readings: only {100 * proof.closed:.0f} % of the excess misfit (chi "
+                f"squared) goes, {100 * share_of_gap(proof.closed):.0f} % of the gap"
+            )
     return tuple(dict.fromkeys(said))
 
 
