@@ -204,6 +204,9 @@ def judge(claim: Claim, run: Run) -> dict[str, Any]:
         "limit": claim.range.limit.value,
         "verdict": verdict.value,
         "reason": _reason(claim, verdict, ours, missing),
+        "evidence": "contradicted"
+        if claim.contradicted
+        else {Verdict.INSIDE: "independent"}.get(claim.evidence, claim.evidence.value),
     }
 
 

@@ -71,7 +71,7 @@ FRAME_COLUMNS = (
 
 
 LIMITS = ("two_sided", "chosen", "wide", "one_sided", "binary", "none")
-"""What being inside a range takes, from the most to nothing; see `spinepipe.comparison.claim`."""
+"""What being inside a range takes, from the most to nothing; see `papers.ranges`."""
 
 
 def against_paper(name: str) -> Table:
@@ -113,13 +113,22 @@ def against_paper(name: str) -> Table:
             allowed=("inside", "outside", "circular", "recomputed", "contradicted", "not_computed"),
         ),
         Column("reason", "text", "what the range is, and why ours is outside it"),
+        Column(
+            "evidence",
+            "text",
+            "what agreement would show; independent: that ours is as the paper's; circular: the "
+            "cohort or the study was made to have the number; recomputed: it follows from the "
+            "paper's other numbers; contradicted: these exclude it",
+            null="nothing of a run can be held against it",
+            allowed=("independent", "circular", "recomputed", "contradicted"),
+        ),
     )
     return Table(name, about, ("id",), columns)
 
 
 _AGAINST_ORDER = (
     *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
-    *("limit", "verdict", "reason", "where"),
+    *("limit", "verdict", "reason", "where", "evidence"),
 )
 
 

@@ -341,6 +341,7 @@ def against_rows() -> list[Row]:
     values = {"paper": 8.5, "paper_low": 8.0, "paper_high": 9.0, "ours": 5.0}
     words = {"id": "accuracy", "where": "Results", "quantity": "mean error", "unit": "mm"}
     judged = {"limit": "two_sided", "verdict": "outside", "reason": "another cohort"}
+    judged["evidence"] = "independent"
     return [{**words, **values, **judged}]
 
 

@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import Any
 
@@ -19,7 +19,8 @@ from spinepipe.report.page.space import Space, segment
 from spinepipe.report.words import count, listed, number
 from spinepipe.studies.study import Study
 from spinepipe.tables import Tables
-from spinepipe.tables.schema import Column
+from spinepipe.tables.schema import Column, Table
+from spinepipe.tables.shared import against_as_shown
 
 _VERSION = "version_"
 _OF_A_TABLE = ("code_digest", "config_digest", "data_digest", "specimens_digest", KEY)
@@ -118,6 +119,7 @@ class Sortable:
     Attributes
     ----------
     note : what was left out, or nothing.
+    folded : whether its rows are shown on demand.
     """
 
     name: str
@@ -126,6 +128,7 @@ class Sortable:
     heads: tuple[Head, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str
+    folded: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,26 +298,46 @@ def _cell(value: Any, column: Column) -> Cell:
     return Cell(str(value), None)
 
 
+def beside_paper(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]:
+    """A paper's numbers beside ours: those that are evidence, then folded those that are none."""
+    independent = frame["evidence"] == "independent"
+    columns = against_as_shown(shape)
+    rest = sortable(shape.name, f"{title}: no evidence", NO_EVIDENCE, frame[~independent], columns)
+    first = sortable(shape.name, title, shape.about, frame[independent], columns)
+    return [table for table in (first, replace(rest, folded=True)) if table.rows]
+
+
+NO_EVIDENCE = (
+    "Numbers of the paper of which agreement shows nothing: the cohort or the study was made to "
+    "have them (circular), they follow from the paper's other numbers (recomputed), these exclude "
+    "them (contradicted), or no run has anything to set beside them."
+)
+
+
 def judged(rows: pd.DataFrame) -> str:
-    """How published quantities were judged, and what being inside a range took."""
+    """How published quantities that are evidence were judged, and what being inside took."""
     if rows.empty:
         return ""
-    found = {name: int((rows["verdict"] == name).sum()) for name in rows["verdict"].unique()}
-    inside, outside = found.get("inside", 0), found.get("outside", 0)
-    told = [f"{found[name]} {words}" for name, words in _NOT_COMPARED if name in found]
-    words = (
-        f"Of {len(rows)} published quantities ours are inside the paper's range for {inside} and "
-        f"outside for {outside}"
+    counted = rows[rows["evidence"] == "independent"]
+    inside, outside, lacking = (
+        int((counted["verdict"] == name).sum()) for name in ("inside", "outside", "not_computed")
     )
-    whole = "; ".join(part for part in (words, ", ".join(told)) if part)
-    return f"{whole}.{_what_it_took(rows[rows['verdict'] == 'inside'])}"
+    told = (
+        f"Of {len(counted)} published quantities that are evidence ours are inside the paper's "
+        f"range for {inside} and outside for {outside}"
+        + (f"; {lacking} are not computed" if lacking else "")
+    )
+    kinds = rows["evidence"].fillna("")
+    others = [f"{n} {words}" for kind, words in _NO_EVIDENCE if (n := int((kinds == kind).sum()))]
+    rest = f" Not counted: {', '.join(others)}." if others else ""
+    return f"{told}.{_what_it_took(counted[counted['verdict'] == 'inside'])}{rest}"
 
 
-_NOT_COMPARED = (
-    ("circular", "are what the cohort was built to have"),
-    ("recomputed", "only follow from the paper's own numbers"),
-    ("contradicted", "are contradicted by other numbers of the paper and not chased"),
-    ("not_computed", "are not computed"),
+_NO_EVIDENCE = (
+    ("circular", "that cohort or study were made to have"),
+    ("recomputed", "that follow from the paper's own numbers"),
+    ("contradicted", "that other numbers of the paper exclude"),
+    ("", "that nothing of a run can be held against"),
 )
 
 _WORDS_OF_LIMITS = {

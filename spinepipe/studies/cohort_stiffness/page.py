@@ -6,7 +6,16 @@ from dataclasses import replace
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
+from spinepipe.comparison import papers
+from spinepipe.report.page.document import (
+    Document,
+    Picture,
+    Results,
+    Sortable,
+    beside_paper,
+    sortable,
+)
+from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
 from spinepipe.studies.cohort_stiffness.settings import (
@@ -20,7 +29,6 @@ from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDI
 from spinepipe.studies.cohort_stiffness.tables_of_experiments import TABLES as TABLES_OF_EXPERIMENTS
 from spinepipe.studies.cohort_stiffness.tables_of_nuisances import NUISANCES
 from spinepipe.tables.schema import Column, Table
-from spinepipe.tables.shared import against_as_shown
 
 QUESTION = (
     "Does stiffness differ between specimens, levels and load cases, how should it be described, "
@@ -70,7 +78,6 @@ def _shown(table: Table) -> tuple[Column, ...]:
 _COLUMNS = {
     FINDINGS.name: tuple(c for name in _CLAIM_ORDER for c in FINDINGS.columns if c.name == name),
     **{table.name: _shown(table) for table in TABLES_OF_EXPERIMENTS},
-    AGAINST_GOULD_2024B.name: against_as_shown(AGAINST_GOULD_2024B),
 }
 """What a reader compares stands first; short names are left to the files."""
 
@@ -98,7 +105,10 @@ def document(study: CohortStiffness, cohort: Cohort, results: Results) -> Docume
         pictures=[_with_base(study, picture) for picture in results.pictures.values()],
         tables=shown_tables(results),
         metadata=results.metadata,
-        left_out=left_out(study, len(cohort.specimen_names), cohort.joint_names),
+        left_out=(
+            *left_out(study, len(cohort.specimen_names), cohort.joint_names),
+            *papers.left_out(GOULD_2024B.cited, GOULD_2024B.stands_for(cohort.name)),
+        ),
         poses=results.table("poses"),
     )
 
@@ -142,6 +152,9 @@ def shown_tables(results: Results) -> list[Sortable]:
             continue
         rows, told = _rows(name, frame)
         shape = _SHAPES[name]
+        if shape is AGAINST_GOULD_2024B:
+            found += beside_paper(shape, title, rows)
+            continue
         columns = _COLUMNS.get(shape.name, shape.columns)
         found.append(sortable(name, title, f"{shape.about} {told}".strip(), rows, columns))
     return [table for table in found if table.rows]

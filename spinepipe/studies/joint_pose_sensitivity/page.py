@@ -7,7 +7,15 @@ from dataclasses import replace
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Picture, Results, Sortable, sortable
+from spinepipe.comparison import papers
+from spinepipe.report.page.document import (
+    Document,
+    Picture,
+    Results,
+    Sortable,
+    beside_paper,
+    sortable,
+)
 from spinepipe.studies.joint_pose_sensitivity.figures.agreement import in_rows
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
     TREE,
@@ -26,7 +34,7 @@ from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
     TABLES as TABLES_OF_POSTERIOR,
 )
 from spinepipe.tables.schema import Column
-from spinepipe.tables.shared import STATISTICS, against_as_shown
+from spinepipe.tables.shared import STATISTICS
 
 QUESTION = (
     "How stiff are the intervertebral joints of this cohort, and how much of the answer hangs on "
@@ -95,7 +103,6 @@ FOLDED = (
     ),
 )
 
-_AGAINST = against_as_shown(AGAINST_GOULD_2024A)
 
 _SHAPES = {
     table.name: table
@@ -114,7 +121,10 @@ def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> D
         ],
         tables=shown_tables(study, results),
         metadata=results.metadata,
-        left_out=left_out(study),
+        left_out=(
+            *left_out(study),
+            *papers.left_out(GOULD_2024A.cited, GOULD_2024A.stands_for(cohort.name)),
+        ),
         poses=results.table("poses"),
         tests=study.tests,
         load_shift_mm=study.load_point_shift_mm.in_order(),
@@ -178,7 +188,7 @@ def _of(
     elif name == "importance":
         yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
     elif name == AGAINST_GOULD_2024A.name:
-        yield sortable(name, title, about, frame, _AGAINST)
+        yield from beside_paper(AGAINST_GOULD_2024A, title, frame)
     else:
         yield sortable(name, title, about, frame, _SHAPES[name].columns)
 

@@ -1,10 +1,19 @@
 """The report of a study of scoliotic spines: its answer, figures and tables."""
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Headline, Results, Sortable, sortable
+from spinepipe.comparison import papers
+from spinepipe.report.page.document import (
+    Document,
+    Headline,
+    Results,
+    Sortable,
+    beside_paper,
+    sortable,
+)
 from spinepipe.studies.scoliosis.films import HELD_OUT
 from spinepipe.studies.scoliosis.findings import findings
 from spinepipe.studies.scoliosis.headline import headline
+from spinepipe.studies.scoliosis.jalalian_2017 import stands_for
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POPULATION, POSITIONS
 from spinepipe.studies.scoliosis.tables_of_errors import (
@@ -13,8 +22,7 @@ from spinepipe.studies.scoliosis.tables_of_errors import (
     BY_RANGE,
     VARIATION,
 )
-from spinepipe.tables.schema import Column, Table
-from spinepipe.tables.shared import STATISTICS, against_as_shown
+from spinepipe.tables.shared import STATISTICS
 
 QUESTION = (
     "Which model of a scoliotic spine, personalised on two bending films, reproduces positions "
@@ -47,7 +55,10 @@ def document(study: Scoliosis, cohort: Cohort, results: Results) -> Document:
         pictures=list(results.pictures.values()),
         tables=shown_tables(results),
         metadata=results.metadata,
-        left_out=left_out(study, cohort),
+        left_out=(
+            *left_out(study, cohort),
+            *papers.left_out("Jalalian et al. 2017", stands_for(cohort.name)),
+        ),
         headline=Headline(_joined(found.words), _joined(found.how_sure), found.warnings),
     )
 
@@ -59,17 +70,14 @@ def _joined(words: str) -> str:
 
 def shown_tables(results: Results) -> list[Sortable]:
     """Tables that the study has; those without rows are left out."""
-    found = [
-        sortable(shape.name, title, shape.about, results.table(shape.name), _columns(shape))
-        for shape, title in _TITLES.items()
-        if len(results.table(shape.name))
-    ]
+    found = []
+    for shape, title in _TITLES.items():
+        rows = results.table(shape.name)
+        if shape is AGAINST_JALALIAN_2017 and len(rows):
+            found += beside_paper(shape, title, rows)
+        elif len(rows):
+            found.append(sortable(shape.name, title, shape.about, rows, shape.columns))
     return [table for table in found if table.rows]
-
-
-def _columns(shape: Table) -> tuple[Column, ...]:
-    """What a reader of the paper compares stands first."""
-    return against_as_shown(shape) if shape is AGAINST_JALALIAN_2017 else shape.columns
 
 
 def left_out(study: Scoliosis, cohort: Cohort) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from spinepipe.cohort import Cohort
+from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
@@ -48,12 +49,13 @@ _ANALYSES = (
     Job("accuracy", "", ("errors",), ("accuracy",)),
     Job(
         "against_wang_2021",
-        "wang_2021.against",
+        "",
         (
             *("accuracy", "errors", "ranges", "sharing", "similarity", "fits", "stiffness"),
             "clusters",
         ),
         ("against_wang_2021",),
+        also=hangs_on("wang_2021"),
     ),
 )
 
@@ -139,7 +141,8 @@ class TrackingFiles(StudyFiles):
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
         laws = ("stiffness",) if self.laws else ()
-        analysed = (name for job in _ANALYSES for name in job.writes)
+        made = (name for job in _ANALYSES for name in job.writes)
+        analysed = (name for name in made if beside() or not name.startswith("against"))
         return (*_OF_MOTIONS, *laws, *_OF_PROFILES, *_OF_RECORDINGS, "weights", *analysed)
 
     @property

@@ -1,7 +1,15 @@
 """The report of a study of tracked motions: its answer, figures, the spine in 3-D, and tables."""
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Headline, Results, Sortable, sortable
+from spinepipe.comparison import papers
+from spinepipe.report.page.document import (
+    Document,
+    Headline,
+    Results,
+    Sortable,
+    beside_paper,
+    sortable,
+)
 from spinepipe.studies.tracking.findings import findings
 from spinepipe.studies.tracking.headline import headline
 from spinepipe.studies.tracking.in_space import spine_in_space
@@ -25,8 +33,6 @@ from spinepipe.studies.tracking.tables_of_studies import (
     SIMILARITY,
     WEIGHTS,
 )
-from spinepipe.tables.schema import Column, Table
-from spinepipe.tables.shared import against_as_shown
 
 QUESTION = (
     "How do the vertebrae of a moving person turn under the skin, as markers on it tell: which "
@@ -96,13 +102,11 @@ def shown_tables(results: Results) -> list[Sortable]:
             if shape in _SORTED:
                 columns, rising = _SORTED[shape]
                 rows = rows.sort_values(columns, ascending=rising, kind="stable")
-            found.append(sortable(shape.name, title, shape.about, rows, _columns(shape)))
+            if shape is AGAINST_WANG_2021:
+                found += beside_paper(shape, title, rows)
+            else:
+                found.append(sortable(shape.name, title, shape.about, rows, shape.columns))
     return [table for table in found if table.rows]
-
-
-def _columns(shape: Table) -> tuple[Column, ...]:
-    """What a reader of the paper compares stands first."""
-    return against_as_shown(shape) if shape is AGAINST_WANG_2021 else shape.columns
 
 
 def left_out(study: Tracking, results: Results) -> tuple[str, ...]:
@@ -112,4 +116,4 @@ def left_out(study: Tracking, results: Results) -> tuple[str, ...]:
         parts.append("errors (where vertebrae truly were is not known)")
     if results.table("stiffness").empty:
         parts.append("calibrated stiffness (no approach asks for it)")
-    return tuple(parts)
+    return (*parts, *papers.left_out("Wang et al. 2021"))

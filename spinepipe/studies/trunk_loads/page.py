@@ -1,8 +1,17 @@
 """The report of a study of trunk loads: its answer, figures, the trunk in 3-D, and tables."""
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Headline, Results, Sortable, sortable
+from spinepipe.comparison import papers
+from spinepipe.report.page.document import (
+    Document,
+    Headline,
+    Results,
+    Sortable,
+    beside_paper,
+    sortable,
+)
 from spinepipe.studies.trunk_loads.findings import findings
+from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
 from spinepipe.studies.trunk_loads.headline import headline
 from spinepipe.studies.trunk_loads.in_space import trunk_in_space
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
@@ -25,8 +34,6 @@ from spinepipe.studies.trunk_loads.tables_of_studies import (
     SIMPLIFIED,
     TUNING,
 )
-from spinepipe.tables.schema import Column, Table
-from spinepipe.tables.shared import against_as_shown
 
 QUESTION = (
     "What do tasks ask of a person's trunk: which forces of muscles, which compression and shear "
@@ -65,7 +72,10 @@ def document(study: TrunkLoads, cohort: Cohort, results: Results) -> Document:
         pictures=list(results.pictures.values()),
         tables=shown_tables(results),
         metadata=results.metadata,
-        left_out=left_out(study),
+        left_out=(
+            *left_out(study),
+            *papers.left_out("Ghezelbash et al. 2016", stands_for(cohort.name)),
+        ),
         headline=Headline(_joined(found.words), _joined(found.how_sure), found.warnings),
         space=trunk_in_space(cohort, results.table(PATHS.name), results.table("levels")),
     )
@@ -78,17 +88,14 @@ def _joined(words: str) -> str:
 
 def shown_tables(results: Results) -> list[Sortable]:
     """Tables that the study has; those without rows are left out."""
-    found = [
-        sortable(shape.name, title, shape.about, results.table(shape.name), _columns(shape))
-        for shape, title in _TITLES.items()
-        if len(results.table(shape.name))
-    ]
+    found = []
+    for shape, title in _TITLES.items():
+        rows = results.table(shape.name)
+        if shape is AGAINST_GHEZELBASH_2016 and len(rows):
+            found += beside_paper(shape, title, rows)
+        elif len(rows):
+            found.append(sortable(shape.name, title, shape.about, rows, shape.columns))
     return [table for table in found if table.rows]
-
-
-def _columns(shape: Table) -> tuple[Column, ...]:
-    """What a reader of the paper compares stands first."""
-    return against_as_shown(shape) if shape is AGAINST_GHEZELBASH_2016 else shape.columns
 
 
 def left_out(study: TrunkLoads) -> tuple[str, ...]:

@@ -1,0 +1,77 @@
+"""Selectors that papers share: how our value is read from the tables of a run."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import pandas as pd
+
+from papers.run import NotComputed, Ours, Run
+
+Selector = Callable[..., Ours]
+
+
+def selectors_of(paper: str) -> dict[str, Selector]:
+    """Those that papers share, and the paper's own, by name."""
+    return {**SELECTORS, **import_module(f"papers.{paper}").SELECTORS}
+
+
+def named(*selectors: Selector) -> dict[str, Selector]:
+    """Functions by their names."""
+    return {one.__name__: one for one in selectors}
+
+
+def number(run: Run, value: float, low: float | None = None, high: float | None = None) -> Ours:
+    """A value that the paper's other numbers give, whatever the run."""
+    return Ours(value, low, high)
+
+
+def setting(run: Run, name: str) -> Ours:
+    """A setting of the study, or a number that the product has of its own."""
+    if run.asked.get(name) is None:
+        raise NotComputed(f"this study states no {name.replace('_', ' ')}")
+    return Ours(float(run.asked[name]))
+
+
+def cell(
+    run: Run,
+    table: str,
+    column: str,
+    low: str = "",
+    high: str = "",
+    scale: float = 1.0,
+    **where: Any,
+) -> Ours:
+    """One cell, and cells of the same row that are its ends."""
+    value = run.number(table, column, **where)
+    row = run.row(table, **where)
+    ends = [None if not name or pd.isna(row[name]) else float(row[name]) for name in (low, high)]
+    return Ours(scale * value, ends[0], ends[1])
+
+
+def equals(run: Run, table: str, column: str, text: Any, **where: Any) -> Ours:
+    """Whether a cell has a text."""
+    return Ours(float(run.row(table, **where)[column] == text))
+
+
+def distinct(run: Run, table: str, column: str, **where: Any) -> Ours:
+    """How many values a column has."""
+    return Ours(float(run.rows(table, **where)[column].nunique()))
+
+
+def reduced(run: Run, table: str, column: str, by: str, ends: bool = False, **where: Any) -> Ours:
+    """Mean, median, largest ... of a column's numbers; its ends, the least and the largest."""
+    values = filled(run.rows(table, **where), column)
+    low, high = (float(values.min()), float(values.max())) if ends else (None, None)
+    return Ours(float(values.agg(by)), low, high)
+
+
+def filled(rows: pd.DataFrame, column: str) -> "pd.Series[float]":
+    """Numbers of a column without what is empty, at least one."""
+    values = pd.to_numeric(rows[column], errors="coerce").astype(float).dropna()
+    if values.empty:
+        raise NotComputed(f"{column} is empty in all rows")
+    return values
+
+
+SELECTORS = named(number, setting, cell, equals, distinct, reduced)

@@ -1,1 +1,0 @@
-"""The numbers of Wang et al. 2021 (OptK) beside those of a run."""
