@@ -8,7 +8,7 @@ import csv
 import inspect
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
@@ -217,9 +217,13 @@ def claims_of(paper: str) -> tuple[Claim, ...]:
     return tuple(claim_of(row, selectors) for row in rows_of(paper))
 
 
-def judged(
+def judged(claims: Iterable[Claim], run: Run) -> list[dict[str, Any]]:
+    """Rows of the table ``against_<paper>``, in the order of the claims."""
+    return [judge(claim, run) for claim in claims]
+
+
+def compare(
     paper: str, tables: Mapping[str, pd.DataFrame], asked: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
-    """All rows of the table ``against_<paper>``, in the order of the csv."""
-    run = Run(tables, asked)
-    return [judge(claim, run) for claim in claims_of(paper)]
+    """All rows of a paper, in the order of its csv."""
+    return judged(claims_of(paper), Run(tables, asked))

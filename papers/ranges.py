@@ -140,8 +140,8 @@ def near(value: float, to: float, why: str) -> Range:
 
 
 def rounded(value: float, unit_of_last_digit: float) -> Range:
-    """What rounds to a printed number; a trifle more, for halves that floats miss."""
-    half = 0.5 * unit_of_last_digit * (1.0 + 1e-9)
+    """What rounds to a printed number."""
+    half = unit_of_last_digit / 2.0
     return Range(value - half, value + half, "what rounds to the printed number")
 
 

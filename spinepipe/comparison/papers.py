@@ -44,7 +44,7 @@ def hangs_on(paper: str) -> Callable[[Any, Mapping[str, str]], list[str]]:
     return lambda expected, place: [digest(paper)]
 
 
-def judged(
+def compare(
     paper: str, tables: Mapping[str, pd.DataFrame], asked: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
     """Rows of the table ``against_<paper>``.
@@ -60,7 +60,7 @@ def judged(
     engine = import_module("papers.engine")
     if Path(str(engine.__file__)).resolve().parent != FOLDER:
         raise ImportError(f"another package is called papers: {engine.__file__}; expected {FOLDER}")
-    rows: list[dict[str, Any]] = engine.judged(paper, tables, asked)
+    rows: list[dict[str, Any]] = engine.compare(paper, tables, asked)
     return rows
 
 

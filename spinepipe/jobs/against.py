@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.comparison.papers import digest, judged
+from spinepipe.comparison.papers import compare, digest
 from spinepipe.jobs.digest import provenance
 from spinepipe.studies.study import Study
 from spinepipe.tables import from_rows, write
@@ -23,6 +23,6 @@ def write_against(
 ) -> None:
     """Write it; what needs an absent table is told as not computed."""
     name = f"against_{paper}"
-    rows = judged(paper, tables, asked)
+    rows = compare(paper, tables, asked)
     origin = provenance(name, study, cohort, others=[digest(paper)])
     write(from_rows(against_paper(name), rows), output, origin)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from sweeps import sweep
 
-from papers.engine import COLUMNS, FOLDER, Evidence, arguments, claims_of, judged, rows_of
+from papers.engine import COLUMNS, FOLDER, Evidence, arguments, claims_of, compare, rows_of
 from papers.ranges import RULES
 from papers.selectors import SELECTORS, selectors_of
 from spinepipe.comparison import papers
@@ -83,20 +83,20 @@ def test_evidence_is_what_the_row_is(paper: str) -> None:
         name = row["id"]
         assert (row["evidence"] == "contradicted") == bool(row["contradicted"]), name
         assert (row["evidence"] == "") == bool(row["missing"]), name
-        assert row["selector"] != "number" or row["evidence"] in ("recomputed", "contradicted"), (
-            name
-        )
+        if row["selector"] == "number" and row["evidence"] not in ("recomputed", "contradicted"):
+            assert row["evidence"] == "circular", name
+            assert "of the shipped study" in row["note"], name
         assert row["also"] == "" or row["contradicted"], name
 
 
 @sweep("paper", PAPERS)
 def test_what_follows_from_the_paper_alone_needs_no_run(paper: str) -> None:
     """A recomputed or excluded number is a row with our value filled in, not code of a study."""
-    found = {row["id"]: row for row in judged(paper, {}, {})}
+    found = {row["id"]: row for row in compare(paper, {}, {})}
     for row in rows_of(paper):
         if row["selector"] == "number":
             assert found[row["id"]]["ours"] == arguments(row["selector_args"])["value"]
-            assert found[row["id"]]["verdict"] in ("recomputed", "contradicted"), row["id"]
+            assert found[row["id"]]["evidence"] != "independent", row["id"]
     assert all(row["reason"] for row in found.values())
 
 

@@ -303,7 +303,8 @@ def beside_paper(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable
     independent = frame["evidence"] == "independent"
     columns = against_as_shown(shape)
     rest = sortable(shape.name, f"{title}: no evidence", NO_EVIDENCE, frame[~independent], columns)
-    first = sortable(shape.name, title, shape.about, frame[independent], columns)
+    told = frame[independent].drop(columns="evidence")
+    first = sortable(shape.name, title, shape.about, told, columns)
     return [table for table in (first, replace(rest, folded=True)) if table.rows]
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
@@ -31,9 +32,10 @@ _ANALYSES = (
     Job("statistics", "significance", ("positions", "displacements", "curves"), ("statistics",)),
     Job(
         "against_jalalian_2017",
-        "jalalian_2017.against",
-        ("laws", "positions", "displacements", "accuracy", "by_range", "variants", "variation"),
+        "",
+        ("positions", "displacements", "accuracy", "by_range", "variants", "variation"),
         ("against_jalalian_2017",),
+        also=hangs_on("jalalian_2017"),
     ),
 )
 """What is computed from tables."""
@@ -53,7 +55,7 @@ class ScoliosisFiles(StudyFiles):
 
     Attributes
     ----------
-    rebuilt : whether the cohort stands for that of a paper.
+    rebuilt : whether the cohort stands for that of a paper whose numbers are at hand.
     """
 
     joined = (*OF_JOBS, "variants")
@@ -97,7 +99,8 @@ class ScoliosisFiles(StudyFiles):
     @classmethod
     def of(cls, study: Scoliosis, cohort: Cohort) -> "ScoliosisFiles":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, stands_for(cohort.name))
+        rebuilt = stands_for(cohort.name) and beside()
+        return cls(study, cohort.specimen_names, rebuilt)
 
     @property
     def tables(self) -> tuple[str, ...]:

@@ -216,6 +216,7 @@ def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
             "limit": "two_sided",
             "verdict": verdict,
             "reason": "as <it> is",
+            "evidence": "contradicted" if verdict == "contradicted" else "independent",
         }
         for n, verdict in enumerate(verdicts)
     ]
@@ -227,11 +228,13 @@ def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
     tables = Tables({"poses": poses, "against_gould_2024a": against})
     found = Page(html(study, cohort, Results(tables, {}, {})))
     (told,) = found.text("li")
-    assert "Of 7 published quantities ours are inside the paper's range for 3" in told
-    assert "outside for 2; 1 are contradicted by other numbers" in told
-    assert "not chased, 1 are not computed. Of the 3 inside, 3 lie in a range with two ends" in told
+    assert "Of 6 published quantities that are evidence ours are inside the paper's range" in told
+    assert "for 3 and outside for 2; 1 are not computed. Of the 3 inside, 3 lie in a" in told
+    assert "Not counted: 1 that other numbers of the paper exclude." in told
     heads = found.text("button")
-    assert heads == ["quantity", "unit", "paper", "ours", "limit", "verdict", "reason", "where"]
+    first = ["quantity", "unit", "paper", "ours", "limit", "verdict", "reason", "where"]
+    assert heads == [*first, *first, "evidence"]
+    assert found.text("summary")[0] == "1 rows"
     assert found.text("td").count("as <it> is") == 7
 
 

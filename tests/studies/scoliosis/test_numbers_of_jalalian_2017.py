@@ -13,10 +13,10 @@ import pytest
 from scipy.stats import binomtest
 from sweeps import sweep
 
-from spinepipe.comparison.claim import Claim, Run, judge
-from spinepipe.studies.scoliosis.jalalian_2017.against import CLAIMS
-from spinepipe.studies.scoliosis.jalalian_2017.own_numbers import _EVEN, _TWO
+from papers.engine import Claim, claims_of, judge
+from papers.run import Run
 
+CLAIMS = claims_of("jalalian_2017")
 BY_ID = {claim.id: claim for claim in CLAIMS}
 
 COUNTED = {
@@ -96,7 +96,7 @@ REDUCTIONS = {
 
 def ends(name: str) -> tuple[Any, ...]:
     claim = BY_ID[name]
-    return claim.paper, claim.range.low, claim.range.high
+    return claim.printed, claim.range.low, claim.range.high
 
 
 def unprinted(name: str) -> tuple[Any, ...]:
@@ -233,67 +233,6 @@ def test_formulas_give_what_is_printed(name: str, ours: float) -> None:
 @sweep("key, ours", [("age_mean", 274 / 18), ("cobb_median", 53)])
 def test_ages_and_angles_of_table_1(key: str, ours: float) -> None:
     assert ours_of(BY_ID[f"closed_form.J1.{key}"])["ours"] == pytest.approx(ours)
-
-
-def test_made_up_segments_are_what_their_words_say() -> None:
-    """Both turn with the bend and have other ends to each side; the even one has the same."""
-    assert not _TWO.opposite.any()
-    assert (np.abs(_TWO.left) != _TWO.right).all()
-    assert not _EVEN.opposite.any()
-    np.testing.assert_array_equal(-_EVEN.left, _EVEN.right)
-    np.testing.assert_array_equal(_EVEN.arm_left, _EVEN.arm_right)
-    assert ((_TWO.arm_right > 0) & (_TWO.arm_left > 0)).all()
-
-
-def films(readings: dict[tuple[str, str], list[float]]) -> pd.DataFrame:
-    """Tilts of the upper of two vertebrae by observer and film."""
-    rows = [
-        {
-            "specimen": "p1",
-            "position": film,
-            "observer": observer,
-            "repeat": 1 + repeat,
-            "vertebra": name,
-            "orientation_deg": tilt if name == "L3" else 0.0,
-            "y_mm": 0.0,
-            "z_mm": 30.0 * (name == "L3"),
-        }
-        for (observer, film), tilts in readings.items()
-        for repeat, tilt in enumerate(tilts)
-        for name in ("L4", "L3")
-    ]
-    return pd.DataFrame(rows)
-
-
-def test_observers_and_repeats_are_counted_by_film() -> None:
-    """Medians, and least and most: two observers of one film and one of the other two."""
-    table = films(
-        {
-            ("a", "erect"): [1, 2, 3],
-            ("b", "erect"): [1, 2, 3],
-            ("a", "neutral"): [1],
-            ("a", "traction"): [4],
-        }
-    )
-    observers = ours_of(BY_ID["results.observers"], films=table)
-    assert (observers["ours"], observers["ours_low"], observers["ours_high"]) == (1, 1, 2)
-    repeats = ours_of(BY_ID["results.observers.repeats"], films=table)
-    assert (repeats["ours"], repeats["ours_low"], repeats["ours_high"]) == (2, 1, 3)
-    silent = table.assign(observer=None, repeat=None)
-    assert ours_of(BY_ID["results.observers"], films=silent)["ours"] == 1
-
-
-def test_the_largest_number_at_the_lowest_vertebra_counts() -> None:
-    table = films({("a", "erect"): [5]})
-    table.loc[table["vertebra"] == "L4", ["y_mm", "orientation_deg"]] = [0.1, -0.4]
-    row = ours_of(BY_ID["results.origin_frame"], films=table)
-    assert (row["ours"], row["verdict"]) == (0.4, "outside")
-
-
-def test_steps_of_reading_are_the_least_differences() -> None:
-    table = films({("a", "erect"): [0.5, 0.8, 1.6]})
-    assert ours_of(BY_ID["results.theta_step"], films=table)["ours"] == pytest.approx(0.3)
-    assert ours_of(BY_ID["results.pixel_size"], films=table)["ours"] == pytest.approx(30.0)
 
 
 def test_classes_of_a_range_are_pooled_by_their_counts() -> None:

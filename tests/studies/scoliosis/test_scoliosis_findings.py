@@ -229,8 +229,9 @@ def test_whether_films_were_brought_to_one_size_is_told() -> None:
 
 def test_published_quantities_are_told_once_they_are_judged() -> None:
     assert "published quantities" not in told(Size())
-    judged = pd.DataFrame({"verdict": ["inside", "outside", "contradicted"], "limit": "wide"})
-    assert "Of 3 published quantities" in told(Size(), against_jalalian_2017=judged)
+    judged = pd.DataFrame({"verdict": ["inside", "outside", "outside"], "limit": "wide"})
+    judged["evidence"] = ["independent", "independent", "circular"]
+    assert "Of 2 published quantities" in told(Size(), against_jalalian_2017=judged)
 
 
 def test_fits_at_a_bound_lost_or_of_several_optima_are_told() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from papers.engine import claims_of, judged
+from papers.engine import claims_of, compare
 from spinepipe.motion.skeleton import BODIES, JOINTS
 from spinepipe.studies.tracking.against_wang_2021 import asked_of
 from spinepipe.studies.tracking.settings import Bounds, Tracking
@@ -171,7 +171,7 @@ def complete() -> dict[str, pd.DataFrame]:
 
 
 def rows_of(**changed: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    rows = judged("wang_2021", {**complete(), **changed}, ASKED)
+    rows = compare("wang_2021", {**complete(), **changed}, ASKED)
     from_rows(AGAINST_WANG_2021, rows)
     return {str(row["id"]): dict(row) for row in rows}
 
@@ -426,7 +426,7 @@ def test_formulas_are_the_papers() -> None:
 
 
 def test_a_run_without_tables_computes_nothing_and_says_so() -> None:
-    rows = judged("wang_2021", {}, {})
+    rows = compare("wang_2021", {}, {})
     from_rows(AGAINST_WANG_2021, rows)
     found = {row["verdict"] for row in rows}
     assert found == {"not_computed", "contradicted", "recomputed"}

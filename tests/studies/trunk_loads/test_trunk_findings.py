@@ -249,8 +249,9 @@ def test_upright_moments_add_up() -> None:
 
 def test_published_quantities_are_told_once_they_are_judged() -> None:
     assert "published quantities" not in told(ONE)
-    judged = pd.DataFrame({"verdict": ["inside", "outside", "contradicted"], "limit": "wide"})
-    assert "Of 3 published quantities" in told(ONE, against_ghezelbash_2016=judged)
+    judged = pd.DataFrame({"verdict": ["inside", "outside", "outside"], "limit": "wide"})
+    judged["evidence"] = ["independent", "independent", "circular"]
+    assert "Of 2 published quantities" in told(ONE, against_ghezelbash_2016=judged)
 
 
 @pytest.mark.parametrize("gone", sorted(tables_of(ONE)))

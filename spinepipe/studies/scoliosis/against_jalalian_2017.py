@@ -6,34 +6,20 @@ doi 10.1007/s11517-016-1576-8.
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.comparison.claim import Run, judged
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.against import write_against
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.scoliosis.curve_angles import main_curve
 from spinepipe.studies.scoliosis.films import ERECT, read_films
-from spinepipe.studies.scoliosis.jalalian_2017.cohort_facts import claims_of_cohort
-from spinepipe.studies.scoliosis.jalalian_2017.laws_and_films import claims_of_laws
-from spinepipe.studies.scoliosis.jalalian_2017.model_errors import claims_of_errors
-from spinepipe.studies.scoliosis.jalalian_2017.own_numbers import claims_of_own_numbers
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import AGAINST_JALALIAN_2017
-from spinepipe.tables import from_rows, read_frames, write
+from spinepipe.tables import read_frames
 from spinepipe.units import DEG_PER_RAD
-
-CLAIMS = (
-    *claims_of_cohort(),
-    *claims_of_laws(),
-    *claims_of_errors(),
-    *claims_of_own_numbers(),
-)
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:
-    """Write ``against_jalalian_2017.parquet``; what needs an absent table is not computed."""
+    """Write ``against_jalalian_2017.parquet``."""
     settings, cohort = study_of_kind(Scoliosis, root, study)
-    rows = judged(CLAIMS, Run({**read_frames(tables), **facts(cohort)}, asked_of(settings)))
-    origin = provenance("against_jalalian_2017", settings, cohort)
-    write(from_rows(AGAINST_JALALIAN_2017, rows), output, origin)
+    frames = {**read_frames(tables), **facts(cohort)}
+    write_against("jalalian_2017", frames, asked_of(settings), settings, cohort, output)
 
 
 def asked_of(settings: Scoliosis) -> dict[str, float | None]:
