@@ -59,11 +59,13 @@ def distinct(run: Run, table: str, column: str, **where: Any) -> Ours:
     return Ours(float(run.rows(table, **where)[column].nunique()))
 
 
-def reduced(run: Run, table: str, column: str, by: str, ends: bool = False, **where: Any) -> Ours:
+def reduced(
+    run: Run, table: str, column: str, by: str, ends: bool = False, scale: float = 1.0, **where: Any
+) -> Ours:
     """Mean, median, largest ... of a column's numbers; its ends, the least and the largest."""
     values = filled(run.rows(table, **where), column)
     low, high = (float(values.min()), float(values.max())) if ends else (None, None)
-    return Ours(float(values.agg(by)), low, high)
+    return Ours(scale * float(values.agg(by)), low, high)
 
 
 def filled(rows: pd.DataFrame, column: str) -> "pd.Series[float]":

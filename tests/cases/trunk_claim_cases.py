@@ -193,21 +193,6 @@ def agreement() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def scaling() -> pd.DataFrame:
-    tall, area = 173.9 / 173.0, 0.97
-    ratios = {
-        "lengths and disc heights": tall,
-        "disc_area": area,
-        "axial_stiffness": area / tall,
-        "angular_stiffness": area**2 / tall,
-    }
-    rows = [
-        {"specimen": "volunteer", "quantity": name, "of": "all", "ratio": ratio, "source": "rule"}
-        for name, ratio in ratios.items()
-    ]
-    return pd.DataFrame(rows)
-
-
 def complete() -> dict[str, pd.DataFrame]:
     """All tables that claims look at."""
     return {
@@ -219,5 +204,4 @@ def complete() -> dict[str, pd.DataFrame]:
         "upright": upright(),
         "pressures": pressures(),
         "agreement": agreement(),
-        "scaling": scaling(),
     }

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
+from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
@@ -49,9 +50,10 @@ TUNED = ("pressures", "tuning", "agreement")
 _SPREAD = Job("spread", "", ("tasks", "responses"), ("intervals", "drivers"))
 _AGAINST = Job(
     "against_ghezelbash_2016",
-    "ghezelbash_2016.against",
-    ("tasks", "levels", "muscles", "upright", "scaling", "pressures", "agreement"),
+    "",
+    ("tasks", "levels", "muscles", "upright", "pressures", "agreement"),
     ("against_ghezelbash_2016",),
+    also=hangs_on("ghezelbash_2016"),
 )
 
 FULL = ("simplified", *TUNED, *_AGAINST.writes)
@@ -64,7 +66,7 @@ class TrunkFiles(StudyFiles):
 
     Attributes
     ----------
-    rebuilt : whether the cohort stands for that of a paper.
+    rebuilt : whether the cohort stands for that of a paper whose numbers are at hand.
     """
 
     full = FULL
@@ -121,7 +123,7 @@ class TrunkFiles(StudyFiles):
     @classmethod
     def of(cls, study: TrunkLoads, cohort: Cohort) -> "TrunkFiles":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, stands_for(cohort.name))
+        return cls(study, cohort.specimen_names, stands_for(cohort.name) and beside())
 
     @property
     def tables(self) -> tuple[str, ...]:

@@ -566,15 +566,13 @@ def test_the_shipped_phantom_has_the_patients_of_the_paper() -> None:
 def test_what_is_told_of_the_shipped_cohort_is_so() -> None:
     """Rows whose value is data: five films each, read once in tenths of a mm and deg, from L4."""
     films = facts(study()[1])["films"]
+    each = films.groupby(["specimen", "position"])
     read = films[["y_mm", "z_mm", "orientation_deg"]].to_numpy(float)
     tenths = 10.0 * read[np.isfinite(read)]
     found = {
         "xrays_per_patient": films.groupby("specimen")["position"].nunique().unique(),
-        "observers": films.groupby(["specimen", "position"])["observer"].nunique().clip(1).unique(),
-        "observers.repeats": films.groupby(["specimen", "position"])["repeat"]
-        .nunique()
-        .clip(1)
-        .unique(),
+        "observers": each["observer"].nunique().clip(1).unique(),
+        "observers.repeats": each["repeat"].nunique().clip(1).unique(),
         "origin_frame": np.unique(np.abs(read[films["vertebra"] == "L4"])),
         "pixel_size": 0.1 * np.unique(np.round(np.abs(tenths - np.round(tenths)), 6) + 1.0),
     }

@@ -1,6 +1,8 @@
 """Figure: how the bodies of every person turn to stand upright with the least moments."""
 
+import tomllib
 from collections.abc import Mapping
+from importlib.resources import files
 from typing import Any
 
 import pandas as pd
@@ -15,7 +17,6 @@ from spinepipe.report.style import BLACK, GREY, blank, saying
 from spinepipe.report.words import short
 from spinepipe.studies.trunk_loads.figures.looks import key_of, look_of
 from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
-from spinepipe.studies.trunk_loads.ghezelbash_2016.paper import PAPER, PERSONS
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
 _HEIGHT_MM, _KEY_MM = 68.0, 17.0
@@ -56,10 +57,11 @@ def _course(axis: Axes, values: "pd.Series[float]", number: int) -> None:
 
 def _printed(axis: Axes) -> bool:
     """Table 2 of the paper, whose geometry is another."""
-    table = PAPER["table_2"]
+    text = files("spinepipe.studies.trunk_loads.figures").joinpath("ghezelbash_2016.toml")
+    table = tomllib.loads(text.read_text(encoding="utf-8"))
     at = [BODIES.index(body) for body in table["bodies"]]
-    for person in PERSONS:
-        axis.plot(table[person]["upright_deg"], at, "x", color=BLACK, ms=3.5, mew=0.7, zorder=2)
+    for turned in table["upright_deg"].values():
+        axis.plot(turned, at, "x", color=BLACK, ms=3.5, mew=0.7, zorder=2)
     return True
 
 
