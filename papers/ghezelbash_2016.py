@@ -205,7 +205,8 @@ def _apart(run: Run, column: str, persons: tuple[str, ...]) -> _Apart:
     both = _loads(run, column, persons)
     loads = both.to_numpy(float)
     at = int((loads[:, 0] - loads[:, 1]).argmax())
-    return _Apart(float(both.index[at]), *map(float, loads[at]), len(both))
+    one, other = (float(load) for load in loads[at])
+    return _Apart(float(both.index[at]), one, other, len(both))
 
 
 def persons_apart(run: Run, column: str, of: str, pair: bool = True) -> Ours:

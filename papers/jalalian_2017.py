@@ -48,8 +48,8 @@ def error(run: Run, column: str, unit: str, **where: str) -> Ours:
         float(row[name]) for name in ("mean_of_patients", "sd_of_patients", "reading_noise")
     )
     told = f"ours: reading the films alone makes {noise:.2g} {unit}" if noise > 0.0 else ""
-    ends = (mean - sd, mean + sd) if np.isfinite(sd) else (None, None)
-    return Ours(value, *ends, note=told)
+    low, high = (mean - sd, mean + sd) if np.isfinite(sd) else (None, None)
+    return Ours(value, low, high, told)
 
 
 def _against_the_bend(run: Run, films: str, model: str) -> "pd.Series[float]":

@@ -68,6 +68,17 @@ def reduced(
     return Ours(scale * float(values.agg(by)), low, high)
 
 
+def tested(run: Run, test: str, **where: Any) -> pd.DataFrame:
+    """Tests that have a result and whose name begins like this, in any case; at least one."""
+    rows = run.rows("statistics", **where)
+    rows = rows[rows["test"].str.lower().str.startswith(test)]
+    done = rows.dropna(subset=["p"])
+    if done.empty:
+        messages = [str(text) for text in rows["message"].unique() if text]
+        raise NotComputed("; ".join(["no such test has a result", *messages[:1]]))
+    return done
+
+
 def filled(rows: pd.DataFrame, column: str) -> "pd.Series[float]":
     """Numbers of a column without what is empty, at least one."""
     values = pd.to_numeric(rows[column], errors="coerce").astype(float).dropna()

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness, check_one_stiffening
 from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
@@ -39,9 +40,10 @@ _ANALYSES = (
     Job("findings", "", ("stiffness", "errors", "statistics", "pooling"), ("findings",)),
     Job(
         "against_gould_2024b",
-        "gould_2024b.against",
+        "",
         ("stiffness", "fits", "errors", "mae", "statistics"),
         ("against_gould_2024b",),
+        also=hangs_on("gould_2024b"),
     ),
 )
 """What is computed from tables."""
@@ -67,7 +69,8 @@ class CohortLayout(StudyFiles):
 
     Attributes
     ----------
-    tests : load cases of the study. rebuilt : whether the cohort stands for that of a paper.
+    tests : load cases of the study. rebuilt : whether the cohort stands for that of a
+        paper whose numbers are at hand.
     representations : those of the study that the cohort has published values for.
     """
 
@@ -113,7 +116,7 @@ class CohortLayout(StudyFiles):
     @classmethod
     def of(cls, study: CohortStiffness, cohort: Cohort) -> "CohortLayout":
         """The files of a study of a cohort."""
-        rebuilt = GOULD_2024B.stands_for(cohort.name)
+        rebuilt = GOULD_2024B.stands_for(cohort.name) and beside()
         described = representations_of(study, cohort.joint_names)
         return cls(study, cohort.specimen_names, tests_of(study, cohort), rebuilt, described)
 
