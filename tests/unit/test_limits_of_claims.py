@@ -4,7 +4,6 @@ Catches a claim called true or false on the wrong side of its limit.
 """
 
 import csv
-import importlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,29 +12,16 @@ import pandas as pd
 import pytest
 from sweeps import sweep
 
-from papers import engine
-from spinepipe.comparison.claim import (
-    Claim,
-    Limit,
-    NotComputed,
-    Ours,
-    Range,
-    Run,
-    factor_of_two,
-    judge,
-)
+from papers.engine import Claim, Evidence, claims_of, judge
+from papers.ranges import Limit, Range, factor_of_two
+from papers.run import NotComputed, Ours, Run
+from spinepipe.comparison import papers
 from spinepipe.report.page.document import judged as told
 from spinepipe.tables.shared import LIMITS
 from tests.validation import comparisons
 
 ROOT = Path(__file__).parents[2]
-PAPERS = {
-    "gould_2024a": "joint_pose_sensitivity",
-    "gould_2024b": "cohort_stiffness",
-    "ghezelbash_2016": "trunk_loads",
-    "jalalian_2017": "scoliosis",
-    "wang_2021": "tracking",
-}
+PAPERS = papers.papers()
 NOTHING = Run({}, {"failed_when": "all"})
 
 NO_OTHER_NUMBER = (
@@ -43,20 +29,6 @@ NO_OTHER_NUMBER = (
     *(f"reduced_against_complete.extension_iqr_drop.{joint}" for joint in ("L1L2", "L3L4")),
 )
 """A19: a column that is probably a copy, in whose place nothing else is printed."""
-
-
-def claims(paper: str) -> tuple[Any, ...]:
-    if (ROOT / "papers" / f"{paper}.csv").is_file():
-        return engine.claims_of(paper)
-    module = importlib.import_module(f"spinepipe.studies.{PAPERS[paper]}.{paper}.against")
-    found: tuple[Claim, ...] = module.CLAIMS
-    return found
-
-
-def judged(claim: Any) -> dict[str, Any]:
-    if isinstance(claim, engine.Claim):
-        return engine.judge(claim, engine.Run({}, NOTHING.asked))
-    return judge(claim, NOTHING)
 
 
 def by_hand(row: Mapping[str, Any]) -> str:
@@ -75,7 +47,7 @@ def by_hand(row: Mapping[str, Any]) -> str:
 
 @sweep("paper", PAPERS)
 def test_limit_follows_from_the_row(paper: str) -> None:
-    rows = [judged(claim) for claim in claims(paper)]
+    rows = [judge(claim, NOTHING) for claim in claims_of(paper)]
     compared = [row for row in rows if row["verdict"] != "contradicted"]  # tells no range
     assert {row["id"]: row["limit"] for row in compared} == {
         row["id"]: by_hand(row) for row in compared
@@ -85,19 +57,19 @@ def test_limit_follows_from_the_row(paper: str) -> None:
 @sweep("paper", PAPERS)
 def test_a_sign_alone_is_never_called_contradicted(paper: str) -> None:
     """Where the paper's sign is known, ours agrees with it or does not."""
-    signs = [claim for claim in claims(paper) if 0.0 in (claim.range.low, claim.range.high)]
+    signs = [claim for claim in claims_of(paper) if 0.0 in (claim.range.low, claim.range.high)]
     hidden = [one.id for one in signs if one.range.limit is Limit.ONE_SIDED and one.contradicted]
     assert hidden == []
 
 
 @sweep("paper", PAPERS)
 def test_a_contradicted_number_of_a_run_is_compared_with_all_that_is_printed(paper: str) -> None:
-    for claim in claims(paper):
+    for claim in claims_of(paper):
         if not claim.contradicted or claim.also or claim.id in NO_OTHER_NUMBER:
             continue
         try:
             claim.ours(NOTHING)  # the paper's own other number, of no run
-        except (NotComputed, engine.NotComputed):
+        except NotComputed:
             pytest.fail(f"{claim.id}: our value is not held against the paper's other numbers")
 
 
@@ -107,6 +79,7 @@ def test_ours_outside_all_that_the_paper_prints_disagrees(value: float, verdict:
     claim = Claim(
         *("a", "Table 1", "something", "mm", 1.0, factor_of_two(1.0)),
         ours=lambda run: Ours(value),
+        evidence=Evidence.CONTRADICTED,
         outside="for a reason",
         contradicted="A1: 1 is not 20",
         also=(factor_of_two(20.0),),
@@ -170,7 +143,7 @@ def counted() -> dict[str, dict[str, int]]:
     with COUNTS.open() as file:
         return {
             row["study"]: {key: int(row[key]) for key in row if key not in ("study", "paper")}
-            | {"claims": len(claims(row["paper"]))}
+            | {"claims": len(claims_of(row["paper"]))}
             for row in csv.DictReader(file)
         }
 
@@ -192,7 +165,7 @@ def test_documents_tell_the_counts() -> None:
         f"and outside for {found['outside']} "
     ) in words
     readme = " ".join((ROOT / "README.md").read_text().split())
-    assert f"sets {len(claims('gould_2024a'))} published numbers beside ours" in readme
+    assert f"sets {len(claims_of('gould_2024a'))} published numbers beside ours" in readme
 
 
 @sweep("study", ["l1l4_joint_pose", "t12s1_as_published"])

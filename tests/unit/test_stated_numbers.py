@@ -14,10 +14,10 @@ import pandas as pd
 import pytest
 import yaml
 
+from papers.engine import rows_of
 from spinepipe.anatomy import published
 from spinepipe.reference.pictures import FOLDER, PICTURES, renewed
 from spinepipe.studies.discrepancy.verdict import share_of_gap
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a.against import CLAIMS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -52,7 +52,7 @@ def test_counts_are_those_of_the_study_that_comes_along() -> None:
 
 def test_published_numbers_are_counted() -> None:
     """Each claim of the comparison is a row of its table."""
-    assert numbers(r"sets (\d+) published numbers", README) == {float(len(CLAIMS))}
+    assert numbers(r"sets (\d+) published numbers", README) == {float(len(rows_of("gould_2024a")))}
 
 
 def test_the_phantoms_of_the_coverage_are_counted() -> None:

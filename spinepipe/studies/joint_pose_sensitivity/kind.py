@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
@@ -100,7 +101,7 @@ class Layout(StudyFiles):
     Attributes
     ----------
     rebuilt
-        Whether its cohort was rebuilt from the paper that results are compared with.
+        Whether its cohort was rebuilt from a paper whose numbers are at hand.
     """
 
     joined = OF_JOBS
@@ -175,7 +176,8 @@ class Layout(StudyFiles):
     @classmethod
     def of(cls, study: JointPoseSensitivity, cohort: Cohort) -> "Layout":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, GOULD_2024A.stands_for(cohort.name))
+        rebuilt = GOULD_2024A.stands_for(cohort.name) and beside()
+        return cls(study, cohort.specimen_names, rebuilt)
 
     @cached_property
     def stiffnesses(self) -> list[str]:
@@ -445,10 +447,11 @@ _ANALYSES = (
     ),
     Job(
         "against_gould_2024a",
-        "gould_2024a.against",
+        "",
         COMPARED,
         ("against_gould_2024a",),
         ignoring("block"),
+        also=hangs_on("gould_2024a"),
     ),
 )
 

@@ -13,30 +13,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 from study_cases import TABLES
 from sweeps import sweep
 
-from spinepipe.comparison.claim import (
-    Claim,
-    NotComputed,
-    Ours,
-    Range,
-    Run,
-    binomial,
-    judge,
-    judged,
-    kendall_p,
-    normal_iqr,
-    spearman_interval,
-    spearman_p,
-    spearman_threshold,
-)
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a import against as against_gould_2024a
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a.against import CLAIMS
+from papers.engine import Claim, Evidence, claims_of, judge, judged
+from papers.ranges import Range, binomial, normal_iqr, spearman_interval, spearman_threshold
+from papers.run import NotComputed, Ours, Run
+from spinepipe.anatomy import published
+from spinepipe.studies.joint_pose_sensitivity import against_gould_2024a
 from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
 from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
 from spinepipe.tables import from_rows, read, read_frame
 
+CLAIMS = claims_of("gould_2024a")
 ROOT = Path(__file__).parents[3]
 CHECKS = ROOT.parent / "shared" / "published" / "consistency-checks.csv"
 
@@ -270,16 +260,13 @@ def missing(run: Run) -> Ours:
 
 def claim(value: float | None, low: float | None, high: float | None, wrong: str = "") -> Claim:
     return Claim(
-        "a",
-        "Table 1",
-        "something",
-        "mm",
-        2.0,
-        Range(low, high, "the paper's IQR"),
-        missing if value is None else lambda run: Ours(value),
-        "for a reason",
-        "a note",
-        wrong,
+        *("a", "Table 1", "something", "mm", 2.0),
+        range=Range(low, high, "the paper's IQR"),
+        ours=missing if value is None else lambda run: Ours(value),
+        evidence=Evidence.CONTRADICTED if wrong else Evidence.INDEPENDENT,
+        contradicted=wrong,
+        outside="for a reason",
+        note="a note",
     )
 
 
@@ -333,10 +320,55 @@ def test_wilson_interval_by_its_formula() -> None:
 
 def test_correlations_of_the_consistency_checks() -> None:
     """A22-A25: p of r = 0.18, the threshold, rho = 0.67 of 10 and tau = 0.12 of 123."""
-    assert spearman_p(0.18, 123) == pytest.approx(0.046, abs=5e-4)
+    t = 0.18 * sqrt(121 / (1 - 0.18**2))
+    found = row_of("closed_form.pose_correlation_p", EMPTY_RUN)["ours"]
+    assert found == pytest.approx(2 * stats.t.sf(t, 121))
     assert spearman_threshold(0.05, 123) == pytest.approx(0.177, abs=5e-4)
-    assert spearman_p(0.67, 10) == pytest.approx(0.034, abs=5e-4)
-    assert kendall_p(0.12, 123) == pytest.approx(0.049, abs=5e-4)
+    threshold = row_of("closed_form.spearman_threshold", EMPTY_RUN)["ours"]
+    assert threshold == pytest.approx(spearman_threshold(0.05, 123))
+    cells = {claim.id: claim.note for claim in CLAIMS}
+    p = 2 * stats.t.sf(0.67 * sqrt(8 / (1 - 0.67**2)), 8)
+    assert f"p = {p:.2g}" in cells["table_6.extension_stiffness.L2L3.anterior_error.coefficient"]
+    p = 2 * stats.norm.sf(0.12 * sqrt(9 * 123 * 122 / (2 * 251)))
+    cell = "table_6.extension_orientation.L2L3.extension_error.coefficient"
+    assert f"p = {p:.2g}" in cells[cell]
+
+
+def test_what_follows_from_the_paper() -> None:
+    """From its load, motion, stiffness and Tables 4 and 7, as sections 2.1 to 3.3 print them."""
+    paper = published("gould_2024a")
+    force, best = paper["load"]["largest_compression_n"], paper["best_model"]["stiffness"]
+    ten = paper["ten_best_stiffness"]
+    origins = [
+        iqr * sqrt(2.0) / (2 * stats.norm.ppf(0.75))
+        for joint in JOINTS
+        for iqr in paper["joint_origin"]["complete"][joint]["iqr"].values()
+    ]
+    turn = {
+        joint: np.deg2rad(abs(paper["measured_motion"][joint]["extension_deg"]))
+        for joint in ("L2L3", "L3L4")
+    }
+    expected = {
+        "load.moment": force * paper["bodies"]["top_offset_mm"] / 1000,
+        "load.lever_arm": 1000 * paper["load"]["flexion_moment_nm"] / force,
+        "load.spring_moment.L2L3": best["extension_nm_per_rad"] * turn["L2L3"],
+        "load.spring_moment.L3L4": best["extension_nm_per_rad"] * turn["L3L4"],
+        "start_stiffness.anterior_in_box": paper["start_stiffness"]["anterior_n_per_m"],
+        "best_model.anterior_in_box": best["anterior_n_per_m"],
+        "closed_form.compression": 1000 * force / best["superior_n_per_m"],
+        "closed_form.outlier": paper["outlier"]["extension_nm_per_rad"]
+        / paper["start_stiffness"]["extension_nm_per_rad"],
+        **{
+            f"closed_form.ten_best_anterior_{kind}_percent": 100
+            * ten[kind]["anterior_n_per_m"]
+            / ten["median"]["anterior_n_per_m"]
+            for kind in ("iqr", "range")
+        },
+        "landmarks.largest_resultant_sd": max(origins),
+        "table_6.significance": paper["significance"]["p_below"],
+    }
+    found = {name: row_of(name, EMPTY_RUN)["ours"] for name in expected}
+    assert found == pytest.approx(expected)
 
 
 def test_interval_of_a_rank_correlation_by_hand() -> None:
@@ -568,7 +600,9 @@ def test_few_fits_tell_no_rate(fits: int, verdict: str) -> None:
 
 def test_ids_are_unique_and_every_claim_has_a_reason() -> None:
     assert len({claim.id for claim in CLAIMS}) == len(CLAIMS)
-    assert [claim.id for claim in CLAIMS if not (claim.outside or claim.contradicted)] == []
+    assert [
+        one.id for one in CLAIMS if one.evidence and not (one.outside or one.contradicted)
+    ] == []
 
 
 @sweep("name", ["summary", "statistics"])
