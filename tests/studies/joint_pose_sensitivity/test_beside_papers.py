@@ -13,6 +13,7 @@ from study_cases import FIGURES, STUDY, Size, drawing, project, results
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
+from spinepipe.comparison import papers
 from spinepipe.report.style import picture, style
 from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
@@ -54,6 +55,24 @@ def test_results_are_held_against_the_paper_of_cohort_and_question(
 ) -> None:
     found = kind_of(kind).files.of(study_of(kind, cohort), cohorts.read(COHORTS / cohort))
     assert [name for name in found.tables if name.startswith("against")] == against
+
+
+@sweep(
+    "kind, cohort", [("joint_pose_sensitivity", "palanca_l1l4"), ("tracking", "tracking_phantom")]
+)
+def test_without_the_folder_of_papers_the_comparison_is_left_out_and_told(
+    kind: str, cohort: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    forms = kind_of(kind).forms if kind == "tracking" else ()
+    read = cohorts.read(COHORTS / cohort, forms)
+    whole = set(kind_of(kind).files.of(study_of(kind, cohort), read).tables)
+    assert papers.left_out("the paper") == ()
+    monkeypatch.setattr(papers, "FOLDER", tmp_path)
+    rest = set(kind_of(kind).files.of(study_of(kind, cohort), read).tables)
+    assert [name.startswith("against_") for name in whole - rest] == [True]
+    (told,) = papers.left_out("the paper")
+    assert "the folder papers" in told
+    assert papers.left_out("the paper", wanted=False) == ()
 
 
 def test_numbers_of_a_paper_are_for_its_own_cohort_only() -> None:

@@ -15,13 +15,13 @@ from pydantic import ValidationError
 from study_cases import STUDY, TABLES, Size, project
 from sweeps import sweep
 
-from spinepipe.comparison.claim import Run, judge
+from papers.engine import claims_of, judge
+from papers.run import Run
 from spinepipe.problems import InputError
 from spinepipe.report.page.document import Results
 from spinepipe.report.style import style
 from spinepipe.studies.joint_pose_sensitivity.figures.load_point import load_point_figure
 from spinepipe.studies.joint_pose_sensitivity.findings_of_load_point import load_point
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a.against import CLAIMS
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.load_point_effect import effect
 from spinepipe.studies.joint_pose_sensitivity.over_load_point import allowed
@@ -274,7 +274,7 @@ def test_figure_has_a_panel_for_each_stiffness_and_one_for_the_cost(
 
 
 def claim(name: str, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
-    (found,) = [one for one in CLAIMS if one.id == name]
+    (found,) = [one for one in claims_of("gould_2024a") if one.id == name]
     return judge(found, Run(tables))
 
 

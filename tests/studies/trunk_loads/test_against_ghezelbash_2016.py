@@ -623,3 +623,20 @@ def test_the_figure_shows_the_rotations_of_the_rows() -> None:
     for column, turned in zip("ABCD", table["upright_deg"].values(), strict=True):
         rows = [claim_of(f"table_2.{column}.{body}").printed for body in table["bodies"]]
         assert rows == turned
+
+
+def test_what_is_told_of_the_shipped_study_is_so() -> None:
+    """Rows whose value is data: what tasks.csv asks, and shares that are made to sum to 100 %."""
+    found = {name: row["ours"] for name, row in all_rows().items()}
+    for joint, flexion, sideways in (("T11T12", 6.0, 8.3), ("L4L5", 20.1, 25.6)):
+        assert found[f"partition.{joint}.flexion_percent"] == pytest.approx(100 * flexion / 99.9)
+        assert found[f"partition.{joint}.lateral_percent"] == pytest.approx(sideways)
+    with (ROOT / "config/cohorts/trunk_volunteers/tasks.csv").open(encoding="utf-8") as file:
+        tasks = list(csv.DictReader(file))
+    for number in (10, 11):
+        (first, *_) = [row for row in tasks if row["number"] == str(number)]
+        alike = [row for row in tasks if row["push_extension_nm"] == first["push_extension_nm"]]
+        asked = {float(row["intra_abdominal_pressure_kpa"] or 0.0) for row in alike}
+        told = {found[f"table_3.task_{number}.{case}.iap_kpa"] for case in CASES}
+        assert told == asked, number
+    assert found["equations.scale_coordinates"] == pytest.approx(173.9 / 173.0)
