@@ -6,6 +6,7 @@ number that no rule makes a range of, and evidence that is called independent an
 
 import inspect
 import re
+import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -106,3 +107,22 @@ def test_what_follows_from_the_paper_alone_needs_no_run(paper: str) -> None:
 )
 def test_every_paper_has_numbers_of_each_kind(paper: str, numbers: set[str]) -> None:
     assert {row["evidence"] for row in rows_of(paper)} - {""} == numbers
+
+
+def test_a_comparison_hangs_on_its_own_paper_and_the_engine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(FOLDER, tmp_path / "papers", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(papers, "FOLDER", tmp_path / "papers")
+    paper, other = PAPERS[:2]
+    for changed, same in (
+        (f"{paper}.csv", {other}),
+        (f"{paper}.py", {other}),
+        ("ranges.py", set()),
+        ("engine.py", set()),
+    ):
+        before = {name: papers.digest(name) for name in PAPERS}
+        with (tmp_path / "papers" / changed).open("a") as file:
+            file.write("\n")
+        after = {name: papers.digest(name) for name in PAPERS}
+        assert {name for name in (paper, other) if before[name] == after[name]} == same, changed
