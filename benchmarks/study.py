@@ -19,7 +19,7 @@ from spinepipe.studies.registry import files_of
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDY = "l1l4_joint_pose"
-PARTS = ("Snakefile", "workflow", "profiles", "spinepipe", "config")
+PARTS = ("Snakefile", "workflow", "profiles", "spinepipe", "papers", "config")
 SECONDS_BETWEEN_LOOKS = 0.5
 
 

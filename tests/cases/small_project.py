@@ -23,7 +23,7 @@ from whereabouts import told_of_the_machine
 from spinepipe.studies.registry import place_of
 
 _ROOT = Path(__file__).parents[2]
-_PARTS = ("Snakefile", "workflow", "profiles", "spinepipe")
+_PARTS = ("Snakefile", "workflow", "profiles", "spinepipe", "papers")
 _STUDY = """\
 study: {name}
 kind: joint_pose_sensitivity
