@@ -19,7 +19,10 @@ import yaml
 from spinepipe.files import appearing
 from spinepipe.marks import read_mark
 
-PROJECT = ("Snakefile", "requirements.lock", "config", "profiles", "spinepipe", "workflow")
+PROJECT = (
+    *("Snakefile", "requirements.lock", "config", "papers", "profiles", "spinepipe"),
+    "workflow",
+)
 """Files and folders of a project on which all results may hang."""
 
 RESULTS = "results"

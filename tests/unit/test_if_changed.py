@@ -21,6 +21,8 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[
     monkeypatch.chdir(tmp_path)
     (tmp_path / "config/studies").mkdir(parents=True)
     (tmp_path / "spinepipe").mkdir()
+    (tmp_path / "papers").mkdir()
+    (tmp_path / "papers/one.csv").write_text("a,b\n")
     (tmp_path / "lab").mkdir()
     (tmp_path / "lab/loads.csv").write_text("a\n")
     (tmp_path / "spinepipe/code.py").write_text("x = 1\n")
@@ -70,13 +72,23 @@ def _damage(path: Path) -> None:
     [
         lambda: Path("spinepipe/code.py").write_text("x = 22\n"),
         lambda: Path("spinepipe/new.py").write_text(""),
+        lambda: Path("papers/one.csv").write_text("b\n"),
         lambda: Path("config/studies/study.yaml").write_text("cohort: other\n"),
         lambda: Path("lab/loads.csv").write_text("bb\n"),
         lambda: Path("lab/more.csv").write_text("a\n"),
         lambda: Path(RESULT).unlink(),
         lambda: _damage(Path(RESULT)),
     ],
-    ids=["code", "new code", "settings", "data", "new data", "lost result", "damaged result"],
+    ids=[
+        "code",
+        "new code",
+        "published",
+        "settings",
+        "data",
+        "new data",
+        "lost result",
+        "damaged result",
+    ],
 )
 def test_a_change_is_seen(
     run: Callable[..., tuple[int, bool]], change: Callable[[], object]
