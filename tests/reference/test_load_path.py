@@ -337,7 +337,9 @@ def monotone(rng: np.random.Generator) -> tuple[SpineModel, LoadCase]:
     return model, loads(model, *((0.0, bending(m)) for m in moments.tolist()))
 
 
-@pytest.mark.parametrize("seed, count", [(1, 400), pytest.param(2, 2000, marks=pytest.mark.full)])
+@pytest.mark.parametrize(
+    ("seed", "count"), [(1, 400), pytest.param(2, 2000, marks=pytest.mark.full)]
+)
 def test_no_law_that_rises_is_called_unstable(seed: int, count: int) -> None:
     """But for joints that turn beyond 80 degrees, which the message says."""
     rng = np.random.default_rng(seed)
