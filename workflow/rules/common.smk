@@ -180,7 +180,8 @@ def base_model(wildcards):
 def jobs_of_block(wildcards):
     """The job files of one block of a table; of some tables those that are yet to be made.
 
-    A block that is right misses no file: who wants a lost one asks for it (see `everything`).
+    A block that is right misses no lost file: who wants it asks for it (see `everything`). One with
+    files of another setting is made again, and of all its files.
     """
     for wait in WAITING.get(wildcards.table, ()):
         wait(wildcards)
@@ -192,8 +193,8 @@ def jobs_of_block(wildcards):
         return files
     marks, block = expected(study), mark_in(layout(study).block_file(*place))
     wrong = [file for file in files if mark_in(file) != marks.of_part(table, file)]
-    if wrong and block is not None and block == marks.of_block(*place):
-        return [file for file in wrong if mark_in(file) is not None]
+    if all(mark_in(file) is None for file in wrong) and block == marks.of_block(*place):
+        return []
     return wrong
 
 
