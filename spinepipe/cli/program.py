@@ -8,8 +8,10 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from keyword import iskeyword
 from pathlib import Path
+from typing import cast
 
 from spinepipe.files import cache_home, cache_of_project, refusal
 
@@ -26,9 +28,9 @@ COMMANDS = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 well, 1 a problem, 2 wrong usage."""
     if arguments is None and sys.getfilesystemencoding() != "utf-8":
-        # Python decides at its start how it reads paths and what it can print: it starts anew.
-        anew = [sys.executable, *sys.orig_argv[1:]]
-        os.execve(sys.executable, anew, {**os.environ, "PYTHONUTF8": "1"})
+        # a locale of ASCII: paths hold their bytes as surrogates, which are printed as these bytes
+        for stream in (sys.stdout, sys.stderr):
+            cast(TextIOWrapper, stream).reconfigure(encoding="utf-8", errors="surrogateescape")
     parser = argparse.ArgumentParser(
         prog="spinepipe",
         description="Spine models calibrated on measured motion.",

@@ -32,6 +32,7 @@ def sweep(
                 values = case if len(arguments) > 1 else (case,)
                 name = None
                 if isinstance(case, PARAM):
+                    assert not case.marks, "marks are of tests: parametrize, as here all cases run"
                     values, name = case.values, case.id
                 if folder is not None:
                     fixtures["tmp_path"] = folder / str(count)

@@ -337,7 +337,9 @@ def monotone(rng: np.random.Generator) -> tuple[SpineModel, LoadCase]:
     return model, loads(model, *((0.0, bending(m)) for m in moments.tolist()))
 
 
-@sweep("seed, count", [(1, 400), pytest.param(2, 2000, marks=pytest.mark.full)])
+@pytest.mark.parametrize(
+    ("seed", "count"), [(1, 400), pytest.param(2, 2000, marks=pytest.mark.full)]
+)
 def test_no_law_that_rises_is_called_unstable(seed: int, count: int) -> None:
     """But for joints that turn beyond 80 degrees, which the message says."""
     rng = np.random.default_rng(seed)
@@ -387,7 +389,7 @@ STEPS = 100
 
 @pytest.mark.slow
 @sweep("draw", [pressed, tilted])
-@sweep("seeds", [range(3), pytest.param(range(100, 140), marks=pytest.mark.full)])
+@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(100, 140), marks=pytest.mark.full)])
 def test_chains_stand_where_slow_loads_bring_them_by_virtual_work(draw, seeds: range) -> None:
     lost = 0
     for seed in seeds:

@@ -180,7 +180,8 @@ def base_model(wildcards):
 def jobs_of_block(wildcards):
     """The job files of one block of a table; of some tables those that are yet to be made.
 
-    A block that is right misses no file: who wants a lost one asks for it (see `everything`).
+    A block that is right misses no lost file: who wants it asks for it (see `everything`). One with
+    files of another setting is made again, and of all its files.
     """
     for wait in WAITING.get(wildcards.table, ()):
         wait(wildcards)
@@ -191,10 +192,14 @@ def jobs_of_block(wildcards):
     if forced or table not in layout(study).known_by_mark:
         return files
     marks, block = expected(study), mark_in(layout(study).block_file(*place))
-    wrong = [file for file in files if mark_in(file) != marks.of_part(table, file)]
-    if wrong and block is not None and block == marks.of_block(*place):
-        return [file for file in wrong if mark_in(file) is not None]
-    return wrong
+    wrong = {
+        file: mark
+        for file in files
+        if (mark := mark_in(file)) != marks.of_part(table, file)
+    }
+    if wrong and not any(wrong.values()) and block == marks.of_block(*place):
+        return []
+    return list(wrong)
 
 
 # What must be done before the job files of a table are known, by table: functions of wildcards.

@@ -119,29 +119,39 @@ def _closed(verdict: Verdict) -> str:
         return ""
     before, after = verdict.gap.held_out_base, verdict.gap.held_out_with_effects
     sizes = "" if before is None or after is None else f" from {fixed(before)} to {fixed(after)}"
-    told = [f"On motion held out of the fits the gap falls{sizes}: {_shares(closed)}."]
-    for one in verdict.left_out:
-        if len(verdict.left_out) > 1 and one.excess_closed is not None:
-            told.append(f"{TRAINED_ON[one.kind]}: {_shares(one.excess_closed)}.")
-    return " ".join(told)
+    return (
+        f"On motion held out of the fits the gap falls{sizes}, by {_share(share_of_gap(closed))}."
+    )
 
 
 TRAINED_ON = {
-    "test": "Of tests left out, with fits to the other tests of the same specimens",
-    "specimen": "Of specimens left out, with their own stiffness and sizes fitted to the other "
-    "half of their load steps",
-    "steps": "Of load steps left out, with fits to every second one",
+    "test": "in tests left out, with fits to the other tests of the same specimens",
+    "specimen": "in specimens left out, with their own stiffness and sizes fitted to half of their "
+    "load steps",
+    "steps": "in load steps left out, with fits to every second one",
 }
 """What the fits have seen of a specimen whose motion they predict, by the kind of fold."""
 
 
-def _shares(excess: float) -> str:
-    """Of the excess misfit, and of the gap."""
-    shares = [
-        "100 %" if share >= 1.0 else ">99 %" if share >= 0.995 else f"{100.0 * share:.0f} %"
-        for share in (excess, share_of_gap(excess))
+def by_what_was_fitted(verdict: Verdict) -> str:
+    """Kinds of folds apart, as their fits have seen more or less of what they predict."""
+    closed = [(one.kind, one.excess_closed) for one in verdict.left_out]
+    shares = [(kind, share) for kind, share in closed if share is not None]
+    if len(shares) < 2 or not (verdict.effects or verdict.candidates_in_set):
+        return ""
+    told = [
+        f"by {_share(share_of_gap(share))} {TRAINED_ON[kind]} "
+        f"({_share(share)} of the excess misfit)"
+        for kind, share in shares
     ]
-    return f"{shares[0]} of the excess misfit (chi squared), {shares[1]} of the gap"
+    return (
+        f"Held out, the gap falls {'; '.join(told)}. The excess misfit (chi squared) is the square "
+        "of the gap."
+    )
+
+
+def _share(share: float) -> str:
+    return "100 %" if share >= 1.0 else ">99 %" if share >= 0.995 else f"{100.0 * share:.0f} %"
 
 
 def warnings(verdict: Verdict) -> tuple[str, ...]:
@@ -160,6 +170,7 @@ def findings(verdict: Verdict, results: Results) -> list[str]:
         *_sizes(verdict),
         would_have_been_seen(verdict),
         before_and_after(where),
+        by_what_was_fitted(verdict),
         where_most(where),
         what_stays(verdict, where),
         of_another_coordinate(verdict, where),

@@ -34,7 +34,13 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.style import picture, style
 from spinepipe.studies.discrepancy.figures.gap_map import worst_places
-from spinepipe.studies.discrepancy.findings import findings, headline, how_sure, warnings
+from spinepipe.studies.discrepancy.findings import (
+    by_what_was_fitted,
+    findings,
+    headline,
+    how_sure,
+    warnings,
+)
 from spinepipe.studies.discrepancy.kind import KIND, TABLES, DiscrepancyFiles
 from spinepipe.studies.discrepancy.page import document, left_out, shown_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
@@ -169,8 +175,7 @@ def test_how_sure_a_name_is() -> None:
     assert how_sure(verdict_of(VERDICTS["NAMED"])) == (
         "Neutral zone: log evidence 88.0, 6.2 is needed; next best nonlinear stiffening, 17 "
         "behind. Residuals of 4.10 noise SD become 1.02 (1 is noise). On motion held out of the "
-        "fits the gap falls from 4.18 to 0.35: 97 % of the excess misfit (chi squared), 83 % of "
-        "the gap."
+        "fits the gap falls from 4.18 to 0.35, by 83 %."
     )
     apart = VERDICTS["NAMED"] | {
         "left_out": [
@@ -180,12 +185,13 @@ def test_how_sure_a_name_is() -> None:
             | {"excess_closed": 0.67, "gap_closed": 0.43},
         ]
     }
-    assert how_sure(verdict_of(apart)).endswith(
-        "Of tests left out, with fits to the other tests of the same specimens: 42 % of the excess "
-        "misfit (chi squared), 24 % of the gap. Of specimens left out, with their own stiffness "
-        "and sizes fitted to the other half of their load steps: 67 % of the excess misfit (chi "
-        "squared), 43 % of the gap."
+    assert by_what_was_fitted(verdict_of(apart)) == (
+        "Held out, the gap falls by 24 % in tests left out, with fits to the other tests of the "
+        "same specimens (42 % of the excess misfit); by 43 % in specimens left out, with their own "
+        "stiffness and sizes fitted to half of their load steps (67 % of the excess misfit). The "
+        "excess misfit (chi squared) is the square of the gap."
     )
+    assert by_what_was_fitted(verdict_of(VERDICTS["NAMED"])) == ""
     assert "Its shape: one side only" in how_sure(verdict_of(VERDICTS["UNKNOWN"]))
 
 

@@ -56,7 +56,7 @@ def test_the_verdict_says_that_nothing_is_known_and_why(verdict: Mapping[str, An
     assert verdict["imperfections"] is None
     assert "flexion" in verdict["unknown"]["where"]
     sizes = [v for key in ("gap", "rms_residual") for k, v in verdict[key].items() if k != "unit"]
-    assert sizes == [None] * 9
+    assert set(sizes) == {None}
 
 
 def test_the_mistake_is_pointed_to(verdict: Mapping[str, Any]) -> None:
