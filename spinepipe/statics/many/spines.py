@@ -144,7 +144,6 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
     """The same test of many spines, a run each."""
     count, steps = len(spines), len(cases.like.steps)
     like, test = spines.like, cases.like
-    chain = np.arange(count)
     chains = Chains(
         spines.rotations,
         spines.origins,
@@ -152,7 +151,7 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
         spines.coms,
         spines.inertias,
         spines.damping,
-        np.repeat(like.gravity[None], count, axis=0),
+        _repeated(like.gravity, count),
     )
     most = cases.points.shape[2]
     bodies = np.full((steps, most), -1)
@@ -161,21 +160,22 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
     points, forces, moments = (
         numbers.reshape(-1, most, 3) for numbers in (cases.points, cases.forces, cases.moments)
     )
-    supports = supports_of(test.steps * count, like.n_joints)
-    places = np.repeat(chain, steps), np.tile(bodies, (count, 1))
+    row = np.tile(np.arange(steps), count)
+    supports = supports_of(test.steps, like.n_joints).part(row)
+    places = np.repeat(np.arange(count), steps), bodies[row]
     listed = Loads(*places, points, forces, moments, supports)
-    effects = Effects.of([like] * count, [(number, test.test) for number in chain.tolist()])
     return Stack.made(
         spines.model,
         cases.case,
         Chains(*map(np.ascontiguousarray, chains)),
-        effects.with_values(spines.values),
+        Effects.of([like], [(0, test.test)]).repeated(spines.values),
         listed,
-        [durations(test)] * count,
+        np.full(count, steps),
+        durations(test)[row],
     )
 
 
 def _repeated(one: object, count: int) -> Array:
-    """(count, ...) copies."""
+    """(count, ...) of the same numbers, kept once."""
     values = np.asarray(one, dtype=float)
-    return np.repeat(values[None], count, axis=0)
+    return np.broadcast_to(values, (count, *values.shape))
