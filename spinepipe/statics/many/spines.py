@@ -1,5 +1,6 @@
 """Many spines of one structure, and the same test of each: numbers as arrays, names once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, SpineModel
 from spinepipe.statics.many.lanes import Effects
-from spinepipe.statics.many.stack import Stack, durations, supports_of
+from spinepipe.statics.many.stack import Stack, durations, supports_of, wrenches_of
 from spinepipe.statics.many.survey import Chains, Loads
 
 
@@ -106,11 +107,7 @@ class Cases:
     @classmethod
     def of(cls, case: LoadCase, count: int) -> "Cases":
         """The same loads that many times."""
-        most = max((len(step.wrenches) for step in case.steps), default=0)
-        numbers = np.zeros((3, len(case.steps), most, 3))
-        for row, step in enumerate(case.steps):
-            for column, wrench in enumerate(step.wrenches):
-                numbers[:, row, column] = wrench.point, wrench.force, wrench.moment
+        _, *numbers = wrenches_of(case.steps)
         points, forces, moments = (_repeated(part, count) for part in numbers)
         return cls(case, points, forces, moments)
 
@@ -121,6 +118,15 @@ class Cases:
             points=self.points[chosen],
             forces=self.forces[chosen],
             moments=self.moments[chosen],
+        )
+
+    def steps(self, chosen: Sequence[int]) -> "Cases":
+        """Some of the steps, by their places."""
+        return Cases(
+            replace(self.like, steps=tuple(self.like.steps[place] for place in chosen)),
+            self.points[:, chosen],
+            self.forces[:, chosen],
+            self.moments[:, chosen],
         )
 
     def case(self, i: int) -> LoadCase:
@@ -153,17 +159,14 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
         spines.damping,
         _repeated(like.gravity, count),
     )
-    most = cases.points.shape[2]
-    bodies = np.full((steps, most), -1)
-    for row, step in enumerate(test.steps):
-        bodies[row, : len(step.wrenches)] = [wrench.body for wrench in step.wrenches]
-    points, forces, moments = (
-        numbers.reshape(-1, most, 3) for numbers in (cases.points, cases.forces, cases.moments)
-    )
     row = np.tile(np.arange(steps), count)
+    bodies = wrenches_of(test.steps)[0][row]
+    points, forces, moments = (
+        numbers.reshape(*bodies.shape, 3) for numbers in (cases.points, cases.forces, cases.moments)
+    )
     supports = supports_of(test.steps, like.n_joints).part(row)
-    places = np.repeat(np.arange(count), steps), bodies[row]
-    listed = Loads(*places, points, forces, moments, supports)
+    chain = np.repeat(np.arange(count), steps)
+    listed = Loads(chain, bodies, points, forces, moments, supports)
     return Stack.made(
         spines.model,
         cases.case,

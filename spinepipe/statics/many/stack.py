@@ -95,15 +95,17 @@ class Stack:
         """Runs of models; ValueError where these differ in their number of joints."""
         if len({model.n_joints for model in models}) != 1:
             raise ValueError("models of a stack have equally many joints")
-        cases = list({id(case): case for _, case in runs}.values())
-        place = {id(case): number for number, case in enumerate(cases)}
-        which = np.array([place[id(case)] for _, case in runs], dtype=np.int64)
-        of_case = np.array([len(case.steps) for case in cases], dtype=np.int64)
-        steps = of_case[which]
-        lanes = ranges((np.cumsum(of_case) - of_case)[which], steps)
+        cases = {id(case): case for _, case in runs}  # models share them: each is read once
+        of_case = np.array([len(case.steps) for case in cases.values()], dtype=np.int64)
+        first = dict(zip(cases, np.cumsum(of_case) - of_case, strict=True))
+        steps = np.array([len(case.steps) for _, case in runs], dtype=np.int64)
+        lanes = ranges(np.array([first[id(case)] for _, case in runs], dtype=np.int64), steps)
         chain = np.repeat(np.array([number for number, _ in runs], dtype=np.int64), steps)
-        listed = part(_listed(cases, models[0].n_joints), lanes)._replace(chain=chain)
-        seconds = np.concatenate([np.zeros(0), *map(durations, cases)])[lanes]
+        every = [step for case in cases.values() for step in case.steps]
+        supports = supports_of(every, models[0].n_joints)
+        own = Loads(np.zeros(len(every), dtype=np.int64), *wrenches_of(every), supports)
+        listed = part(own, lanes)._replace(chain=chain)
+        seconds = np.concatenate([np.zeros(0), *map(durations, cases.values())])[lanes]
         return cls.made(
             tuple(models).__getitem__,
             [case for _, case in runs].__getitem__,
@@ -174,7 +176,7 @@ class Stack:
         for runs in self.chunks(np.flatnonzero(open_ones), stepwise=True):
             open_ones[runs] = ~self._step_by_step(runs, None, q, at_once)
         status = np.full(len(self.run), Status.CONVERGED.value, dtype="U20")
-        messages = self._past_critical(q, at_once) if why else {}
+        messages = self.past_critical(q, at_once) if why else {}
         by_engine = self.alone | (open_ones & (self.remembers | why))
         for number in np.flatnonzero(by_engine).tolist():
             self._by_engine(number, q, status, messages)
@@ -184,7 +186,7 @@ class Stack:
             messages |= dict.fromkeys(lanes, NO_WAY)
         return Poses(q, status, messages, by_engine)
 
-    def _past_critical(self, q: Array, at_once: Flags) -> dict[int, str]:
+    def past_critical(self, q: Array, at_once: Flags) -> dict[int, str]:
         """By lane with a pose q (L, J, 6) whose load would move the neutral pose away.
 
         It is certified not to be so where one step brings there from the neutral pose, and in later
@@ -287,6 +289,19 @@ class Stack:
         for number in range(int(steps.max(initial=0))):
             live = np.flatnonzero(steps > number)
             yield live, self.first[runs[live]] + number
+
+    def walked(self, q: Array) -> Iterator[tuple[Indices, Bound]]:
+        """Lanes with a pose q (L, J, 6), in portions, with what acts and what that remembers."""
+        good, states = ~np.isnan(q[:, 0, 0]), self.initial_states()
+        for runs in self.chunks(np.flatnonzero(~self.remembers)):
+            lanes = self.lanes(runs)
+            yield lanes[good[lanes]], self.bound(lanes[good[lanes]], states)
+        for runs in self.chunks(np.flatnonzero(self.remembers), stepwise=True):
+            for _, lanes in self.steps(runs):
+                there = lanes[good[lanes]]
+                bound = self.bound(there, states)
+                yield there, bound
+                self.remember(states, bound, bound.after(q[there]))
 
     def initial_states(self, *unknowns: int) -> dict[int, Array]:
         """States of all path laws before the first step, zero; or their derivatives."""
@@ -393,19 +408,18 @@ def _chains(models: Sequence[SpineModel]) -> Chains:
     )
 
 
-def _listed(cases: Sequence[LoadCase], joints: int) -> Loads:
-    """The loads of every step of the cases, all on one chain of J joints."""
-    steps = [step for case in cases for step in case.steps]
+def wrenches_of(steps: Sequence[LoadStep]) -> tuple[Indices, Array, Array, Array]:
+    """Bodies (N, W) and points, forces, moments (N, W, 3) of load steps, as of `Loads`."""
     count = np.array([len(step.wrenches) for step in steps], dtype=np.int64)
     wrenches = [wrench for step in steps for wrench in step.wrenches]
-    vectors = [part for one in wrenches for part in (one.point, one.force, one.moment)]
+    vectors = [vector for one in wrenches for vector in (one.point, one.force, one.moment)]
     at = np.repeat(np.arange(len(steps)), count), ranges(np.zeros_like(count), count)
     bodies = np.full((len(steps), count.max(initial=0)), -1)
     numbers = np.zeros((3, *bodies.shape, 3))
     bodies[at] = [wrench.body for wrench in wrenches]
     numbers[:, *at] = np.reshape(vectors, (-1, 3, 3)).swapaxes(0, 1)
-    chain = np.zeros(len(steps), dtype=np.int64)
-    return Loads(chain, bodies, *numbers, supports_of(steps, joints))
+    points, forces, moments = numbers
+    return bodies, points, forces, moments
 
 
 def supports_of(steps: Sequence[LoadStep], joints: int) -> Supports:
