@@ -10,8 +10,11 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, SpineModel
 from spinepipe.statics.many.lanes import Effects
-from spinepipe.statics.many.stack import Stack, durations, supports_of, wrenches_of
+from spinepipe.statics.many.stack import Stack, chains_of, durations, supports_of, wrenches_of
 from spinepipe.statics.many.survey import Chains, Loads
+
+_NUMBERS = ("rotations", "origins", "masses", "coms", "inertias", "damping")
+"""What spines share with `Chains`, by the same names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,29 +45,15 @@ class Spines:
     @classmethod
     def of(cls, model: SpineModel, count: int) -> "Spines":
         """The same spine that many times."""
-        return cls(
-            model,
-            _repeated([frame.rotation for frame in model.frames], count),
-            _repeated([frame.origin for frame in model.frames], count),
-            _repeated([body.mass for body in model.bodies], count),
-            _repeated([body.com for body in model.bodies], count),
-            _repeated([body.inertia for body in model.bodies], count),
-            _repeated(model.damping, count),
-            tuple(_repeated(scoped.values, count) for scoped in model.effects),
-        )
+        chain = chains_of([model])._asdict()
+        numbers = {name: _repeated(chain[name][0], count) for name in _NUMBERS}
+        values = tuple(_repeated(scoped.values, count) for scoped in model.effects)
+        return cls(like=model, **numbers, values=values)
 
     def part(self, chosen: slice | Indices) -> "Spines":
         """Some of them."""
-        return replace(
-            self,
-            rotations=self.rotations[chosen],
-            origins=self.origins[chosen],
-            masses=self.masses[chosen],
-            coms=self.coms[chosen],
-            inertias=self.inertias[chosen],
-            damping=self.damping[chosen],
-            values=tuple(values[chosen] for values in self.values),
-        )
+        numbers = {name: getattr(self, name)[chosen] for name in _NUMBERS}
+        return replace(self, **numbers, values=tuple(values[chosen] for values in self.values))
 
     def model(self, i: int) -> SpineModel:
         """One of them as a model of its own.
@@ -113,35 +102,20 @@ class Cases:
 
     def part(self, chosen: slice | Indices) -> "Cases":
         """Some of them."""
-        return replace(
-            self,
-            points=self.points[chosen],
-            forces=self.forces[chosen],
-            moments=self.moments[chosen],
-        )
+        return Cases(self.like, self.points[chosen], self.forces[chosen], self.moments[chosen])
 
     def steps(self, chosen: Sequence[int]) -> "Cases":
         """Some of the steps, by their places."""
-        return Cases(
-            replace(self.like, steps=tuple(self.like.steps[place] for place in chosen)),
-            self.points[:, chosen],
-            self.forces[:, chosen],
-            self.moments[:, chosen],
-        )
+        like = replace(self.like, steps=tuple(self.like.steps[place] for place in chosen))
+        return Cases(like, self.points[:, chosen], self.forces[:, chosen], self.moments[:, chosen])
 
     def case(self, i: int) -> LoadCase:
         """One of them as a load case of its own."""
         steps = []
         for row, step in enumerate(self.like.steps):
-            wrenches = tuple(
-                Wrench(
-                    one.body,
-                    self.points[i, row, w],
-                    self.forces[i, row, w],
-                    self.moments[i, row, w],
-                )
-                for w, one in enumerate(step.wrenches)
-            )
+            at = (self.points[i, row], self.forces[i, row], self.moments[i, row])
+            every = zip(step.wrenches, *at, strict=False)  # where a step has fewer, the rest is 0
+            wrenches = tuple(Wrench(one.body, *numbers) for one, *numbers in every)
             steps.append(replace(step, wrenches=wrenches))
         return replace(self.like, steps=tuple(steps))
 
@@ -150,15 +124,8 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
     """The same test of many spines, a run each."""
     count, steps = len(spines), len(cases.like.steps)
     like, test = spines.like, cases.like
-    chains = Chains(
-        spines.rotations,
-        spines.origins,
-        spines.masses,
-        spines.coms,
-        spines.inertias,
-        spines.damping,
-        _repeated(like.gravity, count),
-    )
+    numbers = {name: np.ascontiguousarray(getattr(spines, name)) for name in _NUMBERS}
+    chains = Chains(**numbers, gravity=np.ascontiguousarray(_repeated(like.gravity, count)))
     row = np.tile(np.arange(steps), count)
     bodies = wrenches_of(test.steps)[0][row]
     points, forces, moments = (
@@ -170,7 +137,7 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
     return Stack.made(
         spines.model,
         cases.case,
-        Chains(*map(np.ascontiguousarray, chains)),
+        chains,
         Effects.of([like], [(0, test.test)]).repeated(spines.values),
         listed,
         np.full(count, steps),

@@ -109,7 +109,7 @@ class Stack:
         return cls.made(
             tuple(models).__getitem__,
             [case for _, case in runs].__getitem__,
-            _chains(models),
+            chains_of(models),
             Effects.of(models, [(number, case.test) for number, case in runs]),
             listed,
             steps,
@@ -393,19 +393,19 @@ class Stack:
                 q[lane] = step.equilibrium.q.reshape(-1, 6)
 
 
-def _chains(models: Sequence[SpineModel]) -> Chains:
-    def numbers(of: Iterator[object]) -> Array:
-        return np.array(list(of), dtype=float)
-
-    return Chains(
-        numbers([frame.rotation for frame in model.frames] for model in models),
-        numbers([frame.origin for frame in model.frames] for model in models),
-        numbers([body.mass for body in model.bodies] for model in models),
-        numbers([body.com for body in model.bodies] for model in models),
-        numbers([body.inertia for body in model.bodies] for model in models),
-        numbers(model.damping for model in models),
-        numbers(model.gravity for model in models),
+def chains_of(models: Sequence[SpineModel]) -> Chains:
+    """The numbers of models with equally many joints."""
+    frames, bodies = [one.frames for one in models], [one.bodies for one in models]
+    numbers = (
+        [[frame.rotation for frame in own] for own in frames],
+        [[frame.origin for frame in own] for own in frames],
+        [[body.mass for body in own] for own in bodies],
+        [[body.com for body in own] for own in bodies],
+        [[body.inertia for body in own] for own in bodies],
+        [model.damping for model in models],
+        [model.gravity for model in models],
     )
+    return Chains(*(np.array(one, dtype=float) for one in numbers))
 
 
 def wrenches_of(steps: Sequence[LoadStep]) -> tuple[Indices, Array, Array, Array]:
