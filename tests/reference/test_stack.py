@@ -39,6 +39,7 @@ from spinepipe.statics.many import (
     readings,
     readings_by,
 )
+from spinepipe.statics.many.lanes import acting
 from spinepipe.statics.many.survey import Flags
 from spinepipe.status import Status
 from spinepipe.world import Chain
@@ -335,3 +336,36 @@ def test_derivatives_by_what_is_given_are_refused_where_effects_hang_on_it(effec
     for derivative in (lambda: by_joint_pose(stack, q), lambda: by_load(stack, q, 0)):
         with pytest.raises(ValueError, match="load and path effects"):
             derivative()
+
+
+def test_effects_are_bound_as_a_double_loop_over_runs_and_joints_binds_them() -> None:
+    """Catches a joint bound to values of another one, where effects, scopes and tests differ."""
+    rng = np.random.default_rng(21)
+    (plain, _), joints = draw.model(rng, 3, []), range(3)
+    bushing = plain.effects[0].effect
+    models = []
+    for _ in range(7):
+        effects = []
+        for effect in (bushing, *rng.permutation(named("power_term", "axes_tilt", "load_gain"))):
+            scope = tuple(n for n in joints if rng.random() < 0.6) or (2,)
+            rows = len(scope) if effect.per_joint else 1
+            start = np.array([p.default for p in effect.parameters])
+            values = start + 1e-3 * rng.random((rows, len(start)))
+            tests = ("*",) if rng.random() < 0.5 else ("bend",)
+            effects.append(ScopedEffect(effect, scope, values, tests))
+        models.append(replace(plain, effects=()).with_effects(tuple(effects[: rng.integers(1, 5)])))
+    runs = [(int(rng.integers(7)), test) for test in ("bend", "turn") * 8]
+    found: dict[tuple[int, int, int], tuple[Effect, list[float]]] = {}
+    for one in acting(models, runs):
+        places, at = one.on(np.arange(len(runs)))
+        np.testing.assert_array_equal(places, np.arange(len(one.joint)))
+        for run, joint, row in zip(at.tolist(), one.joint.tolist(), one.row.tolist(), strict=True):
+            assert (run, one.place, joint) not in found
+            found[run, one.place, joint] = one.effect, one.values[row].tolist()
+    expected = {}
+    for run, (number, test) in enumerate(runs):
+        for place, scoped in enumerate(models[number].effects):
+            for row, joint in enumerate(scoped.joints if scoped.in_scope(test) else ()):
+                values = scoped.values[row if scoped.effect.per_joint else 0]
+                expected[run, place, joint] = scoped.effect, values.tolist()
+    assert found == expected
