@@ -16,8 +16,10 @@ from spinepipe.statics.equilibrium import decays
 from spinepipe.statics.many import stability
 from spinepipe.statics.many.dynamics import Factored, Moving
 from spinepipe.statics.many.newton import newton
+from spinepipe.statics.many.proofs import respond
 from spinepipe.statics.many.stack import Stack
 from spinepipe.statics.many.survey import part, survey
+from spinepipe.statics.many.vectors import lanes as unblocked
 from spinepipe.world import Chain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
@@ -166,6 +168,44 @@ def test_no_mode_lies_below_the_rate_where_the_form_loses_its_sign(n_joints: int
         )
         for factor, apart in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
             assert lanes.apart(np.array([factor * highest])).tolist() == [apart]
+
+
+@sweep("n_joints", [1, 2, 5])
+def test_a_vertebra_swings_as_whole_matrices_tell(n_joints: int) -> None:
+    """The skew part of PyBullet's tangent is of the turns U that the moment has its rank from.
+
+    And U' (S - w^2 M + i w)^-1 U and x* M x are those of the whole matrices.
+    """
+    rng = np.random.default_rng(700 + n_joints)
+    chain = loaded(rng, n_joints, 0.3, 1.0)
+    top = n_joints // 2
+    chain = chain.with_loads(
+        *(replace(one, moment=(one.body == top) * one.moment) for one in chain.loads)
+    )
+    stack, q, tangents = posed(rng, [chain])
+    lanes = stability.lanes_of(stack.chains, stack.loads, q, tangents)
+    single, body, moment = lanes.moment()
+    assert single.tolist() == [True]
+    assert body.tolist() == [top]
+    size = np.linalg.norm(moment)
+    across = np.linalg.svd(moment)[2][1:][None]
+    mass, tangent = by_pybullet(chain, q[0])
+    turns = np.zeros((6 * n_joints, 3))
+    turns[: 6 * (top + 1)] = lanes.seen.axes[0, : top + 1, :, :3].reshape(-1, 3)
+    turns = turns / np.sqrt(lanes.damping.reshape(-1, 1)) @ across[0].T
+    skew = 0.5 * size * (turns[:, :1] @ turns[:, 1:].T - turns[:, 1:] @ turns[:, :1].T)
+    sign = np.sign(np.linalg.det(np.vstack([moment, across[0]])))
+    scale = np.abs(skew).max()
+    np.testing.assert_allclose(0.5 * (tangent - tangent.T), sign * skew, rtol=0, atol=1e-9 * scale)
+    whole, inertia = 0.5 * (tangent + tangent.T), unblocked(lanes.inertia, 1)
+    seen = (lanes.seen.axes, lanes.seen.rows, lanes.seen.stiff, lanes.seen.slopes)
+    for rate in (3.0, 30.0, 300.0):
+        compliance, moving = np.empty((1, 2, 2), complex), np.empty(1)
+        asked = (np.array([0]), np.array([rate]))
+        respond(seen, inertia, lanes.damping, (body, across), asked, compliance, moving)
+        x = np.linalg.solve(whole - rate**2 * mass + 1j * rate * np.eye(len(mass)), turns)
+        np.testing.assert_allclose(compliance[0], turns.T @ x, rtol=0, atol=1e-9 * abs(x).max())
+        assert moving[0] == pytest.approx(np.trace(x.conj().T @ mass @ x).real, rel=1e-9)
 
 
 def posed(rng: np.random.Generator, made: list[chains.Chain]) -> tuple[Stack, Array, Array]:

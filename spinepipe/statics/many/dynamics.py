@@ -57,12 +57,18 @@ def inertias_of(chains: Chains, chain: Indices, seen: Survey) -> Array:
     return found
 
 
+def momenta_of(axes: Array, inertias: Array) -> Array:
+    """(N, J, 6, 6) momentum by each axis of all that its joint carries."""
+    found: Array = axes @ np.cumsum(inertias[:, ::-1], axis=1)[:, ::-1]
+    return found
+
+
 def masses_of(seen: Survey, inertias: Array) -> Array:
-    """(N, n, n) mass matrices: by each axis, momentum of what it carries along earlier axes."""
+    """(N, n, n) mass matrices: momentum by each axis along earlier ones (Featherstone's CRBA)."""
     axes = seen.axes
-    momenta = axes @ np.cumsum(inertias[:, ::-1], axis=1)[:, ::-1]
-    flat_axes, n = axes.reshape(len(axes), -1, 6), 6 * axes.shape[1]
-    lower = np.tril(momenta.reshape(len(axes), n, 6) @ flat_axes.swapaxes(1, 2))
+    shape = (len(axes), 6 * axes.shape[1], 6)
+    momenta = momenta_of(axes, inertias).reshape(shape)
+    lower = np.tril(momenta @ axes.reshape(shape).swapaxes(1, 2))
     found: Array = lower + np.tril(lower, -1).swapaxes(1, 2)
     return found
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.equilibrium import decays
-from spinepipe.statics.many.dynamics import inertias_of, masses_of, tangents_of
+from spinepipe.statics.many.dynamics import inertias_of, masses_of, momenta_of, tangents_of
 from spinepipe.statics.many.proofs import apart, respond, twists
 from spinepipe.statics.many.survey import Chains, Loads, Survey, part, survey
 from spinepipe.statics.many.vectors import blocks, lanes
@@ -37,8 +37,9 @@ Flags = NDArray[np.bool_]
 FIRST = (0.8, 0.6, 0.4, 0.2, 0.1)
 """Shares of |A| up to which S - w^2 M may be positive definite."""
 
-PIECES, HALVINGS = 4, 5
-"""Between that and |A|, in how many pieces F is bounded, and how often one that fails is halved."""
+PIECE, HALVINGS = 1.35, 5
+"""Between that and |A|, F is bounded in pieces that end so many times above their start at most,
+and one that fails is halved so often."""
 
 STIFF = 1e6
 """Of the largest stiffness, springs on coordinates that a rig fixes."""
@@ -141,9 +142,7 @@ def _by_response(every: Lanes, top: Array) -> Flags:
     """(N,) which spines under a moment on one vertebra have no mode with w up to top (N,)."""
     low = np.zeros(len(top))
     for share in FIRST:
-        left = np.flatnonzero(low == 0.0)
-        good = every.part(left).apart(share * top[left])
-        low[left[good]] = share * top[left[good]]
+        low = np.where((low == 0.0) & every.apart(share * top), share * top, low)
     single, body, moment = every.moment()
     found: Flags = single & every.even & (low > 0.0)
     going = np.flatnonzero(found)
@@ -156,10 +155,12 @@ def _by_response(every: Lanes, top: Array) -> Flags:
     across = both / np.maximum(np.linalg.norm(both, axis=2, keepdims=True), np.finfo(float).tiny)
     seen = (every.seen.axes, every.seen.rows, every.seen.stiff, every.seen.slopes)
     inertia = lanes(every.inertia, len(top))
-    masses = np.diagonal(masses_of(every.seen, inertia), axis1=1, axis2=2)
-    trace = np.sum(masses / every.damping.reshape(len(top), -1), axis=1)
-    lane, number = np.repeat(going, PIECES), np.tile(np.arange(PIECES), len(going))
-    ratio = (top[lane] / low[lane]) ** (1.0 / PIECES)
+    momenta = momenta_of(every.seen.axes, inertia)
+    trace = np.sum(np.sum(momenta * every.seen.axes, axis=3) / every.damping, axis=(1, 2))
+    width = np.log(top[going] / low[going])
+    count = np.ceil(width / np.log(PIECE)).astype(np.int64)
+    lane, ratio = np.repeat(going, count), np.exp(np.repeat(width / count, count))
+    number = np.arange(len(lane)) - np.repeat(np.cumsum(count) - count, count)
     begin, end = low[lane] * ratio**number, low[lane] * ratio ** (number + 1)
     for _ in range(HALVINGS):
         middle = np.sqrt(begin * end)
