@@ -204,24 +204,17 @@ def _carry(
         6 J) one where a coordinate moves and zero elsewhere, or none.
     """
     every_axes, _, every_rows, every_stiff, every_slopes, _, _ = seen
-    sources, pushes, lower, upper = changes
-    joints, own = every_axes.shape[1], np.arange(len(sources))
-    m = sources.shape[1] // (6 * joints)
-    pushed, displaced, held = len(pushes) > 0, len(lower) > 0, len(free) > 0
-    given = np.empty((4, 6 * joints * m, WIDTH))
-    source, push, low, high = (
-        vectors(given[0]).reshape((joints, 6, m)),
-        vectors(given[1]).reshape((joints, 6, m)),
-        vectors(given[2]).reshape((joints, 6, m)),
-        vectors(given[3]).reshape((joints, 6, m)),
-    )
-    move = np.empty((6 * joints, WIDTH))
-    moves = vectors(move).reshape((joints, 6))
+    joints, own = every_axes.shape[1], np.arange(len(changes[0]))
+    m = changes[0].shape[1] // (6 * joints)
+    pushed, displaced, held = len(changes[1]) > 0, len(changes[2]) > 0, len(free) > 0
+    given, move = np.empty((4, 6 * joints * m, WIDTH)), np.empty((6 * joints, WIDTH))
+    every, moves = vectors(given).reshape((4, joints, 6, m)), vectors(move).reshape((joints, 6))
+    source, push, low, high = every[0], every[1], every[2], every[3]
     found = np.empty((6 * joints * m, WIDTH))
     rate = vectors(found).reshape((joints, 6, m))
     gains = vectors(np.empty((joints, 6, 6 + m, WIDTH)))  # u = gains (xi, 1)
-    matrix, root = vectors(np.empty((6, 6, WIDTH))), vectors(np.empty((6, 6, WIDTH)))
-    slope, along = vectors(np.empty((3, 6, WIDTH))), vectors(np.empty((3, 6, WIDTH)))
+    work = vectors(np.empty((18, 6, WIDTH)))
+    matrix, root, slope, along = work[:6], work[6:12], work[12:15], work[15:]
     passed, twist = vectors(np.empty((6, m, WIDTH))), vectors(np.empty((6, m, WIDTH)))
     divided, halved = np.empty((joints, 2, 6, WIDTH)), np.empty((joints, 6, WIDTH))
     pivots, halves, strayed, well = vectors(divided), vectors(halved), np.empty((1, WIDTH)), True
@@ -230,12 +223,9 @@ def _carry(
         first = WIDTH * block
         axes, slopes = vectors(every_axes[block]), vectors(every_slopes[block])
         rows, stiff = vectors(every_rows[block]), vectors(every_stiff[block])
-        gather(sources, own, first, given[0])
-        if pushed:
-            gather(pushes, own, first, given[1])
-        if displaced:
-            gather(lower, own, first, given[2])
-            gather(upper, own, first, given[3])
+        for n, one in enumerate(changes):
+            if len(one):
+                gather(one, own, first, given[n])
         if held:
             gather(free, own, first, move)
         slope[:] = 0.0
@@ -317,7 +307,7 @@ def eliminated(seen: Survey, changes: Changes, asked: bool = False) -> tuple[Arr
     """
     sources = flat(changes.sources)
     rates, signs = np.empty(sources.shape), np.empty(len(sources), dtype=np.int64)
-    free = flat(1.0 - seen.fixed) if len(seen.fixed) else EMPTY
+    free = flat(np.where(seen.fixed, 0.0, 1.0)) if len(seen.fixed) else EMPTY
     pushes, lower, upper = [flat(one) if one.shape[3] else EMPTY for one in changes[1:]]
     well = _carry(seen.numbers, free, (sources, pushes, lower, upper), asked, rates, signs)
     rates = rates.reshape(changes.sources.shape)
@@ -332,7 +322,8 @@ def _by_whole(seen: Survey, changes: Changes, asked: bool) -> tuple[Array, Indic
     """The same by the whole tangents, their rows in the order of their pivots (LAPACK)."""
     with np.errstate(invalid="ignore", over="ignore"):  # of lanes that are lost
         right = -missing(seen, np.zeros_like(changes.sources), changes)
-    matrices, right = tangents_of(seen), right.reshape(len(right), -1, right.shape[3])
+    matrices = tangents_of(seen)
+    right = right.reshape(*matrices.shape[:2], right.shape[3])
     if len(seen.fixed):
         free = ~seen.fixed.reshape(len(right), -1)
         both = free[:, :, None] & free[:, None]

@@ -5,6 +5,8 @@ in the rates of all joints is a sum over joints. The least of what those beyond 
 form in the twist above it, so that one small factorisation L D L' per joint decides.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,8 @@ from spinepipe.statics.many.survey import Plain, compiled, inner
 from spinepipe.statics.many.vectors import WIDTH, vectors
 
 Flags = NDArray[np.bool_]
+Entries = NDArray[Any]
+"""Real (four lanes) or complex."""
 
 
 @inner
@@ -77,7 +81,7 @@ def twists(seen: Plain, damping: Array, found: Array) -> None:
 
 
 @inner
-def _add_body(least: Array, slopes: Array, inertia: Array, j: int, square: Array) -> None:
+def _add_body(least: Entries, slopes: Array, inertia: Array, j: int, square: Array) -> None:
     """Add a vertebra to the form in the twist above its joint: its loads, and its inertia."""
     for r in range(3):
         for c in range(6):
@@ -93,13 +97,13 @@ def _add_body(least: Array, slopes: Array, inertia: Array, j: int, square: Array
 
 @inner
 def _least_beyond(
-    pivot: Array, gains: Array, least: Array, passed: Array, axes: Array, joined: Array
+    pivot: Entries, gains: Entries, least: Entries, passed: Entries, axes: Array, joined: Entries
 ) -> None:
     """One joint off a symmetric form in all joints' rates, real or complex.
 
     Parameters
     ----------
-    pivot : (6, 6) of the joint's own rates, made D L' of its factors.
+    pivot : (6, 6) of the joint's own rates, of which the upper half is made D L' of its factors.
     gains : (6, 6 + m), of these with the twist below, and load on each axis; made L^-1 of that.
     least, passed : (6, 6) the least of the form beyond by the twist above, and load (6, m) on that
         twist, made those of the twist below. joined : (6, 6) work space.
@@ -113,11 +117,12 @@ def _least_beyond(
             joined[k, r] = value
     for k in range(6):
         for r in range(6):
+            gains[k, r] += joined[k, r]
+        for r in range(k, 6):
             value = pivot[k, r]
             for c in range(6):
                 value += joined[k, c] * axes[r, c]
             pivot[k, r] = value
-            gains[k, r] += joined[k, r]
         for c in range(6, m):
             value = axes[k, 0] * passed[0, c - 6]
             for i in range(1, 6):
@@ -133,10 +138,13 @@ def _least_beyond(
                 gains[r, c] -= f * gains[k, c]
         for r in range(6):
             f = gains[k, r] * inverse
-            for c in range(6):
+            for c in range(r, 6):
                 least[r, c] -= f * gains[k, c]
             for c in range(6, m):
                 passed[r, c - 6] -= f * gains[k, c]
+    for r in range(6):
+        for c in range(r):
+            least[r, c] = least[c, r]
 
 
 @compiled

@@ -37,7 +37,7 @@ Flags = NDArray[np.bool_]
 FIRST = (0.8, 0.6, 0.4, 0.2, 0.1)
 """Shares of |A| up to which S - w^2 M may be positive definite."""
 
-PIECE, HALVINGS = 1.35, 5
+PIECE, HALVINGS = 1.25, 5
 """Between that and |A|, F is bounded in pieces that end so many times above their start at most,
 and one that fails is halved so often."""
 

@@ -10,6 +10,7 @@ What PyBullet does for one chain is done here for many; tests hold the two again
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import prod
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
@@ -308,7 +309,8 @@ def _turning_rows(axes: Array, beyond: Array, rows: Array) -> None:
         rows[k, 5] = a0 * f1 - a1 * f0
 
 
-class Survey(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Survey:
     """N lanes at one pose each: what the tangents and the mass matrices are made of.
 
     Compiled code takes the numbers in blocks of four lanes (B, ..., 4); the properties are the same

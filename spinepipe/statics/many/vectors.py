@@ -10,6 +10,9 @@ Arrays of N lanes are laid out for this in blocks (B, ..., 4); the last block re
 What is kept of compilations does not know when this file changes: remove it then (`make clean`).
 """
 
+# mypy: disable-error-code="no-untyped-call, untyped-decorator, import-untyped"
+# (the interface of numba's compiler has no types)
+
 import operator
 from typing import Any
 
@@ -17,7 +20,7 @@ import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
-from numba.core.typeconv import Conversion
+from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 from numba.np import arrayobj
@@ -33,20 +36,21 @@ _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
 def blocks(lanes: NDArray[Any]) -> NDArray[Any]:
     """(B, ..., 4) from lanes (N, ...)."""
-    short = -len(lanes) % WIDTH
-    if short:
-        lanes = np.concatenate([lanes, np.repeat(lanes[-1:], short, axis=0)])
-    apart = lanes.reshape(len(lanes) // WIDTH, WIDTH, *lanes.shape[1:])
-    return np.ascontiguousarray(np.moveaxis(apart, 1, -1))
+    count, shape = -(-len(lanes) // WIDTH), lanes.shape[1:]
+    if count * WIDTH != len(lanes):
+        lanes = lanes[np.minimum(np.arange(count * WIDTH), len(lanes) - 1)]
+    apart = lanes.reshape(count, WIDTH, *shape)
+    return np.ascontiguousarray(apart.transpose(0, *range(2, apart.ndim), 1))
 
 
 def lanes(found: NDArray[Any], count: int) -> NDArray[Any]:
     """(N, ...) of blocks (B, ..., 4)."""
-    apart = np.moveaxis(found, -1, 1)
-    return apart.reshape(WIDTH * len(found), *apart.shape[2:])[:count]
+    last = found.ndim - 1
+    apart = found.transpose(0, last, *range(1, last))
+    return apart.reshape(WIDTH * len(found), *found.shape[1:last])[:count]
 
 
-class Lanes(types.Type):  # type: ignore[misc]
+class Lanes(types.Type):
     """The type of four lanes."""
 
     def __init__(self) -> None:
@@ -61,7 +65,7 @@ LANES = Lanes()
 
 
 @register_model(Lanes)
-class _Model(models.PrimitiveModel):  # type: ignore[misc]
+class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, numba_type: Any) -> None:
         super().__init__(manager, numba_type, _VECTOR)
 
@@ -77,7 +81,7 @@ def _equal(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> An
 def _define(function: Any, instruction: str) -> None:
     """Make an arithmetic operator act on four lanes, or on these and a number."""
 
-    class Typed(AbstractTemplate):  # type: ignore[misc]
+    class Typed(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
             if LANES in args and all(one in (LANES, types.float64) for one in args):
                 return signature(LANES, *[LANES] * len(args))
@@ -104,8 +108,7 @@ for _operator, _instruction in (
     _define(_operator, _instruction)
 
 
-@intrinsic  # type: ignore[misc]
-def vectors(typingctx: Any, array: Any) -> Any:
+def _vectors(typingctx: Any, array: Any) -> Any:
     """The same memory (..., 4) as an array (...) of four lanes each."""
     if not isinstance(array, types.Array) or array.layout != "C":
         return None
@@ -132,7 +135,10 @@ def vectors(typingctx: Any, array: Any) -> Any:
     return view(array), lower
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator]
+vectors: Any = intrinsic(_vectors)
+
+
+@njit(error_model="numpy")
 def gather(rows: Array, chosen: Indices, first: int, out: Array) -> None:
     """Fill out (n, 4) with rows (N, n) of the lanes from the first on, as ``chosen`` (L,) says."""
     for lane in range(WIDTH):
@@ -141,7 +147,7 @@ def gather(rows: Array, chosen: Indices, first: int, out: Array) -> None:
             out[c, lane] = rows[row, c]
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def scatter(block: Array, first: int, rows: Array) -> None:
     """Enter a block (n, 4) in rows (N, n), from the first on."""
     for lane in range(min(WIDTH, len(rows) - first)):
