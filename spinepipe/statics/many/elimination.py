@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.many.dynamics import tangents_of
 from spinepipe.statics.many.survey import Plain, Survey, compiled, flat, inner
-from spinepipe.statics.many.vectors import WIDTH, gather, scatter, vectors
+from spinepipe.statics.many.vectors import WIDTH, add_product, gather, scatter, vectors
 
 Flags = NDArray[np.bool_]
 
@@ -105,12 +105,8 @@ def _below(
     axes: Array, rows: Array, stiff: Array, slope: Array, matrix: Array, right: Array
 ) -> None:
     """A joint's matrix (6, 6) of u, and how the twist below enters, (6, 6) of the right side."""
-    for k in range(6):
-        for c in range(6):
-            value = axes[k, 0] * slope[0, c]
-            for r in range(1, 3):
-                value += axes[k, r] * slope[r, c]
-            right[k, c] = value
+    right[:, :6] = 0.0
+    add_product(axes[:, :3], slope, right[:, :6])
     for k in range(6):
         for c in range(6):
             value = stiff[k, c]
@@ -126,25 +122,10 @@ def _below(
 @inner
 def _hand_down(axes: Array, right: Array, slope: Array, passed: Array, along: Array) -> None:
     """Make slope (3, 6) and passed (3, m) those of all that hangs on the twist below the joint."""
-    for r in range(3):
-        for k in range(6):
-            value = slope[r, 0] * axes[k, 0]
-            for c in range(1, 6):
-                value += slope[r, c] * axes[k, c]
-            along[r, k] = value
-    _add_product(along, right[:, :6], slope)
-    _add_product(along, right[:, 6:], passed[:3])
-
-
-@inner
-def _add_product(matrix: Array, columns: Array, out: Array) -> None:
-    """Add matrix (r, k) times columns (k, m) to out (r, m)."""
-    for r in range(matrix.shape[0]):
-        for c in range(columns.shape[1]):
-            value = out[r, c]
-            for k in range(matrix.shape[1]):
-                value += matrix[r, k] * columns[k, c]
-            out[r, c] = value
+    along[:] = 0.0
+    add_product(slope, axes.T, along)
+    add_product(along, right[:, :6], slope)
+    add_product(along, right[:, 6:], passed[:3])
 
 
 @inner
@@ -240,12 +221,12 @@ def _carry(
             if pushed:
                 _add(push[j], passed)
             if displaced:
-                _add_product(slope, high[j], passed[:3])
+                add_product(slope, high[j], passed[:3])
             _below(axes[j], rows[j], stiff[j], slope, matrix, right)
             for k in range(6):
                 for c in range(m):
                     right[k, 6 + c] = source[j, k, c]
-            _add_product(axes[j], passed, right[:, 6:])
+            add_product(axes[j], passed, right[:, 6:])
             if held:
                 _hold(moves[j], matrix, right)
             if asked:
@@ -253,7 +234,7 @@ def _carry(
             _eliminate(matrix, right, pivots[j])
             _hand_down(axes[j], right, slope, passed, along)
             if displaced:
-                _add_product(slope, low[j], passed[:3])
+                add_product(slope, low[j], passed[:3])
         twist[:] = 0.0
         lost[0] = 0.0
         for j in range(joints):
@@ -262,11 +243,11 @@ def _carry(
             for k in range(6):
                 for c in range(m):
                     rate[j, k, c] = gains[j, k, 6 + c]
-            _add_product(gains[j, :, :6], twist, rate[j])
+            add_product(gains[j, :, :6], twist, rate[j])
             for k in range(6):
                 for c in range(m):
                     lost[0] += rate[j, k, c] - rate[j, k, c]
-            _add_product(axes[j].T, rate[j], twist)
+            add_product(axes[j].T, rate[j], twist)
             if displaced:
                 _add(high[j], twist)
         scatter(found, first, rates)

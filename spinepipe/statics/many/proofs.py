@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.many.survey import Plain, compiled, inner
-from spinepipe.statics.many.vectors import WIDTH, vectors
+from spinepipe.statics.many.vectors import WIDTH, add_product, vectors
 
 Flags = NDArray[np.bool_]
 Entries = NDArray[Any]
@@ -26,12 +26,8 @@ def _skew(axes: Array, rows: Array, stiff: Array, slope: Array, skew: Plain) -> 
     ``skew`` : both of these, and (6, 3), moment by the motion along each axis.
     """
     towards, own, pulled = skew
-    for k in range(6):
-        for r in range(3):
-            value = slope[r, 0] * axes[k, 0]
-            for i in range(1, 6):
-                value += slope[r, i] * axes[k, i]
-            pulled[k, r] = value
+    pulled[:] = 0.0
+    add_product(axes, slope.T, pulled)
     for k in range(6):
         for c in range(6):
             value, bend = rows[k, c], stiff[k, c] - stiff[c, k]
@@ -109,12 +105,10 @@ def _least_beyond(
         twist, made those of the twist below. joined : (6, 6) work space.
     """
     m = gains.shape[1]
-    for k in range(6):
-        for r in range(6):
-            value = axes[k, 0] * least[0, r]
-            for c in range(1, 6):
-                value += axes[k, c] * least[c, r]
-            joined[k, r] = value
+    joined[:] = 0.0
+    gains[:, 6:] = 0.0
+    add_product(axes, least, joined)
+    add_product(axes, passed, gains[:, 6:])
     for k in range(6):
         for r in range(6):
             gains[k, r] += joined[k, r]
@@ -123,11 +117,6 @@ def _least_beyond(
             for c in range(6):
                 value += joined[k, c] * axes[r, c]
             pivot[k, r] = value
-        for c in range(6, m):
-            value = axes[k, 0] * passed[0, c - 6]
-            for i in range(1, 6):
-                value += axes[k, i] * passed[i, c - 6]
-            gains[k, c] = value
     for k in range(6):
         inverse = 1.0 / pivot[k, k]
         for r in range(k + 1, 6):

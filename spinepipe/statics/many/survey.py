@@ -19,7 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.many.vectors import WIDTH, blocks, gather, lanes, scatter, vectors
+from spinepipe.statics.many.vectors import WIDTH, add_product, blocks, gather, lanes, vectors
 
 Plain = tuple[NDArray[Any], ...]
 """Arrays as compiled code takes them: what is kept of a compilation must not name our classes,
@@ -184,12 +184,8 @@ def _move(frames: Plain, q: Array, width: int, axes: Array, turned: Array, shift
                 numbers[27 + k, lane] = numbers[27 + k, width - 1]
                 numbers[30 + k, lane] = numbers[30 + k, width - 1]
         _turn(below, turns, pivot, axes[j], final)
-        for r in range(3):
-            for c in range(3):
-                value = final[r, 0] * rotations[j, c, 0]
-                for i in range(1, 3):
-                    value += final[r, i] * rotations[j, c, i]
-                turned[j, r, c] = value
+        turned[j][:] = 0.0
+        add_product(final, rotations[j].T, turned[j])
         turned_into(turned[j], origins[j], back)
         for r in range(3):
             shifted[j, r] = pivot[r] - back[r]
@@ -434,27 +430,6 @@ def flat(numbers: Array) -> Array:
     return np.ascontiguousarray(numbers).reshape(len(numbers), prod(numbers.shape[1:]))
 
 
-@compiled
-def _place(rotations: Array, origins: Array, q: Array, found: Plain) -> None:
-    """Move every chain; arrays (N, n), found in that form too."""
-    joints, own = q.shape[1] // 6, np.arange(len(q))
-    numbers = np.empty((66 * joints, WIDTH))
-    every = vectors(numbers)
-    ends = np.cumsum(np.array([0, 9, 3, 6, 36, 9, 3])) * joints
-    frames, places = every[: ends[1]].reshape((joints, 3, 3)), every[ends[1] : ends[2]]
-    pose = numbers[ends[2] : ends[3]].reshape((joints, 6, WIDTH))
-    axes = every[ends[3] : ends[4]].reshape((joints, 6, 6))
-    turned = every[ends[4] : ends[5]].reshape((joints, 3, 3))
-    shifted = every[ends[5] :].reshape((joints, 3))
-    for first in range(0, len(q), WIDTH):
-        for n, one in enumerate((rotations, origins, q)):
-            gather(one, own, first, numbers[ends[n] : ends[n + 1]])
-        width = min(WIDTH, len(q) - first)
-        _move((frames, places.reshape((joints, 3))), pose, width, axes, turned, shifted)
-        for n, one in enumerate(found):
-            scatter(numbers[ends[n + 3] : ends[n + 4]], first, one)
-
-
 def placed(rotations: Array, origins: Array, q: Array) -> tuple[Array, Array, Array]:
     """Axes (N, J, 6, 6) and displacements of N chains at q (N, J, 6), as of `Survey`.
 
@@ -462,7 +437,10 @@ def placed(rotations: Array, origins: Array, q: Array) -> tuple[Array, Array, Ar
     ----------
     rotations, origins : (N, J, 3, 3) and (N, J, 3) m, joint frames of each.
     """
-    axes, turned, shifted = (np.empty((*q.shape[:2], *s)) for s in ((6, 6), (3, 3), (3,)))
-    found = (flat(axes), flat(turned), flat(shifted))
-    _place(flat(rotations), flat(origins), flat(q), found)
-    return axes, turned, shifted
+    (count, joints), own = q.shape[:2], np.arange(len(q))
+    nothing, none = np.zeros((count, joints, 3)), np.zeros((count, 0, 3))
+    masses, inertias = nothing[..., 0], np.zeros((count, joints, 3, 3))
+    chains = Chains(rotations, origins, masses, nothing, inertias, q, nothing[:, 0])
+    unloaded = Loads(own, np.zeros((count, 0), dtype=np.int64), none, none, none)
+    seen = survey(chains, unloaded, q, np.zeros((*q.shape, 6)))
+    return seen.axes, seen.turned, seen.shifted

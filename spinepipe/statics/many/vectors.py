@@ -153,3 +153,14 @@ def scatter(block: Array, first: int, rows: Array) -> None:
     for lane in range(min(WIDTH, len(rows) - first)):
         for c in range(len(block)):
             rows[first + lane, c] = block[c, lane]
+
+
+@njit(error_model="numpy")
+def add_product(matrix: NDArray[Any], columns: NDArray[Any], out: NDArray[Any]) -> None:
+    """Add matrix (r, k) times columns (k, m) to out (r, m), of whatever entries."""
+    for r in range(matrix.shape[0]):
+        for c in range(columns.shape[1]):
+            value = out[r, c]
+            for k in range(matrix.shape[1]):
+                value += matrix[r, k] * columns[k, c]
+            out[r, c] = value
