@@ -34,7 +34,7 @@ Run = tuple[int, LoadCase]
 
 NO_WAY = "no stable equilibrium on the way from the neutral pose"
 
-CHUNK = 40_000
+CHUNK = 80_000
 """Numbers in the tangents that are worked on together: they should stay in a core's cache."""
 
 
