@@ -90,7 +90,7 @@ def to_the_point(record):
 
 
 def is_news_of_the_queue(record):
-    """Whether a submitted job, or a group, of that rule is the first to fail: one of many alike.
+    """Whether it is the first failure of a submitted job of its rule, or of its group.
 
     Snakemake drops what was said when a group was refused, and lists its jobs instead, twice.
     """
