@@ -12,14 +12,22 @@ What PyBullet does for one chain is done here for many; tests hold the two again
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import prod
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.many.vectors import WIDTH, add_product, blocks, gather, lanes, vectors
+from spinepipe.statics.many.vectors import (
+    SOURCE,
+    WIDTH,
+    add_product,
+    blocks,
+    gather,
+    lanes,
+    vectors,
+)
 
 Plain = tuple[NDArray[Any], ...]
 """Arrays as compiled code takes them: what is kept of a compilation must not name our classes,
@@ -43,8 +51,10 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     Entries are copied and added one by one in loops: for `a[:] = b` or `a += b` of arrays a message
     about shapes is compiled each time, which takes longer than all the rest.
     """
-    result: Callable[P, R] = njit(cache=True, error_model="numpy")(function)
-    return result
+    result: Any = njit(cache=True, error_model="numpy")(function)
+    kept = result._cache._cache_file  # numba looks at the function's own file alone
+    kept._source_stamp = (kept._source_stamp, SOURCE)
+    return cast(Callable[P, R], result)
 
 
 class Chains(NamedTuple):

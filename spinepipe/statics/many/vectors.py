@@ -6,14 +6,14 @@ for one lane. Every operation acts on each lane by itself and in the same order,
 numbers do not hang on those beside it, nor on how wide the processor's registers are.
 
 Arrays of N lanes are laid out for this in blocks (B, ..., 4); the last block repeats its last lane.
-
-What is kept of compilations does not know when this file changes: remove it then (`make clean`).
 """
 
 # mypy: disable-error-code="no-untyped-call, untyped-decorator, import-untyped"
 # (the interface of numba's compiler has no types)
 
 import operator
+from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,9 @@ from spinepipe.effects.contract import Array, Indices
 
 WIDTH = 4
 """Lanes: the doubles of an AVX2 register. A lone lane so costs what it does in scalar code."""
+
+SOURCE = sha256(Path(__file__).read_bytes()).hexdigest()
+"""What is kept of compilations hangs on."""
 
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
