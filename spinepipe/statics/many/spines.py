@@ -124,12 +124,14 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
     """The same test of many spines, a run each."""
     count, steps = len(spines), len(cases.like.steps)
     like, test = spines.like, cases.like
-    numbers = {name: np.ascontiguousarray(getattr(spines, name)) for name in _NUMBERS}
-    chains = Chains(**numbers, gravity=np.ascontiguousarray(_repeated(like.gravity, count)))
+    # copies, which may be written to: kernels are compiled for such arrays alone
+    numbers = {name: np.array(getattr(spines, name), order="C") for name in _NUMBERS}
+    chains = Chains(**numbers, gravity=np.array(_repeated(like.gravity, count), order="C"))
     row = np.tile(np.arange(steps), count)
     bodies = wrenches_of(test.steps)[0][row]
     points, forces, moments = (
-        numbers.reshape(*bodies.shape, 3) for numbers in (cases.points, cases.forces, cases.moments)
+        np.array(one, order="C").reshape(*bodies.shape, 3)
+        for one in (cases.points, cases.forces, cases.moments)
     )
     supports = supports_of(test.steps, like.n_joints).part(row)
     chain = np.repeat(np.arange(count), steps)
