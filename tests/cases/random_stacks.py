@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from sweeps import one_of_each
 
 from spinepipe.effects import Effect, Kind, create, registered
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
+from tests.cases.sweeps import one_of_each
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 

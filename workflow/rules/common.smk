@@ -192,10 +192,14 @@ def jobs_of_block(wildcards):
     if forced or table not in layout(study).known_by_mark:
         return files
     marks, block = expected(study), mark_in(layout(study).block_file(*place))
-    wrong = [file for file in files if mark_in(file) != marks.of_part(table, file)]
-    if all(mark_in(file) is None for file in wrong) and block == marks.of_block(*place):
+    wrong = {
+        file: mark
+        for file in files
+        if (mark := mark_in(file)) != marks.of_part(table, file)
+    }
+    if wrong and not any(wrong.values()) and block == marks.of_block(*place):
         return []
-    return wrong
+    return list(wrong)
 
 
 # What must be done before the job files of a table are known, by table: functions of wildcards.

@@ -19,7 +19,7 @@ from itertools import islice
 import numpy as np
 from scipy.stats import norm, qmc
 
-from spinepipe.calibrate.descent import Descent, Point, Settled, descend
+from spinepipe.calibrate.descent import Point, Settled
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
@@ -338,14 +338,7 @@ def _search(
 ) -> Optimum | None:
     """The end of a fit from one start."""
     fit = FilmFit(fit.patient, fit.sd, ask)
-    return optimum(fit, fit.point(population), begin, near, _limits(population), _descend)
-
-
-def _descend(point: Point, start: Array, limits: Limits) -> Descent:
-    low, high, scale = limits
-    found = point(start)
-    size = 0 if found is None else len(found[0])
-    return descend(point, start, (low, high), scale, size, SETTLED)
+    return optimum(fit, fit.point(population), begin, near, _limits(population), SETTLED)
 
 
 def _fitted(ends: Sequence[Optimum | None], population: Population) -> Fitted | None:

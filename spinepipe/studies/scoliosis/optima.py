@@ -5,13 +5,13 @@ model does not take from neutral (`statics.prescribed.hold_at`). What is told of
 of the poses from neutral; where these are others it is fitted anew with such poses alone.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from spinepipe.calibrate.descent import Descent, Point, once
+from spinepipe.calibrate.descent import Descent, Point, Settled, descend, once
 from spinepipe.effects.contract import Array
 from spinepipe.statics.prescribed import Held
 from spinepipe.status import Status
@@ -43,8 +43,6 @@ class Holder(Protocol):
 Limits = tuple[Array, Array, Array]
 """(m,) each: least and largest unknowns, and their scale."""
 
-Descend = Callable[[Point, Array, Limits], Descent]
-
 
 @dataclass(frozen=True)
 class Optimum:
@@ -75,7 +73,7 @@ def optimum(
     begin: Sequence[Array],
     near: Mapping[str, Held],
     limits: Limits,
-    descend: Descend,
+    settled: Settled,
 ) -> Optimum | None:
     """The end of a fit from the first of some unknowns that has poses; None where none has.
 
@@ -89,7 +87,7 @@ def optimum(
         return point(x)
 
     holder.near = dict(near)
-    ended = _ended(once(point), begin, limits, descend)
+    ended = _ended(once(point), begin, limits, settled)
     if ended is None:
         return None
     trials = holder.near
@@ -98,7 +96,7 @@ def optimum(
         np.abs(holder.near[name].q - trials[name].q).max() < SAME_POSE for name in trials
     )
     if not led:
-        ended = _ended(once(from_neutral), [ended.x, *begin], limits, descend)
+        ended = _ended(once(from_neutral), [ended.x, *begin], limits, settled)
         found = None if ended is None else from_neutral(ended.x)
     if ended is None or found is None:
         return None
@@ -112,12 +110,15 @@ def optimum(
 
 
 def _ended(
-    point: Point, begin: Sequence[Array], limits: Limits, descend: Descend
+    point: Point, begin: Sequence[Array], limits: Limits, settled: Settled
 ) -> Descent | None:
-    low, high, _ = limits
-    within = (np.clip(one, low + 1e-9, high - 1e-9) for one in begin)
-    start = next((one for one in within if point(one) is not None), None)
-    return None if start is None else descend(point, start, limits)
+    low, high, scale = limits
+    for one in begin:
+        start = np.clip(one, low + 1e-9, high - 1e-9)
+        found = point(start)
+        if found is not None:
+            return descend(point, start, (low, high), scale, len(found[0]), settled)
+    return None
 
 
 def best(ends: Sequence[Optimum | None], scale: Array) -> tuple[Optimum | None, int]:

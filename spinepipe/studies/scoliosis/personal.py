@@ -8,14 +8,14 @@ is one for all models, so that they differ by what they make of the films alone.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.descent import Descent, Point, Settled, descend
+from spinepipe.calibrate.descent import Settled
 from spinepipe.calibrate.profile import Reach
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
@@ -31,7 +31,7 @@ from spinepipe.studies.scoliosis.held_spine import (
     with_laws,
     with_springs,
 )
-from spinepipe.studies.scoliosis.optima import Limits, Optimum, best, optimum
+from spinepipe.studies.scoliosis.optima import Optimum, best, optimum
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
     Ends,
@@ -223,16 +223,15 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
     """
     fit, found, n_optima = region_optimum(patient)
     free = fit.by_logs.shape[1]
-    if not free:
-        return _springs(patient, patient.springs[:, BENDING], free)
-    if found is None:  # no start has poses with the uppermost vertebra where the films have it
-        lost = _springs(patient, patient.springs[:, BENDING], free)
-        return replace(lost, fitting=Fitting(Status.NOT_CONVERGED, n_optima))
+    if found is None:
+        personal = _springs(patient, patient.springs[:, BENDING], free)
+        if not free:
+            return personal
+        # no start has poses with the uppermost vertebra where the films have it
+        return replace(personal, fitting=Fitting(Status.NOT_CONVERGED, n_optima))
     held = np.append(found.at_bound, found.at_bound.any())  # multipliers are over the last region's
-    personal, fitting = (
-        _springs(patient, fit.stiffness(found.x), free),
-        Fitting(found.status, n_optima),
-    )
+    personal = _springs(patient, fit.stiffness(found.x), free)
+    fitting = Fitting(found.status, n_optima)
     return replace(personal, constrained=held[fit.regions], fitting=fitting)
 
 
@@ -248,14 +247,10 @@ def region_optimum(
     fit = RegionFit(patient, _regions(patient))
     free = fit.by_logs.shape[1]
     reach = np.full(free, FARTHEST_MULTIPLIER)
-    limits, descending = (-reach, reach, np.ones(free)), partial(_descend, 2 * len(patient.curves))
+    limits = -reach, reach, np.ones(free)
     starts = [np.zeros(free), *(reach * one for one in product(shares, repeat=free))]
-    ends = [optimum(fit, fit.missed, [one], {}, limits, descending) for one in starts if free]
+    ends = [optimum(fit, fit.missed, [one], {}, limits, SETTLED) for one in starts if free]
     return fit, *best(ends, limits[2])
-
-
-def _descend(size: int, point: Point, start: Array, limits: Limits) -> Descent:
-    return descend(point, start, limits[:2], limits[2], size, SETTLED)
 
 
 class RegionFit:

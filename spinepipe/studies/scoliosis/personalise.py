@@ -126,7 +126,7 @@ def _personal(
     except NoFit as why:
         return fit.unfitted(everyone), f"not fitted: {why}; stiffness is that of the population"
     personal = fit.personal(fitted)
-    unsettled = UNSETTLED if "not_converged" in set(population["status"].dropna()) else ""
+    unsettled = UNSETTLED if (population["status"] == Status.NOT_CONVERGED.value).any() else ""
     told = joined(unsettled, _of_fit(personal))
     if not settings.film_regions:
         return personal, told

@@ -14,7 +14,7 @@ import pytest
 from scoliosis_cases import SHIPPED, write_shipped
 
 from spinepipe import cohort as cohorts
-from spinepipe.calibrate.descent import Descent, Point
+from spinepipe.calibrate.descent import Settled
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress
@@ -23,7 +23,7 @@ from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis import learn as learning
 from spinepipe.studies.scoliosis.film_fit import TOPS, FilmFit, fit_alike, laws_of, weighed_with
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT
-from spinepipe.studies.scoliosis.optima import Limits, Optimum, best, optimum
+from spinepipe.studies.scoliosis.optima import Optimum, best, optimum
 from spinepipe.studies.scoliosis.personal import linear_regions, patient_of, region_optimum
 from spinepipe.studies.scoliosis.personalise import UNSETTLED, rows_of
 from spinepipe.studies.scoliosis.population import Population, assumed
@@ -196,6 +196,9 @@ def test_a_population_that_still_moves_says_so(
             assert all(UNSETTLED in row["message"] for row in made["positions"])
 
 
+CLOSE = Settled(cost=1e-15, step=1e-9, slope=1e-15, evaluations=200)
+
+
 class Line:
     """A spine without films: where its one number is beyond 1 it stands on another path."""
 
@@ -212,21 +215,9 @@ class Line:
 def test_a_fit_that_ends_where_poses_leave_for_another_path_has_not_converged() -> None:
     """Cost falls up to 1, beyond which the poses from neutral are others and worse."""
 
-    def descend(point: Point, start: Array, limits: Limits) -> Descent:
-        x, step = start.copy(), 0.5
-        while step > 1e-9:
-            costs = [
-                abs(float((point(at) or (np.array([np.inf]),))[0][0]))
-                for at in (x, x - step, x + step)
-            ]
-            least = int(np.argmin(costs))
-            x = x + (0.0, -step, step)[least]
-            step *= 0.5 if least == 0 else 1.0
-        return Descent(x, 0.0, True, 1)
-
     limits = (np.array([-5.0]), np.array([5.0]), np.ones(1))
     line = Line()
-    found = optimum(line, line.point, [np.zeros(1)], {}, limits, descend)
+    found = optimum(line, line.point, [np.zeros(1)], {}, limits, CLOSE)
     assert found is not None
     assert found.x[0] == pytest.approx(1.0, abs=1e-6)
     assert found.status is Status.NOT_CONVERGED
