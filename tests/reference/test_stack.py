@@ -23,7 +23,6 @@ from spinepipe.statics import (
     by_parameters,
     follow,
     free_parameters,
-    given_sensitivity,
     observe,
     observed_by_parameters,
 )
@@ -33,8 +32,6 @@ from spinepipe.statics.many import (
     Answering,
     Idle,
     Stack,
-    by_joint_pose,
-    by_load,
     poses_by,
     readings,
     readings_by,
@@ -300,42 +297,6 @@ def test_runs_for_the_engine_are_not_answered() -> None:
     weight = ScopedEffect(ExtraWeight(((0.0, 0.1, 0.0),)), (0,), np.array([[20.0]]))
     stack = stack_of([(model.with_effects((*model.effects, weight)), case)])
     assert Answering.of(stack, np.zeros((len(stack.run), 2, 6))) is None
-
-
-def test_derivatives_by_loads_and_joint_poses() -> None:
-    rng = np.random.default_rng(6)
-    shapes = [effect for effect in FEW if effect.name in ("axes_tilt", "neutral_zone")]
-    runs, _ = standing([draw.model(rng, 4, [effect], 0.5) for effect in shapes])
-    stack = stack_of(runs)
-    q = stack.solve().q
-    by_frames, by_wrench = by_joint_pose(stack, q), by_load(stack, q, 1)
-    lane = 0
-    for model, case in runs:
-        system = System(Chain(model), model, case)
-        for step in follow(system):
-            there = with_tangent_there(system, step)
-            frames = given_sensitivity.by_joint_pose(system, there)
-            load = given_sensitivity.by_load(system, there, 1)
-            wrench = np.hstack([load.by_force, load.by_moment, load.by_point])
-            for one, other in (
-                (by_frames[lane].reshape(frames.shape), frames),
-                (by_wrench[lane].reshape(wrench.shape), wrench),
-            ):
-                np.testing.assert_allclose(one, other, rtol=0, atol=AGREEMENT * np.abs(other).max())
-            lane += 1
-
-
-HANGING = [effect for effect in VARIANTS if effect.kind in (Kind.LOAD, Kind.PATH)]
-
-
-@sweep("effect", HANGING, str)
-def test_derivatives_by_what_is_given_are_refused_where_effects_hang_on_it(effect: Effect) -> None:
-    rng = np.random.default_rng(7)
-    stack = stack_of([draw.model(rng, 2, [effect])])
-    q = np.zeros((len(stack.run), 2, 6))
-    for derivative in (lambda: by_joint_pose(stack, q), lambda: by_load(stack, q, 0)):
-        with pytest.raises(ValueError, match="load and path effects"):
-            derivative()
 
 
 def test_effects_are_bound_as_a_double_loop_over_runs_and_joints_binds_them() -> None:
