@@ -16,6 +16,7 @@ from benchmarks import (
     commands,
     discrepancy,
     engine,
+    equilibria,
     films,
     identification,
     lost_fits,
@@ -53,7 +54,9 @@ def main() -> None:
         "summary": lambda: summary.write(RESULTS),
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("part", nargs="*", help=f"{', '.join(parts)}; or: commands OLD")
+    parser.add_argument(
+        "part", nargs="*", help=f"{', '.join(parts)}; or: commands OLD; equilibria OLD"
+    )
     given = os.environ.get(real_geometry.COHORT_VARIABLE)
     parser.add_argument("--cohort", default=given, help="folder of a cohort, for real_geometry")
     small = "discrepancy: the small cohort alone, and no file is written"
@@ -61,6 +64,9 @@ def main() -> None:
     options = parser.parse_args()
     if options.part[:1] == ["commands"]:
         commands_part(*options.part[1:])
+        return
+    if options.part[:1] == ["equilibria"]:
+        equilibria_part(*options.part[1:])
         return
     for name in options.part or parts:
         if name not in parts:
@@ -148,6 +154,21 @@ def commands_part(old: str) -> None:
             cells.append(f"{float(cells[0]) / float(cells[2]):.2f}")
         lines.append(f"| {step} | {' | '.join(cells)} |")
     _write("commands", lines, {"machine": _about(), "older": old, "runs": found})
+
+
+def equilibria_part(old: str) -> None:
+    """Stacks of spines solved from neutral at HEAD and at an older commit, in turn."""
+    lines = [
+        *_head("Equilibria in stacks", _about()),
+        "",
+        f"us each, HEAD beside {old}, least.",
+        "",
+    ]
+    lines += ["| what | HEAD us | older us | ratio |", "|---|---|---|---|"]
+    found = equilibria.beside(old)
+    lines += [f"| {what} | {new:.1f} | {was:.1f} | {was / new:.2f} |" for what, new, was in found]
+    print(*lines, sep="\n", flush=True)
+    _write("equilibria", lines, {"machine": _about(), "older": old, "figures": found})
 
 
 def cohort_parts() -> None:

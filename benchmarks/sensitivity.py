@@ -87,7 +87,7 @@ class Sobol:
 
     Attributes
     ----------
-    equilibria : that its responses took. handed_on : share of them, of its first samples, that the
+    equilibria : that its table holds. handed_on : share of them, of its first samples, that the
         engine of record had to solve, in each test.
     design_bytes, join_bytes : memory per row of drawing the design and of joining the responses.
     """

@@ -129,11 +129,15 @@ class NonlinearStiffening(CarriedShare):
 def exponential_rise(v: Array, steepest: float = STEEPEST_EXPONENT) -> tuple[Array, Array]:
     """``(exp(v) - 1) / v - 1`` and its derivative by v; the exponential goes on straight."""
     at, beyond = np.minimum(v, steepest), np.maximum(v - steepest, 0.0)
-    rise, slope = np.expm1(at) + beyond * np.exp(at), np.exp(at)
+    slope = np.exp(at)
     near = np.abs(v) < _NEAR_ZERO
     safe = np.where(near, 1.0, v)
-    value = np.where(near, v * polyval(v, _EXPONENTIAL), rise / safe - 1.0)
-    by_v = np.where(near, polyval(v, _EXPONENTIAL_SLOPE), (slope - rise / safe) / safe)
+    mean = (np.expm1(at) + beyond * slope) / safe
+    value, by_v = mean - 1.0, (slope - mean) / safe
+    if near.any():
+        few = v[near]
+        value[near] = few * polyval(few, _EXPONENTIAL)
+        by_v[near] = polyval(few, _EXPONENTIAL_SLOPE)
     return value, by_v
 
 

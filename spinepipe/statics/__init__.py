@@ -1,8 +1,7 @@
 """Statics: equilibria of a spine model, their stability and sensitivities, and settling in time."""
 
 from spinepipe.statics.equilibrium import Equilibrium
-from spinepipe.statics.given_sensitivity import LoadSensitivity, by_joint_pose, by_load
-from spinepipe.statics.path import SolvedStep, carried_over, follow
+from spinepipe.statics.path import SolvedStep, follow
 from spinepipe.statics.reactions import reaction, reactions_by
 from spinepipe.statics.sensitivity import (
     FreeParameter,
@@ -32,7 +31,6 @@ __all__ = [
     "Course",
     "Equilibrium",
     "FreeParameter",
-    "LoadSensitivity",
     "Loading",
     "Program",
     "Settled",
@@ -40,10 +38,7 @@ __all__ = [
     "SolvedStep",
     "Status",
     "System",
-    "by_joint_pose",
-    "by_load",
     "by_parameters",
-    "carried_over",
     "declared",
     "follow",
     "free_parameters",

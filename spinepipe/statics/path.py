@@ -1,6 +1,5 @@
 """A case step by step: each equilibrium starts from the last, path states advance in between."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,19 +84,3 @@ def _advance(system: System, q: Array, states: States) -> dict[int, Advance]:
     if system.geometry:
         joints = system.placed(q, with_parameters=False).q
     return states_after(joints, system.laws, states)
-
-
-def carried_over(system: System, solved: Sequence[SolvedStep]) -> list[SolvedStep]:
-    """The solved steps of another model in a system that differs by effects which are off.
-
-    Poses and tangents stay; the states of the path laws start and move on as in the system.
-    """
-    states, clock = system.initial_states(), 0.0
-    steps = []
-    for step in solved:
-        time = clock if step.step.time is None else step.step.time
-        states, clock = replace(states, seconds=time - clock), time
-        advances = _advance(system, step.equilibrium.q, states)
-        steps.append(replace(step, states=states, advances=advances))
-        states = States({index: advance.state for index, advance in advances.items()})
-    return steps

@@ -30,6 +30,11 @@ class AskedTest:
         """Numbers of the steps that become rows."""
         return tuple(step.step for step in self.case.steps[self.stored])
 
+    @property
+    def needed(self) -> list[int]:
+        """Places of these steps and of the first, from which the others are reached."""
+        return sorted({0, *range(len(self.case.steps))[self.stored]})
+
 
 def asked(case: LoadCase, pressed: bool, all_steps: bool, subtracted: bool = True) -> AskedTest:
     """What is computed of a test: all of its load steps, or that of the largest load only.

@@ -4,16 +4,17 @@ Catches a stack that solves a spine otherwise than the engine of record.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from example_effects import ExtraWeight
 
-from spinepipe.effects import create
-from spinepipe.model import LoadCase, ScopedEffect, SpineModel
+from spinepipe.effects import Wrench, create
+from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import System, follow
 from spinepipe.statics.holding import hold
-from spinepipe.statics.many import Cases, Spines, solve_many
+from spinepipe.statics.many import Cases, Spines, solve, solve_many
 from spinepipe.status import Status
 from spinepipe.world import Chain
 from tests.reference import bridge
@@ -163,3 +164,93 @@ def test_parts_and_single_spines_are_what_they_were() -> None:
         for wrench, same in zip(step.wrenches, other.wrenches, strict=True):
             np.testing.assert_array_equal(wrench.moment, same.moment)
             np.testing.assert_array_equal(wrench.point, same.point)
+
+
+def bent(case: LoadCase, steps: int, beside: float) -> LoadCase:
+    """The load in so many steps after one of weight alone, on a way that is bent."""
+    (last,) = case.steps
+    shares = np.linspace(0.0, 1.0, steps + 1)
+    return replace(
+        case,
+        steps=tuple(
+            LoadStep(
+                number,
+                tuple(
+                    replace(
+                        one,
+                        force=share * one.force,
+                        moment=share * one.moment
+                        + beside * share * (1.0 - share) * np.roll(one.moment, 1),
+                    )
+                    for one in last.wrenches
+                ),
+            )
+            for number, share in enumerate(shares.tolist())
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ("n_joints", "share", "beside", "least", "most"),
+    [(6, 0.5, 0.1, 1.0, 1.0), (4, 12.0, 0.2, 0.9, 1.0), (2, 25.0, 0.1, 0.1, 0.5), (3, 1, 4, 0, 0)],
+    ids=["straight", "past critical loads", "some tip over", "bent"],
+)
+def test_steps_that_nobody_asks_for_are_passed_as_if_solved(
+    n_joints: int,
+    share: float,
+    beside: float,
+    least: float,
+    most: float,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Catches a spine that is led past steps which would have led it elsewhere, or nowhere."""
+    rng = np.random.default_rng(30 + n_joints)
+    chain = chains.random_chain(rng, n_joints)
+    spines = varied(bridge.spine_model(chain), rng)
+    cases = Cases.of(bent(bridge.load_case(chain, share), 6, beside), COUNT)
+    whole, asked, own = solve_many(spines, cases), [0, 3, 6], solve._passed
+    at_once: list[bool] = []
+
+    def counted(*rest: Any) -> np.ndarray:
+        found = own(*rest)
+        at_once.extend(found.tolist())
+        return found
+
+    monkeypatch.setattr(solve, "_passed", counted)
+    found = solve_many(spines, cases, asked)
+    assert least <= np.mean(at_once) <= most
+    np.testing.assert_allclose(found.q, whole.q[:, asked], rtol=0, atol=AGREEMENT)
+    np.testing.assert_allclose(found.load, whole.load[:, asked], rtol=1e-8, atol=1e-8)
+    np.testing.assert_array_equal(found.status, whole.status[:, asked])
+    np.testing.assert_array_equal(found.by_engine, whole.by_engine)
+    told = {(n, asked.index(s)): why for (n, s), why in whole.messages.items() if s in asked}
+    assert found.messages == told
+
+
+def test_a_push_between_the_asked_steps_decides_the_side_of_a_column() -> None:
+    """Past its critical load it stays where it was pushed, whoever asks for that step."""
+    stiffness, height = 50.0, 0.15
+    chain = chains.random_chain(np.random.default_rng(1), 1)
+    rigid = [1e10, 1e10, 1e10, stiffness, 1e4, 1e4]
+    upright = replace(
+        chain,
+        origins=np.zeros((1, 3)),
+        rotations=np.eye(3)[None],
+        masses=np.zeros(1),
+        inertias=np.zeros((1, 3, 3)),
+        stiffness=np.array([rigid]),
+        gravity=np.zeros(3),
+    )
+    top, down = np.array([0.0, height, 0.0]), np.array([0.0, -1.2 * stiffness / height, 0.0])
+    model = bridge.spine_model(upright)
+    steps = tuple(
+        LoadStep(number, (Wrench(0, top, share * down, np.array([0.0, 0.0, push])),))
+        for number, (share, push) in enumerate([(0.0, 0.0), (0.5, 1.0), (1.0, -0.1)])
+    )
+    cases = Cases.of(LoadCase("test", 1, steps), 2)
+    whole = solve_many(Spines.of(model, 2), cases)
+    found = solve_many(Spines.of(model, 2), cases, [0, 2])
+    assert whole.q[0, 2, 0, 3] > 0.5
+    np.testing.assert_allclose(found.q, whole.q[:, [0, 2]], rtol=0, atol=AGREEMENT)
+    straight = solve_many(Spines.of(model, 2), cases.steps([0, 2]))
+    assert straight.q[0, 1, 0, 3] < -0.5  # the way that is not stated leads to the other side

@@ -23,7 +23,6 @@ from spinepipe.statics import (
     by_parameters,
     follow,
     free_parameters,
-    given_sensitivity,
     observe,
     observed_by_parameters,
 )
@@ -33,12 +32,11 @@ from spinepipe.statics.many import (
     Answering,
     Idle,
     Stack,
-    by_joint_pose,
-    by_load,
     poses_by,
     readings,
     readings_by,
 )
+from spinepipe.statics.many.lanes import acting
 from spinepipe.statics.many.survey import Flags
 from spinepipe.status import Status
 from spinepipe.world import Chain
@@ -301,37 +299,34 @@ def test_runs_for_the_engine_are_not_answered() -> None:
     assert Answering.of(stack, np.zeros((len(stack.run), 2, 6))) is None
 
 
-def test_derivatives_by_loads_and_joint_poses() -> None:
-    rng = np.random.default_rng(6)
-    shapes = [effect for effect in FEW if effect.name in ("axes_tilt", "neutral_zone")]
-    runs, _ = standing([draw.model(rng, 4, [effect], 0.5) for effect in shapes])
-    stack = stack_of(runs)
-    q = stack.solve().q
-    by_frames, by_wrench = by_joint_pose(stack, q), by_load(stack, q, 1)
-    lane = 0
-    for model, case in runs:
-        system = System(Chain(model), model, case)
-        for step in follow(system):
-            there = with_tangent_there(system, step)
-            frames = given_sensitivity.by_joint_pose(system, there)
-            load = given_sensitivity.by_load(system, there, 1)
-            wrench = np.hstack([load.by_force, load.by_moment, load.by_point])
-            for one, other in (
-                (by_frames[lane].reshape(frames.shape), frames),
-                (by_wrench[lane].reshape(wrench.shape), wrench),
-            ):
-                np.testing.assert_allclose(one, other, rtol=0, atol=AGREEMENT * np.abs(other).max())
-            lane += 1
-
-
-HANGING = [effect for effect in VARIANTS if effect.kind in (Kind.LOAD, Kind.PATH)]
-
-
-@sweep("effect", HANGING, str)
-def test_derivatives_by_what_is_given_are_refused_where_effects_hang_on_it(effect: Effect) -> None:
-    rng = np.random.default_rng(7)
-    stack = stack_of([draw.model(rng, 2, [effect])])
-    q = np.zeros((len(stack.run), 2, 6))
-    for derivative in (lambda: by_joint_pose(stack, q), lambda: by_load(stack, q, 0)):
-        with pytest.raises(ValueError, match="load and path effects"):
-            derivative()
+def test_effects_are_bound_as_a_double_loop_over_runs_and_joints_binds_them() -> None:
+    """Catches a joint bound to values of another one, where effects, scopes and tests differ."""
+    rng = np.random.default_rng(21)
+    (plain, _), joints = draw.model(rng, 3, []), range(3)
+    bushing = plain.effects[0].effect
+    models = []
+    for _ in range(7):
+        effects = []
+        for effect in (bushing, *rng.permutation(named("power_term", "axes_tilt", "load_gain"))):
+            scope = tuple(n for n in joints if rng.random() < 0.6) or (2,)
+            rows = len(scope) if effect.per_joint else 1
+            start = np.array([p.default for p in effect.parameters])
+            values = start + 1e-3 * rng.random((rows, len(start)))
+            tests = ("*",) if rng.random() < 0.5 else ("bend",)
+            effects.append(ScopedEffect(effect, scope, values, tests))
+        models.append(replace(plain, effects=()).with_effects(tuple(effects[: rng.integers(1, 5)])))
+    runs = [(int(rng.integers(7)), test) for test in ("bend", "turn") * 8]
+    found: dict[tuple[int, int, int], tuple[Effect, list[float]]] = {}
+    for one in acting(models, runs):
+        places, at = one.on(np.arange(len(runs)))
+        np.testing.assert_array_equal(places, np.arange(len(one.joint)))
+        for run, joint, row in zip(at.tolist(), one.joint.tolist(), one.row.tolist(), strict=True):
+            assert (run, one.place, joint) not in found
+            found[run, one.place, joint] = one.effect, one.values[row].tolist()
+    expected = {}
+    for run, (number, test) in enumerate(runs):
+        for place, scoped in enumerate(models[number].effects):
+            for row, joint in enumerate(scoped.joints if scoped.in_scope(test) else ()):
+                values = scoped.values[row if scoped.effect.per_joint else 0]
+                expected[run, place, joint] = scoped.effect, values.tolist()
+    assert found == expected

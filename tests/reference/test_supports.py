@@ -39,7 +39,6 @@ from spinepipe.statics.many import (
     Answering,
     Idle,
     Stack,
-    by_load,
     poses_by,
     reactions,
     readings,
@@ -327,16 +326,6 @@ def test_what_is_off_moves_reactions_too() -> None:
     push = rng.normal(size=(*q.shape, 1))
     small = answered(plain, q, push)
     assert np.abs(small[plain.loads.supports.fixed]).max() > 0.0
-
-
-def test_loads_move_nothing_that_is_fixed() -> None:
-    rng = np.random.default_rng(3)
-    model, case = with_rig(rng, draw.model(rng, 2, [], 0.5))
-    stack = Stack.of([model], [(0, case)])
-    by = by_load(stack, stack.solve().q, 0)
-    fixed = stack.loads.supports.fixed
-    assert not by[fixed].any()
-    assert by[~fixed].any()
 
 
 def test_coordinates_are_fixed_in_all_steps_or_none() -> None:

@@ -1,5 +1,6 @@
 """How indices settle as a design grows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,7 @@ def convergence(
     settings: Settings | None = None,
     sizes: int = 8,
     resolution: ArrayLike = 0.0,
+    whole: Sequence[Index] = (),
 ) -> tuple[Stage, ...]:
     """Indices but for those of pairs on growing parts of a design, the whole last.
 
@@ -35,6 +37,7 @@ def convergence(
     outputs, ok, settings, resolution : as for `indices`.
     sizes : at most so many parts (1 or more), each twice the one before; fewer where they would be
         too small.
+    whole : what `indices` makes of all of it, where that is known already.
 
     Parts of a Sobol design are its first base samples, powers of two, each of them as well spread
     as a design of its own; of Morris the first trajectories. The first points of a Latin hypercube
@@ -49,11 +52,12 @@ def convergence(
     if design.method is Method.LATIN_HYPERCUBE:
         order = np.random.default_rng([settings.seed, design.n]).permutation(design.n)
         design = replace(design, unit=design.unit[order])
-        values, good = values[order], good[order]
-    stages = []
+        values, good, whole = values[order], good[order], ()
+    stages, known = [], tuple(one for one in whole if one.index in asked and not one.other)
     for samples in _sizes(design, sizes):
         part = design.first(samples)
-        found = indices(part, values[: part.n], good[: part.n], settings, resolution)
+        found = known if samples == design.samples else ()
+        found = found or indices(part, values[: part.n], good[: part.n], settings, resolution)
         stages.append(Stage(samples, part.n, found))
     return tuple(stages)
 

@@ -6,6 +6,7 @@ once. With 24 factors and a dummy, 1,024 base samples, pairs and 1,000 resamples
 output instead of 10.6 s (one core).
 """
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -80,7 +81,11 @@ def morris_indices(design: Design, outputs: Array, settings: Settings) -> Estima
     effects = elementary_effects(design, outputs)
     kinds = [(index, g) for g in range(len(design.inputs)) for index in _kinds(design, g)]
     pick = np.array([3 * g + ALONE.index(index) for index, g in kinds])
-    found = [_of_effects(effects[:, :, k], settings)[:, pick] for k in range(outputs.shape[1])]
+    drawn = _resamples(len(effects), settings)
+    found = [
+        _of_effects(effects[:, :, k], drawn, settings.confidence)[:, pick]
+        for k in range(outputs.shape[1])
+    ]
     estimate, low, high = np.stack(found, axis=-1)
     names = tuple((index, design.inputs[g], "") for index, g in kinds)
     return Estimated(names, estimate, np.stack([low, high]))
@@ -107,13 +112,24 @@ def _kinds(design: Design, g: int) -> tuple[str, ...]:
     return ("mu_star",) if several else ALONE
 
 
-def _of_effects(effects: Array, settings: Settings) -> Array:
+Counts = NDArray[np.uint8]
+
+
+def _resamples(n: int, settings: Settings) -> list[Counts]:
+    """Blocks (r, n) of how often each row is in each resample, which all outputs share.
+
+    A row is in one resample more than 255 times only where n is; then it is at most n times there.
+    """
+    drawn = resample_weights(n, settings.bootstraps, settings.seed)
+    return [weights.astype(np.uint8) for weights in drawn]
+
+
+def _of_effects(effects: Array, resamples: Sequence[Counts], confidence: float) -> Array:
     """(3, 3 G) estimates and ends of one output from effects (r, G)."""
     r = len(effects)
-    weights = resample_weights(r, settings.bootstraps, settings.seed)
-    drawn = np.concatenate([_indices(some / r, effects) for some in weights])
+    drawn = np.concatenate([_indices(some / r, effects) for some in resamples])
     whole = _indices(np.full((1, r), 1.0 / r), effects)
-    return np.vstack([whole, percentile_interval(drawn, settings.confidence)])
+    return np.vstack([whole, percentile_interval(drawn, confidence)])
 
 
 def _indices(weights: Array, effects: Array) -> Array:
@@ -142,8 +158,10 @@ def sobol_indices(design: Design, outputs: Array, settings: Settings) -> Estimat
     inputs = design.inputs
     pairs = _pairs(len(inputs) if design.second_order and settings.asks("S2") else 0)
     blocks = outputs.reshape(-1, design.block, outputs.shape[1])
+    drawn = _resamples(len(blocks), settings)
     found = [
-        _of_blocks(blocks[:, :, k], len(inputs), pairs, settings) for k in range(outputs.shape[1])
+        _of_blocks(blocks[:, :, k], len(inputs), pairs, drawn, settings.confidence)
+        for k in range(outputs.shape[1])
     ]
     estimate, low, high = np.stack(found, axis=-1)
     names = [(index, name, "") for index in ("S1", "ST") for name in inputs]
@@ -156,13 +174,15 @@ def _pairs(inputs: int) -> Array:
     return np.array(list(combinations(range(inputs), 2)), dtype=int).reshape(-1, 2)
 
 
-def _of_blocks(blocks: Array, inputs: int, pairs: Array, settings: Settings) -> Array:
+def _of_blocks(
+    blocks: Array, inputs: int, pairs: Array, resamples: Sequence[Counts], confidence: float
+) -> Array:
     """(3, C) estimates and ends of one output from (N, block) runs."""
     columns = _columns((blocks - blocks.mean()) / blocks.std(), inputs, pairs)
     whole = _from_means(columns.mean(axis=0)[None], inputs, pairs)
-    weights = resample_weights(len(blocks), settings.bootstraps, settings.seed)
-    drawn = [_from_means(some @ columns / len(blocks), inputs, pairs) for some in weights]
-    return np.vstack([whole, percentile_interval(np.vstack(drawn), settings.confidence)])
+    means = (some.astype(float) @ columns / len(blocks) for some in resamples)
+    drawn = np.vstack([_from_means(some, inputs, pairs) for some in means])
+    return np.vstack([whole, percentile_interval(drawn, confidence)])
 
 
 def _columns(blocks: Array, inputs: int, pairs: Array) -> Array:

@@ -9,7 +9,6 @@ from spinepipe.statics.many.derive import (
     readings_by,
 )
 from spinepipe.statics.many.dynamics import Moving
-from spinepipe.statics.many.given import by_joint_pose, by_load
 from spinepipe.statics.many.idle import Acting, Answering, Idle, acts_here
 from spinepipe.statics.many.settling import Ends, settle
 from spinepipe.statics.many.solve import ManySolved, solve_many
@@ -30,8 +29,6 @@ __all__ = [
     "Stack",
     "acts_here",
     "answered",
-    "by_joint_pose",
-    "by_load",
     "poses_by",
     "reactions",
     "reactions_by",

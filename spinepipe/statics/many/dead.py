@@ -7,7 +7,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Array, Indices, Neutral
 from spinepipe.effects.dead_load import DeadLoad, Wrenches
-from spinepipe.statics.many.lanes import Acting
+from spinepipe.statics.many.lanes import Acting, ranges
 from spinepipe.statics.many.survey import Chains, Loads
 
 
@@ -38,16 +38,17 @@ def with_dead_loads(
 
 def _parts(one: Acting, chains: Chains, listed: Loads, run: Indices) -> Iterator[_Part]:
     """An effect's lanes by the joints that it acts on."""
+    count = np.diff(one.first)[run]
     places, at = one.on(run)
-    lanes, first, count = np.unique(at, return_index=True, return_counts=True)
-    groups: dict[tuple[int, ...], list[int]] = {}
-    for number, (begin, size) in enumerate(zip(first.tolist(), count.tolist(), strict=True)):
-        joints = tuple(one.joint[places[begin : begin + size]].tolist())
-        groups.setdefault(joints, []).append(number)
+    every = np.full((len(run), count.max(initial=0)), -1)
+    every[at, ranges(np.zeros_like(count), count)] = one.joint[places]
+    lanes = np.flatnonzero(count)
+    groups, which = np.unique(every[lanes], axis=0, return_inverse=True)
     neutral = Neutral(chains.rotations, chains.origins, chains.coms)
     assert isinstance(one.effect, DeadLoad)
-    for joints, numbers in groups.items():
-        there, rows = lanes[numbers], one.row[places[first[numbers]]]
+    for number, joints in enumerate(groups):
+        there = lanes[which == number]
+        rows = one.row[one.first[run[there]]]
         wrenches = Wrenches(
             listed.bodies[there], listed.points[there], listed.forces[there], listed.moments[there]
         )
@@ -55,7 +56,7 @@ def _parts(one: Acting, chains: Chains, listed: Loads, run: Indices) -> Iterator
             one.effect,
             there,
             rows,
-            np.array(joints),
+            joints[joints >= 0],
             one.values[rows],
             wrenches,
             neutral.part(listed.chain[there]),

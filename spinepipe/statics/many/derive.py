@@ -48,7 +48,7 @@ def answered(stack: Stack, q: Array, sources: Array, observed: bool = False) -> 
         seen = survey(stack.chains, part(stack.loads, lanes), q[lanes], tangents)
         found[lanes], _ = answers(seen, Changes(sources[lanes]))
         if stack.loads.supports.there:
-            held[lanes] = missing(seen, found[lanes]) - sources[lanes]
+            held[lanes] = missing(seen, found[lanes], Changes(sources[lanes]))
     if observed:
         found = _observed(stack, q, found, None)
     if stack.loads.supports.there:
@@ -77,7 +77,7 @@ def answered_on_path(stack: Stack, q: Array, own: Array, shift: Array | None) ->
             dq = answers(seen, Changes(-loads))[0]
             found[lanes] = dq
             if stack.loads.supports.there:
-                held[lanes] = missing(seen, dq) + loads
+                held[lanes] = missing(seen, dq, Changes(-loads))
             moved = None if shift is None else shift[lanes]
             stack.remember(states_by_x, bound, bound.after_by(there, dq, still, before, moved))
             stack.remember(states, bound, bound.after(there))
@@ -256,7 +256,7 @@ class _Moved:
         stack, (q, dq) = self.stack, there
         seen = survey(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
         own = bound.held_by(q, slopes, states_by_x)
-        by_x = own + missing(seen, dq, self._pushes(lanes, seen))
+        by_x = missing(seen, dq, Changes(-own, self._pushes(lanes, seen)))
         found: Array = np.where(seen.fixed[..., None], by_x, 0.0)
         return found
 

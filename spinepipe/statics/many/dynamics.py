@@ -5,7 +5,6 @@ the twist of what carries an axis S, the axis changes at the rate V x S; a verte
 and twist V asks for the wrench I A + V x* I V at the acceleration A that is left when no rate
 changes (Featherstone 2008, doi 10.1007/978-1-4899-7560-7, recursive Newton-Euler).
 
-Nothing here calls another compiled file: what is kept of a compilation hangs on its own file alone.
 """
 
 from dataclasses import dataclass
@@ -13,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.many.survey import Chains, Plain, Survey, compiled
+from spinepipe.statics.many.survey import Chains, Plain, Survey, compiled, flat, inner
+from spinepipe.statics.many.vectors import WIDTH, gather, lanes, vectors
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,8 @@ class Moving:
     @classmethod
     def of(cls, chains: Chains, chain: Indices, seen: Survey) -> "Moving":
         """Lanes (N,) of which each is a pose of a chain."""
-        inertias = inertias_of(chains, chain, seen)
-        count, n = len(inertias), 6 * inertias.shape[1]
-        mass = np.empty((count, n, n))
-        _weigh(seen.axes, inertias, mass)
-        return cls(seen, inertias, mass)
+        inertias = lanes(inertias_of(chains, chain, seen), seen.count)
+        return cls(seen, inertias, masses_of(seen, inertias))
 
     def inertial(self, rates: Array) -> Array:
         """(N, J, 6) what inertia asks of each axis at rates (N, J, 6) that do not change."""
@@ -52,33 +49,62 @@ class Moving:
 
 
 def inertias_of(chains: Chains, chain: Indices, seen: Survey) -> Array:
-    """(N, J, 6, 6) inertia of each vertebra by its twist, about the origin of ground."""
-    found = np.empty((*seen.shifted.shape[:2], 6, 6))
-    bodies = (chain, chains.masses, chains.coms, chains.inertias)
-    _place_inertias(bodies, seen.turned, seen.shifted, found)
+    """Inertia of each vertebra by its twist, about the origin of ground, in blocks."""
+    turned, shifted = seen.numbers[5:]
+    found = np.empty((*shifted.shape[:2], 6, 6, WIDTH))
+    bodies = tuple(map(flat, (chains.masses, chains.coms, chains.inertias)))
+    _place_inertias(chain, bodies, turned, shifted, found)
+    return found
+
+
+def momenta_of(axes: Array, inertias: Array) -> Array:
+    """(N, J, 6, 6) momentum by each axis of all that its joint carries."""
+    found: Array = axes @ np.cumsum(inertias[:, ::-1], axis=1)[:, ::-1]
+    return found
+
+
+def masses_of(seen: Survey, inertias: Array) -> Array:
+    """(N, n, n) mass matrices: momentum by each axis along earlier ones (Featherstone's CRBA)."""
+    axes = seen.axes
+    shape = (len(axes), 6 * axes.shape[1], 6)
+    momenta = momenta_of(axes, inertias).reshape(shape)
+    lower = np.tril(momenta @ axes.reshape(shape).swapaxes(1, 2))
+    found: Array = lower + np.tril(lower, -1).swapaxes(1, 2)
     return found
 
 
 def tangents_of(seen: Survey) -> Array:
     """(N, n, n) tangents of what the joints hold less what is applied."""
-    count, n = len(seen.axes), 6 * seen.axes.shape[1]
-    found = np.empty((count, n, n))
-    _unfold(seen.numbers, found)
+    axes, slopes, joints = seen.axes, seen.slopes, seen.numbers[0].shape[1]
+    count, n = len(axes), 6 * joints
+    down, moments = axes[..., :3] @ slopes, axes @ slopes.swapaxes(2, 3)
+    along = axes.reshape(count, n, 6).swapaxes(1, 2)
+    below = (down + seen.rows).reshape(count, n, 6) @ along
+    above = moments.reshape(count, n, 3) @ along[:, :3]
+    earlier = np.kron(np.tri(joints, k=-1), np.ones((6, 6)))
+    found: Array = -earlier * below - (earlier * above).swapaxes(1, 2)
+    own = seen.stiff - down @ axes.swapaxes(2, 3)
+    for j in range(joints):
+        found[:, 6 * j : 6 * j + 6, 6 * j : 6 * j + 6] = own[:, j]
     return found
 
 
-@compiled
-def _inertia(
-    turned: Array, shifted: Array, mass: float, com: Array, own: Array, found: Array
-) -> None:
-    """Fill the inertia (6, 6) of a displaced vertebra about the origin of ground."""
-    c, half = np.empty(3), np.empty((3, 3))
+@inner
+def _inertia(turned: Array, shifted: Array, body: Plain, work: Array, found: Array) -> None:
+    """Fill the inertia (6, 6) of a displaced vertebra about the origin of ground.
+
+    Parameters
+    ----------
+    body : mass (1,), centre of mass (3,) and inertia (3, 3) about it. work : (12,).
+    """
+    masses, com, own = body
+    mass, c, half = masses[0], work[:3], work[3:].reshape((3, 3))
     for r in range(3):
         c[r] = shifted[r]
         for k in range(3):
             c[r] += turned[r, k] * com[k]
-            half[r, k] = 0.0
-            for i in range(3):
+            half[r, k] = turned[r, 0] * own[0, k]
+            for i in range(1, 3):
                 half[r, k] += turned[r, i] * own[i, k]
     square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2]
     found[:] = 0.0
@@ -99,85 +125,25 @@ def _inertia(
 
 
 @compiled
-def _place_inertias(bodies: Plain, turned: Array, shifted: Array, found: Array) -> None:
-    """Fill the inertias (N, J, 6, 6)."""
-    chain_of, masses, coms, own = bodies
-    for n in range(len(turned)):
-        chain = chain_of[n]
-        for j in range(turned.shape[1]):
-            _inertia(
-                turned[n, j],
-                shifted[n, j],
-                masses[chain, j],
-                coms[chain, j],
-                own[chain, j],
-                found[n, j],
-            )
-
-
-@compiled
-def _weigh(every_axes: Array, inertias: Array, mass: Array) -> None:
-    """Fill the mass matrices (N, n, n)."""
-    carried, momentum = np.empty((6, 6)), np.empty(6)
-    for n in range(len(inertias)):
-        axes = every_axes[n]
-        carried[:] = 0.0
-        for j in range(len(axes) - 1, -1, -1):
-            for r in range(6):
-                for c in range(6):
-                    carried[r, c] += inertias[n, j, r, c]
-            for k in range(6):
-                for r in range(6):
-                    momentum[r] = 0.0
-                    for c in range(6):
-                        momentum[r] += carried[r, c] * axes[j, k, c]
-                for i in range(j + 1):
-                    for c in range(6):
-                        value = 0.0
-                        for r in range(6):
-                            value += axes[i, c, r] * momentum[r]
-                        mass[n, 6 * j + k, 6 * i + c] = value
-                        mass[n, 6 * i + c, 6 * j + k] = value
-
-
-@compiled
-def _unfold(seen: Plain, found: Array) -> None:
-    """Fill the tangents (N, n, n) from what the survey keeps of them joint by joint."""
-    every_axes, _, every_rows, every_blocks, every_slopes, _, _ = seen
-    joints = every_axes.shape[1]
-    down, moments = np.empty((6, 6)), np.empty((6, 3))
-    for n in range(len(every_axes)):
+def _place_inertias(
+    chain: Indices, bodies: Plain, every_turned: Array, every_shifted: Array, every: Array
+) -> None:
+    """Fill the inertias (B, J, 6, 6, 4); bodies (M, n)."""
+    joints = every.shape[1]
+    given, work = np.empty((13 * joints, WIDTH)), vectors(np.empty((12, WIDTH)))
+    numbers = vectors(given)
+    coms = numbers[joints : 4 * joints].reshape((joints, 3))
+    own = numbers[4 * joints :].reshape((joints, 3, 3))
+    for block in range(len(every)):
+        at = 0
+        for one in bodies:
+            gather(one, chain, WIDTH * block, given[at : at + one.shape[1]])
+            at += one.shape[1]
+        turned, shifted = vectors(every_turned[block]), vectors(every_shifted[block])
+        found = vectors(every[block])
         for j in range(joints):
-            axes, slopes = every_axes[n, j], every_slopes[n, j]
-            for k in range(6):
-                for c in range(6):
-                    down[k, c] = 0.0
-                    for r in range(3):
-                        down[k, c] += axes[k, r] * slopes[r, c]
-                for r in range(3):
-                    moments[k, r] = 0.0
-                    for c in range(6):
-                        moments[k, r] += slopes[r, c] * axes[k, c]
-            for k in range(6):
-                for c in range(6):
-                    value = every_blocks[n, j, k, c]
-                    for r in range(6):
-                        value -= down[k, r] * axes[c, r]
-                    found[n, 6 * j + k, 6 * j + c] = value
-            for k in range(6):
-                for c in range(6):
-                    down[k, c] += every_rows[n, j, k, c]
-            for i in range(j):
-                other = every_axes[n, i]
-                for k in range(6):
-                    for c in range(6):
-                        lower, upper = 0.0, 0.0
-                        for r in range(6):
-                            lower += down[k, r] * other[c, r]
-                        for r in range(3):
-                            upper += moments[k, r] * other[c, r]
-                        found[n, 6 * j + k, 6 * i + c] = -lower
-                        found[n, 6 * i + c, 6 * j + k] = -upper
+            body = (numbers[j : j + 1], coms[j], own[j])
+            _inertia(turned[j], shifted[j], body, work, found[j])
 
 
 @compiled

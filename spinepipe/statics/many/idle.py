@@ -6,7 +6,7 @@ answers any. Without memory its answers to unit loads on each axis serve all of 
 remember are led through all loads at once, step by step. An instrument changes its own reading.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, TypeGuard, cast
@@ -14,10 +14,9 @@ from typing import NamedTuple, TypeGuard, cast
 import numpy as np
 
 from spinepipe.effects import Effect, Kind
-from spinepipe.effects.contract import Array, GeometryEffect, Indices, JointLaw, PathLaw
+from spinepipe.effects.contract import Array, GeometryEffect, JointLaw, PathLaw
 from spinepipe.statics.holding import hold
 from spinepipe.statics.instruments import Instrument
-from spinepipe.statics.many.bound import Bound
 from spinepipe.statics.many.derive import answered, answered_on_path, reported, reported_by
 from spinepipe.statics.many.stack import Stack
 
@@ -153,25 +152,13 @@ class Answering:
         joints, count = self.stack.joints, self.q.size // 6
         q, first = np.zeros((count, 6)), np.zeros((count, 6, 6))
         load, tangent = np.zeros((count, 6)), np.zeros((count, 6, 6))
-        for lanes, bound in self._walked():
+        for lanes, bound in self.stack.walked(self.q):
             at = (joints * lanes[:, None] + np.arange(joints)).ravel()
             placed = bound.placed(self.q[lanes])
             found = hold(placed, bound.laws, bound.states, moved=False)
             q[at], load[at], tangent[at] = placed.q, found.load, found.tangent
             first[at] = placed.by_coordinate if bound.geometry else np.eye(6)
         return _Held(q, load, tangent, first if self.stack.effects.geometry else None)
-
-    def _walked(self) -> Iterator[tuple[Indices, Bound]]:
-        """All lanes in portions, with what acts on them and what that remembers there."""
-        stack, states = self.stack, self.stack.initial_states()
-        for runs in stack.chunks(np.flatnonzero(~stack.remembers)):
-            lanes = stack.lanes(runs)
-            yield lanes, stack.bound(lanes, states)
-        for runs in stack.chunks(np.flatnonzero(stack.remembers), stepwise=True):
-            for _, lanes in stack.steps(runs):
-                bound = stack.bound(lanes, states)
-                yield lanes, bound
-                stack.remember(states, bound, bound.after(self.q[lanes]))
 
     def _own(self, idle: Idle) -> _Own:
         """What each joint's own effect would do; m = S P, shapes first."""

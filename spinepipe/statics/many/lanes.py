@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.effects import Effect, Kind
 from spinepipe.effects.contract import AcrossJoints, Array, Indices
 from spinepipe.effects.dead_load import DeadLoad
-from spinepipe.model import SpineModel
+from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.statics.sensitivity import FreeParameter
 
 
@@ -23,7 +24,7 @@ class Acting:
     Attributes
     ----------
     place : in each model's effects. owner : (V,) model of each row of values.
-    run, joint, row : (K,) of each place: the run, its joint, and the row of its values; by run.
+    joint, row : (K,) of each place, run by run: its joint, and the row of its values.
     values : (V, P) of all models one after the other.
     first : (R + 1,) number of places before each run.
     """
@@ -31,7 +32,6 @@ class Acting:
     effect: Effect
     place: int
     owner: Indices
-    run: Indices
     joint: Indices
     row: Indices
     values: Array
@@ -43,13 +43,27 @@ class Acting:
         found = [models[owner].effects[self.place].values for owner in owners]
         return replace(self, values=np.concatenate(found))
 
+    def repeated(self, values: Array) -> "Acting":
+        """One run of one model as runs of M models, each its own, with values (M, R, P)."""
+        each, (rows, places) = np.arange(len(values)), (len(self.values), len(self.joint))
+        return replace(
+            self,
+            owner=np.repeat(each, rows),
+            joint=np.tile(self.joint, len(values)),
+            row=(rows * each[:, None] + self.row).ravel(),
+            values=values.reshape(-1, values.shape[2]),
+            first=places * np.arange(len(values) + 1),
+        )
+
+    @property
+    def acts(self) -> NDArray[np.bool_]:
+        """(R,) in which runs it has a place."""
+        return np.diff(self.first) > 0
+
     def on(self, runs: Indices) -> tuple[Indices, Indices]:
         """Its places on lanes of these runs (N,), lane by lane: (K',) places and their lanes."""
         count = self.first[runs + 1] - self.first[runs]
-        lanes = np.repeat(np.arange(len(runs)), count)
-        ends = np.cumsum(count)
-        within = np.arange(len(lanes)) - np.repeat(ends - count, count)
-        return np.repeat(self.first[runs], count) + within, lanes
+        return ranges(self.first[runs], count), np.repeat(np.arange(len(runs)), count)
 
     def by_unknowns(self, free: Sequence[Sequence[FreeParameter]], count: int) -> Array:
         """(V, P, m) derivative of the values by the unknowns of the model that owns each row."""
@@ -94,9 +108,9 @@ class Effects:
         """The same with the values of these models."""
         return self._each(lambda one: one.with_models(models))
 
-    def with_values(self, values: Sequence[Array]) -> "Effects":
-        """The same with values (M, R, P) of each effect, for models with the same effects."""
-        return self._each(lambda one: replace(one, values=np.concatenate(values[one.place])))
+    def repeated(self, values: Sequence[Array]) -> "Effects":
+        """Of one run of one model those of M, each its own model; values (M, R, P) by effect."""
+        return self._each(lambda one: one.repeated(values[one.place]))
 
     def _each(self, change: Callable[[Acting], Acting]) -> "Effects":
         groups = {f.name: tuple(map(change, getattr(self, f.name))) for f in fields(self)}
@@ -124,38 +138,42 @@ def acting(models: Sequence[SpineModel], runs: Sequence[tuple[int, str]]) -> Ite
     """
     most = max((len(model.effects) for model in models), default=0)
     for place in range(most):
-        groups: dict[Effect, list[int]] = {}
+        groups: dict[Effect, dict[int, ScopedEffect]] = {}
         for number, model in enumerate(models):
             if place < len(model.effects):
-                groups.setdefault(model.effects[place].effect, []).append(number)
+                scoped = model.effects[place]
+                groups.setdefault(scoped.effect, {})[number] = scoped
         for effect, members in groups.items():
-            yield _one(models, runs, effect, place, members)
+            yield _one(effect, place, members, runs)
 
 
 def _one(
-    models: Sequence[SpineModel],
-    runs: Sequence[tuple[int, str]],
-    effect: Effect,
-    place: int,
-    members: Sequence[int],
+    effect: Effect, place: int, members: dict[int, ScopedEffect], runs: Sequence[tuple[int, str]]
 ) -> Acting:
-    before: dict[int, int] = {}
-    owner: list[int] = []
-    for number in members:
-        before[number] = len(owner)
-        owner += [number] * len(models[number].effects[place].values)
-    found: list[tuple[int, int, int]] = []
-    first = [0]
-    for run, (number, test) in enumerate(runs):
-        if number in before:
-            scoped = models[number].effects[place]
-            if scoped.in_scope(test):
-                found += [
-                    (run, joint, before[number] + (k if effect.per_joint else 0))
-                    for k, joint in enumerate(scoped.joints)
-                ]
-        first.append(len(found))
-    run_of, joint_of, row_of = np.array(found, dtype=np.int64).reshape(-1, 3).T
-    values = np.concatenate([models[number].effects[place].values for number in members])
-    owners, firsts = np.array(owner), np.array(first)
-    return Acting(effect, place, owners, run_of, joint_of, row_of, values, firsts)
+    """An effect at one place of the models that have it, by their numbers."""
+    values = [scoped.values for scoped in members.values()]
+    sizes = [len(of_model) for of_model in values]
+    before = dict(zip(members, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
+    nowhere = np.zeros(0, dtype=np.int64)
+    there = {number: np.array(scoped.joints, dtype=np.int64) for number, scoped in members.items()}
+    joints = [
+        there[number] if number in there and members[number].in_scope(test) else nowhere
+        for number, test in runs
+    ]
+    count = np.array([len(of_run) for of_run in joints], dtype=np.int64)
+    rows = np.array([before.get(number, 0) for number, _ in runs], dtype=np.int64)
+    return Acting(
+        effect,
+        place,
+        np.repeat(list(members), sizes),
+        np.concatenate([nowhere, *joints]),
+        ranges(rows, count) if effect.per_joint else np.repeat(rows, count),
+        np.concatenate(values),
+        np.concatenate([[0], np.cumsum(count)]),
+    )
+
+
+def ranges(first: Indices, count: Indices) -> Indices:
+    """``count`` (N,) numbers that follow each other from each of ``first`` (N,)."""
+    before = np.cumsum(count) - count
+    return np.repeat(first - before, count) + np.arange(count.sum())

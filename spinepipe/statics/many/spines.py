@@ -1,5 +1,6 @@
 """Many spines of one structure, and the same test of each: numbers as arrays, names once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,8 +10,11 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, SpineModel
 from spinepipe.statics.many.lanes import Effects
-from spinepipe.statics.many.stack import Stack, durations, supports_of
+from spinepipe.statics.many.stack import Stack, chains_of, durations, supports_of, wrenches_of
 from spinepipe.statics.many.survey import Chains, Loads
+
+_NUMBERS = ("rotations", "origins", "masses", "coms", "inertias", "damping")
+"""What spines share with `Chains`, by the same names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,29 +45,15 @@ class Spines:
     @classmethod
     def of(cls, model: SpineModel, count: int) -> "Spines":
         """The same spine that many times."""
-        return cls(
-            model,
-            _repeated([frame.rotation for frame in model.frames], count),
-            _repeated([frame.origin for frame in model.frames], count),
-            _repeated([body.mass for body in model.bodies], count),
-            _repeated([body.com for body in model.bodies], count),
-            _repeated([body.inertia for body in model.bodies], count),
-            _repeated(model.damping, count),
-            tuple(_repeated(scoped.values, count) for scoped in model.effects),
-        )
+        chain = chains_of([model])._asdict()
+        numbers = {name: _repeated(chain[name][0], count) for name in _NUMBERS}
+        values = tuple(_repeated(scoped.values, count) for scoped in model.effects)
+        return cls(like=model, **numbers, values=values)
 
     def part(self, chosen: slice | Indices) -> "Spines":
         """Some of them."""
-        return replace(
-            self,
-            rotations=self.rotations[chosen],
-            origins=self.origins[chosen],
-            masses=self.masses[chosen],
-            coms=self.coms[chosen],
-            inertias=self.inertias[chosen],
-            damping=self.damping[chosen],
-            values=tuple(values[chosen] for values in self.values),
-        )
+        numbers = {name: getattr(self, name)[chosen] for name in _NUMBERS}
+        return replace(self, **numbers, values=tuple(values[chosen] for values in self.values))
 
     def model(self, i: int) -> SpineModel:
         """One of them as a model of its own.
@@ -106,36 +96,26 @@ class Cases:
     @classmethod
     def of(cls, case: LoadCase, count: int) -> "Cases":
         """The same loads that many times."""
-        most = max((len(step.wrenches) for step in case.steps), default=0)
-        numbers = np.zeros((3, len(case.steps), most, 3))
-        for row, step in enumerate(case.steps):
-            for column, wrench in enumerate(step.wrenches):
-                numbers[:, row, column] = wrench.point, wrench.force, wrench.moment
+        _, *numbers = wrenches_of(case.steps)
         points, forces, moments = (_repeated(part, count) for part in numbers)
         return cls(case, points, forces, moments)
 
     def part(self, chosen: slice | Indices) -> "Cases":
         """Some of them."""
-        return replace(
-            self,
-            points=self.points[chosen],
-            forces=self.forces[chosen],
-            moments=self.moments[chosen],
-        )
+        return Cases(self.like, self.points[chosen], self.forces[chosen], self.moments[chosen])
+
+    def steps(self, chosen: Sequence[int]) -> "Cases":
+        """Some of the steps, by their places."""
+        like = replace(self.like, steps=tuple(self.like.steps[place] for place in chosen))
+        return Cases(like, self.points[:, chosen], self.forces[:, chosen], self.moments[:, chosen])
 
     def case(self, i: int) -> LoadCase:
         """One of them as a load case of its own."""
         steps = []
         for row, step in enumerate(self.like.steps):
-            wrenches = tuple(
-                Wrench(
-                    one.body,
-                    self.points[i, row, w],
-                    self.forces[i, row, w],
-                    self.moments[i, row, w],
-                )
-                for w, one in enumerate(step.wrenches)
-            )
+            at = (self.points[i, row], self.forces[i, row], self.moments[i, row])
+            every = zip(step.wrenches, *at, strict=False)  # where a step has fewer, the rest is 0
+            wrenches = tuple(Wrench(one.body, *numbers) for one, *numbers in every)
             steps.append(replace(step, wrenches=wrenches))
         return replace(self.like, steps=tuple(steps))
 
@@ -144,38 +124,30 @@ def stacked(spines: Spines, cases: Cases) -> Stack:
     """The same test of many spines, a run each."""
     count, steps = len(spines), len(cases.like.steps)
     like, test = spines.like, cases.like
-    chain = np.arange(count)
-    chains = Chains(
-        spines.rotations,
-        spines.origins,
-        spines.masses,
-        spines.coms,
-        spines.inertias,
-        spines.damping,
-        np.repeat(like.gravity[None], count, axis=0),
-    )
-    most = cases.points.shape[2]
-    bodies = np.full((steps, most), -1)
-    for row, step in enumerate(test.steps):
-        bodies[row, : len(step.wrenches)] = [wrench.body for wrench in step.wrenches]
+    # copies, which may be written to: kernels are compiled for such arrays alone
+    numbers = {name: np.array(getattr(spines, name), order="C") for name in _NUMBERS}
+    chains = Chains(**numbers, gravity=np.array(_repeated(like.gravity, count), order="C"))
+    row = np.tile(np.arange(steps), count)
+    bodies = wrenches_of(test.steps)[0][row]
     points, forces, moments = (
-        numbers.reshape(-1, most, 3) for numbers in (cases.points, cases.forces, cases.moments)
+        np.array(one, order="C").reshape(*bodies.shape, 3)
+        for one in (cases.points, cases.forces, cases.moments)
     )
-    supports = supports_of(test.steps * count, like.n_joints)
-    places = np.repeat(chain, steps), np.tile(bodies, (count, 1))
-    listed = Loads(*places, points, forces, moments, supports)
-    effects = Effects.of([like] * count, [(number, test.test) for number in chain.tolist()])
+    supports = supports_of(test.steps, like.n_joints).part(row)
+    chain = np.repeat(np.arange(count), steps)
+    listed = Loads(chain, bodies, points, forces, moments, supports)
     return Stack.made(
         spines.model,
         cases.case,
-        Chains(*map(np.ascontiguousarray, chains)),
-        effects.with_values(spines.values),
+        chains,
+        Effects.of([like], [(0, test.test)]).repeated(spines.values),
         listed,
-        [durations(test)] * count,
+        np.full(count, steps),
+        durations(test)[row],
     )
 
 
 def _repeated(one: object, count: int) -> Array:
-    """(count, ...) copies."""
+    """(count, ...) of the same numbers, kept once."""
     values = np.asarray(one, dtype=float)
-    return np.repeat(values[None], count, axis=0)
+    return np.broadcast_to(values, (count, *values.shape))

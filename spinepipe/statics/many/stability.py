@@ -7,45 +7,53 @@ decays. Such a mode has
 
     x* S x = w^2 x* M x   and   t x* (i A) x = -w x* x,   hence |w| <= |A|.
 
-With v = |w| / t, no less than |w| and no more than |A|, there is none if S - v^2 M + c (v - i A) is
-positive definite for some c >= 0: on x the last term is nothing, so x* S x > v^2 x* M x. Where
-S - v2^2 M + c (v1 - i A) is positive definite that holds for all v from v1 to v2. One interval with
-c = 0 proves nearly all spines of up to ten joints; others are proven interval by interval, and
-the rest by the rates of all their modes.
+There is none up to a w where S - w^2 M is positive definite, which up to |A| proves nearly all
+spines of up to ten joints. A moment m on a single vertebra is what A is of in most tests: then
+A = U B U', with the turns U' of that vertebra about two axes across m and B = |m|/2 ((0, 1), (-1,
+0)), and a mode at w needs, with H = S - w^2 M + i w and F(w) = U' H^-1 U,
+
+    det(1 + t B F) = 1 + t^2 (|m|/2)^2 det F(w) = 0   (F is symmetric).
+
+There is none where (|m|/2)^2 det F is no number from minus infinity to -1. F is computed at a few
+w; how far off it may be between these is bounded, for |H(w)^-1| <= 1/w: with X = H^-1 U and E the
+change of H, F changes by X' E X and at most |E X|^2 / w more (Nyquist's criterion, with bounds
+between its samples). The rest is proven by the rates of all modes.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.equilibrium import decays
-from spinepipe.statics.many.dynamics import inertias_of, tangents_of
-from spinepipe.statics.many.proofs import apart, twists
-from spinepipe.statics.many.survey import Chains, Loads, Survey, survey
+from spinepipe.statics.many.dynamics import inertias_of, masses_of, momenta_of, tangents_of
+from spinepipe.statics.many.proofs import apart, respond, twists
+from spinepipe.statics.many.survey import Chains, Loads, Survey, part, survey
+from spinepipe.statics.many.vectors import blocks, lanes
 
 Flags = NDArray[np.bool_]
 
-FIRST = (0.8, 0.6, 0.4, 0.2)
-"""Shares of |A| up to which c = 0 is tried."""
+FIRST = (0.8, 0.6, 0.4, 0.2, 0.1)
+"""Shares of |A| up to which S - w^2 M may be positive definite."""
 
-FURTHER, WEIGHTS = (1.5, 1.2, 1.1), (0.5, 1.0, 0.25)
-"""Factors by which an interval ends above its start v1, and c over v1 tr(M)."""
-
-MOST_INTERVALS = 12
+PIECE, HALVINGS = 1.25, 5
+"""Between that and |A|, F is bounded in pieces that end so many times above their start at most,
+and one that fails is halved so often."""
 
 STIFF = 1e6
 """Of the largest stiffness, springs on coordinates that a rig fixes."""
 
+EVEN = 1e-12
+"""Of a tangent's largest entry: by less, rounding makes what a joint holds unsymmetric."""
+
 
 def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
     """(N,) which lanes are stable at q (N, J, 6) with the joints' tangents (N, J, 6, 6)."""
-    lanes = lanes_of(chains, loads, q, tangents)
-    proven = proven_by_forms(lanes)
+    every = lanes_of(chains, loads, q, tangents)
+    proven = proven_by_forms(every)
     for lane in np.flatnonzero(~proven):
-        mass, stiffness = matrices(lanes.part(np.array([lane])))
+        mass, stiffness = matrices(every.part(np.array([lane])))
         sign, _ = np.linalg.slogdet(stiffness)
         proven[lane] = sign > 0.0 and decays(mass, stiffness)
     return proven
@@ -54,7 +62,9 @@ def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Fl
 def lanes_of(chains: Chains, loads: Loads, q: Array, tangents: Array) -> "Lanes":
     """Lanes at q (N, J, 6) with all that decides their stability."""
     seen, chain = survey(chains, loads, q, _held(loads, tangents)), loads.chain
-    return Lanes(seen, inertias_of(chains, chain, seen), chains.damping[chain])
+    bent = np.abs(tangents - tangents.swapaxes(2, 3)).max(axis=(1, 2, 3))
+    even = bent <= EVEN * np.abs(tangents).max(axis=(1, 2, 3))
+    return Lanes(seen, inertias_of(chains, chain, seen), chains.damping[chain], loads, even)
 
 
 def _held(loads: Loads, tangents: Array) -> Array:
@@ -72,73 +82,115 @@ def _held(loads: Loads, tangents: Array) -> Array:
     return found
 
 
-def proven_by_forms(lanes: "Lanes") -> Flags:
+def proven_by_forms(every: "Lanes") -> Flags:
     """(N,) which lanes are proven stable without the rates of their modes."""
-    square = np.zeros(len(lanes.damping))
-    twists(lanes.seen.numbers, lanes.damping, square)
-    top, nothing = np.sqrt(square), np.zeros(len(square))
-    proven = lanes.apart(nothing, top, nothing)
+    top = every.top
+    proven = every.apart(top)
     doubt = np.flatnonzero(~proven)
     if len(doubt):
-        proven[doubt] = _by_intervals(lanes.part(doubt), top[doubt])
+        proven[doubt] = _by_response(every.part(doubt), top[doubt])
     return proven
 
 
 @dataclass(frozen=True, eq=False)
 class Lanes:
-    """Lanes with the inertia (N, J, 6, 6) of each vertebra by its twist, and damping (N, J, 6)."""
+    """Lanes with the inertia of each vertebra by its twist, in blocks (B, J, 6, 6, 4), and damping.
+
+    Attributes
+    ----------
+    damping : (N, J, 6). even : (N,) whether what the joints hold is symmetric.
+    """
 
     seen: Survey
     inertia: Array
     damping: Array
+    loads: Loads
+    even: Flags
 
-    def part(self, lanes: Indices) -> "Lanes":
+    def part(self, chosen: Indices) -> "Lanes":
         """Some of them."""
-        return Lanes(self.seen.part(lanes), self.inertia[lanes], self.damping[lanes])
+        inertia = blocks(lanes(self.inertia, self.seen.count)[chosen])
+        of = (self.damping[chosen], part(self.loads, chosen), self.even[chosen])
+        return Lanes(self.seen.part(chosen), inertia, *of)
 
-    def apart(self, low: Array, high: Array, weight: Array) -> Flags:
-        """(N,) whether no mode lies between two rates; see `proofs.apart`."""
-        found = np.zeros(len(low), dtype=bool)
-        apart(self.seen.numbers, self.inertia, self.damping, low, high, weight, found)
+    @property
+    def top(self) -> Array:
+        """(N,) no less than |A|."""
+        squares = np.empty((len(self.inertia), self.inertia.shape[-1]))
+        twists(self.seen.numbers, blocks(self.damping), squares)
+        return np.sqrt(lanes(squares, self.seen.count))
+
+    def apart(self, rate: Array) -> Flags:
+        """(N,) whether S - w^2 M is positive definite at w = rate (N,)."""
+        found = np.zeros(len(rate), dtype=bool)
+        apart(self.seen.numbers, self.inertia, blocks(rate**2), found)
         return found
 
-    @cached_property
-    def momenta(self) -> Array:
-        """(N, J, 6, 6) momentum by each axis of all that its joint carries."""
-        result: Array = self.seen.axes @ np.cumsum(self.inertia[:, ::-1], axis=1)[:, ::-1]
-        return result
+    def moment(self) -> tuple[Flags, Indices, Array]:
+        """(N,) whether moments act on one vertebra alone, which, and their sum (N, 3)."""
+        rows, total = np.arange(len(self.damping)), np.zeros((*self.damping.shape[:2], 3))
+        for body, moment in zip(
+            self.loads.bodies.T, self.loads.moments.swapaxes(0, 1), strict=True
+        ):
+            np.add.at(total, (rows, body), moment * (body >= 0)[:, None])
+        there = total.any(axis=2)
+        body = there.argmax(axis=1)
+        return there.sum(axis=1) == 1, body, total[rows, body]
 
 
-def _by_intervals(lanes: Lanes, top: Array) -> Flags:
-    """(N,) interval by interval up to top (N,)."""
-    reached, nothing = np.zeros(len(top)), np.zeros(len(top))
+def _by_response(every: Lanes, top: Array) -> Flags:
+    """(N,) which spines under a moment on one vertebra have no mode with w up to top (N,)."""
+    low = np.zeros(len(top))
     for share in FIRST:
-        left = np.flatnonzero(reached == 0.0)
-        good = lanes.part(left).apart(nothing[left], share * top[left], nothing[left])
-        reached[left[good]] = share * top[left[good]]
-    trace = np.sum(np.sum(lanes.momenta * lanes.seen.axes, axis=3) / lanes.damping, axis=(1, 2))
-    for _ in range(MOST_INTERVALS):
-        going = np.flatnonzero((reached > 0.0) & (reached < top))
-        before = reached.copy()
-        for factor in FURTHER:
-            for share in WEIGHTS:
-                left = going[reached[going] == before[going]]
-                low = reached[left]
-                high, weight = np.minimum(factor * low, top[left]), share * low * trace[left]
-                good = lanes.part(left).apart(low, high, weight)
-                reached[left[good]] = high[good]
-        if not (reached > before).any():
-            break
-    found: Flags = (reached >= top) & (reached > 0.0)
+        low = np.where((low == 0.0) & every.apart(share * top), share * top, low)
+    single, body, moment = every.moment()
+    found: Flags = single & every.even & (low > 0.0)
+    going = np.flatnonzero(found)
+    if not len(going):
+        return found
+    size = np.linalg.norm(moment, axis=1)
+    least = np.eye(3)[np.abs(moment).argmin(axis=1)]
+    one = np.cross(moment, least)
+    both = np.stack([one, np.cross(moment, one)], axis=1)
+    across = both / np.maximum(np.linalg.norm(both, axis=2, keepdims=True), np.finfo(float).tiny)
+    seen = (every.seen.axes, every.seen.rows, every.seen.stiff, every.seen.slopes)
+    inertia = lanes(every.inertia, len(top))
+    momenta = momenta_of(every.seen.axes, inertia)
+    trace = np.sum(np.sum(momenta * every.seen.axes, axis=3) / every.damping, axis=(1, 2))
+    width = np.log(top[going] / low[going])
+    count = np.ceil(width / np.log(PIECE)).astype(np.int64)
+    lane, ratio = np.repeat(going, count), np.exp(np.repeat(width / count, count))
+    number = np.arange(len(lane)) - np.repeat(np.cumsum(count) - count, count)
+    begin, end = low[lane] * ratio**number, low[lane] * ratio ** (number + 1)
+    for _ in range(HALVINGS):
+        middle = np.sqrt(begin * end)
+        compliance, moving = np.empty((len(lane), 2, 2), complex), np.empty(len(lane))
+        respond(seen, inertia, every.damping, (body, across), (lane, middle), compliance, moving)
+        # x* C x of both motions, told by the imaginary part, and how far off F may be in the piece
+        damped = -np.trace(compliance.imag, axis1=1, axis2=2) / middle
+        squares, rates = end**2 - middle**2, end - middle
+        beside = squares * np.sqrt(trace[lane] * moving) + rates * np.sqrt(damped)
+        off = squares * moving + rates * damped + beside**2 / begin
+        gain = (0.5 * size[lane]) ** 2
+        number = gain * np.linalg.det(compliance)
+        change = gain * (np.linalg.norm(compliance, axis=(1, 2)) * off + 0.5 * off**2)
+        distance = np.where(number.real < -1.0, np.abs(number.imag), np.abs(1.0 + number))
+        left = np.flatnonzero(~(distance > change))
+        if not len(left):
+            return found
+        lane = np.repeat(lane[left], 2)
+        ends = np.stack([begin[left], middle[left], end[left]], axis=1)
+        begin, end = ends[:, :2].ravel(), ends[:, 1:].ravel()
+    found[lane] = False
     return found
 
 
 def matrices(lane: Lanes) -> tuple[Array, Array]:
     """Mass matrix and tangent (n, n) of one lane's free coordinates, where damping is one."""
     scale = 1.0 / np.sqrt(lane.damping.ravel())
-    both, n = scale[:, None] * scale, len(scale)
-    lower = np.tril(lane.momenta.reshape(n, 6) @ lane.seen.axes.reshape(n, 6).T)
-    mass, tangent = (lower + np.tril(lower, -1).T) * both, tangents_of(lane.seen)[0] * both
+    both = scale[:, None] * scale
+    mass = masses_of(lane.seen, lanes(lane.inertia, 1))[0] * both
+    tangent = tangents_of(lane.seen)[0] * both
     if not len(lane.seen.fixed):
         return mass, tangent
     free = np.ix_(*[np.flatnonzero(~lane.seen.fixed.ravel())] * 2)

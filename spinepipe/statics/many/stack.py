@@ -20,7 +20,7 @@ from spinepipe.statics.many.bound import Bound, PathStates
 from spinepipe.statics.many.continuation import Increment, continued, scaled
 from spinepipe.statics.many.dead import with_dead_loads
 from spinepipe.statics.many.dynamics import tangents_of
-from spinepipe.statics.many.lanes import Acting, Effects
+from spinepipe.statics.many.lanes import Acting, Effects, ranges
 from spinepipe.statics.many.newton import Before, certified, newton, stands
 from spinepipe.statics.many.survey import FREE, Chains, Loads, Supports, part, survey
 from spinepipe.statics.path import follow
@@ -34,7 +34,7 @@ Run = tuple[int, LoadCase]
 
 NO_WAY = "no stable equilibrium on the way from the neutral pose"
 
-CHUNK = 40_000
+CHUNK = 80_000
 """Numbers in the tangents that are worked on together: they should stay in a core's cache."""
 
 
@@ -95,13 +95,25 @@ class Stack:
         """Runs of models; ValueError where these differ in their number of joints."""
         if len({model.n_joints for model in models}) != 1:
             raise ValueError("models of a stack have equally many joints")
+        cases = {id(case): case for _, case in runs}  # models share them: each is read once
+        of_case = np.array([len(case.steps) for case in cases.values()], dtype=np.int64)
+        first = dict(zip(cases, np.cumsum(of_case) - of_case, strict=True))
+        steps = np.array([len(case.steps) for _, case in runs], dtype=np.int64)
+        lanes = ranges(np.array([first[id(case)] for _, case in runs], dtype=np.int64), steps)
+        chain = np.repeat(np.array([number for number, _ in runs], dtype=np.int64), steps)
+        every = [step for case in cases.values() for step in case.steps]
+        supports = supports_of(every, models[0].n_joints)
+        own = Loads(np.zeros(len(every), dtype=np.int64), *wrenches_of(every), supports)
+        listed = part(own, lanes)._replace(chain=chain)
+        seconds = np.concatenate([np.zeros(0), *map(durations, cases.values())])[lanes]
         return cls.made(
             tuple(models).__getitem__,
             [case for _, case in runs].__getitem__,
-            _chains(models),
+            chains_of(models),
             Effects.of(models, [(number, case.test) for number, case in runs]),
-            _listed(runs, models[0].n_joints),
-            [durations(case) for _, case in runs],
+            listed,
+            steps,
+            seconds,
         )
 
     @classmethod
@@ -112,10 +124,10 @@ class Stack:
         chains: Chains,
         effects: Effects,
         listed: Loads,
-        seconds: Sequence[Array],
+        steps: Indices,
+        seconds: Array,
     ) -> "Stack":
-        """Runs of chains; ``seconds`` (T,) of each run's steps."""
-        steps = [len(one) for one in seconds]
+        """Runs of chains; ``steps`` (R,) of each run, and how long each takes, ``seconds`` (L,)."""
         run = np.repeat(np.arange(len(steps)), steps)
         paths = [law for law in effects.laws if law.effect.kind is Kind.PATH]
         return cls(
@@ -127,7 +139,7 @@ class Stack:
             with_dead_loads(effects.dead, chains, listed, run),
             run,
             np.concatenate([[0], np.cumsum(steps)]),
-            np.concatenate(seconds),
+            seconds,
             _released(listed, chains, run, bool(effects.dead)),
             _spacing([*effects.laws, *effects.geometry], len(steps)),
             _runs_with(paths, len(steps)),
@@ -164,7 +176,7 @@ class Stack:
         for runs in self.chunks(np.flatnonzero(open_ones), stepwise=True):
             open_ones[runs] = ~self._step_by_step(runs, None, q, at_once)
         status = np.full(len(self.run), Status.CONVERGED.value, dtype="U20")
-        messages = self._past_critical(q, at_once) if why else {}
+        messages = self.past_critical(q, at_once) if why else {}
         by_engine = self.alone | (open_ones & (self.remembers | why))
         for number in np.flatnonzero(by_engine).tolist():
             self._by_engine(number, q, status, messages)
@@ -174,7 +186,7 @@ class Stack:
             messages |= dict.fromkeys(lanes, NO_WAY)
         return Poses(q, status, messages, by_engine)
 
-    def _past_critical(self, q: Array, at_once: Flags) -> dict[int, str]:
+    def past_critical(self, q: Array, at_once: Flags) -> dict[int, str]:
         """By lane with a pose q (L, J, 6) whose load would move the neutral pose away.
 
         It is certified not to be so where one step brings there from the neutral pose, and in later
@@ -232,8 +244,7 @@ class Stack:
 
     def lanes(self, runs: Indices) -> Indices:
         """All lanes of some runs, run by run."""
-        ranges = [np.arange(self.first[run], self.first[run + 1]) for run in runs]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *ranges])
+        return ranges(self.first[runs], self.first[runs + 1] - self.first[runs])
 
     def _at_once(self, runs: Indices, guess: Array, q: Array) -> Flags:
         """Enter the poses of runs without memory, all steps together; which runs are solved."""
@@ -279,10 +290,23 @@ class Stack:
             live = np.flatnonzero(steps > number)
             yield live, self.first[runs[live]] + number
 
+    def walked(self, q: Array) -> Iterator[tuple[Indices, Bound]]:
+        """Lanes with a pose q (L, J, 6), in portions, with what acts and what that remembers."""
+        good, states = ~np.isnan(q[:, 0, 0]), self.initial_states()
+        for runs in self.chunks(np.flatnonzero(~self.remembers)):
+            lanes = self.lanes(runs)
+            yield lanes[good[lanes]], self.bound(lanes[good[lanes]], states)
+        for runs in self.chunks(np.flatnonzero(self.remembers), stepwise=True):
+            for _, lanes in self.steps(runs):
+                there = lanes[good[lanes]]
+                bound = self.bound(there, states)
+                yield there, bound
+                self.remember(states, bound, bound.after(q[there]))
+
     def initial_states(self, *unknowns: int) -> dict[int, Array]:
         """States of all path laws before the first step, zero; or their derivatives."""
         return {
-            number: np.zeros((len(law.run), law.effect.n_states, *unknowns))  # type: ignore[attr-defined]
+            number: np.zeros((len(law.joint), law.effect.n_states, *unknowns))  # type: ignore[attr-defined]
             for number, law in enumerate(self.effects.laws)
             if law.effect.kind is Kind.PATH
         }
@@ -369,35 +393,33 @@ class Stack:
                 q[lane] = step.equilibrium.q.reshape(-1, 6)
 
 
-def _chains(models: Sequence[SpineModel]) -> Chains:
-    def numbers(of: Iterator[object]) -> Array:
-        return np.array(list(of), dtype=float)
-
-    return Chains(
-        numbers([frame.rotation for frame in model.frames] for model in models),
-        numbers([frame.origin for frame in model.frames] for model in models),
-        numbers([body.mass for body in model.bodies] for model in models),
-        numbers([body.com for body in model.bodies] for model in models),
-        numbers([body.inertia for body in model.bodies] for model in models),
-        numbers(model.damping for model in models),
-        numbers(model.gravity for model in models),
+def chains_of(models: Sequence[SpineModel]) -> Chains:
+    """The numbers of models with equally many joints."""
+    frames, bodies = [one.frames for one in models], [one.bodies for one in models]
+    numbers = (
+        [[frame.rotation for frame in own] for own in frames],
+        [[frame.origin for frame in own] for own in frames],
+        [[body.mass for body in own] for own in bodies],
+        [[body.com for body in own] for own in bodies],
+        [[body.inertia for body in own] for own in bodies],
+        [model.damping for model in models],
+        [model.gravity for model in models],
     )
+    return Chains(*(np.array(one, dtype=float) for one in numbers))
 
 
-def _listed(runs: Sequence[Run], joints: int) -> Loads:
-    """The loads of every step of every run on chains of J joints."""
-    steps = [(number, step) for number, case in runs for step in case.steps]
-    most = max((len(step.wrenches) for _, step in steps), default=0)
-    bodies = np.full((len(steps), most), -1)
-    numbers = np.zeros((3, len(steps), most, 3))
-    for lane, (_, step) in enumerate(steps):
-        for column, wrench in enumerate(step.wrenches):
-            bodies[lane, column] = wrench.body
-            numbers[:, lane, column] = wrench.point, wrench.force, wrench.moment
-    chain = np.array([number for number, _ in steps], dtype=np.int64)
+def wrenches_of(steps: Sequence[LoadStep]) -> tuple[Indices, Array, Array, Array]:
+    """Bodies (N, W) and points, forces, moments (N, W, 3) of load steps, as of `Loads`."""
+    count = np.array([len(step.wrenches) for step in steps], dtype=np.int64)
+    wrenches = [wrench for step in steps for wrench in step.wrenches]
+    vectors = [vector for one in wrenches for vector in (one.point, one.force, one.moment)]
+    at = np.repeat(np.arange(len(steps)), count), ranges(np.zeros_like(count), count)
+    bodies = np.full((len(steps), count.max(initial=0)), -1)
+    numbers = np.zeros((3, *bodies.shape, 3))
+    bodies[at] = [wrench.body for wrench in wrenches]
+    numbers[:, *at] = np.reshape(vectors, (-1, 3, 3)).swapaxes(0, 1)
     points, forces, moments = numbers
-    supports = supports_of([step for _, step in steps], joints)
-    return Loads(chain, bodies, points, forces, moments, supports)
+    return bodies, points, forces, moments
 
 
 def supports_of(steps: Sequence[LoadStep], joints: int) -> Supports:
@@ -427,17 +449,17 @@ def durations(case: LoadCase) -> Array:
 
 def _released(listed: Loads, chains: Chains, run: Indices, dead: bool) -> Flags:
     """(L,) see `Stack`; ``dead``: whether effects add loads that stay."""
-    now, count = listed.forces, len(run)
-    last = np.roll(now, 1, axis=0)
-    follows = np.append(False, run[1:] == run[:-1])[:count]
-    same_places = (listed.bodies == np.roll(listed.bodies, 1, axis=0)).all(axis=1)
-    same_places &= (listed.points == np.roll(listed.points, 1, axis=0)).all(axis=(1, 2))
+    found = np.zeros(len(run), dtype=bool)
+    lanes = np.flatnonzero(run[1:] == run[:-1]) + 1
+    now, last = listed.forces[lanes], listed.forces[lanes - 1]
+    same_places = (listed.bodies[lanes] == listed.bodies[lanes - 1]).all(axis=1)
+    same_places &= (listed.points[lanes] == listed.points[lanes - 1]).all(axis=(1, 2))
     squares = np.sum(now * now, axis=(1, 2))
     share = np.sum(now * last, axis=(1, 2)) / np.where(squares > 0.0, squares, 1.0)
     more = (last == share[:, None, None] * now).all(axis=(1, 2)) & (share >= 0.0) & (share <= 1.0)
     if dead or chains.gravity.any():
         more &= share == 1.0
-    found: Flags = follows & ~(same_places & (more | ~last.any(axis=(1, 2))))
+    found[lanes] = ~(same_places & (more | ~last.any(axis=(1, 2))))
     return found
 
 
@@ -445,7 +467,7 @@ def _spacing(effects: Sequence[Acting], count: int) -> Array:
     """(R,) rad, as often as any law or geometry effect of a run asks for."""
     found = np.full(count, SPACING)
     for one in effects:
-        np.minimum.at(found, one.run, straight_over(one.effect))
+        found[one.acts] = np.minimum(found[one.acts], straight_over(one.effect))
     return found
 
 
@@ -453,5 +475,5 @@ def _runs_with(effects: Sequence[Acting], count: int) -> Flags:
     """(R,) which runs have any of these effects."""
     found = np.zeros(count, dtype=bool)
     for one in effects:
-        found[one.run] = True
+        found |= one.acts
     return found

@@ -10,13 +10,24 @@ What PyBullet does for one chain is done here for many; tests hold the two again
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from dataclasses import dataclass
+from math import prod
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
+from spinepipe.statics.many.vectors import (
+    SOURCE,
+    WIDTH,
+    add_product,
+    blocks,
+    gather,
+    lanes,
+    vectors,
+)
 
 Plain = tuple[NDArray[Any], ...]
 """Arrays as compiled code takes them: what is kept of a compilation must not name our classes,
@@ -28,14 +39,22 @@ R = TypeVar("R")
 Flags = NDArray[np.bool_]
 
 
+def inner(function: Callable[P, R]) -> Callable[P, R]:
+    """A function for compiled ones of the same file: these keep it along with themselves."""
+    result: Callable[P, R] = njit(error_model="numpy")(function)
+    return result
+
+
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """The function as machine code, kept beside this file; division by zero is no exception.
 
     Entries are copied and added one by one in loops: for `a[:] = b` or `a += b` of arrays a message
     about shapes is compiled each time, which takes longer than all the rest.
     """
-    result: Callable[P, R] = njit(cache=True, error_model="numpy")(function)
-    return result
+    result: Any = njit(cache=True, error_model="numpy")(function)
+    kept = result._cache._cache_file  # numba looks at the function's own file alone
+    kept._source_stamp = (kept._source_stamp, SOURCE)
+    return cast(Callable[P, R], result)
 
 
 class Chains(NamedTuple):
@@ -75,11 +94,11 @@ class Supports(NamedTuple):
         """Whether any lane may have one."""
         return len(self.fixed) > 0
 
-    def part(self, lanes: Indices) -> "Supports":
+    def part(self, chosen: Indices) -> "Supports":
         """Those of some lanes."""
         if not self.there:
             return self
-        return Supports(self.fixed[lanes], self.values[lanes], self.read_as[lanes])
+        return Supports(self.fixed[chosen], self.values[chosen], self.read_as[chosen])
 
     def towards(self, later: "Supports", share: Array) -> "Supports":
         """The values a share (N,) of the way to those of a later step."""
@@ -116,14 +135,14 @@ class Loads(NamedTuple):
     supports: Supports = FREE
 
 
-def part(loads: Loads, lanes: Indices) -> Loads:
+def part(loads: Loads, chosen: Indices) -> Loads:
     """The loads of some lanes."""
     chain, bodies, points, forces, moments, supports = loads
-    places, wrenches = (chain[lanes], bodies[lanes], points[lanes]), (forces[lanes], moments[lanes])
-    return Loads(*places, *wrenches, supports.part(lanes))
+    wrenches = (bodies[chosen], points[chosen], forces[chosen], moments[chosen])
+    return Loads(chain[chosen], *wrenches, supports.part(chosen))
 
 
-@compiled
+@inner
 def cross_into(a: Array, b: Array, out: Array) -> None:
     """out = a x b, (3,) each."""
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -131,56 +150,64 @@ def cross_into(a: Array, b: Array, out: Array) -> None:
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@compiled
+@inner
 def turned_into(matrix: Array, vector: Array, out: Array) -> None:
     """out = matrix (3, 3) times vector (3,)."""
     for r in range(3):
         out[r] = matrix[r, 0] * vector[0] + matrix[r, 1] * vector[1] + matrix[r, 2] * vector[2]
 
 
-@compiled
-def move(
-    rotations: Array, origins: Array, q: Array, axes: Array, turned: Array, shifted: Array
-) -> None:
-    """One chain at q (J, 6), m and rad.
+@inner
+def _move(frames: Plain, q: Array, width: int, axes: Array, turned: Array, shifted: Array) -> None:
+    """Four chains at q (J, 6, 4), m and rad; entries of all other arrays are four lanes.
 
     Parameters
     ----------
+    frames : (J, 3, 3) and (J, 3), rotations and origins. width : lanes that are not repeated ones.
     axes : (J, 6, 6), filled with the twist of each coordinate by row.
     turned, shifted : (J, 3, 3) and (J, 3), filled with the displacement of each vertebra.
     """
-    below, final = np.empty((3, 3)), np.empty((3, 3))
-    slid, pivot, back = np.empty(3), np.empty(3), np.empty(3)
+    (rotations, origins), numbers = frames, np.empty((33, WIDTH))
+    work, coordinates = vectors(numbers), vectors(q)
+    below, final = work[:9].reshape((3, 3)), work[9:18].reshape((3, 3))
+    slid, pivot, back, turns = work[18:21], work[21:24], work[24:27], work[27:33]
     for j in range(len(q)):
         if j:
             turned_into(turned[j - 1], origins[j], pivot)
-            for r in range(3):
-                turned_into(turned[j - 1], rotations[j, :, r], below[:, r])
+            for c in range(3):
+                turned_into(turned[j - 1], rotations[j, :, c], below[:, c])
         else:
             for r in range(3):
                 pivot[r] = origins[j, r]
                 for c in range(3):
                     below[r, c] = rotations[j, r, c]
-        turned_into(below, q[j, :3], slid)
+        turned_into(below, coordinates[j, :3], slid)
         for r in range(3):
-            pivot[r] += slid[r] + (shifted[j - 1, r] if j else 0.0)
-        _turn(below, q[j, 3:], pivot, axes[j], final)
-        for r in range(3):
-            for c in range(3):
-                turned[j, r, c] = 0.0
-                for i in range(3):
-                    turned[j, r, c] += final[r, i] * rotations[j, c, i]
+            pivot[r] += slid[r]
+            if j:
+                pivot[r] += shifted[j - 1, r]
+        for k in range(3):
+            for lane in range(width):  # these functions are called lane by lane
+                numbers[27 + k, lane] = np.cos(q[j, 3 + k, lane])
+                numbers[30 + k, lane] = np.sin(q[j, 3 + k, lane])
+            for lane in range(width, WIDTH):
+                numbers[27 + k, lane] = numbers[27 + k, width - 1]
+                numbers[30 + k, lane] = numbers[30 + k, width - 1]
+        _turn(below, turns, pivot, axes[j], final)
+        turned[j][:] = 0.0
+        add_product(final, rotations[j].T, turned[j])
         turned_into(turned[j], origins[j], back)
         for r in range(3):
             shifted[j, r] = pivot[r] - back[r]
 
 
-@compiled
-def _turn(below: Array, angles: Array, pivot: Array, axes: Array, final: Array) -> None:
-    """Twists (6, 6) of a joint's coordinates and its frame (3, 3) after turning by Z, X', Y''."""
-    cz, sz = np.cos(angles[0]), np.sin(angles[0])
-    cx, sx = np.cos(angles[1]), np.sin(angles[1])
-    cy, sy = np.cos(angles[2]), np.sin(angles[2])
+@inner
+def _turn(below: Array, turns: Array, pivot: Array, axes: Array, final: Array) -> None:
+    """Twists (6, 6) of a joint's coordinates and its frame (3, 3) after turning by Z, X', Y''.
+
+    ``turns`` (6,): the cosines of the three angles, and their sines.
+    """
+    cz, cx, cy, sz, sx, sy = turns[0], turns[1], turns[2], turns[3], turns[4], turns[5]
     for r in range(3):
         x, y, z = below[r, 0], below[r, 1], below[r, 2]
         by_z, across = cz * x + sz * y, cz * y - sz * x
@@ -193,12 +220,21 @@ def _turn(below: Array, angles: Array, pivot: Array, axes: Array, final: Array) 
         cross_into(pivot, axes[k, :3], axes[k, 3:])
 
 
-@compiled
+@inner
 def _push(
-    turned: Array, shifted: Array, neutral: Array, force: Array, wrench: Array, slope: Array
+    turned: Array,
+    shifted: Array,
+    neutral: Array,
+    force: Array,
+    work: Array,
+    wrench: Array,
+    slope: Array,
 ) -> None:
-    """Add a force at a vertebra's point (3,) to its wrench (6,) and the slope (3, 6) of that."""
-    point, moment = np.empty(3), np.empty(3)
+    """Add a force at a vertebra's point (3,) to its wrench (6,) and the slope (3, 6) of that.
+
+    ``work`` (6,) is work space.
+    """
+    point, moment = work[:3], work[3:]
     turned_into(turned, neutral, point)
     for r in range(3):
         point[r] += shifted[r]
@@ -218,39 +254,52 @@ def _push(
     slope[2, 4] -= force[0]
 
 
-@compiled
+@inner
 def _load(
-    gravity: Array,
-    masses: Array,
-    coms: Array,
-    bodies: Indices,
-    points: Array,
-    forces: Array,
-    moments: Array,
-    turned: Array,
-    shifted: Array,
-    wrenches: Array,
-    slopes: Array,
+    weighing: Plain, listed: Plain, first: int, turned: Array, shifted: Array, found: Plain
 ) -> None:
-    """Wrench on each vertebra (J, 6) and its slope by the vertebra's twist, (J, 3, 6)."""
-    wrenches[:] = 0.0
-    slopes[:] = 0.0
-    if gravity[0] != 0.0 or gravity[1] != 0.0 or gravity[2] != 0.0:
-        weight = np.empty(3)
-        for b in range(len(turned)):
+    """Wrench on each vertebra (J, 6) and its slope by the vertebra's twist, (J, 3, 6), of a block.
+
+    Parameters
+    ----------
+    weighing : masses (J,), coms (J, 3) and gravity (3,), entries four lanes. listed : wrenches of
+        all lanes (N, W, ...), of which those of the block begin at ``first``.
+    """
+    (masses, coms, gravity), (bodies, points, forces, moments) = weighing, listed
+    wrenches, slopes = found
+    numbers = np.empty((15, WIDTH))
+    every = vectors(numbers)
+    force, point, moment, work = every[:3], every[3:6], every[6:9], every[9:]
+    for j in range(len(wrenches)):
+        for r in range(6):
+            wrenches[j, r] = 0.0
+            for k in range(3):
+                slopes[j, k, r] = 0.0
+        for r in range(3):
+            force[r] = masses[j] * gravity[r]
+        _push(turned[j], shifted[j], coms[j], force, work, wrenches[j], slopes[j])
+    rows = np.minimum(np.arange(first, first + WIDTH), len(bodies) - 1)
+    for w in range(bodies.shape[1]):
+        for lane in range(WIDTH):
+            body = bodies[rows[lane], w]
+            fresh = body >= 0
+            for earlier in range(lane):
+                fresh = fresh and bodies[rows[earlier], w] != body
+            if not fresh:
+                continue
+            for other in range(WIDTH):  # at once for all lanes with a wrench on that vertebra
+                row = rows[other]
+                on = 1.0 if bodies[row, w] == body else 0.0
+                for r in range(3):
+                    numbers[r, other] = on * forces[row, w, r]
+                    numbers[3 + r, other] = points[row, w, r]
+                    numbers[6 + r, other] = on * moments[row, w, r]
+            _push(turned[body], shifted[body], point, force, work, wrenches[body], slopes[body])
             for r in range(3):
-                weight[r] = masses[b] * gravity[r]
-            _push(turned[b], shifted[b], coms[b], weight, wrenches[b], slopes[b])
-    for w in range(len(bodies)):
-        b = bodies[w]
-        if b >= 0:
-            if forces[w, 0] != 0.0 or forces[w, 1] != 0.0 or forces[w, 2] != 0.0:
-                _push(turned[b], shifted[b], points[w], forces[w], wrenches[b], slopes[b])
-            for r in range(3):
-                wrenches[b, r] += moments[w, r]
+                wrenches[body, r] += moment[r]
 
 
-@compiled
+@inner
 def _turning_rows(axes: Array, beyond: Array, rows: Array) -> None:
     """C (6, 6): what turning a joint under the wrench beyond (6,) adds to its axes' loads."""
     m0, m1, m2 = beyond[0], beyond[1], beyond[2]
@@ -266,42 +315,47 @@ def _turning_rows(axes: Array, beyond: Array, rows: Array) -> None:
         rows[k, 5] = a0 * f1 - a1 * f0
 
 
-class Survey(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Survey:
     """N lanes at one pose each: what the tangents and the mass matrices are made of.
+
+    Compiled code takes the numbers in blocks of four lanes (B, ..., 4); the properties are the same
+    lane by lane (N, ...).
 
     Attributes
     ----------
-    axes : (N, J, 6, 6) twist of each coordinate, by row.
-    applied : (N, J, 6) what the loads do to each axis.
-    rows : (N, J, 6, 6) C. blocks : (N, J, 6, 6) tangent of what the joint holds, with how its own
-        axes turn each other.
-    slopes : (N, J, 3, 6) sum of L_b over the joint's vertebra and those beyond.
-    turned, shifted : (N, J, 3, 3) and (N, J, 3) displacement of each vertebra.
+    numbers : axes (J, 6, 6), twist of each coordinate, by row; applied (J, 6), what the loads do to
+        each axis; rows (J, 6, 6), C; stiff (J, 6, 6), tangent of what the joint holds, with how its
+        own axes turn each other; slopes (J, 3, 6), sum of L_b over the joint's vertebra and those
+        beyond; turned, shifted (J, 3, 3) and (J, 3), displacement of each vertebra.
+    count : N.
     fixed : (N, J, 6) coordinates that do not move, or (0, 0, 6) where all do.
     """
 
-    axes: Array
-    applied: Array
-    rows: Array
-    blocks: Array
-    slopes: Array
-    turned: Array
-    shifted: Array
+    numbers: Plain
+    count: int
     fixed: Flags
 
-    def part(self, lanes: Indices) -> "Survey":
+    def part(self, chosen: Indices) -> "Survey":
         """Some of the lanes."""
-        fixed = self.fixed[lanes] if len(self.fixed) else self.fixed
-        axes, applied, rows, blocks, slopes, turned, shifted = (one[lanes] for one in self.numbers)
-        return Survey(axes, applied, rows, blocks, slopes, turned, shifted, fixed)
+        fixed = self.fixed[chosen] if len(self.fixed) else self.fixed
+        numbers = tuple(blocks(lanes(one, self.count)[chosen]) for one in self.numbers)
+        return Survey(numbers, len(chosen), fixed)
 
-    @property
-    def numbers(self) -> Plain:
-        """All of it but what is fixed, as compiled code takes it."""
-        return self[:-1]
+    def _lanes(self, which: int) -> Array:
+        found: Array = lanes(self.numbers[which], self.count)
+        return found
+
+    axes = property(lambda self: self._lanes(0))
+    applied = property(lambda self: self._lanes(1))
+    rows = property(lambda self: self._lanes(2))
+    stiff = property(lambda self: self._lanes(3))
+    slopes = property(lambda self: self._lanes(4))
+    turned = property(lambda self: self._lanes(5))
+    shifted = property(lambda self: self._lanes(6))
 
 
-@compiled
+@inner
 def _add_up(
     axes: Array,
     tangents: Array,
@@ -309,74 +363,81 @@ def _add_up(
     slopes: Array,
     applied: Array,
     rows: Array,
-    blocks: Array,
+    stiff: Array,
 ) -> None:
-    """From the top down: loads of the axes, C and blocks; slopes become sums."""
-    beyond = np.zeros(6)
+    """From the top down: loads of the axes, C and stiffness; slopes and wrenches become sums."""
     for j in range(len(axes) - 1, -1, -1):
-        s = axes[j]
-        for r in range(6):
-            beyond[r] += wrenches[j, r]
+        s, beyond = axes[j], wrenches[j]
         if j + 1 < len(axes):
+            for r in range(6):
+                beyond[r] += wrenches[j + 1, r]
             for r in range(3):
                 for c in range(6):
                     slopes[j, r, c] += slopes[j + 1, r, c]
         _turning_rows(s, beyond, rows[j])
         for k in range(6):
-            applied[j, k] = 0.0
-            for i in range(6):
-                applied[j, k] += s[k, i] * beyond[i]
+            load = s[k, 0] * beyond[0]
+            for i in range(1, 6):
+                load += s[k, i] * beyond[i]
+            applied[j, k] = load
             for c in range(6):
                 value = tangents[j, k, c]
                 if c < k:
                     for i in range(6):
                         value -= rows[j, k, i] * s[c, i]
-                blocks[j, k, c] = value
+                stiff[j, k, c] = value
 
 
 @compiled
 def _look(chains: Plain, loads: Plain, q: Array, tangents: Array, found: Plain) -> None:
-    """Fill the parts of a survey."""
-    rotations, origins, masses, coms, _, _, gravity = chains
-    chain_of, bodies, points, forces, moments = loads
-    axes, applied, rows, blocks, slopes, turned, shifted = found
-    wrenches = np.empty((q.shape[1], 6))
-    for n in range(len(q)):
-        chain = chain_of[n]
-        move(rotations[chain], origins[chain], q[n], axes[n], turned[n], shifted[n])
-        _load(
-            gravity[chain],
-            masses[chain],
-            coms[chain],
-            bodies[n],
-            points[n],
-            forces[n],
-            moments[n],
-            turned[n],
-            shifted[n],
-            wrenches,
-            slopes[n],
-        )
-        _add_up(axes[n], tangents[n], wrenches, slopes[n], applied[n], rows[n], blocks[n])
+    """Fill the parts of a survey, block by block.
+
+    Parameters
+    ----------
+    chains : rotations, origins, masses, coms, gravity (M, n). q, tangents : (N, n).
+    loads : chain of each lane, and its wrenches.
+    """
+    (chain_of, bodies, points, forces, moments), joints = loads, q.shape[1] // 6
+    listed, own = (bodies, points, forces, moments), np.arange(len(q))
+    given = np.empty((16 * joints + 3, WIDTH))
+    frames = vectors(given)
+    rotations = frames[: 9 * joints].reshape((joints, 3, 3))
+    origins = frames[9 * joints : 12 * joints].reshape((joints, 3))
+    coms = frames[13 * joints : 16 * joints].reshape((joints, 3))
+    weighing = (frames[12 * joints : 13 * joints], coms, frames[16 * joints :])
+    pose, held = np.empty((6 * joints, WIDTH)), np.empty((36 * joints, WIDTH))
+    tangent = vectors(held).reshape((joints, 6, 6))
+    wrenches = vectors(np.empty((joints, 6, WIDTH)))
+    axes, applied, rows, stiff, slopes, turned, shifted = found
+    for block in range(len(axes)):
+        first, at = WIDTH * block, 0
+        for one in chains:
+            gather(one, chain_of, first, given[at : at + one.shape[1]])
+            at += one.shape[1]
+        gather(q, own, first, pose)
+        gather(tangents, own, first, held)
+        s, turn, shift = vectors(axes[block]), vectors(turned[block]), vectors(shifted[block])
+        slope = vectors(slopes[block])
+        width = min(WIDTH, len(q) - first)
+        _move((rotations, origins), pose.reshape((joints, 6, WIDTH)), width, s, turn, shift)
+        _load(weighing, listed, first, turn, shift, (wrenches, slope))
+        load, row, own_stiff = vectors(applied[block]), vectors(rows[block]), vectors(stiff[block])
+        _add_up(s, tangent, wrenches, slope, load, row, own_stiff)
 
 
 def survey(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Survey:
     """Lanes at q (N, J, 6) whose joints hold with tangents (N, J, 6, 6)."""
+    count, joints = q.shape[:2]
     shapes = ((6, 6), (6,), (6, 6), (6, 6), (3, 6), (3, 3), (3,))
-    numbers = [np.empty((*q.shape[:2], *shape)) for shape in shapes]
-    _look(tuple(chains), loads[:-1], q, tangents, tuple(numbers))
-    axes, applied, rows, blocks, slopes, turned, shifted = numbers
-    fixed = loads.supports.fixed
-    return Survey(axes, applied, rows, blocks, slopes, turned, shifted, fixed)
+    numbers = tuple([np.empty((-(-count // WIDTH), joints, *one, WIDTH)) for one in shapes])
+    given = (*chains[:4], chains.gravity)
+    _look(tuple(map(flat, given)), loads[:-1], flat(q), flat(tangents), numbers)
+    return Survey(numbers, count, loads.supports.fixed)
 
 
-@compiled
-def _place(
-    rotations: Array, origins: Array, q: Array, axes: Array, turned: Array, shifted: Array
-) -> None:
-    """Move every chain."""
-    for n in range(len(q)):
-        move(rotations[n], origins[n], q[n], axes[n], turned[n], shifted[n])
+def flat(numbers: Array) -> Array:
+    """(N, n) of (N, ...)."""
+    return np.ascontiguousarray(numbers).reshape(len(numbers), prod(numbers.shape[1:]))
 
 
 def placed(rotations: Array, origins: Array, q: Array) -> tuple[Array, Array, Array]:
@@ -386,6 +447,10 @@ def placed(rotations: Array, origins: Array, q: Array) -> tuple[Array, Array, Ar
     ----------
     rotations, origins : (N, J, 3, 3) and (N, J, 3) m, joint frames of each.
     """
-    axes, turned, shifted = (np.empty((*q.shape[:2], *s)) for s in ((6, 6), (3, 3), (3,)))
-    _place(rotations, origins, q, axes, turned, shifted)
-    return axes, turned, shifted
+    (count, joints), own = q.shape[:2], np.arange(len(q))
+    nothing, none = np.zeros((count, joints, 3)), np.zeros((count, 0, 3))
+    masses, inertias = nothing[..., 0], np.zeros((count, joints, 3, 3))
+    chains = Chains(rotations, origins, masses, nothing, inertias, q, nothing[:, 0])
+    unloaded = Loads(own, np.zeros((count, 0), dtype=np.int64), none, none, none)
+    seen = survey(chains, unloaded, q, np.zeros((*q.shape, 6)))
+    return seen.axes, seen.turned, seen.shifted

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.sensitivity.global_indices.convergence import convergence
+from spinepipe.sensitivity.global_indices.design import Design
 from spinepipe.sensitivity.global_indices.estimates import Index, Settings
 from spinepipe.sensitivity.global_indices.floor import (
     Floor,
@@ -33,12 +35,12 @@ from spinepipe.studies.global_sensitivity.tables import (
     INDICES,
     RESPONSES,
 )
-from spinepipe.tables import Table, read, to_arrow, write
+from spinepipe.tables import from_rows, read, to_arrow, write
 
 Where = tuple[str, str, int, str, str]
 """Output, test, step, joint, coordinate."""
 
-Rows = list[dict[str, Any]]
+Columns = dict[str, Sequence[Any]]
 
 SETTLED = 1e-6
 """Outputs (mm, deg, N, N m) that vary by less than a solver can tell are constant."""
@@ -92,110 +94,77 @@ def run(
         *calibrated_outputs(calibrated, settings),
     ]
     made_by = provenance("analyse", settings, cohort, [specimen])
-    for table, rows, path in (
-        (INDICES, _index_rows, indices),
-        (CONVERGENCE, _convergence_rows, convergence),
-    ):
-        _write(table, [row for one in outputs for row in rows(settings, one)], path, made_by)
     drawn = design_of(settings)
+    each = [_analysed(settings, drawn, one) for one in outputs]
+    for place, (table, path) in enumerate(((INDICES, indices), (CONVERGENCE, convergence))):
+        own = table.without("specimen")
+        parts = [part for found in each for part in found[place]]
+        names = [column.name for column in own.columns]
+        columns = {name: list(chain.from_iterable(part[name] for part in parts)) for name in names}
+        write(to_arrow(own, columns), path, made_by)
     values = drawn_values(design, settings, slice(None)) * np.array(settings.per_si)
     failed = list(failed_rows(drawn, values, settings.units, responses, calibrated))
-    _write(FAILED_RUNS, failed, failed_runs, made_by)
+    write(from_rows(FAILED_RUNS.without("specimen"), failed), failed_runs, made_by)
 
 
-def _write(table: Table, rows: Rows, path: str, made_by: dict[str, str]) -> None:
-    own = table.without("specimen")
-    columns = {column.name: [row[column.name] for row in rows] for column in own.columns}
-    write(to_arrow(own, columns), path, made_by)
-
-
-def _asked(settings: GlobalSensitivity) -> Settings:
-    return Settings(
+def _analysed(
+    settings: GlobalSensitivity, design: Design, one: Output
+) -> tuple[list[Columns], list[Columns]]:
+    """Columns of each index of K outputs, and of each while the design grows; K cells each."""
+    asked = Settings(
         bootstraps=settings.bootstraps,
         confidence=settings.confidence,
         seed=settings.seed,
         most_failed=settings.most_failed,
         wanted=settings.chosen_indices,
     )
-
-
-def _index_rows(settings: GlobalSensitivity, one: Output) -> Iterator[dict[str, Any]]:
-    design, asked = design_of(settings), _asked(settings)
     found = indices(design, one.values, one.ok, asked, one.resolution)
     floors = noise_floor(design, one.values, found, one.ok, asked, one.resolution)
-    means, sds = _sizes(one)
-    for index in found:
-        columns = zip(
-            *(one.where, _numbers(index), means, sds, _screened(index, floors)),
-            *(index.status, index.message),
-            strict=True,
-        )
-        for where, numbers, mean, sd, screened, status, message in columns:
-            yield {
-                **dict(zip(WHERE, where, strict=True)),
-                "index": index.index,
-                "factor": index.factor,
-                "other": index.other,
-                **numbers,
-                "mean": mean,
-                "sd": sd,
-                **screened,
-                "runs": index.runs,
-                "failed": index.failed,
-                "conditional": index.failed > 0,
-                "status": status.value,
-                "message": message,
-            }
-
-
-def _screened(index: Index, floors: dict[str, Floor]) -> Sequence[dict[str, Any]]:
-    """What tells an index from noise, and a factor from one that may be fixed."""
-    count = len(index.status)
-    floor = floors.get(index.index)
-    ends = ([None] * count,) * 2 if floor is None else (floor.low.tolist(), floor.high.tolist())
-    columns = zip(*ends, above_floor(index, floors), negligible(index), strict=True)
-    return [
-        {
-            "noise_floor_low": low,
-            "noise_floor": high,
-            "above_floor": above,
-            "floor_replicates": 0 if floor is None else floor.replicates,
-            "negligible": little,
-        }
-        for low, high, above, little in columns
+    stages = convergence(design, one.values, one.ok, asked, 8, one.resolution, found)
+    count, where = len(one.where), dict(zip(WHERE, zip(*one.where, strict=True), strict=True))
+    good = one.values[one.ok] if one.ok.any() else np.full((1, count), np.nan)
+    common = where | {"mean": good.mean(axis=0), "sd": good.std(axis=0)}
+    of_stages = [
+        where | _numbers(index) | _repeated(count, samples=stage.samples, runs=stage.runs)
+        for stage in stages
+        for index in stage.indices
     ]
+    return [common | _screened(index, floors) for index in found], of_stages
 
 
-def _convergence_rows(settings: GlobalSensitivity, one: Output) -> Iterator[dict[str, Any]]:
-    asked = _asked(settings)
-    for stage in convergence(design_of(settings), one.values, one.ok, asked, 8, one.resolution):
-        for index in stage.indices:
-            for where, numbers in zip(one.where, _numbers(index), strict=True):
-                yield {
-                    **dict(zip(WHERE, where, strict=True)),
-                    "index": index.index,
-                    "factor": index.factor,
-                    "samples": stage.samples,
-                    "runs": stage.runs,
-                    **numbers,
-                }
+def _screened(index: Index, floors: dict[str, Floor]) -> Columns:
+    """An index, what tells it from noise, and a factor from one that may be fixed."""
+    count, floor = len(index.status), floors.get(index.index)
+    nothing = [None] * count
+    told = _repeated(
+        count,
+        other=index.other,
+        floor_replicates=0 if floor is None else floor.replicates,
+        runs=index.runs,
+        failed=index.failed,
+        conditional=index.failed > 0,
+    )
+    return {
+        **_numbers(index),
+        **told,
+        "noise_floor_low": nothing if floor is None else floor.low.tolist(),
+        "noise_floor": nothing if floor is None else floor.high.tolist(),
+        "above_floor": above_floor(index, floors),
+        "negligible": negligible(index),
+        "status": [status.value for status in index.status],
+        "message": index.message,
+    }
 
 
-def _sizes(one: Output) -> tuple[list[float | None], list[float | None]]:
-    """Mean and SD of each output over the runs that have it."""
-    if not one.ok.any():
-        nothing: list[float | None] = [None] * len(one.where)
-        return nothing, nothing
-    values = one.values[one.ok]
-    return values.mean(axis=0).tolist(), values.std(axis=0).tolist()
+def _numbers(index: Index) -> Columns:
+    ends = {"estimate": index.estimate, "ci_low": index.low, "ci_high": index.high}
+    told = _repeated(len(index.status), index=index.index, factor=index.factor)
+    return told | {name: numbers.tolist() for name, numbers in ends.items()}
 
 
-def _numbers(index: Index) -> Sequence[dict[str, float | None]]:
-    ends = (index.estimate.tolist(), index.low.tolist(), index.high.tolist())
-    return [
-        {"estimate": estimate, "ci_low": low, "ci_high": high}
-        for estimate, low, high in zip(*ends, strict=True)
-    ]
+def _repeated(count: int, **values: Any) -> Columns:
+    """The same in all cells of a column."""
+    return {name: [value] * count for name, value in values.items()}
 
 
 def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:

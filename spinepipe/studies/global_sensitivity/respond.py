@@ -38,7 +38,8 @@ def run(
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     every = settings.steps == "all"
     one = batch_of(root, settings, cohort, design, base, specimen, int(batch), every)
-    found = [solve_many(one.varied.spines, cases) for cases in one.varied.cases]
+    asked = tuple(zip(one.varied.cases, one.start.tests, strict=True))
+    found = [solve_many(one.varied.spines, cases, test.needed) for cases, test in asked]
     solved = [_rows(one, *both) for both in zip(one.start.tests, found, strict=True)]
     columns = _columns(one, cohort.joint_names, solved)
     size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
@@ -75,7 +76,7 @@ class _Rows:
 def _rows(batch: Batch, test: AskedTest, solved: ManySolved) -> _Rows:
     rows = _Rows(batch, test, solved.q.shape[2])
     motion = less_step_0(solved.q.swapaxes(0, 1), test.from_first).swapaxes(0, 1)
-    kept, stored = batch.varied.kept, test.stored
+    kept, stored = batch.varied.kept, slice(-len(test.steps), None)
     rows.motion[kept] = from_si(motion)[:, stored]
     rows.load[kept] = solved.load[:, stored]
     rows.status[kept] = solved.status[:, stored].astype(object)
