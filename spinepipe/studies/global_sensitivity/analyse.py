@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.schema import Table
 from spinepipe.sensitivity.global_indices.convergence import convergence
 from spinepipe.sensitivity.global_indices.estimates import Index, Settings
 from spinepipe.sensitivity.global_indices.floor import (
@@ -33,7 +34,7 @@ from spinepipe.studies.global_sensitivity.tables import (
     INDICES,
     RESPONSES,
 )
-from spinepipe.tables import Table, read, to_arrow, write
+from spinepipe.tables import read, to_arrow, write
 
 Where = tuple[str, str, int, str, str]
 """Output, test, step, joint, coordinate."""
