@@ -22,6 +22,11 @@ USABLE = tuple(status.value for status in Status if status.usable)
 """Status of rows whose numbers are a solution, as tables have it."""
 
 
+def joined(*notes: str) -> str:
+    """Notes as one message."""
+    return "; ".join(note for note in notes if note)
+
+
 class Ended(StrEnum):
     """Outcome of holding a spine in a place (`spinepipe.statics.prescribed`)."""
 

@@ -4,6 +4,7 @@ import argparse
 
 from spinepipe.reference.pages import outdated, refreshed
 from spinepipe.reference.pictures import FOLDER, PICTURES, renewed
+from spinepipe.reference.result_tables import PAGE, columns_page
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +31,9 @@ def run(options: argparse.Namespace) -> int:
         else:
             path.write_text(refreshed(path.read_text(encoding="utf-8"), str(name)), "utf-8")
             print(f"wrote {name}")
+    if not options.check:
+        (options.root / PAGE).write_text(columns_page(), "utf-8")
+        print(f"wrote {PAGE}: the columns of all result tables")
     if not pages:
         print("ok    every generated part of docs/ is up to date")
     return 1 if pages and options.check else 0

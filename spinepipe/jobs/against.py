@@ -8,13 +8,13 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import compare, digest
 from spinepipe.jobs.digest import provenance
+from spinepipe.schema import Table
 from spinepipe.studies.study import Study
 from spinepipe.tables import from_rows, write
-from spinepipe.tables.shared import against_paper
 
 
 def write_against(
-    paper: str,
+    table: Table,
     tables: Mapping[str, pd.DataFrame],
     asked: Mapping[str, Any],
     study: Study,
@@ -22,7 +22,7 @@ def write_against(
     output: str,
 ) -> None:
     """Write it; what needs an absent table is told as not computed."""
-    name = f"against_{paper}"
+    paper = table.name.removeprefix("against_")
     rows = compare(paper, tables, asked)
-    origin = provenance(name, study, cohort, others=[digest(paper)])
-    write(from_rows(against_paper(name), rows), output, origin)
+    origin = provenance(table.name, study, cohort, others=[digest(paper)])
+    write(from_rows(table, rows), output, origin)

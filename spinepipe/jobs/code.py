@@ -1,8 +1,9 @@
 """Digest of a module's code by its meaning, with what it uses of spinepipe.
 
-Imports are followed where they are written. Of a file that declares result tables only the tables
-that are imported count, and of these no wording. An effect counts where its name is written, or
-where all of them are asked for.
+Imports are followed where they are written. Of a file that names the tables of a ``tables.csv``
+only the names that are imported count, and of that file the rows of these tables, without words: a
+result hangs on what its own columns are called and hold, not on what they mean to a reader. An
+effect counts where its name is written, or where all of them are asked for.
 
 Snakemake does not see imported modules. What a file imports and means is worked out once and kept
 beside Snakemake's own state, known by size and time of change as Python knows its bytecode.
@@ -21,12 +22,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from spinepipe.files import appearing, stamp
+from spinepipe.schema.rows import FILE, read_tables
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGE = "spinepipe"
 _EFFECTS = "spinepipe.effects"
 _ALL_EFFECTS = f"{_EFFECTS}.registered"
-_SCHEMA = "spinepipe.tables.schema"
+_DECLARED = "spinepipe.schema.declared"
+_ALL_DECLARED = "spinepipe.schema.all_declared"
+_TABLE = "#"
+"""Between a folder and a table of its ``tables.csv``, or ``*`` for all of them."""
+
 _DATA_SUFFIXES = (".toml", ".csv", ".yaml", ".json", ".html", ".css")
 _KEPT = _ROOT / ".snakemake" / "spinepipe-used-code.json"
 """What is known of files; may be deleted at any time."""
@@ -53,14 +59,17 @@ def code_digest(module: str) -> str:
     if _source(module) is None:
         raise ModuleNotFoundError(f"no module {module!r} in {_ROOT / _PACKAGE}")
     found = closure(module)
-    lines = [f"{name} {_piece(name).meaning}" for name in sorted(found)]
+    lines = [f"{name} {_meaning(name)}" for name in sorted(found)]
     lines += [_bytes_digest(path) for path in _data_files(found)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
 @cache
 def closure(module: str) -> frozenset[str]:
-    """All that a module uses, itself too; of files that declare tables, parts (``module.NAME``)."""
+    """All that a module uses, itself too.
+
+    Of files that name tables they are parts (``module.NAME``), and the tables (``folder#table``).
+    """
     found: set[str] = set()
     waiting = [module]
     while waiting:
@@ -89,7 +98,7 @@ class _Piece(NamedTuple):
 
 
 class _File(NamedTuple):
-    """A file as a whole, and where it declares tables its parts, by the names they bind."""
+    """A file as a whole, and where it names tables its parts, by the names they bind."""
 
     whole: _Piece
     parts: dict[str, _Piece]
@@ -100,13 +109,31 @@ def _piece(name: str) -> _Piece:
     return _file(name).whole if _source(name) else _file(base).parts[part]
 
 
+def _meaning(name: str) -> str:
+    if _TABLE not in name:
+        return _piece(name).meaning
+    folder, _, table = name.partition(_TABLE)
+    tables = _layouts(_ROOT.joinpath(*folder.split("."), FILE))
+    return str(list(tables.values()) if table == "*" else tables[table])
+
+
+@cache
+def _layouts(path: Path) -> dict[str, list[object]]:
+    """What decides of each table of a file."""
+    return {name: table.layout for name, table in read_tables(path).items()}
+
+
 @cache
 def _used(name: str) -> frozenset[str]:
-    """What a module or a declared table uses of spinepipe, and the packages these are in."""
+    """What a module or a part of one uses of spinepipe, and the packages these are in."""
+    if _TABLE in name:
+        return frozenset()
     found: set[str] = set()
     for used in _piece(name).uses:
         base, _, last = used.rpartition(".")
-        if used == _ALL_EFFECTS:
+        if _TABLE in used:
+            found.add(used)
+        elif used == _ALL_EFFECTS:
             found.update(effect_modules().values())
         elif not base:
             found.update([effect_modules()[used]] if used in effect_modules() else [])
@@ -152,20 +179,25 @@ def _read(module: str, path: Path) -> _File:
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
-    parts = {}
-    if not {f"{_SCHEMA}.Column", f"{_SCHEMA}.Table"}.isdisjoint(imported.values()):
-        tree = _WithoutWording().visit(tree)
+    folder, parts = module if path.stem == "__init__" else module.rpartition(".")[0], {}
+    if not {_DECLARED, _ALL_DECLARED}.isdisjoint(imported.values()):
         local = {name: entry for entry in tree.body for name in _bound(entry)}
         places = {**imported, **{name: f"{module}.{name}" for name in local}}
-        parts = {name: _digested(entry, places) for name, entry in local.items()}
-    return _File(_digested(tree, imported), parts)
+        parts = {name: _digested(entry, places, folder) for name, entry in local.items()}
+    return _File(_digested(tree, imported, folder), parts)
 
 
-def _digested(tree: ast.AST, places: Mapping[str, str]) -> _Piece:
-    """Code with what it uses: modules, names of `places`, and words that may name effects."""
+def _digested(tree: ast.AST, places: Mapping[str, str], folder: str) -> _Piece:
+    """Code with what it uses: modules, names of `places`, tables, words that may name effects."""
     used: set[str] = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            called = places.get(node.func.id)
+            if called == _ALL_DECLARED:
+                used.add(f"{folder}{_TABLE}*")
+            elif called == _DECLARED:
+                used.add(f"{folder}{_TABLE}{ast.literal_eval(node.args[1])}")
+        elif isinstance(node, ast.Import):
             used.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             used.update(places[alias.asname or alias.name] for alias in node.names)
@@ -179,41 +211,6 @@ def _digested(tree: ast.AST, places: Mapping[str, str]) -> _Piece:
 
 _NAME = re.compile(r"\A[a-z]+(?:_[a-z]+)*\Z")
 """How names of effects look."""
-
-_FEWEST_WORDS = 4
-"""In a declaration of tables, a text of so many words is wording whatever is called with it."""
-
-
-class _WithoutWording(ast.NodeTransformer):
-    """Tables without what a reader is told; names, types, units and keys stay."""
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        """Column: no meaning, of `null` only whether it is there; Table: no `about`."""
-        self.generic_visit(node)
-        called = node.func.id if isinstance(node.func, ast.Name) else ""
-        wording = {"Column": ("meaning", 2), "Table": ("about", 1)}.get(called)
-        if wording:
-            name, place = wording
-            node.args[place : place + 1] = [ast.Constant("")] * (len(node.args) > place)
-            node.keywords = [one for one in node.keywords if one.arg != name]
-        nulls = [one for one in node.keywords if one.arg == "null"]
-        for one in nulls:
-            one.value = ast.Constant(not _is_none(one.value))
-        if called == "Column" and len(node.args) > _PLACE_OF_NULL:
-            node.args[_PLACE_OF_NULL] = ast.Constant(not _is_none(node.args[_PLACE_OF_NULL]))
-        return node
-
-    def visit_Constant(self, node: ast.Constant) -> ast.AST:
-        """No text of several words."""
-        long = isinstance(node.value, str) and len(node.value.split()) >= _FEWEST_WORDS
-        return ast.Constant("") if long else node
-
-
-_PLACE_OF_NULL = 4
-
-
-def _is_none(node: ast.expr) -> bool:
-    return isinstance(node, ast.Constant) and node.value is None
 
 
 def _bound(entry: ast.stmt) -> list[str]:
@@ -273,12 +270,12 @@ def _is_cosmetic(node: ast.stmt) -> bool:
 
 
 def _data_files(names: frozenset[str]) -> list[Path]:
-    """Data files beside the modules, in a fixed order."""
+    """Data files beside the modules, in a fixed order; of tables only those that are used count."""
     sources = (_source(name) or _source(name.rpartition(".")[0]) for name in names)
     files = (
         file for folder in {path.parent for path in sources if path} for file in folder.iterdir()
     )
-    return sorted(file for file in files if file.suffix in _DATA_SUFFIXES)
+    return sorted(file for file in files if file.suffix in _DATA_SUFFIXES and file.name != FILE)
 
 
 @cache

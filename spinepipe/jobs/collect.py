@@ -8,8 +8,9 @@ import pyarrow as pa
 from spinepipe.jobs.code import code_digest
 from spinepipe.jobs.digest import value_digest
 from spinepipe.marks import KEY
+from spinepipe.schema import Table
 from spinepipe.studies.registry import kind_of
-from spinepipe.tables import Table, join, metadata_of, read
+from spinepipe.tables import arrow_schema, join, metadata_of, read
 
 NO_MARK = "none"
 
@@ -44,7 +45,7 @@ def run(kind: str, table: str, inputs: list[str], expected: list[str], output: s
 def joined_digest(table: Table, parts: Sequence[str], marks: Sequence[str]) -> str:
     """The mark of a file of a table joined from others of these names and marks."""
     code = code_digest("spinepipe.jobs.collect")
-    return value_digest(code, str(table.schema), list(table.key), list(parts), list(marks))
+    return value_digest(code, str(arrow_schema(table)), list(table.key), list(parts), list(marks))
 
 
 def _check(path: str, wanted: str, found: str) -> None:
@@ -68,7 +69,7 @@ def _together(found: Sequence[dict[str, str]]) -> dict[str, str]:
 
 def _with_folders(table: Table, path: str, rows: pa.Table) -> pa.Table:
     """Rows of one file with the ``name=value`` parts of its folders as columns."""
-    schema = table.schema
+    schema = arrow_schema(table)
     for part in Path(path).parts[:-1]:
         name, found, value = part.partition("=")
         if found and name in schema.names and name not in rows.column_names:

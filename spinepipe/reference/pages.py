@@ -2,11 +2,11 @@
 
 A page says where a part goes:
 
-    <!-- generated: table poses -->
+    <!-- generated: cohort motion -->
     <!-- end of generated -->
 
 What stands between the markers is written by `spinepipe docs` and compared in the tests: the list
-of effects, tables of configuration keys from the pydantic models, tables of columns.
+of effects, tables of configuration keys from the pydantic models, columns of a cohort.
 """
 
 import inspect
@@ -29,7 +29,6 @@ from spinepipe.problems import InputError, Problem, did_you_mean, one_of
 from spinepipe.reference.licences import licences
 from spinepipe.studies.read import Selection
 from spinepipe.studies.registry import every_form, every_kind
-from spinepipe.tables.schema import Column, Table
 from spinepipe.testing_machine.settings import MachineMapping
 
 _HEAD = ("parameter", "unit", "bounds", "off", "default", "prior SD", "meaning")
@@ -97,18 +96,9 @@ def _part(name: str, page: str) -> str:
 
 @cache
 def generators() -> dict[str, Callable[[], str]]:
-    """Every part that can be generated, by the name that pages use.
-
-    A table with the name of another kind's is called by its kind as well.
-    """
+    """Every part that can be generated, by the name that pages use."""
     parts: dict[str, Callable[[], str]] = {"effects": effects, "licences": licence_table}
     kinds = every_kind()
-    shapes: dict[str, Table] = {}
-    for name, kind in kinds.items():
-        for shape in kind.tables:
-            other = shapes.get(shape.name, shape) != shape
-            shapes[f"{name}/{shape.name}" if other else shape.name] = shape
-    parts |= {f"table {name}": partial(result_table, shape) for name, shape in shapes.items()}
     parts |= {
         f"cohort {name}": partial(cohort_table, form)
         for name, form in (
@@ -127,28 +117,6 @@ def licence_table() -> str:
     """Packages that the product runs on, and their licences."""
     rows = [(code(one.package), one.version, one.licence, one.remark) for one in licences()]
     return table(("package", "version", "licence", "remark"), rows)
-
-
-def result_table(shape: Table) -> str:
-    """Columns of a result table."""
-    rows = [
-        (code(c.name), c.kind, c.unit, _range(c), c.meaning, c.null or "never empty")
-        for c in shape.columns
-    ]
-    key = ", ".join(code(name) for name in shape.key)
-    head = ("column", "type", "unit", "range", "meaning", "an empty cell means")
-    return f"{shape.about}\n\nUnique by {key}.\n\n{table(head, rows)}"
-
-
-def _range(column: Column) -> str:
-    if column.allowed:
-        return ", ".join(code(str(value)) for value in column.allowed)
-    ends = [
-        words.format(f"{end:g}")
-        for words, end in (("at least {}", column.low), ("at most {}", column.high))
-        if end is not None
-    ]
-    return " and ".join(ends)
 
 
 def cohort_table(form: cohort_columns.TableForm) -> str:

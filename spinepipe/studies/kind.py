@@ -14,9 +14,9 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import TableForm
 from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem
+from spinepipe.schema import Table
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles
-from spinepipe.tables.schema import Table
 
 Check = Callable[[Document, Any, Cohort], Iterator[Problem]]
 """What is asked of a study file, the study and its cohort."""

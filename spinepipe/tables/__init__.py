@@ -1,8 +1,9 @@
-"""Result tables: one schema each, from which files are checked and the docs are generated."""
+"""Result tables as Parquet files, checked against what is declared of their columns."""
 
 from spinepipe.tables.parquet import (
     BadTable,
     Tables,
+    arrow_schema,
     from_rows,
     join,
     metadata_of,
@@ -14,13 +15,11 @@ from spinepipe.tables.parquet import (
     to_arrow,
     write,
 )
-from spinepipe.tables.schema import Column, Table
 
 __all__ = [
     "BadTable",
-    "Column",
-    "Table",
     "Tables",
+    "arrow_schema",
     "from_rows",
     "join",
     "metadata_of",

@@ -16,7 +16,14 @@ import pyarrow.parquet as pq
 
 from spinepipe.files import appearing
 from spinepipe.marks import BLANK, CONTENT, DamagedFile, check_whole, sealed
-from spinepipe.tables.schema import TYPES, Column, Table
+from spinepipe.schema import Column, Table
+
+TYPES = {
+    "text": pa.string(),
+    "integer": pa.int32(),
+    "number": pa.float64(),
+    "flag": pa.bool_(),
+}
 
 SMALL_ROWS = 1000
 """Files of fewer rows are mostly footer: packing them costs time and gains nothing."""
@@ -29,6 +36,14 @@ class BadTable(ValueError):
     """A result that does not keep its table's promise: a fault of the library, not of the user."""
 
 
+def arrow_schema(table: Table) -> pa.Schema:
+    """Names and types of a table's columns; those that may be empty are nullable."""
+    return pa.schema(
+        pa.field(column.name, TYPES[column.kind], nullable=not column.required)
+        for column in table.columns
+    )
+
+
 def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
     """Columns (NaN or None for empty cells) as a table that keeps the schema.
 
@@ -37,11 +52,10 @@ def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
     BadTable
         For a missing or extra column, an empty, infinite or out-of-range cell, or a double key.
     """
-    names = [column.name for column in table.columns]
-    if set(columns) != set(names):
-        raise BadTable(f"{table.name}: columns differ: {sorted(set(columns) ^ set(names))}")
+    if set(columns) != set(table.names):
+        raise BadTable(f"{table.name}: columns differ: {sorted(set(columns) ^ set(table.names))}")
     arrays = [_array(table.name, column, columns[column.name]) for column in table.columns]
-    rows = pa.Table.from_arrays(arrays, schema=table.schema)
+    rows = pa.Table.from_arrays(arrays, schema=arrow_schema(table))
     _check_keys(table, rows)
     return rows
 
@@ -82,7 +96,7 @@ def _array(table: str, column: Column, values: Sequence[Any]) -> pa.Array:
 
 
 def _problem(column: Column, array: pa.Array) -> str | None:
-    if column.null is None and array.null_count:
+    if column.required and array.null_count:
         return f"{array.null_count} empty cells"
     if len(array) == array.null_count:
         return None
@@ -91,9 +105,9 @@ def _problem(column: Column, array: pa.Array) -> str | None:
         low, high = np.fmin.reduce(numbers), np.fmax.reduce(numbers)
         if not (np.isfinite(low) and np.isfinite(high)):
             return "an infinite cell"
-        if column.low is not None and low < column.low:
+        if low < column.low:
             return f"{low} is below {column.low}"
-        if column.high is not None and high > column.high:
+        if high > column.high:
             return f"{high} is above {column.high}"
     if column.allowed:
         strangers = set(array.drop_null().unique().to_pylist()) - set(column.allowed)
@@ -141,9 +155,10 @@ def join(
     table: Table, parts: Sequence[pa.Table], path: str | Path, metadata: Mapping[str, str]
 ) -> None:
     """Write tables one after the other as one, with metadata of its own."""
-    names = [column.name for column in table.columns]
-    rows = pa.concat_tables([part.select(names).replace_schema_metadata(None) for part in parts])
-    rows = rows.cast(table.schema)
+    rows = pa.concat_tables(
+        [part.select(table.names).replace_schema_metadata(None) for part in parts]
+    )
+    rows = rows.cast(arrow_schema(table))
     _check_keys(table, rows)
     write(rows, path, metadata)
 
@@ -216,5 +231,4 @@ def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]]) -> pa.Table:
     BadTable
         As `to_arrow` does.
     """
-    names = [column.name for column in table.columns]
-    return to_arrow(table, {name: [row[name] for row in rows] for name in names})
+    return to_arrow(table, {name: [row[name] for row in rows] for name in table.names})

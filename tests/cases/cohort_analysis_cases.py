@@ -9,8 +9,8 @@ import pandas as pd
 from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.studies.cohort_stiffness.claims import Claim
 from spinepipe.studies.cohort_stiffness.significance import all_tests
+from spinepipe.studies.cohort_stiffness.tables import STATISTICS
 from spinepipe.tables import from_rows
-from spinepipe.tables.shared import STATISTICS
 from spinepipe.units import ROTATIONS
 
 Row = dict[str, Any]

@@ -11,7 +11,8 @@ import pandas as pd
 import pyarrow as pa
 from chain_cases import JOINTS, ROTATIONS, STUDY, Chains
 
-from spinepipe.studies.discrepancy.kind import OTHERS, TABLES
+from spinepipe.schema import Table
+from spinepipe.studies.discrepancy.kind import KIND, OTHERS
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
     CONFUSIONS,
@@ -23,7 +24,7 @@ from spinepipe.studies.discrepancy.tables import (
     TABULATED,
     WHERE,
 )
-from spinepipe.tables import Table, Tables, from_rows, write
+from spinepipe.tables import Tables, from_rows, write
 
 Rows = list[dict[str, Any]]
 
@@ -214,7 +215,7 @@ def results(root: Path, answer: str) -> Path:
 
 def files_of_a_search(folder: Path) -> dict[str, str]:
     """Where its job writes what, by the names of the job's arguments."""
-    names = [*(f"{table.name}.parquet" for table in TABLES), *OTHERS]
+    names = [*(f"{table.name}.parquet" for table in KIND.tables), *OTHERS]
     return {name.partition(".")[0]: str(folder / name) for name in names}
 
 

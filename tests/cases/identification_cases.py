@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from study_cases import START, TABLES, Size
 
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOADINGS
+from spinepipe.studies.joint_pose_sensitivity.tables import LOADINGS
 from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 

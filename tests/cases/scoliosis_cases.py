@@ -12,13 +12,19 @@ import pandas as pd
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
+from spinepipe.schema import Table
 from spinepipe.studies.scoliosis.accuracy import accuracy_rows
 from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT, read_films
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
-from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
-from spinepipe.studies.scoliosis.tables_of_errors import ACCURACY, VARIATION
+from spinepipe.studies.scoliosis.tables import (
+    ACCURACY,
+    CURVES,
+    DISPLACEMENTS,
+    LAWS,
+    POSITIONS,
+    VARIATION,
+)
 from spinepipe.tables import from_rows
-from spinepipe.tables.schema import Table
 
 FREE = dict(zip(MODELS, (43, 43, 2, 15, 0), strict=True))
 FITTED = ("tangent_fitted", "linear_regions")

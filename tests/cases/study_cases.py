@@ -12,11 +12,12 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.jobs import draw
+from spinepipe.schema import Table
 from spinepipe.studies.joint_pose_sensitivity.kind import KIND
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS, POSES, SIMULATIONS
 from spinepipe.studies.registry import PACKAGE
-from spinepipe.tables import Table, Tables, to_arrow, write
+from spinepipe.tables import Tables, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 STUDY = "probe"

@@ -16,7 +16,7 @@ from spinepipe.marks import read_mark
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import place_of as place_of_job
 from spinepipe.studies.tracking.kind import KIND, TrackingFiles
-from spinepipe.tables import read_frame
+from spinepipe.tables import arrow_schema, read_frame
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Run:
     def table(self, name: str) -> pd.DataFrame:
         """Rows of a table, whose schema is the declared one."""
         found = pq.read_table(self.path_of(name))
-        assert found.schema.remove_metadata() == KIND.table(name).schema, name
+        assert found.schema.remove_metadata() == arrow_schema(KIND.table(name)), name
         return read_frame(self.path_of(name))
 
     def export(self) -> None:

@@ -15,6 +15,7 @@ import pandas as pd
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import BODIES, JOINTS
+from spinepipe.schema import Table
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.accuracy import accuracy_rows
 from spinepipe.studies.tracking.forms import FORMS
@@ -24,28 +25,25 @@ from spinepipe.studies.tracking.profile import PROFILED, REGIONS, point_rows, ve
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.shares import LUMBAR_JOINTS
 from spinepipe.studies.tracking.tables import (
+    ACCURACY,
+    AGAINST_WANG_2021,
     CLUSTERS,
     DRAWN,
+    ERRORS,
     FITS,
     PROFILE_POINTS,
     PROFILES,
+    RANGES,
     REMARKS,
+    SHARING,
+    SIMILARITY,
     SIZES,
     STIFFNESS,
     TRACKED,
-)
-from spinepipe.studies.tracking.tables_of_studies import (
-    ACCURACY,
-    AGAINST_WANG_2021,
-    ERRORS,
-    RANGES,
-    SHARING,
-    SIMILARITY,
     WEIGHTS,
     WINDOWS,
 )
 from spinepipe.tables import from_rows
-from spinepipe.tables.schema import Table
 from spinepipe.units import COORDINATES, ROTATIONS
 
 Row = dict[str, Any]

@@ -13,34 +13,32 @@ from trunk_cases import made_up_trunk
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY
+from spinepipe.schema import Table
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.forms import TASKS
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.table_of_claims import AGAINST_GHEZELBASH_2016
 from spinepipe.studies.trunk_loads.tables import (
+    AGAINST_GHEZELBASH_2016,
+    AGREEMENT,
+    DESIGN,
+    DRIVERS,
+    INTERVALS,
     ITERATIONS,
     LEVELS_TABLE,
     MASSES,
     MUSCLES,
     PATHS,
-    SCALING,
-    UPRIGHT,
-)
-from spinepipe.studies.trunk_loads.tables import TASKS as TASKS_TABLE
-from spinepipe.studies.trunk_loads.tables_of_studies import (
-    AGREEMENT,
-    DESIGN,
-    DRIVERS,
-    INTERVALS,
     PRESSURES,
     QUANTITIES,
     RESPONSES,
+    SCALING,
     SIMPLIFICATIONS,
     SIMPLIFIED,
     TUNING,
+    UPRIGHT,
 )
+from spinepipe.studies.trunk_loads.tables import TASKS as TASKS_TABLE
 from spinepipe.tables import from_rows
-from spinepipe.tables.schema import Table
 
 Row = dict[str, Any]
 

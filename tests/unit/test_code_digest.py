@@ -20,6 +20,7 @@ def forget() -> None:
     """As a new process knows nothing."""
     for known in (code._known, code._file, code._used, code.closure, code.code_digest):
         known.cache_clear()
+    code._layouts.cache_clear()
     code.effect_modules.cache_clear()
 
 
@@ -119,44 +120,51 @@ def test_only_meaning_counts(tmp_path: Path, one: str, other: str, same: bool) -
     assert (first == second) is same
 
 
-TABLES = """from spinepipe.tables.schema import Column, Table
-
-KEY = ("specimen",)
-ONE = Table("one", "About it.", KEY, (Column("a_mm", "number", "what a is", "mm", "was not read"),))
-OTHER = Table("other", "About it.", (), (Column("b", "text", meaning="what b is", null="none"),))
+ROWS = """table,column,kind,unit,key,low,high,allowed,empty,meaning
+@place,{}_mm,number,mm,,,,,was not read,where {} is
+one,,table,,,,,,,About it.
+one,specimen,text,,key,,,,,which it is
+one,along,@place,,,,,,,
+other,,table,,,,,,,About the other.
+other,specimen,text,,key,,,,,which it is
 """
 
 
 @pytest.mark.parametrize(
     ("was", "becomes", "counts"),
     [
-        ("what a is", "what it is", False),
+        ("where {} is", "its place", False),
         ("was not read", "nobody read it", False),
         ("About it.", "All about it", False),
-        ('"what b is", null="none"', '"what b is"', False),
-        ('"b", "text"', '"c", "text"', False),
-        ("a_mm", "a_m", True),
-        ('"mm"', '"m"', True),
-        ('"number"', '"integer"', True),
-        (', "was not read"', "", True),
-        ('("specimen",)', '("specimen", "joint")', True),
+        ("other,specimen,text,", "other,person,integer,", False),
+        ("other,specimen,text,,key", "other,specimen,text,,", False),
+        ("{}_mm", "{}_m", True),
+        (",mm,", ",m,", True),
+        (",number,", ",integer,", True),
+        ("was not read", "", True),
+        ("one,specimen,text,,key", "one,specimen,text,,", True),
+        ("one,along", "one,across", True),
     ],
 )
-def test_of_tables_the_imported_ones_count_without_wording(
+def test_of_tables_the_imported_ones_count_without_words(
     package: Path, was: str, becomes: str, counts: bool
 ) -> None:
-    (package / "tables").mkdir()
-    (package / "tables/__init__.py").write_text("", "utf-8")
-    (package / "tables/schema.py").write_text("class Column: ...\nclass Table: ...\n", "utf-8")
+    (package / "schema").mkdir()
+    (package / "schema/__init__.py").write_text("def declared(module, name): ...\n", "utf-8")
+    (package / "used/it.py").write_text(
+        "from spinepipe.schema import declared\n"
+        'ONE = declared(__file__, "one")\nOTHER = declared(__file__, "other")\n',
+        "utf-8",
+    )
     (package / "own.py").write_text("from spinepipe.used.it import ONE\n", "utf-8")
 
     def digest(text: str) -> str:
-        (package / "used/it.py").write_text(text, "utf-8")
+        (package / "used/tables.csv").write_text(text, "utf-8")
         forget()
         return code.code_digest("spinepipe.own")
 
-    assert was in TABLES
-    assert (digest(TABLES) != digest(TABLES.replace(was, becomes))) is counts
+    assert was in ROWS
+    assert (digest(ROWS) != digest(ROWS.replace(was, becomes))) is counts
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,9 @@ from sweeps import sweep
 
 from spinepipe.jobs.pool import _explain, _Failure
 from spinepipe.marks import write_marked
+from spinepipe.schema import Column, Table
 from spinepipe.studies.discrepancy.kept import Kept
-from spinepipe.tables import Column, Table, to_arrow, write
+from spinepipe.tables import to_arrow, write
 
 TABLE = Table("small", "A table.", ("n",), (Column("n", "integer", "n"),))
 MARK = "0123456789abcdef" * 4

@@ -10,6 +10,8 @@ import pytest
 
 from spinepipe.problems import InputError
 from spinepipe.reference.pages import END, generators, names_in, outdated, pages, refreshed
+from spinepipe.reference.result_tables import columns_page
+from spinepipe.studies.registry import every_kind
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -30,20 +32,20 @@ def test_links_lead_somewhere() -> None:
 
 
 def test_a_part_is_replaced_between_its_markers_only() -> None:
-    text = f"before\n\n<!-- generated: table poses -->\nold\n{END}\n\nafter\n"
+    text = f"before\n\n<!-- generated: cohort joints -->\nold\n{END}\n\nafter\n"
     new = refreshed(text, "page.md")
-    assert new.startswith("before\n\n<!-- generated: table poses -->\n")
+    assert new.startswith("before\n\n<!-- generated: cohort joints -->\n")
     assert new.endswith(f"{END}\n\nafter\n")
     assert "old" not in new
-    assert "| `specimen` | text |" in new
+    assert "| **`specimen`** | text |" in new
     assert refreshed(new, "page.md") == new
 
 
 def test_unknown_and_open_markers_are_told() -> None:
-    with pytest.raises(InputError, match=r"page\.md.*'table pose'.*did you mean 'table poses'"):
-        refreshed(f"<!-- generated: table pose -->\n{END}", "page.md")
+    with pytest.raises(InputError, match=r"page\.md.*'cohort joint'.*did you mean 'cohort joints'"):
+        refreshed(f"<!-- generated: cohort joint -->\n{END}", "page.md")
     with pytest.raises(InputError, match="a marker without an end"):
-        refreshed("<!-- generated: table poses -->\n", "page.md")
+        refreshed("<!-- generated: cohort joints -->\n", "page.md")
 
 
 @pytest.mark.parametrize(
@@ -74,6 +76,17 @@ def test_an_effect_tells_what_its_options_change_and_how_it_is_searched() -> Non
     contact = part[part.index("### `facet_contact`") :].partition("\n### ")[0]
     assert "| `gap` | rad | 0 to 0.5 |  |" in contact  # a shape has no value at which it is off
     assert "with another `coordinate` they differ" in contact
+
+
+def test_the_page_of_columns_has_every_column_of_every_table() -> None:
+    page = columns_page()
+    for name, kind in every_kind().items():
+        part = page.partition(f"## Studies of kind [{name}]")[2].partition("\n## ")[0]
+        for table in kind.tables:
+            own = part.partition(f"### {table.name}.parquet\n")[2].partition("\n### ")[0]
+            told = re.findall(r"^\| `(\w+)` \| (?:text|integer|number|flag) \|", own, re.MULTILINE)
+            assert tuple(told) == table.names
+            assert table.about in own
 
 
 def test_bars_in_cells_are_escaped() -> None:

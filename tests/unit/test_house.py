@@ -30,6 +30,7 @@ ROOMS = (
         "problems",
         "documents",
         "files",
+        "schema",
         "progress",
         "frames",
         "decomposition",

@@ -17,7 +17,7 @@ from papers.ranges import Limit, Range, factor_of_two
 from papers.run import NotComputed, Ours, Run
 from spinepipe.comparison import papers
 from spinepipe.report.page.document import judged as told
-from spinepipe.tables.shared import LIMITS
+from spinepipe.studies.tracking.tables import AGAINST_WANG_2021
 from tests.validation import comparisons
 
 ROOT = Path(__file__).parents[2]
@@ -110,7 +110,7 @@ def test_kinds_of_limits(low: float | None, high: float | None, chosen: bool, li
 
 
 def test_the_schema_knows_every_limit() -> None:
-    assert tuple(limit.value for limit in Limit) == LIMITS
+    assert tuple(limit.value for limit in Limit) == AGAINST_WANG_2021.column("limit").allowed
 
 
 def test_the_page_says_what_inside_took() -> None:

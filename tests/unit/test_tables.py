@@ -11,32 +11,23 @@ import pyarrow as pa
 import pytest
 from sweeps import sweep
 
+from spinepipe.schema import Column, Table
 from spinepipe.status import Status
 from spinepipe.studies.registry import every_kind
-from spinepipe.tables import (
-    BadTable,
-    Column,
-    Table,
-    join,
-    read,
-    read_frame,
-    to_arrow,
-    write,
-)
-from spinepipe.tables.schema import MESSAGE, SPECIMEN, status
+from spinepipe.tables import BadTable, arrow_schema, join, read, read_frame, to_arrow, write
 
 TABLE = Table(
     "small",
     "A table for tests.",
     ("specimen", "pose"),
     (
-        SPECIMEN,
+        Column("specimen", "text", "name of the specimen"),
         Column("pose", "integer", "number", low=0, high=99),
         Column("width_mm", "number", "width", "mm", low=0.0, high=10.0),
-        Column("depth_mm", "number", "depth", "mm", null="not measured"),
-        Column("sure", "flag", "whether it is", null="held fixed"),
-        status("test"),
-        MESSAGE,
+        Column("depth_mm", "number", "depth", "mm", required=False, empty="not measured"),
+        Column("sure", "flag", "whether it is", required=False, empty="held fixed"),
+        Column("status", "text", "how the test ended", allowed=tuple(Status)),
+        Column("message", "text", "why"),
     ),
 )
 TABLES = {f"{name}.{t.name}": t for name, kind in every_kind().items() for t in kind.tables}
@@ -58,10 +49,10 @@ def spoiled(column: str, value: object) -> dict[str, list]:
 
 def test_good_rows_become_a_table_with_empty_cells_as_null() -> None:
     rows = to_arrow(TABLE, ROWS)
-    assert rows.schema == TABLE.schema
+    assert rows.schema == arrow_schema(TABLE)
     assert rows["depth_mm"].to_pylist() == [1.0, None, None]
     assert rows["sure"].to_pylist() == [True, None, False]
-    assert not TABLE.schema.field("width_mm").nullable
+    assert not arrow_schema(TABLE).field("width_mm").nullable
 
 
 @sweep(
@@ -173,11 +164,11 @@ def test_every_result_table_is_complete(table: Table) -> None:
     names = [column.name for column in table.columns]
     assert len(set(names)) == len(names)
     assert set(table.key) <= set(names)
-    assert table.schema.names == names
+    assert arrow_schema(table).names == names
     for column in table.columns:
         assert column.meaning
-        assert column.name not in table.key or column.null is None
+        assert column.required or (column.empty and column.name not in table.key)
         for unit in ("mm", "deg"):
             assert not column.name.endswith(f"_{unit}") or column.unit == unit
     without = table.without("specimen")
-    assert "specimen" not in (*without.key, *without.schema.names)
+    assert "specimen" not in (*without.key, *without.names)

@@ -28,7 +28,8 @@ from spinepipe.marks import (
 )
 from spinepipe.motion.export import mot
 from spinepipe.report.style import picture
-from spinepipe.tables import Column, Table, opened, read, read_metadata, to_arrow, write
+from spinepipe.schema import Column, Table
+from spinepipe.tables import opened, read, read_metadata, to_arrow, write
 
 DIGEST = "0123456789abcdef" * 4
 TABLE = Table(

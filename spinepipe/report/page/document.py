@@ -17,10 +17,9 @@ from spinepipe.marks import KEY
 from spinepipe.report.page.scene import as_script
 from spinepipe.report.page.space import Space, segment
 from spinepipe.report.words import count, listed, number
+from spinepipe.schema import Column, Table
 from spinepipe.studies.study import Study
 from spinepipe.tables import Tables
-from spinepipe.tables.schema import Column, Table
-from spinepipe.tables.shared import against_as_shown
 
 _VERSION = "version_"
 _OF_A_TABLE = ("code_digest", "config_digest", "data_digest", "specimens_digest", KEY)
@@ -270,7 +269,7 @@ def _unit(column: Column) -> str:
 
 
 def _meaning(column: Column) -> str:
-    empty = f"; empty: {column.null}" if column.null else ""
+    empty = f"; empty: {column.empty}" if column.empty else ""
     return f"{column.meaning}{empty}"
 
 
@@ -298,10 +297,17 @@ def _cell(value: Any, column: Column) -> Cell:
     return Cell(str(value), None)
 
 
+_PAPER_ORDER = (
+    *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
+    *("limit", "verdict", "reason", "where", "evidence"),
+)
+"""What a reader compares stands first; the short name is left to the file."""
+
+
 def beside_paper(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]:
     """A paper's numbers beside ours: those that are evidence, then folded those that are none."""
     independent = frame["evidence"] == "independent"
-    columns = against_as_shown(shape)
+    columns = tuple(map(shape.column, _PAPER_ORDER))
     rest = sortable(shape.name, f"{title}: no evidence", NO_EVIDENCE, frame[~independent], columns)
     told = frame[independent].drop(columns="evidence")
     first = sortable(shape.name, title, shape.about, told, columns)

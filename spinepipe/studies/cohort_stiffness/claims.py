@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.statistics import Mean, mean_of
-from spinepipe.tables.shared import joined
+from spinepipe.status import joined
 
 Row = dict[str, Any]
 

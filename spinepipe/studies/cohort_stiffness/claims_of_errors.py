@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.statistics import corrected, wilcoxon_signed_rank
+from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.claims import (
     BY_CONSTRUCTION,
     CIRCULAR,
@@ -36,7 +37,6 @@ from spinepipe.studies.cohort_stiffness.stages import (
     unit_of,
     without_result,
 )
-from spinepipe.tables.shared import joined
 
 QUANTITY = (
     "error with {} less that with {}: root mean square of all measured {}, mean over specimens, "

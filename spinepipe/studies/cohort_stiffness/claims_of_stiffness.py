@@ -10,13 +10,12 @@ from statsmodels.stats.anova import AnovaRM
 from spinepipe.effects.contract import Array
 from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
-from spinepipe.status import Status
+from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.claims import FACTORS, NO_SUCH_FITS, Claim, Row, told, words
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, label_of_others
 from spinepipe.studies.cohort_stiffness.significance import FAMILY
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
-from spinepipe.tables.shared import joined
 
 LITTLE_DEG = 0.05
 """Adjusted share of the squared error below which what is not significant is called absent."""

@@ -18,6 +18,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics import corrected
+from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.representations import (
     ASKED_FOR,
     OF_JOINTS,
@@ -26,9 +27,8 @@ from spinepipe.studies.cohort_stiffness.representations import (
 )
 from spinepipe.studies.cohort_stiffness.settings import SEXES, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
-from spinepipe.studies.cohort_stiffness.tables_of_covariates import COVARIATES_TABLE
+from spinepipe.studies.cohort_stiffness.tables import COVARIATES_TABLE
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.tables.shared import joined
 
 Row = dict[str, Any]
 

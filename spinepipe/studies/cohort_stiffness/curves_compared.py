@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from spinepipe.studies.cohort_stiffness.tables_of_experiments import MEASURED, SIMULATED
+from spinepipe.studies.cohort_stiffness.tables import MEASURED, SIMULATED
 
 KEY = ["specimen", "joint", "test", "cycle"]
 

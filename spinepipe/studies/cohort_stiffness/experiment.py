@@ -20,7 +20,7 @@ from spinepipe.experiment.loop import Loop, Spread, reading_noise
 from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.status import USABLE, Status
+from spinepipe.status import USABLE, Status, joined
 from spinepipe.studies.cohort_stiffness.loop_rows import (
     TWO_ZEROS,
     Seen,
@@ -41,7 +41,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
 )
 from spinepipe.studies.cohort_stiffness.representations import finest
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness, representations_of
-from spinepipe.studies.cohort_stiffness.tables_of_experiments import (
+from spinepipe.studies.cohort_stiffness.tables import (
     HELICAL_AXES,
     LOAD_DISPLACEMENT,
     MEASURED,
@@ -51,7 +51,6 @@ from spinepipe.studies.cohort_stiffness.tables_of_experiments import (
     SIMULATED,
 )
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES, DEG_PER_RAD, less_step_0
 
 Row = dict[str, Any]

@@ -12,6 +12,7 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.claims import (
     BY_CONSTRUCTION,
     CIRCULAR,
@@ -28,7 +29,6 @@ from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import FINDINGS
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.tables.shared import joined
 
 PUT_IN = ("stiffness_differs_between_", "literature_overpredicts_", "wrong_level_ratio_")
 """How claims begin that are about the stiffness that was put into a made-up cohort."""

@@ -12,7 +12,7 @@ from spinepipe.designs import specimen_seed
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import moved
-from spinepipe.status import Status
+from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.fit_rows import (
     criteria,
     independent,
@@ -38,10 +38,8 @@ from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
 from spinepipe.studies.cohort_stiffness.stiffening import Growth, ended, fitted_growth, laws
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, STIFFNESS
-from spinepipe.studies.cohort_stiffness.tables_of_nuisances import NUISANCES
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, NUISANCES, STIFFNESS
 from spinepipe.tables import from_rows, write
-from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]

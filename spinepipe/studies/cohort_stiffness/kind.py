@@ -7,6 +7,7 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
+from spinepipe.schema import all_declared
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness, check_one_stiffening
 from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
@@ -20,9 +21,6 @@ from spinepipe.studies.cohort_stiffness.settings import (
     representations_of,
     tests_of,
 )
-from spinepipe.studies.cohort_stiffness.tables import TABLES
-from spinepipe.studies.cohort_stiffness.tables_of_experiments import TABLES as TABLES_OF_EXPERIMENTS
-from spinepipe.studies.cohort_stiffness.tables_of_nuisances import NUISANCES
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles
 
@@ -264,7 +262,7 @@ KIND = Kind(
     files=CohortLayout,
     checks=(check_cohort_stiffness,),
     checks_of_files=(BaseCheck(own_bushings=True), check_one_stiffening),
-    tables=(*TABLES, NUISANCES, *TABLES_OF_EXPERIMENTS),
+    tables=all_declared(__file__),
     jobs=(
         Job("fit", many=True, ignores=ignoring(*_HELD_OUT), reads_base=True),
         Job("literature", ignores=ignoring(*_HELD_OUT, *_FITTING, "nuisance"), reads_base=True),

@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.status import Status
+from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
@@ -23,7 +23,6 @@ from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stiffening import Growth, laws, median_growth
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 SOURCE = "others_median"

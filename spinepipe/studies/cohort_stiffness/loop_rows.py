@@ -10,8 +10,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.experiment.double_sigmoid import NeutralZone, Zone, neutral_zone
 from spinepipe.experiment.loop import Loop, Measure, Spread, stiffness_interval
 from spinepipe.experiment.screw import SMALLEST_ANGLE, derivatives, screw_between
-from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.tables_of_experiments import (
+from spinepipe.schema import Table
+from spinepipe.status import Status, joined
+from spinepipe.studies.cohort_stiffness.tables import (
     BEYOND,
     DIRECTION,
     HELICAL_AXES,
@@ -22,8 +23,6 @@ from spinepipe.studies.cohort_stiffness.tables_of_experiments import (
     UPPER_HALF,
     WHOLE,
 )
-from spinepipe.tables.schema import Table
-from spinepipe.tables.shared import joined
 from spinepipe.units import BORDER_PER_SI, COORDINATES, DEG_PER_RAD, MM_PER_M
 
 Row = dict[str, Any]
@@ -41,7 +40,7 @@ AGAINST = "moves against the {side} moment: no stiffness there"
 
 def empty(table: Table) -> Row:
     """A row without numbers."""
-    return {column.name: None for column in table.columns if column.null is not None}
+    return {column.name: None for column in table.columns if not column.required}
 
 
 @dataclass(frozen=True)

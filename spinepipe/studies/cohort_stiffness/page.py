@@ -15,6 +15,7 @@ from spinepipe.report.page.document import (
     beside_paper,
     sortable,
 )
+from spinepipe.schema import Column, Table, all_declared
 from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
@@ -25,10 +26,12 @@ from spinepipe.studies.cohort_stiffness.settings import (
     representations_of,
 )
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
-from spinepipe.studies.cohort_stiffness.tables import AGAINST_GOULD_2024B, FINDINGS, TABLES
-from spinepipe.studies.cohort_stiffness.tables_of_experiments import TABLES as TABLES_OF_EXPERIMENTS
-from spinepipe.studies.cohort_stiffness.tables_of_nuisances import NUISANCES
-from spinepipe.tables.schema import Column, Table
+from spinepipe.studies.cohort_stiffness.tables import (
+    AGAINST_GOULD_2024B,
+    FINDINGS,
+    HELICAL_AXES,
+    LOAD_DISPLACEMENT,
+)
 
 QUESTION = (
     "Does stiffness differ between specimens, levels and load cases, how should it be described, "
@@ -76,12 +79,12 @@ def _shown(table: Table) -> tuple[Column, ...]:
 
 
 _COLUMNS = {
-    FINDINGS.name: tuple(c for name in _CLAIM_ORDER for c in FINDINGS.columns if c.name == name),
-    **{table.name: _shown(table) for table in TABLES_OF_EXPERIMENTS},
+    FINDINGS.name: tuple(map(FINDINGS.column, _CLAIM_ORDER)),
+    **{table.name: _shown(table) for table in (LOAD_DISPLACEMENT, HELICAL_AXES)},
 }
 """What a reader compares stands first; short names are left to the files."""
 
-_SHAPES = {table.name: table for table in (*TABLES, NUISANCES, *TABLES_OF_EXPERIMENTS)}
+_SHAPES = {table.name: table for table in all_declared(__file__)}
 
 NO_LEVELS = (
     "no stiffness of single levels is published for these joints and the coordinates that are free"

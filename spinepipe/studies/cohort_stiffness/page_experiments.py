@@ -10,7 +10,7 @@ from spinepipe.report.words import count, number
 from spinepipe.studies.cohort_stiffness.curves_compared import both
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables_of_experiments import (
+from spinepipe.studies.cohort_stiffness.tables import (
     DIRECTION,
     MEASURED,
     NOT_READ,

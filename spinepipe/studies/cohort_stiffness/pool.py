@@ -12,7 +12,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.status import Status
+from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.fit_rows import (
     LEVEL,
     criteria,
@@ -39,10 +39,8 @@ from spinepipe.studies.cohort_stiffness.stiffening import (
     pooled_ended,
     pooled_growth,
 )
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, POOLING, STIFFNESS
-from spinepipe.studies.cohort_stiffness.tables_of_laws import SPREAD_CELLS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, POOLING, SPREAD_CELLS, STIFFNESS
 from spinepipe.tables import from_rows, write
-from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
 
 Row = dict[str, Any]

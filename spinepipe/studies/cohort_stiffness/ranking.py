@@ -11,6 +11,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics import wilcoxon_signed_rank
+from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.representations import NAMES, POOLED, PUBLISHED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import (
@@ -24,7 +25,6 @@ from spinepipe.studies.cohort_stiffness.stages import (
 )
 from spinepipe.studies.cohort_stiffness.tables import CRITERIA, RANKING
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.tables.shared import joined
 
 INFORMATION = ("aicc", "bic")
 _SPREADS = ("between_levels", "between_specimens", "between_joints")

@@ -21,7 +21,6 @@ class Representation:
     name : in study files, tables and folders of results.
     words : in figures and findings.
     sentence : in claims about what it predicts.
-    about : in the description of the tables' column.
     by_level : whether it starts from the published values of each level, else from one for all.
     grouping : which joints share an unknown, as in `free_parameters`; None where it is published
         and nothing is fitted.
@@ -36,7 +35,6 @@ class Representation:
     name: str
     words: str
     sentence: str
-    about: str
     by_level: bool = False
     grouping: Literal["per_specimen", "per_joint"] | None = None
     pooled: bool = False
@@ -53,7 +51,6 @@ def _with_nuisances(one: Representation) -> Representation:
         name=f"{one.name}_nuisance",
         words=f"{one.words}, centres and axes too",
         sentence=f"{one.sentence} {beside} fitted beside",
-        about=f"as {one.name}, {beside} fitted beside",
         without_nuisances=one.name,
         beats=(one.name,),
     )
@@ -64,27 +61,23 @@ _STATED = (
         "literature",
         words="published, one value",
         sentence="published stiffness",
-        about="one published value for all joints",
     ),
     Representation(
         "literature_levels",
         words="published, level by level",
         sentence="published stiffness of the levels",
-        about="published values level by level",
         by_level=True,
     ),
     Representation(
         "per_specimen",
         words="one value per specimen",
         sentence="one stiffness for all joints",
-        about="one stiffness for all joints of a specimen",
         grouping="per_specimen",
     ),
     Representation(
         "level_ratio",
         words="published ratio of levels",
         sentence="the published ratio of levels",
-        about="published ratio of levels times one factor",
         by_level=True,
         grouping="per_specimen",
     ),
@@ -92,7 +85,6 @@ _STATED = (
         "per_joint",
         words="each joint its own",
         sentence="a stiffness for each joint",
-        about="each joint its own",
         grouping="per_joint",
         beats=("per_specimen", "level_ratio"),
     ),
@@ -100,8 +92,6 @@ _STATED = (
         "partially_pooled",
         words="partially pooled",
         sentence="partially pooled stiffness",
-        about="each joint its own, drawn towards its specimen and its cohort as far as the data "
-        "ask for it",
         grouping="per_joint",
         pooled=True,
         beats=("per_specimen", "level_ratio", "per_joint"),
@@ -110,7 +100,6 @@ _STATED = (
         "stiffening",
         words="one value per specimen, stiffening",
         sentence="one stiffening law for all joints",
-        about="one law for all joints of a specimen: stiffness at rest, and how fast it grows",
         grouping="per_specimen",
         stiffens=True,
         beats=("per_specimen",),
@@ -119,7 +108,6 @@ _STATED = (
         "per_joint_stiffening",
         words="each joint its own, stiffening",
         sentence="a stiffening law for each joint",
-        about="a law for each joint: stiffness at rest, and how fast it grows",
         grouping="per_joint",
         stiffens=True,
         beats=("per_joint",),
@@ -128,8 +116,6 @@ _STATED = (
         "pooled_stiffening",
         words="partially pooled, stiffening",
         sentence="partially pooled stiffening laws",
-        about="a law for each joint, stiffness and growth drawn towards specimen and cohort as far "
-        "as the data ask for it",
         grouping="per_joint",
         pooled=True,
         stiffens=True,

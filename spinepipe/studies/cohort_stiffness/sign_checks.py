@@ -12,9 +12,9 @@ from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.cohort.motion_size import implausible, unit_of
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
+from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.predict import predicted
 from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven
-from spinepipe.tables.shared import joined
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]

@@ -22,6 +22,7 @@ from spinepipe.statistics import (
     wilcoxon_signed_rank,
 )
 from spinepipe.statistics.normality import NESTED
+from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.representations import NUISANCE, POOLED, start_of
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
@@ -39,8 +40,8 @@ from spinepipe.studies.cohort_stiffness.stages import (
     of_single_cases,
     unit_of,
 )
+from spinepipe.studies.cohort_stiffness.tables import STATISTICS
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.tables.shared import STATISTICS, joined
 from spinepipe.units import COORDINATES
 
 STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)

@@ -18,11 +18,10 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.statics import FreeParameter, free_parameters, moved
-from spinepipe.status import Status
+from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.representations import STIFFENING_EFFECT, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables_of_laws import GROWTH_CELLS, SPREAD_CELLS
-from spinepipe.tables.shared import joined
+from spinepipe.studies.cohort_stiffness.tables import GROWTH_CELLS, SPREAD_CELLS
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]

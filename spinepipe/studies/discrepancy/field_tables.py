@@ -7,12 +7,12 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.report.words import number
+from spinepipe.schema import Column
 from spinepipe.studies.discrepancy.tables import MODELS
 from spinepipe.studies.discrepancy.verdict import EVERY
 from spinepipe.studies.discrepancy.verdict_imperfections import WithheldEffect
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 from spinepipe.studies.discrepancy.words import TOWARDS, general, motion_of, readable
-from spinepipe.tables.schema import Column
 from spinepipe.units import DEG_PER_RAD, LOAD_UNITS
 
 Shown = tuple[pd.DataFrame, tuple[Column, ...]]

@@ -3,20 +3,10 @@
 from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
+from spinepipe.schema import all_declared
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.discrepancy.checks import check_discrepancy
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.tables import (
-    CANDIDATES,
-    CONFUSIONS,
-    FIELD_NUMBERS,
-    GAP,
-    HELD_OUT,
-    IMPERFECTIONS,
-    NEXT_TESTS,
-    TABULATED,
-    WHERE,
-)
 from spinepipe.studies.kind import Job, Kind
 from spinepipe.studies.study_files import Figure, StudyFiles
 
@@ -87,7 +77,7 @@ class DiscrepancyFiles(StudyFiles):
     @property
     def tables(self) -> tuple[str, ...]:
         """The tables that every study has."""
-        return tuple(table.name for table in TABLES)
+        return tuple(table.name for table in all_declared(__file__))
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -95,17 +85,12 @@ class DiscrepancyFiles(StudyFiles):
         return OTHERS
 
 
-TABLES = (
-    *(GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT, IMPERFECTIONS, NEXT_TESTS),
-    *(FIELD_NUMBERS, TABULATED),
-)
-
 KIND = Kind(
     settings=Discrepancy,
     files=DiscrepancyFiles,
     checks=(check_discrepancy,),
     checks_of_files=(BaseCheck(own_bushings=False),),
-    tables=TABLES,
+    tables=all_declared(__file__),
     # every setting says something about the search
     jobs=(Job("search", at="job", reads_base=True),),
     makes_models="search",

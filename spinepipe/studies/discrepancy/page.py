@@ -9,6 +9,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Headline, Picture, Results, Sortable, sortable
 from spinepipe.report.words import listed, plain
+from spinepipe.schema import Column
 from spinepipe.studies.discrepancy.advice_words import shown_advice
 from spinepipe.studies.discrepancy.field_tables import (
     FORMULA_ABOUT,
@@ -35,7 +36,6 @@ from spinepipe.studies.discrepancy.words import (
     readable,
     where_of,
 )
-from spinepipe.tables.schema import Column
 
 Parts = tuple[str, str, str, pd.DataFrame, tuple[Column, ...]]
 

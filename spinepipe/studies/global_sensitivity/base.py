@@ -18,6 +18,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, SpineModel
+from spinepipe.schema import Table
 from spinepipe.statics.many import Cases, Spines, solve_many
 from spinepipe.status import Status
 from spinepipe.studies.asked_tests import AskedTest
@@ -27,7 +28,7 @@ from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import Start, asked_tests, start_of
 from spinepipe.studies.global_sensitivity.tables import BASE_MOTION, BASE_STIFFNESS, EVERY
 from spinepipe.studies.parts import stiffness_of_joints
-from spinepipe.tables import Table, from_rows, write
+from spinepipe.tables import from_rows, write
 from spinepipe.units import (
     BORDER_PER_SI,
     COORDINATE_UNITS,

@@ -5,20 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.schema import all_declared
 from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.global_sensitivity.checks import check_global_sensitivity
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.size_of_design import check_size_of_design
-from spinepipe.studies.global_sensitivity.tables import (
-    BASE_MOTION,
-    BASE_STIFFNESS,
-    CALIBRATED,
-    CONVERGENCE,
-    DESIGN,
-    FAILED_RUNS,
-    INDICES,
-    RESPONSES,
-)
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 
@@ -144,16 +135,7 @@ KIND = Kind(
     checks=(check_global_sensitivity,),
     checks_at_start=(check_size_of_design,),
     settled=calibration_settled,
-    tables=(
-        DESIGN,
-        BASE_STIFFNESS,
-        BASE_MOTION,
-        RESPONSES,
-        CALIBRATED,
-        INDICES,
-        CONVERGENCE,
-        FAILED_RUNS,
-    ),
+    tables=all_declared(__file__),
     jobs=(
         Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), header_alone=True),
         Job("base", ignores=ignoring(*_DRAWING, *_ANALYSING, "steps")),

@@ -8,6 +8,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Results, Sortable, sortable
 from spinepipe.report.words import fixed, number
+from spinepipe.schema import Column
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
     NAME,
@@ -25,7 +26,6 @@ from spinepipe.studies.global_sensitivity.tables import (
     FAILED_RUNS,
     INDICES,
 )
-from spinepipe.tables.schema import Column
 
 QUESTION = (
     "Which uncertain inputs drive the results of this spine's simulations, how sure is that, and "
@@ -113,7 +113,11 @@ def _ranking(indices: pd.DataFrame, measures: Measures) -> Sortable:
         ),
         Column("not above the dummy", "integer", "factors whose index is not above the floor"),
         Column(
-            "negligible", "integer", "factors whose ST has its interval below 1 %", null="no ST"
+            "negligible",
+            "integer",
+            "factors whose ST has its interval below 1 %",
+            required=False,
+            empty="no ST",
         ),
     ]
     about = f"By {NAME[measures.main]}; one row for each output."

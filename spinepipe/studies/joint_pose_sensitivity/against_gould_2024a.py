@@ -5,6 +5,7 @@ doi 10.3389/fbioe.2024.1304334.
 
 from spinepipe.jobs.against import write_against
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.tables import AGAINST_GOULD_2024A
 from spinepipe.tables import read_frames
 
 
@@ -16,4 +17,4 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
         name: frame[frame["specimen"] == specimen] for name, frame in read_frames(tables).items()
     }
     asked = {"failed_when": settings.success.failed_when}
-    write_against("gould_2024a", frames, asked, settings, cohort, output)
+    write_against(AGAINST_GOULD_2024A, frames, asked, settings, cohort, output)

@@ -28,7 +28,7 @@ from spinepipe.studies.joint_pose_sensitivity.settings import (
     SETS_PER_BATCH,
     JointPoseSensitivity,
 )
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP
+from spinepipe.studies.joint_pose_sensitivity.tables import BOOTSTRAP
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS
 

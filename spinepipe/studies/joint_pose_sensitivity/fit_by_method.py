@@ -25,7 +25,7 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
 )
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import METHOD_FITS
+from spinepipe.studies.joint_pose_sensitivity.tables import METHOD_FITS
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
+from spinepipe.schema import all_declared
 from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
@@ -15,14 +16,6 @@ from spinepipe.studies.joint_pose_sensitivity.ranking import is_whole, ranked_se
 from spinepipe.studies.joint_pose_sensitivity.settings import (
     SETS_PER_BATCH,
     JointPoseSensitivity,
-)
-from spinepipe.studies.joint_pose_sensitivity.tables import TABLES
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
-from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import (
-    TABLES as TABLES_OF_LOAD_POINT,
-)
-from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
-    TABLES as TABLES_OF_POSTERIOR,
 )
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import MOST_FILES_PER_BLOCK, Figure, StudyFiles
@@ -459,7 +452,7 @@ KIND = Kind(
     settings=JointPoseSensitivity,
     files=Layout,
     checks=(check_joint_pose_sensitivity,),
-    tables=(*TABLES, *TABLES_OF_FITS, *TABLES_OF_LOAD_POINT, *TABLES_OF_POSTERIOR),
+    tables=all_declared(__file__),
     jobs=(*_SAMPLED, *_ADDED, *_ANALYSES),
     ignored_by_figures=("block",),
     makes_models="start_model",

@@ -17,7 +17,7 @@ from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import PRECISION_ERRORS
+from spinepipe.studies.joint_pose_sensitivity.tables import PRECISION_ERRORS
 from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M
 

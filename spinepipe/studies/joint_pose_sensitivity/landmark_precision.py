@@ -13,7 +13,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import LandmarkPrecision
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import (
+from spinepipe.studies.joint_pose_sensitivity.tables import (
     LANDMARK_PRECISION,
     REQUIRED_PRECISION,
 )

@@ -23,7 +23,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import LoadPoint
-from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import LOAD_POINT_EFFECT
+from spinepipe.studies.joint_pose_sensitivity.tables import LOAD_POINT_EFFECT
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
 

@@ -24,7 +24,7 @@ from spinepipe.studies.joint_pose_sensitivity.fitted_stiffness import stiffness_
 from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import STIFFNESS_OVER_LOAD_POINT
+from spinepipe.studies.joint_pose_sensitivity.tables import STIFFNESS_OVER_LOAD_POINT
 from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M
 

@@ -16,6 +16,7 @@ from spinepipe.report.page.document import (
     beside_paper,
     sortable,
 )
+from spinepipe.schema import Column, all_declared
 from spinepipe.studies.joint_pose_sensitivity.figures.agreement import in_rows
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
     TREE,
@@ -24,17 +25,11 @@ from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness imp
 from spinepipe.studies.joint_pose_sensitivity.findings import findings, settling
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, TABLES
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import TABLES as TABLES_OF_FITS
-from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import (
-    TABLES as TABLES_OF_LOAD_POINT,
+from spinepipe.studies.joint_pose_sensitivity.tables import (
+    AGAINST_GOULD_2024A,
+    IMPORTANCE,
+    STATISTICS,
 )
-from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
-    TABLES as TABLES_OF_POSTERIOR,
-)
-from spinepipe.tables.schema import Column
-from spinepipe.tables.shared import STATISTICS
 
 QUESTION = (
     "How stiff are the intervertebral joints of this cohort, and how much of the answer hangs on "
@@ -96,18 +91,23 @@ FOLDED = (
     Column("holm", "integer", "significant after Holm's correction"),
     Column("effect_name", "text", "what the effect size is called"),
     Column(
-        "effect_lowest", "number", "smallest effect significant after Bonferroni", "", _NO_EFFECT
+        "effect_lowest",
+        "number",
+        "smallest effect significant after Bonferroni",
+        required=False,
+        empty=_NO_EFFECT,
     ),
     Column(
-        "effect_highest", "number", "largest effect significant after Bonferroni", "", _NO_EFFECT
+        "effect_highest",
+        "number",
+        "largest effect significant after Bonferroni",
+        required=False,
+        empty=_NO_EFFECT,
     ),
 )
 
 
-_SHAPES = {
-    table.name: table
-    for table in (*TABLES, *TABLES_OF_FITS, *TABLES_OF_LOAD_POINT, *TABLES_OF_POSTERIOR)
-}
+_SHAPES = {table.name: table for table in all_declared(__file__)}
 
 
 def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Document:

@@ -42,7 +42,7 @@ from spinepipe.studies.joint_pose_sensitivity.posterior_target import (
     stiffness_values,
 )
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables_of_posterior import (
+from spinepipe.studies.joint_pose_sensitivity.tables import (
     POSE_WEIGHTS,
     POSTERIOR,
     POSTERIOR_MOTION,

@@ -21,6 +21,7 @@ from spinepipe.statistics import (
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables import STATISTICS
 from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     complete_grid,
@@ -31,7 +32,6 @@ from spinepipe.studies.joint_pose_sensitivity.variables import (
     readings,
 )
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.tables.shared import STATISTICS
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 NORMALITY = (chi_squared_normality, kolmogorov_smirnov_normality, lilliefors_normality)

@@ -13,7 +13,7 @@ from spinepipe.frames import zxy_angles
 from spinepipe.jobs.digest import provenance
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables_of_load_point import SPREAD_OVER_LANDMARK_SD
+from spinepipe.studies.joint_pose_sensitivity.tables import SPREAD_OVER_LANDMARK_SD
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATE_UNITS, MM_PER_M, ROTATIONS, TRANSLATIONS
 

@@ -10,7 +10,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap, judge_poses
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import (
+from spinepipe.studies.joint_pose_sensitivity.tables import (
     COUNTS,
     SUCCESS,
     SUCCESS_BY_METHOD,

@@ -13,8 +13,7 @@ from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables import region_columns
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOWER_ENDS, SUMMARY
+from spinepipe.studies.joint_pose_sensitivity.tables import LOWER_ENDS, SUMMARY, region_columns
 from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     measured_size,

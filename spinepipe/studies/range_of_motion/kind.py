@@ -5,15 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from spinepipe.cohort import Cohort
+from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion, check_range_of_motion
-from spinepipe.studies.range_of_motion.tables import (
-    FRAMES,
-    RANGE_OF_MOTION,
-    ROM_SUMMARY,
-    ROM_VARIANCE,
-    STIFFNESS_SETS,
-)
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 
 _JOBS = ("range_of_motion",)
@@ -106,7 +100,7 @@ KIND = Kind(
     settings=RangeOfMotion,
     files=RangeOfMotionFiles,
     checks=(check_range_of_motion,),
-    tables=(FRAMES, STIFFNESS_SETS, RANGE_OF_MOTION, ROM_SUMMARY, ROM_VARIANCE),
+    tables=all_declared(__file__),
     jobs=(
         Job("sample_frames", at="draw:sample_frames", ignores=ignoring(*_MOVING, *_SETS)),
         Job(

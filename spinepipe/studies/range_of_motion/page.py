@@ -7,6 +7,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, Results, Sortable, sortable
 from spinepipe.report.words import count, fixed, percent
+from spinepipe.schema import Table
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import (
     EVERY,
@@ -14,7 +15,6 @@ from spinepipe.studies.range_of_motion.tables import (
     ROM_VARIANCE,
     STIFFNESS_SETS,
 )
-from spinepipe.tables import Table
 
 QUESTION = (
     "How far do the joints of these spines move in tests, and does that hang on the spine, on "

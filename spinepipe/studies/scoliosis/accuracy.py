@@ -18,7 +18,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.scoliosis.errors import REFERENCE, mean_squares, of_group, squares
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import ACCURACY, GROUPS, MEASURES
+from spinepipe.studies.scoliosis.tables import ACCURACY, GROUPS, MEASURES
 from spinepipe.tables import from_rows, read_frames, write
 
 READINGS_OF_A_ROTATION = 4

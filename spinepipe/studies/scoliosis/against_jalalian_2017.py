@@ -11,6 +11,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.scoliosis.curve_angles import main_curve
 from spinepipe.studies.scoliosis.films import ERECT, read_films
 from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import AGAINST_JALALIAN_2017
 from spinepipe.tables import read_frames
 from spinepipe.units import DEG_PER_RAD
 
@@ -19,7 +20,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``against_jalalian_2017.parquet``."""
     settings, cohort = study_of_kind(Scoliosis, root, study)
     frames = {**read_frames(tables), **facts(cohort)}
-    write_against("jalalian_2017", frames, asked_of(settings), settings, cohort, output)
+    write_against(AGAINST_JALALIAN_2017, frames, asked_of(settings), settings, cohort, output)
 
 
 def asked_of(settings: Scoliosis) -> dict[str, float | None]:

@@ -16,7 +16,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.scoliosis.errors import REFERENCE, of_group, of_rotations
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import BEYOND, BY_RANGE, EVERY, GROUPS, RANGES
+from spinepipe.studies.scoliosis.tables import BEYOND, BY_RANGE, EVERY, GROUPS, RANGES
 from spinepipe.tables import from_rows, read_frames, write
 
 DECIMALS = 9

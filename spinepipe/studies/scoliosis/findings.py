@@ -10,7 +10,7 @@ from spinepipe.report.words import capital, count, fixed, listed, number, percen
 from spinepipe.status import Ended, Status
 from spinepipe.studies.scoliosis.headline import DECIDING, SIGNIFICANT, Standing, p_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import GROUPS, MEASURES
+from spinepipe.studies.scoliosis.tables import GROUPS, MEASURES
 from spinepipe.studies.scoliosis.words import IN_WORDS, OF_FILMS, TOLD, in_order
 
 _MOST_PLACES = 6

@@ -6,21 +6,13 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
+from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
 from spinepipe.studies.scoliosis.jalalian_2017 import stands_for
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POPULATION, POSITIONS
-from spinepipe.studies.scoliosis.tables_of_errors import (
-    ACCURACY,
-    AGAINST_JALALIAN_2017,
-    BY_RANGE,
-    VARIANTS,
-    VARIATION,
-)
 from spinepipe.studies.study_files import Figure, StudyFiles
-from spinepipe.tables.shared import STATISTICS
 
 OF_JOBS = ("laws", "positions", "displacements", "curves")
 """Tables joined from job files, one for each patient and model."""
@@ -152,10 +144,7 @@ KIND = Kind(
     settings=Scoliosis,
     files=ScoliosisFiles,
     checks=(check_scoliosis,),
-    tables=(
-        *(LAWS, POPULATION, POSITIONS, DISPLACEMENTS, CURVES),
-        *(ACCURACY, BY_RANGE, STATISTICS, VARIANTS, VARIATION, AGAINST_JALALIAN_2017),
-    ),
+    tables=all_declared(__file__),
     jobs=(
         Job("personalise", many=True, ignores=ignoring("models"), also=_population),
         Job("population", "learn", ignores=ignoring("models")),

@@ -15,14 +15,18 @@ from spinepipe.studies.scoliosis.findings import findings
 from spinepipe.studies.scoliosis.headline import headline
 from spinepipe.studies.scoliosis.jalalian_2017 import stands_for
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
-from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POPULATION, POSITIONS
-from spinepipe.studies.scoliosis.tables_of_errors import (
+from spinepipe.studies.scoliosis.tables import (
     ACCURACY,
     AGAINST_JALALIAN_2017,
     BY_RANGE,
+    CURVES,
+    DISPLACEMENTS,
+    LAWS,
+    POPULATION,
+    POSITIONS,
+    STATISTICS,
     VARIATION,
 )
-from spinepipe.tables.shared import STATISTICS
 
 QUESTION = (
     "Which model of a scoliotic spine, personalised on two bending films, reproduces positions "

@@ -10,7 +10,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.status import Status
+from spinepipe.status import Status, joined
 from spinepipe.studies.scoliosis.curve_angles import region
 from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.film_regions import regions
@@ -23,7 +23,6 @@ from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
 from spinepipe.studies.scoliosis.tangent_laws import ends_of
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.tables.shared import joined
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 Row = dict[str, Any]

@@ -9,9 +9,8 @@ import pandas as pd
 from scipy.stats import norm
 
 from spinepipe.effects.contract import Array
-from spinepipe.status import Status
+from spinepipe.status import Status, joined
 from spinepipe.studies.scoliosis.population import PER_SEGMENT, Population
-from spinepipe.tables.shared import joined
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 

@@ -15,11 +15,11 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
 from spinepipe.statistics import Outcome, wilcoxon_signed_rank
+from spinepipe.status import joined
 from spinepipe.studies.scoliosis.errors import by_patient, of_group, squares
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import GROUPS, MEASURES
+from spinepipe.studies.scoliosis.tables import GROUPS, MEASURES, STATISTICS
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.tables.shared import STATISTICS, joined
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:

@@ -20,7 +20,7 @@ from spinepipe.studies.scoliosis.held_spine import HeldSpine, Posed, with_laws
 from spinepipe.studies.scoliosis.misses import POSED, miss_of
 from spinepipe.studies.scoliosis.personal import Patient, patient_of, tangent
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import SINGULAR, VARIANTS
+from spinepipe.studies.scoliosis.tables import SINGULAR, VARIANTS
 from spinepipe.studies.scoliosis.tangent_laws import characterise, ends_of
 from spinepipe.tables import from_rows, write
 from spinepipe.units import DEG_PER_RAD

@@ -9,7 +9,7 @@ import pandas as pd
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import GROUPS, VARIATION
+from spinepipe.studies.scoliosis.tables import GROUPS, VARIATION
 from spinepipe.tables import from_rows, read_frames, write
 
 

@@ -9,7 +9,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics.outcome import mean_of
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.tables_of_studies import ACCURACY
+from spinepipe.studies.tracking.tables import ACCURACY
 from spinepipe.tables import from_rows, read_frames, write
 
 

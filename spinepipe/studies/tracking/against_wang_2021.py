@@ -14,6 +14,7 @@ from spinepipe.motion.skeleton import JOINTS
 from spinepipe.studies.tracking.forms import PASSIVE
 from spinepipe.studies.tracking.persons import own_rows
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.tables import AGAINST_WANG_2021
 from spinepipe.tables import read_frames
 from spinepipe.units import COORDINATES
 
@@ -22,7 +23,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``against_wang_2021.parquet``."""
     settings, cohort = study_of_kind(Tracking, root, study)
     frames = {**read_frames(tables), **facts(cohort)}
-    write_against("wang_2021", frames, asked_of(settings), settings, cohort, output)
+    write_against(AGAINST_WANG_2021, frames, asked_of(settings), settings, cohort, output)
 
 
 def facts(cohort: Cohort) -> dict[str, pd.DataFrame]:

@@ -13,7 +13,7 @@ from spinepipe.studies.tracking.moved import Moved, kinds_of_trials, motions
 from spinepipe.studies.tracking.off_truth import Bones, Off, bones_of, errors_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.sizes import factors_in
-from spinepipe.studies.tracking.tables_of_studies import ERRORS
+from spinepipe.studies.tracking.tables import ERRORS
 from spinepipe.studies.tracking.truth import Truth, truths
 from spinepipe.tables import from_rows, read_frames, write
 

@@ -19,8 +19,7 @@ from spinepipe.status import Status
 from spinepipe.studies.tracking.forms import STANCE
 from spinepipe.studies.tracking.moved import kinds_of_trials
 from spinepipe.studies.tracking.settings import LEARNT, Tracking
-from spinepipe.studies.tracking.tables import MARKER_OFF
-from spinepipe.studies.tracking.tables_of_studies import MEASURES
+from spinepipe.studies.tracking.tables import MARKER_OFF, MEASURES
 from spinepipe.studies.tracking.words import in_order, short_of, sized, told
 
 FEWEST = 3

@@ -9,7 +9,7 @@ from spinepipe.report.page.document import Results
 from spinepipe.report.words import capital, count, fixed, listed, plain
 from spinepipe.studies.tracking.findings_of_errors import FEWEST
 from spinepipe.studies.tracking.settings import CONSTRAINED, Tracking
-from spinepipe.studies.tracking.tables_of_studies import DONE, TOO_FEW, TOO_SMALL, UNDEFINED
+from spinepipe.studies.tracking.tables import DONE, TOO_FEW, TOO_SMALL, UNDEFINED
 from spinepipe.studies.tracking.words import in_order, told
 
 WINDOW = "20-80"

@@ -27,8 +27,7 @@ from spinepipe.studies.tracking.findings_of_errors import (
 )
 from spinepipe.studies.tracking.findings_of_stiffness import closed, profiled
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.tables import MARKER_OFF
-from spinepipe.studies.tracking.tables_of_studies import MEASURES
+from spinepipe.studies.tracking.tables import MARKER_OFF, MEASURES
 from spinepipe.studies.tracking.words import sized, told
 
 NO_MOTION = "No motion can be told: no approach found a posture of anybody."

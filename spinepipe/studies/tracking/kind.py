@@ -6,6 +6,7 @@ from itertools import product
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
+from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
@@ -20,26 +21,6 @@ from spinepipe.studies.tracking.marks import (
 )
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, profiled_persons
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.tables import (
-    CLUSTERS,
-    DRAWN,
-    FITS,
-    PROFILE_POINTS,
-    PROFILES,
-    REMARKS,
-    SIZES,
-    STIFFNESS,
-    TRACKED,
-)
-from spinepipe.studies.tracking.tables_of_studies import (
-    ACCURACY,
-    AGAINST_WANG_2021,
-    ERRORS,
-    RANGES,
-    SHARING,
-    SIMILARITY,
-    WEIGHTS,
-)
 
 _ANALYSES = (
     Job("ranges", "", ("tracked",), ("ranges",)),
@@ -212,10 +193,7 @@ KIND = Kind(
     files=TrackingFiles,
     checks=(check_tracking,),
     checks_at_start=(check_recordings,),
-    tables=(
-        *(TRACKED, FITS, STIFFNESS, PROFILES, PROFILE_POINTS, CLUSTERS, REMARKS, SIZES, DRAWN),
-        *(RANGES, SHARING, SIMILARITY, ERRORS, ACCURACY, WEIGHTS, AGAINST_WANG_2021),
-    ),
+    tables=all_declared(__file__),
     jobs=(
         Job("calibrate", ignores=_COUNTED, also=marks_of_motion),
         Job(

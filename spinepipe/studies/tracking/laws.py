@@ -12,7 +12,6 @@ from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.passive_elements import PassiveElements
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.status import Status
-from spinepipe.tables.schema import MESSAGE
 from spinepipe.units import COORDINATES, ROTATIONS
 
 LOW_MOMENT_NM = 0.1
@@ -64,7 +63,7 @@ def stiffness_rows(
             "inside_generic": bool(lower[place] <= own[place] <= upper[place]) if loaded else None,
             "ratio_to_generic": float(own[place] / usual[place]) if loaded else None,
             "status": status,
-            MESSAGE.name: message,
+            "message": message,
         }
 
 
@@ -73,7 +72,7 @@ def without(message: str) -> Iterator[dict[str, Any]]:
     numbers = ("a", "b", "at_low_moment", "at_high_moment", "high_moment_nm", "generic_low")
     blank = dict.fromkeys((*numbers, "generic_high", "inside_generic", "ratio_to_generic"))
     for place in np.ndindex(*_SHAPE):
-        yield {**_key(place), **blank, "status": Status.NOT_CONVERGED, MESSAGE.name: message}
+        yield {**_key(place), **blank, "status": Status.NOT_CONVERGED, "message": message}
 
 
 def _key(place: tuple[int, ...]) -> dict[str, str]:

@@ -15,22 +15,20 @@ from spinepipe.studies.tracking.headline import headline
 from spinepipe.studies.tracking.in_space import spine_in_space
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import (
+    ACCURACY,
+    AGAINST_WANG_2021,
     CLUSTERS,
     DRAWN,
+    ERRORS,
     FITS,
     PROFILE_POINTS,
     PROFILES,
-    REMARKS,
-    SIZES,
-    STIFFNESS,
-)
-from spinepipe.studies.tracking.tables_of_studies import (
-    ACCURACY,
-    AGAINST_WANG_2021,
-    ERRORS,
     RANGES,
+    REMARKS,
     SHARING,
     SIMILARITY,
+    SIZES,
+    STIFFNESS,
     WEIGHTS,
 )
 

@@ -11,7 +11,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.skeleton import JOINTS, PELVIS
 from spinepipe.studies.tracking.moved import motions
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.tables_of_studies import RANGES
+from spinepipe.studies.tracking.tables import RANGES
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
 

@@ -10,7 +10,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.tracking.moved import kinds_of_trials, motions
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.shares import LUMBAR_JOINTS, shares_of
-from spinepipe.studies.tracking.tables_of_studies import DONE, SHARING, TOO_FEW, TOO_SMALL, WINDOWS
+from spinepipe.studies.tracking.tables import DONE, SHARING, TOO_FEW, TOO_SMALL, WINDOWS
 from spinepipe.tables import from_rows, read_frames, write
 
 

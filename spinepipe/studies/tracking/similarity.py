@@ -17,7 +17,7 @@ from spinepipe.statistics.waveforms import MultipleCorrelation, multiple_correla
 from spinepipe.studies.tracking.moved import kinds_of_trials, motions
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.shares import Shares, shares_of
-from spinepipe.studies.tracking.tables_of_studies import SIMILARITY, WINDOWS
+from spinepipe.studies.tracking.tables import SIMILARITY, WINDOWS
 from spinepipe.tables import from_rows, read_frames, write
 
 INSTANTS = 101

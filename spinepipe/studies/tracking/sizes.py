@@ -10,7 +10,6 @@ from spinepipe.effects.contract import Array
 from spinepipe.motion.scaling import SEGMENTS, Fit, fitted
 from spinepipe.motion.skeleton import MarkerSet, Skeleton, Trial
 from spinepipe.studies.tracking.tables import NO_STATIC, NOT_TOLD, TOLD
-from spinepipe.tables.schema import MESSAGE
 
 AS_IT_IS = "the cohort's skeleton is taken as it is"
 
@@ -60,7 +59,7 @@ def size_rows(specimen: str, found: Sized) -> Iterator[dict[str, Any]]:
             "first_marker": worst[0],
             "second_marker": worst[1],
             "status": found.status,
-            MESSAGE.name: found.message,
+            "message": found.message,
         }
 
 

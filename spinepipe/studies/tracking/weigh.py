@@ -16,7 +16,7 @@ from spinepipe.studies.tracking.off_truth import Bones, errors_of
 from spinepipe.studies.tracking.persons import Person, person_of
 from spinepipe.studies.tracking.rows import Row, failed_row, fit_row
 from spinepipe.studies.tracking.settings import Approach, Tracking
-from spinepipe.studies.tracking.tables_of_studies import WEIGHTS
+from spinepipe.studies.tracking.tables import WEIGHTS
 from spinepipe.studies.tracking.truth import Truth, truths
 from spinepipe.tables import from_rows, write
 

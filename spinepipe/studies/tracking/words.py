@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from spinepipe.report.words import capital, number, plain
 from spinepipe.studies.tracking.settings import APPROACHES, CONSTRAINED
-from spinepipe.studies.tracking.tables_of_studies import MEASURES
+from spinepipe.studies.tracking.tables import MEASURES
 
 IN_WORDS = {
     "ik": "inverse kinematics",

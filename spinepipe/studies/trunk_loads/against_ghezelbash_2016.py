@@ -11,6 +11,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.diaphragm import AHEAD_M
 from spinepipe.muscles.subject import CM_PER_M, REFERENCE
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.tables import AGAINST_GHEZELBASH_2016
 from spinepipe.tables import read_frames
 
 
@@ -18,7 +19,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``against_ghezelbash_2016.parquet``."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     frames = {**read_frames(tables), **facts(cohort)}
-    write_against("ghezelbash_2016", frames, asked_of(settings), settings, cohort, output)
+    write_against(AGAINST_GHEZELBASH_2016, frames, asked_of(settings), settings, cohort, output)
 
 
 def facts(cohort: Cohort) -> dict[str, pd.DataFrame]:

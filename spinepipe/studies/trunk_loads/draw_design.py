@@ -4,7 +4,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.trunk_loads.sampling import UNITS, values_of_design
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.tables_of_studies import DESIGN
+from spinepipe.studies.trunk_loads.tables import DESIGN
 from spinepipe.tables import from_rows, write
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
+from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
@@ -14,7 +15,6 @@ from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
 from spinepipe.studies.trunk_loads.sampling import batches, sampled
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.source_marks import marks_of_source
-from spinepipe.studies.trunk_loads.table_of_claims import AGAINST_GHEZELBASH_2016
 from spinepipe.studies.trunk_loads.tables import (
     ITERATIONS,
     LEVELS_TABLE,
@@ -25,16 +25,6 @@ from spinepipe.studies.trunk_loads.tables import (
     SCALING,
     TASKS,
     UPRIGHT,
-)
-from spinepipe.studies.trunk_loads.tables_of_studies import (
-    AGREEMENT,
-    DESIGN,
-    DRIVERS,
-    INTERVALS,
-    PRESSURES,
-    RESPONSES,
-    SIMPLIFIED,
-    TUNING,
 )
 
 HELD = tuple(
@@ -164,12 +154,7 @@ KIND = Kind(
     files=TrunkFiles,
     checks=(check_trunk,),
     checks_at_start=(check_source,),
-    tables=(
-        *(TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS),
-        SIMPLIFIED,
-        *(PRESSURES, TUNING, AGREEMENT, DESIGN, RESPONSES, INTERVALS, DRIVERS),
-        AGAINST_GHEZELBASH_2016,
-    ),
+    tables=all_declared(__file__),
     jobs=(
         Job("hold", ignores=_NO_TASK_OF_ITS_OWN, also=marks_of_source),
         Job(

@@ -15,24 +15,22 @@ from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
 from spinepipe.studies.trunk_loads.headline import headline
 from spinepipe.studies.trunk_loads.in_space import trunk_in_space
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.table_of_claims import AGAINST_GHEZELBASH_2016
 from spinepipe.studies.trunk_loads.tables import (
+    AGAINST_GHEZELBASH_2016,
+    AGREEMENT,
+    DRIVERS,
+    INTERVALS,
     LEVELS_TABLE,
     MASSES,
     MUSCLES,
     PATHS,
+    PRESSURES,
     REMARKS,
     SCALING,
-    TASKS,
-    UPRIGHT,
-)
-from spinepipe.studies.trunk_loads.tables_of_studies import (
-    AGREEMENT,
-    DRIVERS,
-    INTERVALS,
-    PRESSURES,
     SIMPLIFIED,
+    TASKS,
     TUNING,
+    UPRIGHT,
 )
 
 QUESTION = (

@@ -21,7 +21,7 @@ from spinepipe.studies.trunk_loads.rows import Outcome, Row, task_row
 from spinepipe.studies.trunk_loads.sampling import drawn, of_batch
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.source_marks import marks_of
-from spinepipe.studies.trunk_loads.tables_of_studies import QUANTITIES, RESPONSES
+from spinepipe.studies.trunk_loads.tables import QUANTITIES, RESPONSES
 from spinepipe.tables import from_rows, read_frame, write
 
 

@@ -17,7 +17,7 @@ from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Outcome, Row, task_row
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.source_marks import marks_of
-from spinepipe.studies.trunk_loads.tables_of_studies import SIMPLIFICATIONS, SIMPLIFIED
+from spinepipe.studies.trunk_loads.tables import SIMPLIFICATIONS, SIMPLIFIED
 from spinepipe.tables import from_rows, write
 
 SHOWN = ("l4l5_pressure_mpa", "l4l5_compression_n", "l5s1_compression_n", "status", "message")

@@ -13,7 +13,7 @@ from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.rows import Row
 from spinepipe.studies.trunk_loads.sampling import design_of
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.tables_of_studies import DRIVERS, INTERVALS, QUANTITIES
+from spinepipe.studies.trunk_loads.tables import DRIVERS, INTERVALS, QUANTITIES
 from spinepipe.tables import from_rows, read_frames, write
 
 LEAST_SAMPLES = 20

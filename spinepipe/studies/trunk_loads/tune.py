@@ -36,7 +36,7 @@ from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Outcome, Row
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.source_marks import marks_of
-from spinepipe.studies.trunk_loads.tables_of_studies import AGREEMENT, PRESSURES, REGION, TUNING
+from spinepipe.studies.trunk_loads.tables import AGREEMENT, PRESSURES, REGION, TUNING
 from spinepipe.tables import from_rows, write
 
 RANGE = {

@@ -18,9 +18,8 @@ from spinepipe.studies.cohort_stiffness.findings import finding_rows
 from spinepipe.studies.cohort_stiffness.mae import mae_rows
 from spinepipe.studies.cohort_stiffness.ranking import ranking_rows
 from spinepipe.studies.cohort_stiffness.significance import all_tests
-from spinepipe.studies.cohort_stiffness.tables import FINDINGS, MAE, RANKING
+from spinepipe.studies.cohort_stiffness.tables import FINDINGS, MAE, RANKING, STATISTICS
 from spinepipe.tables import from_rows
-from spinepipe.tables.shared import STATISTICS
 
 NUMBERS = ("bias", "mae", "rmse", "peak_error")
 

@@ -19,7 +19,7 @@ from spinepipe.studies.cohort_stiffness.covariates import (
 )
 from spinepipe.studies.cohort_stiffness.page_covariates import covariates
 from spinepipe.studies.cohort_stiffness.settings import COVARIATES, CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables_of_covariates import COVARIATES_TABLE
+from spinepipe.studies.cohort_stiffness.tables import COVARIATES_TABLE
 from spinepipe.studies.read import check
 from spinepipe.tables import Tables, from_rows
 

@@ -13,6 +13,7 @@ from spinepipe.studies.cohort_stiffness.representations import (
     EVERY,
     FITTED,
     NAMES,
+    NUISANCE,
     POOLED,
     PUBLISHED,
     UNLESS_ASKED,
@@ -20,7 +21,7 @@ from spinepipe.studies.cohort_stiffness.representations import (
     start_of,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables import REPRESENTATION
+from spinepipe.studies.cohort_stiffness.tables import HELICAL_AXES, NUISANCES, POOLING, STIFFNESS
 
 ROOT = Path(__file__).resolve().parents[3]
 KIND = ROOT / "spinepipe" / "studies" / "cohort_stiffness"
@@ -32,7 +33,16 @@ def test_settings_and_tables_allow_what_is_registered() -> None:
     (item, _) = get_args(CohortStiffness.model_fields["representations"].annotation)
     assert get_args(item) == FITTED
     assert CohortStiffness.model_fields["representations"].default == UNLESS_ASKED
-    assert REPRESENTATION.allowed == NAMES
+    columns = (
+        (STIFFNESS, NAMES),
+        (HELICAL_AXES, ("", *NAMES)),
+        (POOLING, POOLED),
+        (NUISANCES, NUISANCE),
+    )
+    for table, names in columns:
+        assert table.column("representation").allowed == names
+    about = STIFFNESS.column("representation").meaning
+    assert [one.partition(": ")[0] for one in about.split("; ")] == list(NAMES)
     assert {*PUBLISHED, *FITTED} == set(NAMES)
     assert len(set(NAMES)) == len(EVERY)
 

@@ -241,7 +241,7 @@ def test_no_name_but_of_our_data_is_ever_called(name: str) -> None:
 @sweep(
     "name, words",
     [
-        ("spinepipe.tables.parquet:Table", "is called spinepipe.tables.schema:Table"),
+        ("spinepipe.tables.parquet:Table", "is called spinepipe.schema.table:Table"),
         ("spinepipe.files:re.RegexFlag", "cannot be kept as data"),
     ],
 )
@@ -262,7 +262,7 @@ def test_the_program_is_not_run_by_its_name() -> None:
     [
         ["data", "spinepipe.no_such_room:Data"],
         ["data", "spinepipe.status:NoSuchName"],
-        ["data", "spinepipe.tables.schema:Table", "name"],
+        ["data", "spinepipe.schema.table:Table", "name"],
         ["enum", "spinepipe.status:Status", "no_such_member"],
         ["array", "<f8", [2], "C", 0],
         ["no such tag"],

@@ -41,7 +41,7 @@ from spinepipe.studies.discrepancy.findings import (
     how_sure,
     warnings,
 )
-from spinepipe.studies.discrepancy.kind import KIND, TABLES, DiscrepancyFiles
+from spinepipe.studies.discrepancy.kind import KIND, DiscrepancyFiles
 from spinepipe.studies.discrepancy.page import document, left_out, shown_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import Answer, Verdict, plain_data, verdict_of
@@ -409,7 +409,7 @@ def test_jobs_draw_and_write_what_the_search_left(tmp_path: Path) -> None:
         root,
         STUDY,
         "report",
-        [str(folder / f"{table.name}.parquet") for table in TABLES],
+        [str(folder / f"{table.name}.parquet") for table in KIND.tables],
         [made["svg"]],
         [str(ROOT / files.caption(figure.name))],
         str(page),

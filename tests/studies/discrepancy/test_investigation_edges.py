@@ -19,7 +19,7 @@ from discrepancy_cases import files_of_a_search
 
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.studies.discrepancy import job as search
-from spinepipe.studies.discrepancy.kind import TABLES
+from spinepipe.studies.discrepancy.kind import KIND
 from spinepipe.units import STIFFNESS_COLUMNS
 
 pytestmark = pytest.mark.slow
@@ -92,7 +92,7 @@ def searched(made: Chains, root: Path, study: str = PER_SPECIMEN) -> dict[str, A
     folder = root / "results" / STUDY / "discrepancy"
     folder.mkdir(parents=True)
     search.run(str(root), STUDY, **files_of_a_search(folder))
-    for table in TABLES:
+    for table in KIND.tables:
         assert_no_nan(folder / f"{table.name}.parquet")
     for name in ("model_base", "model_with_effects"):
         read_model(folder / f"{name}.yaml")

@@ -16,7 +16,7 @@ from spinepipe.jobs import draw, report
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model.file import effects_for, read_model
 from spinepipe.studies.discrepancy import job as search
-from spinepipe.studies.discrepancy.kind import KIND, TABLES, DiscrepancyFiles
+from spinepipe.studies.discrepancy.kind import KIND, DiscrepancyFiles
 from spinepipe.studies.discrepancy.settings import Discrepancy
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -66,7 +66,7 @@ def test_the_mistake_is_pointed_to(verdict: Mapping[str, Any]) -> None:
 
 
 def test_tables_hold_their_schemas_and_no_rows(folder: Path) -> None:
-    for schema in TABLES:
+    for schema in KIND.tables:
         table = pq.read_table(folder / f"{schema.name}.parquet")
         assert table.num_rows == 0
         assert table.column_names == [column.name for column in schema.columns]
@@ -102,7 +102,7 @@ def test_figures_and_report_cope(folder: Path) -> None:
         drawn.append(svg)
         assert "can be shown" in Path(svg).read_text()
     files = DiscrepancyFiles.of(*study_of_kind(Discrepancy, root, STUDY))
-    paths = [str(folder / f"{table.name}.parquet") for table in TABLES]
+    paths = [str(folder / f"{table.name}.parquet") for table in KIND.tables]
     captions = [str(ROOT / path) for path in map(files.caption, files.figures())]
     output = folder / "report.html"
     report.run(root, STUDY, "report", paths, drawn, captions, str(output), verdict=verdict)

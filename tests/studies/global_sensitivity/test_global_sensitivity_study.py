@@ -19,7 +19,7 @@ from spinepipe.studies import read as studies
 from spinepipe.studies.global_sensitivity import change as varied
 from spinepipe.studies.global_sensitivity import settings as study_file
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
-from spinepipe.studies.global_sensitivity.tables import INDEX_MEANINGS, INDEX_STATUS
+from spinepipe.studies.global_sensitivity.tables import INDICES as INDEX_TABLE
 
 STUDY = """\
 study: probe
@@ -376,5 +376,7 @@ def test_methods_without_groups_take_factors_alone(tmp_path: Path) -> None:
 
 
 def test_tables_know_every_index_and_every_end_of_an_analysis() -> None:
-    assert set(INDEX_MEANINGS) == {name for names in INDICES.values() for name in names}
-    assert set(INDEX_STATUS) == set(Known)
+    index = INDEX_TABLE.column("index")
+    assert set(index.allowed) == {name for names in INDICES.values() for name in names}
+    assert tuple(one.partition(": ")[0] for one in index.meaning.split("; ")) == index.allowed
+    assert set(INDEX_TABLE.column("status").allowed) == set(Known)

@@ -21,6 +21,7 @@ from sweeps import sweep
 from spinepipe.cohort import Cohort, read
 from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.style import picture, style
+from spinepipe.schema import Table
 from spinepipe.studies.global_sensitivity.figures.panels import (
     leading,
     measures_of,
@@ -42,7 +43,7 @@ from spinepipe.studies.global_sensitivity.loaded import loaded
 from spinepipe.studies.global_sensitivity.page import document, shown_tables
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CONVERGENCE, DESIGN, INDICES, RESPONSES
-from spinepipe.tables import Table, Tables, from_rows
+from spinepipe.tables import Tables, from_rows
 
 Rows = list[dict[str, Any]]
 

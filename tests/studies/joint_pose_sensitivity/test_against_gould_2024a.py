@@ -23,7 +23,7 @@ from papers.run import NotComputed, Ours, Run
 from spinepipe.anatomy import published
 from spinepipe.studies.joint_pose_sensitivity import against_gould_2024a
 from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import AGAINST_GOULD_2024A
+from spinepipe.studies.joint_pose_sensitivity.tables import AGAINST_GOULD_2024A
 from spinepipe.tables import from_rows, read, read_frame
 
 CLAIMS = claims_of("gould_2024a")

@@ -15,7 +15,7 @@ from spinepipe.studies.joint_pose_sensitivity.findings import findings
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import left_out, shown_tables
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOWER_ENDS
+from spinepipe.studies.joint_pose_sensitivity.tables import LOWER_ENDS
 from spinepipe.tables import Tables
 
 NAN = float("nan")

@@ -17,6 +17,7 @@ from study_cases import START, STUDY, TABLES, Size, project, results
 from sweeps import sweep
 
 from spinepipe.designs import sample_log_uniform
+from spinepipe.schema import Table
 from spinepipe.studies.joint_pose_sensitivity import (
     agreement,
     bootstrap,
@@ -31,7 +32,7 @@ from spinepipe.studies.joint_pose_sensitivity import (
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
 from spinepipe.studies.joint_pose_sensitivity.settings import SETS_PER_BATCH
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import BOOTSTRAP, PRECISION_ERRORS
+from spinepipe.studies.joint_pose_sensitivity.tables import BOOTSTRAP, PRECISION_ERRORS
 from spinepipe.studies.joint_pose_sensitivity.variables import (
     absolute_error,
     complete_grid,
@@ -41,7 +42,7 @@ from spinepipe.studies.joint_pose_sensitivity.variables import (
     pose_parameters,
     readings,
 )
-from spinepipe.tables import Table, read_frame, to_arrow, write
+from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS
 
 Change = Callable[[pd.DataFrame], pd.DataFrame]

@@ -20,12 +20,12 @@ from spinepipe.jobs import report
 from spinepipe.report.page.document import Picture, Results, sortable
 from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from spinepipe.report.specimen import view_of
+from spinepipe.schema import Column
 from spinepipe.studies.joint_pose_sensitivity.findings import findings
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import document, folded, in_full
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import Tables, read_frame
-from spinepipe.tables.schema import Column
 
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"><!-- &amp; --></svg>'
 VOID = {"meta", "link", "img", "input", "br", "hr"}
@@ -376,7 +376,7 @@ def test_repeated_tests_are_folded_and_counted() -> None:
 def test_columns_that_say_nothing_are_left_out_and_units_stand_in_the_heading() -> None:
     columns = [
         Column("specimen", "text", "name"),
-        Column("sd_mm", "number", "spread", "mm", "none"),
+        Column("sd_mm", "number", "spread", "mm", required=False, empty="none"),
         Column("message", "text", "words"),
         Column("kept", "flag", "whether"),
     ]

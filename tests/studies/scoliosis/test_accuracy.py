@@ -21,8 +21,15 @@ from spinepipe.studies.scoliosis.population import assumed
 from spinepipe.studies.scoliosis.population_table import Learned, population_rows
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
-from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POPULATION, POSITIONS
-from spinepipe.studies.scoliosis.tables_of_errors import ACCURACY, MEASURES
+from spinepipe.studies.scoliosis.tables import (
+    ACCURACY,
+    CURVES,
+    DISPLACEMENTS,
+    LAWS,
+    MEASURES,
+    POPULATION,
+    POSITIONS,
+)
 from spinepipe.tables import from_rows
 from tests.generators import ais_films
 

@@ -28,7 +28,7 @@ from spinepipe.studies.scoliosis.against_jalalian_2017 import facts
 from spinepipe.studies.scoliosis.jalalian_2017 import stands_for
 from spinepipe.studies.scoliosis.kind import KIND, ScoliosisFiles
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import AGAINST_JALALIAN_2017
+from spinepipe.studies.scoliosis.tables import AGAINST_JALALIAN_2017
 from spinepipe.tables import from_rows, read, read_frame
 from tests.generators import ais_films
 

@@ -17,7 +17,7 @@ from spinepipe.studies.scoliosis.by_range import by_range_rows, classes
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
 from spinepipe.studies.scoliosis.personalise import rows_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import BY_RANGE
+from spinepipe.studies.scoliosis.tables import BY_RANGE
 from spinepipe.tables import from_rows
 
 MODELS = ("tangent", "linear_regions")

@@ -13,9 +13,8 @@ from sweeps import sweep
 from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.studies.scoliosis.errors import by_patient, squares
 from spinepipe.studies.scoliosis.significance import all_tests, compared
-from spinepipe.studies.scoliosis.tables_of_errors import MEASURES
+from spinepipe.studies.scoliosis.tables import MEASURES, STATISTICS
 from spinepipe.tables import from_rows
-from spinepipe.tables.shared import STATISTICS
 
 PATIENTS = tuple(f"p{number:02d}" for number in range(1, 7))
 MODELS = ("tangent", "linear_regions", "uniform")

@@ -16,7 +16,7 @@ from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT
 from spinepipe.studies.scoliosis.held_spine import with_laws
 from spinepipe.studies.scoliosis.personal import Patient, RegionFit, _regions, patient_of, tangent
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import VARIANTS, VARIATION
+from spinepipe.studies.scoliosis.tables import VARIANTS, VARIATION
 from spinepipe.studies.scoliosis.variants import variant_rows
 from spinepipe.studies.scoliosis.variation import variation_rows
 from spinepipe.tables import from_rows

@@ -16,7 +16,7 @@ from papers.engine import claims_of, compare
 from spinepipe.motion.skeleton import BODIES, JOINTS
 from spinepipe.studies.tracking.against_wang_2021 import asked_of
 from spinepipe.studies.tracking.settings import Bounds, Tracking
-from spinepipe.studies.tracking.tables_of_studies import AGAINST_WANG_2021, WINDOWS
+from spinepipe.studies.tracking.tables import AGAINST_WANG_2021, WINDOWS
 from spinepipe.tables import from_rows
 
 PUBLISHED = Path(__file__).parents[4] / "shared" / "published"

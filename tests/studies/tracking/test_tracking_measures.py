@@ -17,7 +17,7 @@ from spinepipe.studies.tracking.profile import verdict
 from spinepipe.studies.tracking.ranges import range_rows
 from spinepipe.studies.tracking.sharing import sharing_rows
 from spinepipe.studies.tracking.similarity import similarity_rows
-from spinepipe.studies.tracking.tables_of_studies import (
+from spinepipe.studies.tracking.tables import (
     ACCURACY,
     ERRORS,
     RANGES,

@@ -32,7 +32,7 @@ from spinepipe.muscles.disc_pressure import disc_pressure
 from spinepipe.studies.trunk_loads.against_ghezelbash_2016 import asked_of
 from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.table_of_claims import AGAINST_GHEZELBASH_2016
+from spinepipe.studies.trunk_loads.tables import AGAINST_GHEZELBASH_2016
 from spinepipe.tables import from_rows
 
 CLAIMS = claims_of("ghezelbash_2016")

@@ -23,7 +23,7 @@ from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.sampling import design_of
 from spinepipe.studies.trunk_loads.settings import Uncertain, Volunteer
-from spinepipe.studies.trunk_loads.tables_of_studies import QUANTITIES, SIMPLIFICATIONS
+from spinepipe.studies.trunk_loads.tables import QUANTITIES, SIMPLIFICATIONS
 
 FEW = ("standing", "flexion_50", "flexion_70_with_load")
 ASKED = SETTINGS.model_copy(

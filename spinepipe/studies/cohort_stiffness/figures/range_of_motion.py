@@ -17,7 +17,7 @@ from spinepipe.report.style import BLACK, OURS, WHITE, blank, saying
 from spinepipe.report.words import case, count, short, tick
 from spinepipe.studies.cohort_stiffness.curves_compared import KEY, both
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables_of_experiments import MEASURED
+from spinepipe.studies.cohort_stiffness.tables import MEASURED
 
 _PANEL_MM, _KEY_MM = 58.0, 17.0
 _MOST_INTERVALS = 150

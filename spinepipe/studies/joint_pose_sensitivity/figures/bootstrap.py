@@ -29,7 +29,7 @@ from spinepipe.report.words import AXIS, count, number, stiffness_unit, unit
 from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables_of_fits import LOADINGS
+from spinepipe.studies.joint_pose_sensitivity.tables import LOADINGS
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 _RANGE_OF = "quasi_static"

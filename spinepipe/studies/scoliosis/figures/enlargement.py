@@ -14,7 +14,7 @@ from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, BLUE, GREY, VERMILLION, WHITE, blank, saying
 from spinepipe.studies.scoliosis.figures.looks import axis_lines
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import GROUPS
+from spinepipe.studies.scoliosis.tables import GROUPS
 from spinepipe.studies.scoliosis.words import OF_FILMS
 
 ROTATION, MOVED = "rotation_rmse_deg", "moved_deg"

@@ -18,7 +18,7 @@ from spinepipe.statistics import mean_of
 from spinepipe.studies.scoliosis.errors import by_patient, of_group, squares
 from spinepipe.studies.scoliosis.figures.looks import LOOKS
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables_of_errors import GROUPS
+from spinepipe.studies.scoliosis.tables import GROUPS
 from spinepipe.studies.scoliosis.words import IN_WORDS, in_order
 
 PANELS = {

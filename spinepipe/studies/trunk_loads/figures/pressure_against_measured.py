@@ -16,7 +16,7 @@ from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, WHITE, 
 from spinepipe.report.words import fixed, plain
 from spinepipe.studies.trunk_loads.figures.looks import scale, task_label
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.tables_of_studies import TIERS
+from spinepipe.studies.trunk_loads.tables import TIERS
 from spinepipe.studies.trunk_loads.words import ENDED, sound
 from spinepipe.studies.trunk_loads.words import TIERS as FITTED
 

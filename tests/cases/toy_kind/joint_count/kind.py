@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from spinepipe.studies.joint_count.settings import JointCount
-from spinepipe.studies.joint_count.tables import JOINTS, SHARES, TOTALS
 
 from spinepipe.cohort import Cohort
+from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles
 
@@ -44,7 +44,7 @@ KIND = Kind(
     settings=JointCount,
     files=JointCountFiles,
     checks=(),
-    tables=(JOINTS, TOTALS, SHARES),
+    tables=all_declared(__file__),
     jobs=(
         Job("count", ignores=ignoring("shown")),
         Job("totals", "totals", ("joints",), ("totals",), ignoring("shown")),
