@@ -2,7 +2,7 @@
 
 Imports are followed where they are written. Of a file that declares result tables only the tables
 that are imported count, and of these no wording. An effect counts where its name is written, or
-where all of them are asked for.
+where all of them are asked for; a row of `facts.csv` where its fact is named, without its source.
 
 Snakemake does not see imported modules. What a file imports and means is worked out once and kept
 beside Snakemake's own state, known by size and time of change as Python knows its bytecode.
@@ -10,6 +10,7 @@ beside Snakemake's own state, known by size and time of change as Python knows i
 
 import ast
 import atexit
+import csv
 import hashlib
 import json
 import re
@@ -20,6 +21,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from spinepipe.facts import FILE as FACTS
 from spinepipe.files import appearing, stamp
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -37,8 +39,8 @@ def code_digest(module: str) -> str:
     """sha256 over a module and everything of spinepipe that it uses, directly or not.
 
     Comments, docstrings, layout and the version number do not count. The data files that lie
-    beside a module (published values) do. Imports inside functions are followed too; modules loaded
-    by a computed name are not seen.
+    beside a module (published values) do, and of `facts.csv` the rows that the code names. Imports
+    inside functions are followed too; modules loaded by a computed name are not seen.
 
     Parameters
     ----------
@@ -54,7 +56,9 @@ def code_digest(module: str) -> str:
         raise ModuleNotFoundError(f"no module {module!r} in {_ROOT / _PACKAGE}")
     found = closure(module)
     lines = [f"{name} {_piece(name).meaning}" for name in sorted(found)]
-    lines += [_bytes_digest(path) for path in _data_files(found)]
+    words = {word for name in found for word in _piece(name).uses}
+    for path in _data_files(found):
+        lines += _facts_named(path, words) if path.name == FACTS else [_bytes_digest(path)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
@@ -82,7 +86,7 @@ def _source(module: str) -> Path | None:
 
 
 class _Piece(NamedTuple):
-    """A file or a part: full names that it uses, words that may name effects, and a digest."""
+    """A file or a part: full names used, words that may name effects or facts, a digest."""
 
     uses: list[str]
     meaning: str
@@ -162,7 +166,7 @@ def _read(module: str, path: Path) -> _File:
 
 
 def _digested(tree: ast.AST, places: Mapping[str, str]) -> _Piece:
-    """Code with what it uses: modules, names of `places`, and words that may name effects."""
+    """Code with what it uses: modules, `places`, and words that may name effects or facts."""
     used: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -178,7 +182,7 @@ def _digested(tree: ast.AST, places: Mapping[str, str]) -> _Piece:
 
 
 _NAME = re.compile(r"\A[a-z]+(?:_[a-z]+)*\Z")
-"""How names of effects look."""
+"""How names of effects and facts look."""
 
 _FEWEST_WORDS = 4
 """In a declaration of tables, a text of so many words is wording whatever is called with it."""
@@ -279,6 +283,18 @@ def _data_files(names: frozenset[str]) -> list[Path]:
         file for folder in {path.parent for path in sources if path} for file in folder.iterdir()
     )
     return sorted(file for file in files if file.suffix in _DATA_SUFFIXES)
+
+
+def _facts_named(path: Path, words: set[str]) -> list[str]:
+    """What rows of facts mean, of those that are named: not their sources."""
+    rows = [row for row in _rows(path) if row["fact"] in words]
+    return [" ".join(row[name] for name in ("fact", "of", "values", "unit")) for row in rows]
+
+
+@cache
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as text:
+        return list(csv.DictReader(text))
 
 
 @cache
