@@ -51,7 +51,7 @@ def several(module: str, fact: str) -> dict[str, tuple[float, ...]]:
 def _facts(package: str) -> dict[str, dict[str, tuple[float, ...]]]:
     """Numbers of a folder by fact and by what they are of."""
     found: dict[str, dict[str, tuple[float, ...]]] = {}
-    with files(package).joinpath(FILE).open(encoding="utf-8", newline="") as text:
+    with files(package).joinpath(FILE).open(encoding="utf-8") as text:
         for row in csv.DictReader(text):
             values = tuple(map(float, row["values"].split()))
             found.setdefault(row["fact"], {})[row["of"]] = values

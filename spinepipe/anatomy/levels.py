@@ -29,7 +29,8 @@ mm (L5) apart. Chosen: as much smaller or larger as a spine may be, and a fifth.
 DRY_KG: Mapping[str, float] = numbers(__name__, "dry_vertebra_mass")
 """Mean of a dry vertebra of each region."""
 
-SLICE_PERCENT = tuple(numbers(__name__, "slice_mass_percent").values())
+_SLICES = numbers(__name__, "slice_mass_percent")
+SLICE_PERCENT = (_SLICES["T1"], _SLICES["L5"])
 """Slices of the trunk at T1 and at L5, of body mass."""
 
 HEAVIEST_KG = 300.0

@@ -15,10 +15,10 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.files import appearing
 from spinepipe.frames import Pose
-from spinepipe.model import STANDARD_GRAVITY, RefusedModel
+from spinepipe.model import RefusedModel
 from spinepipe.model import osim_parts as parts
 from spinepipe.motion.skeleton import BODIES, JOINTS, MarkerSet, Skeleton
-from spinepipe.units import COORDINATES, DEG_PER_RAD, TRANSLATIONS
+from spinepipe.units import COORDINATES, DEG_PER_RAD, STANDARD_GRAVITY, TRANSLATIONS
 
 PELVIS_JOINT = "pelvis"
 """What moves the pelvis in ground."""

@@ -21,10 +21,19 @@ from spinepipe.facts import number, several
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.muscles import discs
 from spinepipe.muscles.fascicles import Fascicle, Source, muscles_of, on_their_sides, sheath_of
-from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES, THORAX, Muscles, Trunk, body_of
+from spinepipe.muscles.trunk import (
+    BODIES,
+    LEVELS,
+    RECTUS,
+    SIDES,
+    SLICES,
+    THORAX,
+    Muscles,
+    Trunk,
+    body_of,
+)
 
 SHEATH = "Abdomen"
-RECTUS = "rectus_abdominis"
 OBLIQUES = ("external_oblique", "internal_oblique")
 
 SHOULDER = ("scapula", "clavicle", "humerus", "ulna", "radius", "hand")

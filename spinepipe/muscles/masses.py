@@ -16,10 +16,10 @@ from spinepipe.anatomy.levels import SLICE_PERCENT
 from spinepipe.anatomy.segments import CENTRE, MASS_PERCENT, Sex
 from spinepipe.effects.contract import Array
 from spinepipe.facts import numbers
-from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.task import Hands
 from spinepipe.muscles.trunk import SIDES, SLICES, THORAX, Mass, Trunk, body_of
+from spinepipe.units import STANDARD_GRAVITY
 
 AHEAD_AT = numbers(__name__, "slice_ahead")
 """How far slices lie ahead of the vertebrae, cm: straight between these, 1 cm below L3L4."""
