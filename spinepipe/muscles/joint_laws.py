@@ -16,13 +16,10 @@ from scipy.interpolate import PchipInterpolator
 from spinepipe.anatomy import published
 from spinepipe.effects.contract import Array
 from spinepipe.facts import numbers, several
-from spinepipe.muscles.trunk import LEVELS
 from spinepipe.units import DEG_PER_RAD
 
 AXES = ("right_bending", "left_rotation", "extension")
 """Order of rotation vectors and moments: about x, y, z."""
-
-T11T12, T12L1 = LEVELS.index("T11T12"), LEVELS.index("T12L1")
 
 AXIAL_N_PER_M = numbers(__name__, "axial_stiffness")
 

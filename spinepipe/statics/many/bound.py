@@ -5,7 +5,6 @@ the lane belongs to.
 """
 
 from collections.abc import Mapping
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,12 +119,6 @@ class Bound:
         cables = (self._cable(one, neutral, chain, runs) for one in effects.cables)
         self.cables = {n: cable for n, cable in enumerate(cables) if len(cable.lanes)}
         self.states = States(of, lasting)
-
-    def with_share(self, share: Array) -> "Bound":
-        """The same with another share (N,) of loads across joints."""
-        other = copy(self)
-        other.share = share
-        return other
 
     def _there(
         self, one: Acting, number: int, runs: Indices
