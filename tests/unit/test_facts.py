@@ -28,7 +28,10 @@ def asked(folder: Path) -> set[str]:
     """Facts that modules of a folder ask for; each is written out, beside its own `__name__`."""
     found = set()
     for path in folder.glob("*.py"):
-        tree = ast.parse(path.read_text("utf-8"))
+        text = path.read_text("utf-8")
+        if f"from {facts.__name__} import" not in text:
+            continue
+        tree = ast.parse(text)
         readers = {
             alias.name
             for node in ast.walk(tree)
