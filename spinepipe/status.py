@@ -45,8 +45,3 @@ class Balanced(StrEnum):
     CYCLING = "cycling"
     TWO_ANSWERS = "two_answers"
     OUT_OF_REACH = "out_of_reach"
-
-    @property
-    def has_forces(self) -> bool:
-        """Whether forces stand beside it, sound or not."""
-        return self != Balanced.OUT_OF_REACH

@@ -20,6 +20,9 @@ COORDINATES = (
 TRANSLATIONS = COORDINATES[:3]
 ROTATIONS = COORDINATES[3:]
 
+STANDARD_GRAVITY = np.array([0.0, -9.81, 0.0])
+"""m/s2 in ground axes: y points up."""
+
 MM_PER_M = 1000.0
 DEG_PER_RAD = float(np.rad2deg(1.0))
 

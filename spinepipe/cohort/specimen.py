@@ -14,14 +14,13 @@ from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, joint_pose, rotation_zxy
 from spinepipe.model import (
-    STANDARD_GRAVITY,
     Body,
     LoadCase,
     LoadStep,
     ScopedEffect,
     SpineModel,
 )
-from spinepipe.units import MM_PER_M, ROTATIONS
+from spinepipe.units import MM_PER_M, ROTATIONS, STANDARD_GRAVITY
 
 Landmarks = Mapping[str, Mapping[str, Array]]
 """Points in m, ground: vertebra to landmark to (3,)."""

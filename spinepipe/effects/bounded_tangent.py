@@ -8,12 +8,11 @@ import numpy as np
 from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import register
+from spinepipe.facts import number
 from spinepipe.units import COORDINATES, ROTATIONS
 
-# Jalalian 2017 puts the ends at 1.2 times the motion of maximal bending: 8.5 deg for lumbar
-# joints. 6 N m then stand for 63 N m/rad at rest, near the lateral 68.8 of Gould 2024b Table 2.
-_END_RAD = 0.15
-_STRETCH_NM = 6.0
+_END_RAD = number(__name__, "tangent_end")
+_STRETCH_NM = number(__name__, "tangent_stretch")
 
 
 @register("bounded_tangent")

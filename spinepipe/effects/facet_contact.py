@@ -9,6 +9,7 @@ from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import ramp
+from spinepipe.facts import numbers
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 SIDES = ("positive", "negative")
@@ -16,12 +17,8 @@ SIDES = ("positive", "negative")
 ROUNDED_RAD, ROUNDED_M = 3.5e-3, 2e-5
 """Width to each side of the gap over which contact sets in: 0.2 deg, or 0.02 mm."""
 
-# Gap (deg) and stiffness (N m/rad). Facets stop axial rotation within 1 to 2 deg (Adams and
-# Hutton 1981, Spine 6:241); stiffness as large as that of the joint itself (Gould 2024b Table 2).
-_STOPS = {"extension": (2.0, 50.0), "right_bending": (2.0, 70.0), "left_rotation": (1.0, 290.0)}
-
-# Gap (mm) and stiffness (N/m), as large as that of a joint in shear and in compression.
-_STOPS_MM = {"anterior": (0.5, 1e5), "superior": (0.3, 5e5), "right": (0.5, 1e5)}
+_GAP, _STIFFNESS = numbers(__name__, "facet_gap"), numbers(__name__, "facet_stiffness")
+"""deg or mm, and N m/rad or N/m."""
 
 REFERENCE_RAD, REFERENCE_M = float(np.deg2rad(2.0)), 5e-4
 """How far beyond the gap the stop has the stated stiffness, whatever its exponent."""
@@ -72,16 +69,15 @@ class FacetContact:
             tried=(0.0,),
             unsaid=1.0,
         )
+        size = _STIFFNESS[self.coordinate]
         if self.coordinate in TRANSLATIONS:
-            gap_mm, size = _STOPS_MM[self.coordinate]
-            gap = gap_mm / 1e3
+            gap = _GAP[self.coordinate] / 1e3
             return (
                 Parameter("stiffness", "N/m", 0.0, 1e10, size, size, False, hard, off=0.0),
                 Parameter("gap", "m", 0.0, 0.02, gap, 0.5 * gap, False, free),
                 exponent,
             )
-        gap_deg, size = _STOPS[self.coordinate]
-        gap = float(np.deg2rad(gap_deg))
+        gap = float(np.deg2rad(_GAP[self.coordinate]))
         return (
             Parameter("stiffness", "N m/rad", 0.0, 1e6, size, size, False, hard, off=0.0),
             Parameter("gap", "rad", 0.0, 0.5, gap, 0.5 * gap, False, free),

@@ -11,6 +11,7 @@ from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import TRIED, Advance, Array, JointResponse, Kind, Parameter
 from spinepipe.effects.friction import Stepped, dahl, jenkins
 from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.facts import several
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 LAWS = ("dahl", "jenkins")
@@ -24,8 +25,8 @@ ELEMENTS = 7
 _NORMAL = ndtri((np.arange(ELEMENTS) + 0.5) / ELEMENTS)
 _DEVIATES = {"dahl": np.zeros(1), "jenkins": _NORMAL / np.std(_NORMAL)}
 
-# Friction (N) and yield (mm) of a joint in shear and in compression.
-_FRICTION = {"anterior": (20.0, 0.2), "superior": (30.0, 0.1), "right": (20.0, 0.2)}
+_FRICTION = several(__name__, "joint_friction")
+"""N, and mm in which it yields, of a joint in shear and in compression."""
 
 
 @register("hysteresis")

@@ -9,6 +9,7 @@ from spinepipe.effects.carried_share import CarriedShare, Share, require
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.knee import chord, inside
 from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.facts import numbers
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 ZONES = ("centred", "off_centre")
@@ -24,10 +25,8 @@ SHARPNESS, SHARPNESS_SD = 12.0, 0.6
 """Prior of the sharpness, its SD of the logarithm: from 4 to 40 by two SDs. Smoother zones, 3 at
 2.3 SDs, hardly differ from a joint that stiffens exponentially all the way."""
 
-# Half widths near those of lumbar joints: Yamamoto 1989 (Spine 14:1256), 1 to 2 deg in bending
-# of either kind and less in axial rotation. Shear and compression: zones of 0.3 to 1.2 mm.
-_HALF_WIDTH_DEG = {"extension": 1.5, "right_bending": 1.5, "left_rotation": 0.5}
-_HALF_WIDTH_MM = {"anterior": 0.3, "superior": 0.15, "right": 0.3}
+_HALF_WIDTH = numbers(__name__, "neutral_zone_half_width")
+"""deg or mm."""
 
 
 @register("neutral_zone")
@@ -92,9 +91,9 @@ class NeutralZone(CarriedShare):
         meaning = f"half width of the neutral zone in {self.coordinate}"
         tried = (-1.0, 0.0, 1.0) if self.zone == "centred" else (0.0,)
         if self.coordinate in TRANSLATIONS:
-            unit, width, low, high = "m", _HALF_WIDTH_MM[self.coordinate] / 1e3, 1e-6, 0.02
+            unit, width, low, high = "m", _HALF_WIDTH[self.coordinate] / 1e3, 1e-6, 0.02
         else:
-            unit, width, low = "rad", float(np.deg2rad(_HALF_WIDTH_DEG[self.coordinate])), 1e-4
+            unit, width, low = "rad", float(np.deg2rad(_HALF_WIDTH[self.coordinate])), 1e-4
             high = WIDEST * width
         return Parameter("width", unit, low, high, width, 0.7, True, meaning, tried=tried)
 

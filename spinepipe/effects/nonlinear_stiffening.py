@@ -11,6 +11,7 @@ from spinepipe.effects.carried_share import CarriedShare, Share, require
 from spinepipe.effects.contract import Array, Kind, Parameter
 from spinepipe.effects.registry import PER_JOINT, Trial, register
 from spinepipe.effects.rounding import magnitude, ramp
+from spinepipe.facts import several
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 SHAPES = ("exponential", "tangent", "cubic", "bilinear")
@@ -49,9 +50,9 @@ _RISE_OF_TRANSLATION = {
     "cubic": (2e5, 1e10, "1/m^2"),
 }
 
-# The break, and the least that is one: within twice a usual neutral zone the same curve is that.
-_BREAK_DEG = {"extension": (4.0, 3.0), "right_bending": (4.0, 3.0), "left_rotation": (1.5, 1.0)}
-_BREAK_MM = {"anterior": (1.5, 0.6), "superior": (0.6, 0.3), "right": (1.5, 0.6)}
+_BREAK = several(__name__, "stiffening_break")
+"""deg or mm, the usual break and the least that is one."""
+
 _MOST_RAD, _MOST_M = 0.5, 0.03
 
 
@@ -106,10 +107,10 @@ class NonlinearStiffening(CarriedShare):
         where, tried = f"motion in {self.coordinate} at which it stiffens", (-1.0, 1.0)
         if self.coordinate in TRANSLATIONS:
             unit, most = "m", _MOST_M
-            at, low = (mm / 1e3 for mm in _BREAK_MM[self.coordinate])
+            at, low = (mm / 1e3 for mm in _BREAK[self.coordinate])
         else:
             unit, most = "rad", _MOST_RAD
-            at, low = (float(np.deg2rad(deg)) for deg in _BREAK_DEG[self.coordinate])
+            at, low = (float(np.deg2rad(deg)) for deg in _BREAK[self.coordinate])
         return gain, Parameter("break_at", unit, low, most, at, 0.4, True, where, tried=tried)
 
     def share(self, q: Array, parameters: Array) -> Share:

@@ -8,12 +8,13 @@ import numpy as np
 from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import register
+from spinepipe.facts import several
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 MOST_FACTORS = 4
 
-# A lumbar joint: 5 N m and 100 N where it has moved 6 deg and 1 mm.
-_ROTATION, _TRANSLATION = (0.1, 5.0), (1e-3, 100.0)
+_ROTATION, _TRANSLATION = several(__name__, "usual_motion").values()
+"""How far a lumbar joint has moved under which load."""
 
 
 @register("power_term")

@@ -9,11 +9,9 @@ from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
 from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
 from spinepipe.effects.registry import Spread, Trial, register
 from spinepipe.effects.vertebra_points import centres
+from spinepipe.units import STANDARD_GRAVITY
 
 WHERE = ("each", "top")
-
-WEIGHT_OF_1_KG = np.array([0.0, -9.81, 0.0])
-"""N/kg, ground; the gravity of cohorts."""
 
 
 @register("segment_weight")
@@ -60,7 +58,7 @@ class SegmentWeight(DeadLoad):
         """Weights of the mass."""
         bodies = self._bodies(joints)
         points = centres(neutral)[..., bodies, :]
-        forces = np.broadcast_to(parameters[..., None] * WEIGHT_OF_1_KG, points.shape)
+        forces = np.broadcast_to(parameters[..., None] * STANDARD_GRAVITY, points.shape)
         every = np.broadcast_to(bodies, points.shape[:-1])
         return Wrenches(every, points, forces, np.zeros(points.shape))
 
@@ -69,7 +67,7 @@ class SegmentWeight(DeadLoad):
     ) -> WrenchSlopes:
         """Linear in the mass."""
         shape = (*parameters.shape[:-1], len(self._bodies(joints)), 3, 1)
-        return WrenchSlopes(np.broadcast_to(WEIGHT_OF_1_KG[:, None], shape), np.zeros(shape))
+        return WrenchSlopes(np.broadcast_to(STANDARD_GRAVITY[:, None], shape), np.zeros(shape))
 
     def _bodies(self, joints: Indices) -> Indices:
         """The vertebrae that it acts on."""

@@ -10,6 +10,7 @@ from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.effects.rounding import ramp
+from spinepipe.facts import several
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 KNOTS = np.array([-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0])
@@ -30,9 +31,9 @@ FURTHEST = 10.0
 SIZE = 0.2
 """Prior size of a stretch, as a share of a usual stiffness."""
 
-# A lumbar joint: 5 N m and 100 N where it has moved 6 deg and 1 mm.
-_REACH_RAD, _LOAD_NM = 0.1, 5.0
-_REACH_M, _LOAD_N = 1e-3, 100.0
+_USUAL = several(__name__, "usual_motion")
+(_REACH_RAD, _LOAD_NM), (_REACH_M, _LOAD_N) = _USUAL["rotation"], _USUAL["translation"]
+"""How far a lumbar joint has moved under which load."""
 
 
 @register("tabulated_law")

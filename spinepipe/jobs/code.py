@@ -3,7 +3,8 @@
 Imports are followed where they are written. Of a file that names the tables of a ``tables.csv``
 only the names that are imported count, and of that file the rows of these tables, without words: a
 result hangs on what its own columns are called and hold, not on what they mean to a reader. An
-effect counts where its name is written, or where all of them are asked for.
+effect counts where its name is written, or where all of them are asked for; a row of ``facts.csv``
+where its fact is named, without its source.
 
 Snakemake does not see imported modules. What a file imports and means is worked out once and kept
 beside Snakemake's own state, known by size and time of change as Python knows its bytecode.
@@ -11,6 +12,7 @@ beside Snakemake's own state, known by size and time of change as Python knows i
 
 import ast
 import atexit
+import csv
 import hashlib
 import json
 import re
@@ -21,6 +23,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from spinepipe.facts import FILE as FACTS
 from spinepipe.files import appearing, stamp
 from spinepipe.schema.rows import FILE, read_tables
 
@@ -43,8 +46,8 @@ def code_digest(module: str) -> str:
     """sha256 over a module and everything of spinepipe that it uses, directly or not.
 
     Comments, docstrings, layout and the version number do not count. The data files that lie
-    beside a module (published values) do. Imports inside functions are followed too; modules loaded
-    by a computed name are not seen.
+    beside a module (published values) do, and of `facts.csv` the rows that the code names. Imports
+    inside functions are followed too; modules loaded by a computed name are not seen.
 
     Parameters
     ----------
@@ -60,7 +63,9 @@ def code_digest(module: str) -> str:
         raise ModuleNotFoundError(f"no module {module!r} in {_ROOT / _PACKAGE}")
     found = closure(module)
     lines = [f"{name} {_meaning(name)}" for name in sorted(found)]
-    lines += [_bytes_digest(path) for path in _data_files(found)]
+    words = {word for name in found if _TABLE not in name for word in _piece(name).uses}
+    for path in _data_files(found):
+        lines += _facts_named(path, words) if path.name == FACTS else [_bytes_digest(path)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
@@ -91,7 +96,7 @@ def _source(module: str) -> Path | None:
 
 
 class _Piece(NamedTuple):
-    """A file or a part: full names that it uses, words that may name effects, and a digest."""
+    """A file or a part: full names used, words that may name effects or facts, a digest."""
 
     uses: list[str]
     meaning: str
@@ -188,7 +193,9 @@ def _read(module: str, path: Path) -> _File:
 
 
 def _digested(tree: ast.AST, places: Mapping[str, str], folder: str) -> _Piece:
-    """Code with what it uses: modules, names of `places`, tables, words that may name effects."""
+    """Code with what it uses: modules, names of `places`, tables, words that may name effects or
+    facts.
+    """
     used: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
@@ -210,7 +217,7 @@ def _digested(tree: ast.AST, places: Mapping[str, str], folder: str) -> _Piece:
 
 
 _NAME = re.compile(r"\A[a-z]+(?:_[a-z]+)*\Z")
-"""How names of effects look."""
+"""How names of effects and facts look."""
 
 
 def _bound(entry: ast.stmt) -> list[str]:
@@ -276,6 +283,18 @@ def _data_files(names: frozenset[str]) -> list[Path]:
         file for folder in {path.parent for path in sources if path} for file in folder.iterdir()
     )
     return sorted(file for file in files if file.suffix in _DATA_SUFFIXES and file.name != FILE)
+
+
+def _facts_named(path: Path, words: set[str]) -> list[str]:
+    """What rows of facts mean, of those that are named: not their sources."""
+    rows = [row for row in _rows(path) if row["fact"] in words]
+    return [" ".join(row[name] for name in ("fact", "of", "values", "unit")) for row in rows]
+
+
+@cache
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as text:
+        return list(csv.DictReader(text))
 
 
 @cache

@@ -2,7 +2,6 @@
 
 from spinepipe.model.spine import (
     MOST_JOINTS,
-    STANDARD_GRAVITY,
     Body,
     LoadCase,
     LoadStep,
@@ -15,7 +14,6 @@ from spinepipe.model.spine import (
 
 __all__ = [
     "MOST_JOINTS",
-    "STANDARD_GRAVITY",
     "Body",
     "LoadCase",
     "LoadStep",

@@ -7,13 +7,11 @@ stand in the file as the model has them.
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.files import appearing
 from spinepipe.frames import Pose
 from spinepipe.model import osim_parts as parts
 from spinepipe.model.osim_parts import NAME, listed, numbers, told
@@ -82,13 +80,6 @@ def osim(model: SpineModel, loads: LoadCase | None = None, left_out: Sequence[st
         forces.append(law)
     forces.extend([] if loads is None else _prescribed_forces(loads, paths[1:]))
     return parts.written(document)
-
-
-def write_osim(model: SpineModel, path: str | Path, loads: LoadCase | None = None) -> None:
-    """Write `osim`; the file appears whole or not at all. Raises what `osim` raises."""
-    text = osim(model, loads)
-    with appearing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def _stiffness(model: SpineModel, loads: LoadCase | None) -> Array:

@@ -12,9 +12,6 @@ from spinepipe.effects.contract import Array, Neutral
 from spinepipe.frames import Pose
 from spinepipe.units import without_step_0
 
-STANDARD_GRAVITY = np.array([0.0, -9.81, 0.0])
-"""m/s2 in ground axes: y points up."""
-
 MOST_JOINTS = 20
 """Beyond 120 coordinates PyBullet's answers are silently wrong."""
 

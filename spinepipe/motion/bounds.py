@@ -31,8 +31,6 @@ KEYS = ("joint", "coordinate")
 NUMBERS = ("low", "high")
 """mm or deg."""
 
-LOW, HIGH = range(2)
-
 
 @dataclass(frozen=True, eq=False)
 class Bounds:

@@ -7,18 +7,16 @@ two-sided exponentials, for which OpenSim has no force.
 
 from collections.abc import Sequence
 from itertools import chain, count, pairwise
-from pathlib import Path
 from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.files import appearing
 from spinepipe.frames import Pose
-from spinepipe.model import STANDARD_GRAVITY, RefusedModel
+from spinepipe.model import RefusedModel
 from spinepipe.model import osim_parts as parts
 from spinepipe.motion.skeleton import BODIES, JOINTS, MarkerSet, Skeleton
-from spinepipe.units import COORDINATES, DEG_PER_RAD, TRANSLATIONS
+from spinepipe.units import COORDINATES, DEG_PER_RAD, STANDARD_GRAVITY, TRANSLATIONS
 
 PELVIS_JOINT = "pelvis"
 """What moves the pelvis in ground."""
@@ -45,28 +43,14 @@ def usable(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def write_osim(path: str | Path, skeleton: Skeleton, markers: MarkerSet, name: str) -> None:
-    """Write the model of a skeleton; the file appears whole or not at all.
+def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
+    """OpenSim document of a skeleton and its markers.
 
     Raises
     ------
     RefusedModel
         Of names that OpenSim cannot take.
     """
-    text = osim(skeleton, markers, name)
-    with appearing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def write_mot(path: str | Path, name: str, time_s: Array, q: Array) -> None:
-    """Write postures (F, 18, 6) m and rad at times (F,), in m and deg; the file appears whole."""
-    text = mot(name, time_s, q)
-    with appearing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
-    """OpenSim document of a skeleton and its markers. Raises what `write_osim` raises."""
     for one in (name, *markers.names):
         if not parts.NAME.fullmatch(one):
             raise RefusedModel(

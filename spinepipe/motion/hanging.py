@@ -1,9 +1,7 @@
 """Head and arms that T1 carries: rigid, where the arms are in the task.
 
-Masses, centres, radii of gyration and lengths are those of de Leva 1996, lengths growing with
-height. Where they lie relative to the joint T1T2 comes from the trunk that `trunk_loads` uses
-(myo-sim 0.2.4, upright, 1.73 m): shoulders 33 mm ahead of the joint, 12 mm below it and 170 mm to
-each side, centre of head and neck 17 mm ahead and 155 mm above it. Places grow with height.
+Masses, centres, radii of gyration and lengths are those of de Leva 1996. Where they lie relative to
+the joint T1T2 comes from the trunk that `trunk_loads` uses. All grow with height.
 
 Arms are two straight pieces, upper arm and forearm with hand. Where the hands are is a choice:
 
@@ -13,16 +11,17 @@ Arms are two straight pieces, upper arm and forearm with hand. Where the hands a
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
+from spinepipe.anatomy.segments import CENTRE, GYRATION, MASS_PERCENT, length_m
 from spinepipe.effects.contract import Array
+from spinepipe.facts import several
 from spinepipe.frames import Pose
 from spinepipe.motion.rigid import Part, joined, seen_from
 from spinepipe.motion.skeleton import BODIES, JOINTS, Masses, Skeleton, body_poses
-from spinepipe.muscles.masses import ARM, HEAD_PERCENT, Segment
+from spinepipe.muscles.masses import ARM
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.units import COORDINATES
 
@@ -31,10 +30,10 @@ ARMS: tuple[Arms, ...] = get_args(Arms)
 
 T1 = BODIES.index("T1")
 
-SHOULDER_M = np.array([0.0325, -0.0120, 0.1700])
+SHOULDER_M = np.array(several(__name__, "shoulder_from_joint")[""])
 """Right shoulder from the joint T1T2 at the reference height, ground axes."""
 
-HEAD_M = np.array([0.0173, 0.1550, 0.0])
+HEAD_M = np.array(several(__name__, "head_from_joint")[""])
 """Centre of mass of head and neck from the joint T1T2 at the reference height."""
 
 BEHIND_HEAD_M = np.array([-0.10, 0.0, 0.03])
@@ -45,45 +44,6 @@ ON_SHOULDER_M = np.array([0.06, -0.03, 0.0])
 
 ELBOW_TOWARDS = {"behind_head": (0.3, 0.3, 1.0), "crossed": (0.3, -1.0, 0.3)}
 """Where a right elbow points, off the line from shoulder to hand: a choice."""
-
-DE_LEVA_HEIGHT_M = {"male": 1.741, "female": 1.735}
-
-
-@dataclass(frozen=True)
-class Build:
-    """Length of a segment and its radii of gyration (de Leva 1996 Table 4).
-
-    Attributes
-    ----------
-    length_m : by sex, of persons of `DE_LEVA_HEIGHT_M`.
-    radii : by sex, shares of the length: about the axis forwards, to the side, along the segment.
-    """
-
-    length_m: dict[Literal["male", "female"], float]
-    radii: dict[Literal["male", "female"], tuple[float, float, float]]
-
-
-HEAD = Build(
-    {"male": 0.2429, "female": 0.2437},
-    {"male": (0.303, 0.315, 0.261), "female": (0.271, 0.295, 0.261)},
-)
-"""From the vertex to C7."""
-
-ARM_BUILDS = {
-    "upper_arm": Build(
-        {"male": 0.2817, "female": 0.2751},
-        {"male": (0.285, 0.269, 0.158), "female": (0.278, 0.260, 0.148)},
-    ),
-    "forearm": Build(
-        {"male": 0.2689, "female": 0.2643},
-        {"male": (0.276, 0.265, 0.121), "female": (0.261, 0.257, 0.094)},
-    ),
-    "hand": Build(
-        {"male": 0.1879, "female": 0.1701},
-        {"male": (0.288, 0.235, 0.184), "female": (0.244, 0.208, 0.154)},
-    ),
-}
-"""By the name of the segment in `masses.ARM`; the hand from the wrist to the tip of the finger."""
 
 
 def hung(skeleton: Skeleton, arms: Arms, subject: Subject) -> Masses:
@@ -128,16 +88,18 @@ def carried_parts(arms: Arms, subject: Subject, t1: Array) -> tuple[Part, ...]:
 
 
 def _head(subject: Subject, at: Array) -> Part:
-    kg = HEAD_PERCENT[subject.sex] / 100.0 * subject.mass_kg
-    forwards, sideways, along = _length(HEAD, subject) * np.array(HEAD.radii[subject.sex])
+    head = f"head {subject.sex}"
+    kg = MASS_PERCENT[head] / 100.0 * subject.mass_kg
+    length = length_m("head", subject.sex, subject.height_m)
+    forwards, sideways, along = length * np.array(GYRATION[head])
     return Part("head", kg, at, kg * np.diag([forwards**2, along**2, sideways**2]))
 
 
 def _arm(arms: Arms, subject: Subject, shoulder: Array, head: Array, t1: Array) -> Iterator[Part]:
     """Segments of the right arm."""
     upper, fore, hand = ARM
-    lengths = [_length(ARM_BUILDS[segment.name], subject) for segment in ARM]
-    to_hand = lengths[1] + hand.centre[subject.sex] * lengths[2]
+    lengths = [length_m(segment, subject.sex, subject.height_m) for segment in ARM]
+    to_hand = lengths[1] + CENTRE[f"{hand} {subject.sex}"] * lengths[2]
     tall = subject.height_m / REFERENCE.height_m
     if arms == "hanging":
         elbow = shoulder - [0.0, lengths[0], 0.0]
@@ -156,18 +118,19 @@ def _arm(arms: Arms, subject: Subject, shoulder: Array, head: Array, t1: Array) 
         yield _segment(segment, subject, start, along, length)
 
 
-def _segment(segment: Segment, subject: Subject, start: Array, along: Array, length: float) -> Part:
+def _segment(segment: str, subject: Subject, start: Array, along: Array, length: float) -> Part:
     """A segment from its upper end along a direction (3,); round, as its axes are not known.
 
     De Leva's two radii across the segment differ by 1 to 18 %; their mean square is taken.
     """
-    kg = segment.percent[subject.sex] / 100.0 * subject.mass_kg
-    forwards, sideways, lengthwise = ARM_BUILDS[segment.name].radii[subject.sex]
+    named = f"{segment} {subject.sex}"
+    kg = MASS_PERCENT[named] / 100.0 * subject.mass_kg
+    forwards, sideways, lengthwise = GYRATION[named]
     across = 0.5 * (forwards**2 + sideways**2)
     axis = np.outer(along, along)
     about = kg * length**2 * (across * (np.eye(3) - axis) + lengthwise**2 * axis)
-    at = start + segment.centre[subject.sex] * length * along
-    return Part(f"right_{segment.name}", kg, at, about)
+    at = start + CENTRE[named] * length * along
+    return Part(f"right_{segment}", kg, at, about)
 
 
 def elbow_between(
@@ -200,7 +163,3 @@ def _mirrored(part: Part, t1: Array) -> Part:
     at = t1 + flip @ (part.com - t1)
     name = part.name.replace("right", "left")
     return Part(name, part.kg, at, flip @ part.about_com @ flip)
-
-
-def _length(build: Build, subject: Subject) -> float:
-    return build.length_m[subject.sex] * subject.height_m / DE_LEVA_HEIGHT_M[subject.sex]

@@ -74,12 +74,6 @@ class PassiveElements:
             getattr(self, field.name).flags.writeable = False
 
     @property
-    def stiffness_at_rest(self) -> Array:
-        """(17, 6) N/m and N m/rad."""
-        found: Array = (self.a * self.b).mean(axis=-1)
-        return found
-
-    @property
     def sources(self) -> tuple[str, ...]:
         """All sources, each once."""
         return tuple(dict.fromkeys(self.source.ravel().tolist()))

@@ -12,9 +12,9 @@ from numba import njit
 
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.motion.points import COUNT
 from spinepipe.motion.skeleton import BODIES, Skeleton
+from spinepipe.units import STANDARD_GRAVITY
 
 _JOINTS = (
     *(pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ),

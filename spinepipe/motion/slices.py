@@ -2,35 +2,28 @@
 
 A slice is as high as its vertebra with one disc, from the joint below it to the one above; T1,
 above which no joint is told, is as high as T2. Its area follows from its mass at the density of
-water, and it is 0.65 times as deep as wide, as the middle part of de Leva's men is (0.54 in the
-upper, 0.86 in the lower part; worked out from his radii of gyration). The pelvis is turned as his
-lower trunk: radii of gyration in shares of 146 mm (men) or 182 mm (women), growing with height.
+water, and it is 0.65 times as deep as wide, as the middle part of de Leva's men is. The pelvis is
+turned as his lower trunk, growing with height.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from spinepipe.anatomy.segments import GYRATION, HEIGHT_M, LENGTH_M
 from spinepipe.effects.contract import Array
+from spinepipe.facts import number
 from spinepipe.frames import Pose
-from spinepipe.motion.hanging import DE_LEVA_HEIGHT_M
 from spinepipe.motion.skeleton import BODIES, PELVIS
 from spinepipe.muscles.subject import Subject
 
 DENSITY_KG_PER_M3 = 1000.0
 """A choice; a thorax with its lungs is some 10 % lighter."""
 
-DEPTH_OVER_WIDTH = 0.65
-"""Middle trunk of de Leva 1996, men."""
+DEPTH_OVER_WIDTH = number(__name__, "trunk_depth_over_width")
 
 WIDEST_M = 0.6
 """A slice wider than this has no slice's mass: head and arms are hung on T1 separately."""
-
-LOWER_TRUNK_M = {"male": 0.1457, "female": 0.1815}
-"""From the navel to between the hips, de Leva 1996, of persons of his mean height."""
-
-LOWER_TRUNK_RADII = {"male": (0.615, 0.587, 0.551), "female": (0.433, 0.444, 0.402)}
-"""Shares of that length, about the axes forwards, up and to the right (de Leva 1996 Table 4)."""
 
 
 def slice_inertias(steps: Sequence[Pose], kg: Array, subject: Subject) -> Array:
@@ -88,7 +81,7 @@ def _upright(up: Array) -> Array:
 
 def pelvis_inertia(kg: float, subject: Subject) -> Array:
     """(3, 3) kg m2 of the pelvis, axes of ground in the neutral pose."""
-    tall = subject.height_m / DE_LEVA_HEIGHT_M[subject.sex]
-    radii = tall * LOWER_TRUNK_M[subject.sex] * np.array(LOWER_TRUNK_RADII[subject.sex])
-    found: Array = kg * np.diag(radii**2)
+    trunk, tall = f"lower_trunk {subject.sex}", subject.height_m / HEIGHT_M[subject.sex]
+    forwards, right, up = tall * LENGTH_M[trunk] * np.array(GYRATION[trunk])
+    found: Array = kg * np.diag(np.array([forwards, up, right]) ** 2)
     return found

@@ -1,48 +1,21 @@
 """What pressure in the abdomen does to the ribs: a lift ahead of T11 (Ghezelbash 2016, 2.8).
 
-The paper prints no area of the diaphragm. Values differ twofold, and with them the moment that a
-kilopascal makes, so each is here with its source.
+The paper prints no area of the diaphragm, and values differ twofold (`facts.csv`): the one whose
+source was read is taken.
 """
 
-from dataclasses import dataclass
-
 from spinepipe.effects.contract import Array
+from spinepipe.facts import number
 from spinepipe.muscles.masses import Load
 from spinepipe.muscles.regressions import Regressions
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import THORAX
 
-AHEAD_M = 0.05
+AHEAD_M = number(__name__, "diaphragm_ahead")
 """How far ahead of T11 the diaphragm's force acts."""
 
-_PA_PER_KPA = 1e3
-
-
-@dataclass(frozen=True)
-class Area:
-    """A diaphragm area in m2, where it is from, and whether it was read there."""
-
-    m2: float
-    source: str
-    status: str
-
-    @property
-    def nm_per_kpa(self) -> float:
-        """Extension moment about T11 that each kilopascal makes, N m."""
-        return _PA_PER_KPA * self.m2 * AHEAD_M
-
-
-AREAS = {
-    "cavity": Area(
-        0.0452, "abdominal cavity as a circle of 0.12 m radius, AnyBody/ammr Buckle.any", "derived"
-    ),
-    "mcgill": Area(0.0243, "McGill and Norman 1987", "from_memory"),
-    "morris": Area(0.0465, "Morris 1961", "from_memory"),
-}
-"""What the area may be for a person of reference size. 1.2 to 2.3 N m for each kPa."""
-
-AREA_M2 = AREAS["cavity"].m2
-"""Area for a person of reference size: the one whose source was read."""
+AREA_M2 = number(__name__, "diaphragm_area")
+"""Area for a person of reference size."""
 
 
 def diaphragm_area(

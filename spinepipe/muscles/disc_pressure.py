@@ -11,18 +11,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.facts import number, numbers, several
 from spinepipe.units import DEG_PER_RAD
 
 PA_PER_MPA = 1e6
 
-_ONE, _P, _T, _PP, _PT, _TT = -1.556e-2, 1.255, 1.243e-2, 3.988e-2, -1.212e-2, 1.669e-3
+_ONE, _P, _T, _PP, _PT, _TT = several(__name__, "disc_pressure_polynomial")[""]
 """MPa and degrees: 1, P, theta, P^2, P theta, theta^2."""
 
-LARGEST_PA = 1.86 * PA_PER_MPA
-LARGEST_FLEXION = 10.0 / DEG_PER_RAD
+_FITTED = numbers(__name__, "disc_pressure_range")
+LARGEST_PA = _FITTED["nominal_pressure"] * PA_PER_MPA
+LARGEST_FLEXION = _FITTED["flexion"] / DEG_PER_RAD
 """Compression over area, Pa, and flexion, rad, up to which the polynomial was fitted (from 0)."""
 
-DREISCHARF = 0.77
+DREISCHARF = number(__name__, "pressure_over_disc_pressure")
 """P over pressure in the disc, of Dreischarf 2013 as Ghezelbash 2016 Fig 4 has it."""
 
 
@@ -83,9 +85,3 @@ def disc_pressure(compression: float, area: float, flexion: float) -> DiscPressu
     """
     nominal = compression / area
     return DiscPressure(float(eq6(nominal, flexion)), nominal / DREISCHARF, nominal, flexion)
-
-
-def flexion_of_least_pressure(nominal_pa: float) -> float:
-    """Flexion at which Eq 6 is least for a compression over area in Pa, rad; below 0: extension."""
-    theta_deg = -(_T + _PT * nominal_pa / PA_PER_MPA) / (2.0 * _TT)
-    return theta_deg / DEG_PER_RAD

@@ -1,39 +1,21 @@
 """Discs where a source of geometry has none: their height and area, and how they lie.
 
-Areas are ratios to L4L5 times 1455 mm2 (Ghezelbash 2016, section 3.1, its own model). L1L2 to L5S1:
-pi/4 depth times width, mean of the facing endplates of the Visible Human male (landmarks of the
-public lumbar model, BSD-3-Clause). Heights of L1L2 to L5S1: centre of the disc in magnetic
-resonance images of 14 healthy adults (abstract of the study). For T12L1 and T11T12 nobody has read
-a source here: area ratios 0.83 and 0.72 and a height of 6 to 7 mm at T11T12 are from memory, the
-height of T12L1 lies midway between its neighbours. They are no ground for accepting anything.
+Areas are ratios to L4L5 times that of Ghezelbash 2016. For T12L1 and T11T12 nobody has read a
+source here (`facts.csv`): they are no ground for accepting anything.
 """
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.facts import numbers, several
 from spinepipe.muscles.trunk import LEVELS
 
-_L4L5_AREA_MM2 = 1455.0
-
+_L4L5_AREA_MM2 = numbers(__name__, "disc_area")["L4L5"]
 _AREA_RATIO = {
-    "L5S1": 1406.0 / 1550.0,
-    "L4L5": 1.0,
-    "L3L4": 1478.0 / 1550.0,
-    "L2L3": 1438.0 / 1550.0,
-    "L1L2": 1457.0 / 1550.0,
-    "T12L1": 0.83,
-    "T11T12": 0.72,
+    level: area / reference
+    for level, (area, reference) in several(__name__, "disc_area_beside_reference").items()
 }
-
-_HEIGHT_MM = {
-    "L5S1": 12.99,
-    "L4L5": 13.82,
-    "L3L4": 12.45,
-    "L2L3": 11.59,
-    "L1L2": 10.0,
-    "T12L1": 8.25,
-    "T11T12": 6.5,
-}
+_HEIGHT_MM = numbers(__name__, "disc_height")
 
 REMARK = (
     "heights and areas of the discs are not the source's: MRI of 14 adults and one man's endplates "

@@ -17,13 +17,23 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.effects.contract import Array
+from spinepipe.facts import number, several
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.muscles import discs
 from spinepipe.muscles.fascicles import Fascicle, Source, muscles_of, on_their_sides, sheath_of
-from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES, THORAX, Muscles, Trunk, body_of
+from spinepipe.muscles.trunk import (
+    BODIES,
+    LEVELS,
+    RECTUS,
+    SIDES,
+    SLICES,
+    THORAX,
+    Muscles,
+    Trunk,
+    body_of,
+)
 
 SHEATH = "Abdomen"
-RECTUS = "rectus_abdominis"
 OBLIQUES = ("external_oblique", "internal_oblique")
 
 SHOULDER = ("scapula", "clavicle", "humerus", "ulna", "radius", "hand")
@@ -38,10 +48,10 @@ _ANGLES = ["extension_deg", "right_bending_deg", "left_rotation_deg"]
 _CHAIN = (*LEVELS, *(f"T{n}T{n + 1}" for n in range(10, 0, -1)))
 """Joints below L5, L4, ... T1."""
 
-_REFERENCE_LENGTH_M = 0.45066
-_HEAD_M = np.array([0.0042, 0.1430, 0.0])
-_SHOULDER_M = np.array([0.0176, -0.0501, 0.1706])
-_ARM_LENGTH_M = 0.60
+_REFERENCE_LENGTH_M = number(__name__, "generic_male_length")
+_HEAD_M = np.array(several(__name__, "generic_male_head")[""])
+_SHOULDER_M = np.array(several(__name__, "generic_male_shoulder")[""])
+_ARM_LENGTH_M = number(__name__, "generic_male_arm_length")
 """Generic male of Allaire 2020: height of T1T2 above L5S1; from T1T2 to the centre of mass of head
 and neck, and to the middle of the shoulder; from there to the centre of mass of a hanging hand."""
 

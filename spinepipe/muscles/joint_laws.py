@@ -15,27 +15,16 @@ from scipy.interpolate import PchipInterpolator
 
 from spinepipe.anatomy import published
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.trunk import LEVELS
+from spinepipe.facts import numbers, several
 from spinepipe.units import DEG_PER_RAD
 
 AXES = ("right_bending", "left_rotation", "extension")
 """Order of rotation vectors and moments: about x, y, z."""
 
-T11T12, T12L1 = LEVELS.index("T11T12"), LEVELS.index("T12L1")
+AXIAL_N_PER_M = numbers(__name__, "axial_stiffness")
 
-AXIAL_N_PER_M = {
-    "L5S1": 1.47e6,
-    "L4L5": 1.87e6,
-    "L3L4": 2.00e6,
-    "L2L3": 2.00e6,
-    "L1L2": 2.13e6,
-    "T12L1": 1.80e6,
-    "T11T12": 1.50e6,
-}
-"""Kitazaki and Griffin 1997, Table 4."""
-
-PRELOADS_N, PRELOAD_FACTORS = (0.0, 250.0, 500.0), (1.0, 1.71, 2.11)
-"""Stiffness over that without preload, lumbar segments (Gardner-Morse 2004); held beyond 500 N."""
+PRELOADS_N, PRELOAD_FACTORS = zip(*several(__name__, "stiffening_by_preload").values(), strict=True)
+"""Stiffness over that without preload, lumbar segments; held beyond the last."""
 
 
 @dataclass(frozen=True)
@@ -81,45 +70,33 @@ class Curve:
         return found
 
 
+def _both_sides(back: str, fore: str) -> Curve:
+    """From points of two sides, as `heuer flexion` names them in `facts.csv`."""
+    known = several(__name__, "moment_curve")
+    points = (
+        (*(-value for value in reversed(known[f"{back} {of}"])), 0.0, *known[f"{fore} {of}"])
+        for of in ("deg", "nm")
+    )
+    return Curve(*points)
+
+
+def _of(source: str, back: str = "flexion") -> tuple[Curve, Curve, Curve]:
+    """About x, y and z; `back` is extension where a source has one curve for both of its sides."""
+    sides = (("right_bending",) * 2, ("left_rotation",) * 2, (back, "extension"))
+    x, y, z = (_both_sides(f"{source} {one}", f"{source} {other}") for one, other in sides)
+    return x, y, z
+
+
 def _linear(nm_per_rad: float) -> Curve:
-    return _both_sides((10.0,), (10.0 * nm_per_rad / DEG_PER_RAD,))
-
-
-def _both_sides(degrees: tuple[float, ...], newton_metres: tuple[float, ...]) -> Curve:
-    return Curve(
-        (*(-d for d in reversed(degrees)), 0.0, *degrees),
-        (*(-m for m in reversed(newton_metres)), 0.0, *newton_metres),
-    )
-
-
-def _sagittal(
-    flexion_deg: tuple[float, ...],
-    extension_deg: tuple[float, ...],
-    newton_metres: tuple[float, ...],
-) -> Curve:
-    return Curve(
-        (*(-d for d in reversed(flexion_deg)), 0.0, *extension_deg),
-        (*(-m for m in reversed(newton_metres)), 0.0, *newton_metres),
-    )
+    nm = 10.0 * nm_per_rad / DEG_PER_RAD
+    return Curve((-10.0, 0.0, 10.0), (-nm, 0.0, nm))
 
 
 _GOULD = published("gould_2024b")["uniform_stiffness"]
-_HEUER_NM = (1.0, 2.5, 5.0, 7.5)
-_JARAMILLO_NM = (2.0, 4.0, 6.0, 8.0)
-
-_SCHMIDT = (  # Schmidt 1998, whole segments: 2.3, 8.4 and 1.8 (flexion), 2.6 (extension) N m/deg
-    _both_sides((10.0,), (23.0,)),
-    _both_sides((10.0,), (84.0,)),
-    Curve((-10.0, -5.0, -0.5, 0.0, 0.5, 5.0, 10.0), (-18.0, -9.0, -0.9, 0.0, 1.3, 13.0, 26.0)),
-)
-_HEUER = (  # Heuer 2007, disc L4L5 alone, medians
-    _both_sides((2.27, 3.6, 5.08, 6.43), _HEUER_NM),
-    _both_sides((1.32, 2.7, 4.36, 5.73), _HEUER_NM),
-    _sagittal((4.95, 6.64, 8.38, 10.11), (1.23, 5.15, 7.92, 10.28), _HEUER_NM),
-)
+_SCHMIDT, _HEUER = _of("schmidt"), _of("heuer")
 
 CURVES: Mapping[str, tuple[Curve, Curve, Curve]] = {
-    "segment_gould": (  # Gould 2024b Table 2, uniform: linear, whole segments
+    "segment_gould": (  # linear, whole segments
         _linear(_GOULD["right_bending_nm_per_rad"]),
         _linear(_GOULD["left_rotation_nm_per_rad"]),
         _linear(_GOULD["extension_nm_per_rad"]),
@@ -127,18 +104,10 @@ CURVES: Mapping[str, tuple[Curve, Curve, Curve]] = {
     "mixed": (_HEUER[0], _SCHMIDT[1], _SCHMIDT[2]),
     "segment": _SCHMIDT,
     "disc_heuer": _HEUER,
-    "disc_jaramillo": (  # Jaramillo, in Gruber 2024, disc L4L5 alone, means
-        _both_sides((4.39, 5.77, 6.58, 7.1), _JARAMILLO_NM),
-        _both_sides((3.21, 4.51, 5.43, 5.79), _JARAMILLO_NM),
-        _sagittal((7.32, 9.26, 10.76, 11.87), (5.47, 6.77, 7.65, 8.27), _JARAMILLO_NM),
-    ),
-    "disc_han": (  # Han 2010, lumbar disc
-        _both_sides((2.0, 4.0, 6.0, 8.0, 10.0), (1.43, 2.93, 4.51, 6.15, 7.86)),
-        _both_sides((1.0, 2.0, 3.0, 4.0), (1.03, 2.09, 3.22, 4.47)),
-        _both_sides((2.0, 4.0, 6.0, 8.0, 10.0), (0.90, 1.79, 2.76, 3.90, 5.32)),
-    ),
+    "disc_jaramillo": _of("jaramillo"),
+    "disc_han": _of("han", back="extension"),
 }
-"""About x, y and z: right bending, left rotation, extension.
+"""About x, y and z: right bending, left rotation, extension. Sources: `facts.csv`, `anatomy`.
 
 mixed: sideways the disc alone, else whole segments. Ligaments and facets hardly resist bending
 sideways; a segment as stiff sideways as Schmidt's needs muscles to bend it where people lean.

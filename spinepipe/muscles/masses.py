@@ -1,63 +1,37 @@
 """Where every kilogram of a person goes: slices of the trunk, head, arms, and what the hands hold.
 
 Slices of the trunk hang on T1 to L5: their share of body mass grows from 1.1 % at T1 to 2.6 % at
-L5, their centres lie up to 5 cm ahead of the vertebrae, most in the lower thorax (Pearsall 1996,
-abstract, four trunks; how share and distance run between the printed values is a straight line
-here). Together 31.45 %; another generic male model has 32.1 %. Head and arms are those of de Leva
-1996.
+L5, their centres lie up to 5 cm ahead of the vertebrae, most in the lower thorax; how share and
+distance run between the printed values is a straight line here. Sources: `facts.csv`.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 
+from spinepipe.anatomy.levels import SLICE_PERCENT
+from spinepipe.anatomy.segments import CENTRE, MASS_PERCENT, Sex
 from spinepipe.effects.contract import Array
-from spinepipe.model import STANDARD_GRAVITY
+from spinepipe.facts import numbers
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.task import Hands
 from spinepipe.muscles.trunk import SIDES, SLICES, THORAX, Mass, Trunk, body_of
+from spinepipe.units import STANDARD_GRAVITY
 
-SLICE_PERCENT = (1.1, 2.6)
-"""Share of body mass of the slices at T1 and at L5."""
-
-AHEAD_AT = {"T1": 0.0, "T7T8": 4.0, "T11": 5.0, "L3L4": 1.0}
+AHEAD_AT = numbers(__name__, "slice_ahead")
 """How far slices lie ahead of the vertebrae, cm: straight between these, 1 cm below L3L4."""
-
-HEAD_PERCENT = {"male": 6.94, "female": 6.68}
-"""Head and neck, de Leva 1996."""
 
 HALF_GRIP_M = 0.15
 """How far each hand is from the middle of a load that both hold: a choice, a crate 30 cm wide."""
 
 
-@dataclass(frozen=True)
-class Segment:
-    """A segment of the arm.
+ARM_LENGTH_PERCENT = numbers(__name__, "arm_length_percent")
+"""Lengths of the segments of an arm, shoulder to fingertip, of body height; only ratios count."""
 
-    Attributes
-    ----------
-    name : upper_arm, forearm, hand.
-    percent : of body mass, one side, by sex (de Leva 1996).
-    centre : share of the segment's length from its upper end, by sex (de Leva 1996).
-    length_percent : of body height (Drillis and Contini 1966, from memory; only the ratios count).
-    """
-
-    name: str
-    percent: dict[Literal["male", "female"], float]
-    centre: dict[Literal["male", "female"], float]
-    length_percent: float
-
-
-ARM = (
-    Segment("upper_arm", {"male": 2.71, "female": 2.55}, {"male": 0.5772, "female": 0.5754}, 18.6),
-    Segment("forearm", {"male": 1.62, "female": 1.38}, {"male": 0.4574, "female": 0.4559}, 14.6),
-    Segment("hand", {"male": 0.61, "female": 0.56}, {"male": 0.3624, "female": 0.3427}, 10.8),
-)
-"""Shoulder to fingertip; the hand's centre is counted along wrist to tip of the third finger."""
+ARM = tuple(ARM_LENGTH_PERCENT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +80,12 @@ def masses_of(trunk: Trunk, subject: Subject, ahead_times: float = 1.0) -> tuple
             )
             for name, percent, centre, ahead in slices
         ),
-        Mass("head", THORAX, HEAD_PERCENT[subject.sex] / 100.0 * subject.mass_kg, trunk.head),
+        Mass(
+            "head",
+            THORAX,
+            MASS_PERCENT[f"head {subject.sex}"] / 100.0 * subject.mass_kg,
+            trunk.head,
+        ),
     )
 
 
@@ -131,10 +110,10 @@ def _position(name: str) -> float:
 def shares(subject: Subject) -> tuple[Share, ...]:
     """Where 100 % of the body is; what the trunk does not carry is what is left."""
     sex = subject.sex
-    arms = ((f"both {s.name.replace('_', ' ')}s", 2.0 * s.percent[sex]) for s in ARM)
+    arms = ((f"both {s.replace('_', ' ')}s", 2.0 * MASS_PERCENT[f"{s} {sex}"]) for s in ARM)
     carried = (
         ("slices T1 to L5", float(sum(slice_percents()))),
-        ("head and neck", HEAD_PERCENT[sex]),
+        ("head and neck", MASS_PERCENT[f"head {sex}"]),
         *arms,
     )
     left = 100.0 - sum(percent for _, percent in carried)
@@ -142,43 +121,6 @@ def shares(subject: Subject) -> tuple[Share, ...]:
         *(Share(part, percent, True) for part, percent in carried),
         Share("pelvis and legs (what is left)", left, False),
     )
-
-
-@dataclass(frozen=True)
-class CentreCheck:
-    """How far ahead of a level a part of the trunk has its centre: here and as published, cm."""
-
-    part: str
-    level: str
-    here_cm: float
-    published_cm: float
-
-
-_PEARSALL = (("upper trunk", 0.0, 18.5, "T7T8", 4.0), ("middle trunk", 18.5, 30.7, "L3L4", 1.0))
-"""Part, where it begins and ends in per cent of body mass from the top, level, cm ahead of it."""
-
-
-def centre_checks(trunk: Trunk) -> tuple[CentreCheck, ...]:
-    """Centres of parts of a trunk of reference size beside those that Pearsall 1996 prints.
-
-    Its parts are 18.5, 12.2 and 10.7 % of body mass; the lowest reaches below L5, so that of the
-    whole trunk the slices hold three quarters. Parts are cut off by mass, from T1 downwards.
-    """
-    whole = ("trunk, T1 to L5", 0.0, float(sum(slice_percents())), "L1L2", 2.0)
-    return tuple(
-        CentreCheck(part, level, _ahead_of(trunk, level, low, high), published)
-        for part, low, high, level, published in (*_PEARSALL, whole)
-    )
-
-
-def _ahead_of(trunk: Trunk, level: str, low: float, high: float) -> float:
-    """Centre of the slices from low to high per cent, ahead of the middle of a level, cm."""
-    percents = np.array(slice_percents())
-    ends = np.cumsum(percents)
-    held = np.clip(np.minimum(ends, high) - np.maximum(ends - percents, low), 0.0, None)
-    ahead = 100.0 * trunk.vertebrae[:, 0] + np.array(ahead_cm())
-    at = np.interp(_position(level), range(len(SLICES)), 100.0 * trunk.vertebrae[:, 0])
-    return float(held @ ahead / held.sum() - at)
 
 
 def arm_loads(
@@ -218,9 +160,9 @@ def arm_masses(side: str, shoulder: Array, hand: Array, subject: Subject) -> tup
     """
     return tuple(
         Mass(
-            f"{side}_{segment.name}",
+            f"{side}_{segment}",
             THORAX,
-            segment.percent[subject.sex] / 100.0 * subject.mass_kg,
+            MASS_PERCENT[f"{segment} {subject.sex}"] / 100.0 * subject.mass_kg,
             shoulder + share * (hand - shoulder),
         )
         for segment, share in zip(ARM, centre_shares(subject.sex), strict=True)
@@ -228,12 +170,12 @@ def arm_masses(side: str, shoulder: Array, hand: Array, subject: Subject) -> tup
 
 
 @cache
-def centre_shares(sex: Literal["male", "female"]) -> tuple[float, ...]:
+def centre_shares(sex: Sex) -> tuple[float, ...]:
     """Where on the line from shoulder to hand each segment's centre lies, as a share; hand: 1."""
-    starts = np.cumsum([0.0, *(segment.length_percent for segment in ARM)])
+    starts = np.cumsum([0.0, *ARM_LENGTH_PERCENT.values()])
     centres = [
-        start + segment.centre[sex] * segment.length_percent
-        for start, segment in zip(starts, ARM, strict=False)
+        start + CENTRE[f"{segment} {sex}"] * percent
+        for start, (segment, percent) in zip(starts, ARM_LENGTH_PERCENT.items(), strict=False)
     ]
     return tuple(float(centre / centres[-1]) for centre in centres)
 

@@ -37,6 +37,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from spinepipe.effects.contract import Array
+from spinepipe.facts import number
 from spinepipe.frames import Pose
 from spinepipe.muscles import discs
 from spinepipe.muscles.fascicles import Fascicle, Source, muscles_of, on_their_sides, sheath_of
@@ -56,8 +57,8 @@ _FILES = {
     "arm": "arm/assets/myoarm_r_chain.xml",
 }
 
-STRESS_PA = 0.46e6
-"""Maximum force over cross-section in the source: 46 N/cm2, Christophy 2012."""
+STRESS_PA = number(__name__, "force_over_area")
+"""Maximum force over cross-section in the source."""
 
 _GROUPS = {
     "Ps": "psoas",

@@ -1,6 +1,6 @@
 """Force of a muscle that is stretched, without any activity.
 
-An exponential of the strain of the fibres (Thelen 2003, J Biomech Eng 125:70; default of OpenSim).
+An exponential of the strain of the fibres (Thelen 2003; default of OpenSim).
 Fibres are slack up to the length of the upright posture and take up all that the path gains; the
 curve of Davis 2003, which the paper uses, is printed nowhere that we know of.
 """
@@ -10,7 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.facts import numbers
 from spinepipe.muscles.trunk import Muscles
+
+_CURVE = numbers(__name__, "passive_muscle")
 
 
 def fibres_of(muscles: Muscles, rest: Array, share: float) -> Array:
@@ -31,8 +34,8 @@ class PassiveMuscle:
     fibre_share : of the path upright that stretches, where the source has no length of the fibres.
     """
 
-    strain: float = 0.6
-    shape: float = 5.0
+    strain: float = _CURVE["strain"]
+    shape: float = _CURVE["shape"]
     factor: float = 1.0
     fibre_share: float = 1.0
 

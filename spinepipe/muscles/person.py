@@ -8,13 +8,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.muscles.joint_laws import JointLaws
 from spinepipe.muscles.passive_muscle import PassiveMuscle, fibres_of
 from spinepipe.muscles.paths import Lines
 from spinepipe.muscles.pose import Chain, posed, rotations_of
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import LEVELS, Mass
+from spinepipe.units import STANDARD_GRAVITY
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ named level. Each quantity needs a row for all muscles and levels.
 """
 
 import csv
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.resources import files
@@ -122,11 +122,6 @@ class Regressions:
     @cached_property
     def _at(self) -> Mapping[tuple[str, str, str], Regression]:
         return {(row.quantity, row.muscle, row.level): row for row in self.rows}
-
-    def unknown_muscles(self, groups: Iterable[str]) -> tuple[str, ...]:
-        """Muscles that rows name and a trunk has not: their rows would change nothing."""
-        known = {ALL, *groups}
-        return tuple(dict.fromkeys(row.muscle for row in self.rows if row.muscle not in known))
 
 
 @cache

@@ -21,10 +21,7 @@ from spinepipe.muscles.regressions import (
     Regressions,
 )
 from spinepipe.muscles.subject import Subject
-from spinepipe.muscles.trunk import NO_BODY, Trunk
-
-SHEATH_MUSCLE = "rectus_abdominis"
-"""The rectus sheath, and what ends in it, moves as this muscle does."""
+from spinepipe.muscles.trunk import NO_BODY, RECTUS, Trunk
 
 _L5S1 = 0
 _X, _Y, _Z = range(3)
@@ -81,7 +78,7 @@ def scaled(
         head=tall * trunk.head,
         shoulders=tall * trunk.shoulders,
         arm_length=tall * trunk.arm_length,
-        sheath=size.moved(trunk.sheath, np.full(trunk.sheath.shape[:-1], SHEATH_MUSCLE)),
+        sheath=size.moved(trunk.sheath, np.full(trunk.sheath.shape[:-1], RECTUS)),
         muscles=replace(
             muscles,
             pcsa=choices.pcsa_times * size.pcsa() * muscles.pcsa,
@@ -153,7 +150,7 @@ def point_muscles(trunk: Trunk) -> NDArray[np.str_]:
     """(M, P) the muscle whose regressions move each point."""
     muscles = trunk.muscles
     names = np.array(muscles.groups, dtype=object)[:, None].repeat(muscles.body.shape[1], axis=1)
-    names[muscles.in_sheath, 1] = SHEATH_MUSCLE
+    names[muscles.in_sheath, 1] = RECTUS
     return names.astype(str)
 
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from spinepipe.facts import numbers
+
 CM_PER_M = 100.0
 
 
@@ -33,5 +35,5 @@ class Subject:
         return male, self.age_years, CM_PER_M * self.height_m, self.mass_kg
 
 
-REFERENCE = Subject("male", 41.8, 1.730, 75.1)
-"""Whom the published model fits best (Ghezelbash 2016, section 3.2)."""
+REFERENCE = Subject("male", *numbers(__name__, "reference_man").values())
+"""Whom the published model fits best."""

@@ -26,6 +26,9 @@ THORAX = len(BODIES) - 1
 
 NO_BODY = -1
 
+RECTUS = "rectus_abdominis"
+"""The rectus sheath, and what ends in it, moves as this muscle does."""
+
 SIDES = ("right", "left")
 
 

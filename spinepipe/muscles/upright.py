@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from spinepipe.effects.contract import Array
-from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.muscles.masses import arm_masses
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import Chain
 from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES
+from spinepipe.units import STANDARD_GRAVITY
 
 MOST_ROUNDS = 30
 BEGINNINGS = 12

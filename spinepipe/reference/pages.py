@@ -81,11 +81,6 @@ def refreshed(text: str, page: str) -> str:
     return _PART.sub(lambda found: _part(found[1], page), text)
 
 
-def names_in(text: str) -> list[str]:
-    """Names of the generated parts of a page."""
-    return [found[1] for found in _PART.finditer(text)]
-
-
 def _part(name: str, page: str) -> str:
     known = generators()
     if name not in known:

@@ -18,6 +18,9 @@ BLACK, GREY, WHITE = "#000000", "#767676", "#FFFFFF"
 BLUE, GREEN, VERMILLION = "#0072B2", "#009E73", "#D55E00"
 """Okabe and Ito, Color Universal Design, 2008."""
 
+EMPTY, HATCH = "#E4E4E4", "#9A9A9A"
+"""Cells of a map where nothing was read, and the lines across those that say why."""
+
 INK = {BLUE: "#005A8E", GREEN: "#00694D", VERMILLION: "#A84A00", GREY: "#555555"}
 """Darker tones of some of them, for small print."""
 

@@ -11,7 +11,7 @@ from moving_spine import everywhere, markers, postures, spine
 
 from spinepipe.model import RefusedModel
 from spinepipe.motion.asked import SHAPE, Ask, watched
-from spinepipe.motion.export import COLUMNS, osim, write_mot, write_osim
+from spinepipe.motion.export import COLUMNS, mot, osim
 from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.posture import postures as fitted
 from spinepipe.motion.rigid_body import bodies_of
@@ -41,14 +41,14 @@ def folder(tmp_path_factory) -> Path:
 def exported(folder: Path, seen: MarkerSet, name: str):
     """The model as OpenSim reads it."""
     path = folder / f"{name}.osim"
-    write_osim(path, spine(), seen, name)
+    path.write_text(osim(spine(), seen, name), encoding="utf-8")
     return peer.model_of(path, COLUMNS)
 
 
 def test_opensim_replays_a_motion(folder: Path) -> None:
     q, times = postures(11, 5), np.linspace(0.3, 1.1, 5)
     model = exported(folder, markers(), "replayed")
-    write_mot(folder / "replayed.mot", "replayed", times, q)
+    (folder / "replayed.mot").write_text(mot("replayed", times, q), encoding="utf-8")
     told, values = peer.coordinates_of(model, folder / "replayed.mot")
     np.testing.assert_allclose(told, times, atol=1e-12)
     np.testing.assert_allclose(values, q.reshape(5, COUNT), atol=1e-13)

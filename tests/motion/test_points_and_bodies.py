@@ -5,10 +5,10 @@ import pytest
 from moving_spine import law, markers, postures, spine
 
 from spinepipe.frames import rotation_zxy
-from spinepipe.model import STANDARD_GRAVITY
 from spinepipe.motion.points import COUNT, marker_places, with_slopes
 from spinepipe.motion.rigid_body import bodies_of
 from spinepipe.motion.skeleton import BODIES, body_poses
+from spinepipe.units import STANDARD_GRAVITY
 
 SMALL = 1e-6
 

@@ -1,9 +1,9 @@
-"""Eq 6 of Ghezelbash 2016: the 24 values of Fig 4, its range, and where it is least."""
+"""Eq 6 of Ghezelbash 2016: the 24 values of Fig 4, and its range."""
 
 import numpy as np
 import pytest
 
-from spinepipe.muscles.disc_pressure import disc_pressure, eq6, flexion_of_least_pressure
+from spinepipe.muscles.disc_pressure import disc_pressure
 
 DEG = np.pi / 180
 AREA = 1455e-6
@@ -51,14 +51,3 @@ def test_a_disc_without_load_is_within_and_one_that_is_pulled_is_not() -> None:
     assert disc_pressure(0.0, AREA, 0.0).inside
     assert not disc_pressure(-1e-9, AREA, 0.0).inside
     assert not disc_pressure(0.0, AREA, -1e-9).inside
-
-
-@pytest.mark.parametrize(("nominal_mpa", "theta_deg"), [(0.62, -1.5), (1.24, 0.8), (1.86, 3.0)])
-def test_pressure_is_least_at_a_flexion_that_grows_with_load(
-    nominal_mpa: float, theta_deg: float
-) -> None:
-    """Angles worked out by others to 0.1 deg; beside, a search on a grid of 0.001 deg."""
-    found = flexion_of_least_pressure(1e6 * nominal_mpa) / DEG
-    assert found == pytest.approx(theta_deg, abs=0.06)
-    grid = np.arange(-10, 10, 0.001)
-    assert found == pytest.approx(grid[eq6(1e6 * nominal_mpa, grid * DEG).argmin()], abs=0.001)

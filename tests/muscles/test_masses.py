@@ -11,7 +11,6 @@ from spinepipe.muscles.masses import (
     ahead_cm,
     arm_loads,
     arm_masses,
-    centre_checks,
     centre_shares,
     masses_of,
     shares,
@@ -75,57 +74,6 @@ def test_what_the_trunk_carries_is_what_the_shares_say() -> None:
     assert carried == pytest.approx(
         0.6 * sum(share.percent for share in shares(woman) if share.carried)
     )
-
-
-def test_centres_of_parts_of_a_straight_trunk() -> None:
-    """On vertebrae in one line the centre of a part is its weighted mean distance ahead."""
-    trunk = made_up_trunk()
-    straight = replace(trunk, vertebrae=trunk.vertebrae * [0, 1, 1])
-    found = {check.part: check for check in centre_checks(straight)}
-    weights = np.linspace(1.1, 2.6, 17)
-    whole = found["trunk, T1 to L5"]
-    assert whole.here_cm == pytest.approx(float(np.average(ahead_cm(), weights=weights)))
-    assert whole.published_cm == 2.0
-    upper = weights[:11].sum(), 18.5 - weights[:11].sum()
-    expected = (weights[:11] @ ahead_cm()[:11] + upper[1] * ahead_cm()[11]) / 18.5
-    assert found["upper trunk"].here_cm == pytest.approx(float(expected))
-
-
-def test_centres_of_parts_go_with_the_vertebrae() -> None:
-    """A bent trunk moves the centre of a part by the mean of its vertebrae, and its level too."""
-    trunk = made_up_trunk()
-    forwards = np.random.default_rng(4).uniform(-0.05, 0.05, 17)
-    bent = trunk.vertebrae * [0, 1, 1] + np.outer(forwards, [1, 0, 0])
-    checks = {c.part: c.here_cm for c in centre_checks(replace(trunk, vertebrae=bent))}
-    straight = {
-        c.part: c.here_cm
-        for c in centre_checks(replace(trunk, vertebrae=trunk.vertebrae * [0, 1, 1]))
-    }
-    weights = np.linspace(1.1, 2.6, 17)
-    cuts = {"upper trunk": (0.0, 18.5), "middle trunk": (18.5, 30.7)}
-    cuts["trunk, T1 to L5"] = (0.0, weights.sum())
-    levels = {"upper trunk": ("T7", "T8"), "middle trunk": ("L3", "L4")}
-    levels["trunk, T1 to L5"] = ("L1", "L2")
-    assert set(checks) == set(cuts)
-    for part, (low, high) in cuts.items():
-        moved, kg, end = 0.0, 0.0, 0.0
-        for weight, x in zip(weights, forwards, strict=True):
-            inside = max(0.0, min(high, end + weight) - max(low, end))
-            moved, kg, end = moved + inside * x, kg + inside, end + weight
-        level = np.mean([forwards[SLICES.index(name)] for name in levels[part]])
-        assert kg == pytest.approx(high - low)
-        assert checks[part] - straight[part] == pytest.approx(100.0 * (moved / kg - level))
-
-
-def test_centres_stand_beside_those_that_pearsall_prints() -> None:
-    """Abstract of Pearsall 1996: cm ahead of T7T8 and L3L4, where its upper and middle parts end
-    nearest; its parts are 18.5 and 12.2 % of body mass. Of the whole trunk at L1L2."""
-    printed = {c.part: (c.level, c.published_cm) for c in centre_checks(made_up_trunk())}
-    assert printed == {
-        "upper trunk": ("T7T8", 4.0),
-        "middle trunk": ("L3L4", 1.0),
-        "trunk, T1 to L5": ("L1L2", 2.0),
-    }
 
 
 def test_arms_that_hang_pull_straight_down_from_the_shoulders() -> None:

@@ -11,7 +11,6 @@ from spinepipe.anatomy.levels import (
     EXTENSION_DEG,
     PEDICLES_MM,
     SPACING_MM,
-    THORACIC_DISC_MM,
     extension_range_deg,
     height_mm,
     least_kg,
@@ -97,7 +96,7 @@ def test_discs_and_bodies() -> None:
     )
     for vertebra, above, below in pairs:
         assert DISC_MM[vertebra] == pytest.approx((above + below) / 2.0, abs=0.06)
-    assert pytest.approx((4.5 + 7.2) / 2.0, abs=0.06) == THORACIC_DISC_MM
+    assert pytest.approx((4.5 + 7.2) / 2.0, abs=0.06) == DISC_MM["T"]
     assert height_mm("L5") == pytest.approx((26.3 + 30.3) / 2.0, abs=0.6)
     assert height_mm("C5") == pytest.approx(11.1)
     assert height_mm("T9") == pytest.approx((18.83 + 20.46) / 2.0, abs=1.0)

@@ -191,3 +191,39 @@ def test_effects_count_where_they_are_named_or_all_are_asked_for(
     one = digest()
     (package / "effects/creep.py").write_text("rate = 22\n", "utf-8")
     assert (one != without, digest() != one) == (counts, counts)
+
+
+FACTS = """fact,of,values,unit,status,source,doi,place,note
+usual_size,L4,1.5 2.5,mm,confirmed,Someone 1999,,Table 1,
+usual_size,L5,1.5,mm,confirmed,Someone 1999,,Table 1,
+usual_rate,,3,1/s,choice,own estimate,,,
+"""
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "counts"),
+    [
+        ("1.5 2.5", "1.5 2.6", True),
+        ("L5", "L3", True),
+        (",mm,", ",m,", True),
+        ("usual_size,L5", "usual_width,L5", True),
+        ("Someone 1999", "Another 2001", False),
+        ("Table 1,", "Table 1,wider than others", False),
+        ("choice", "from_memory", False),
+        ("usual_rate,,3", "usual_rate,,4", False),
+    ],
+)
+def test_of_facts_the_named_ones_count_without_their_sources(
+    package: Path, monkeypatch: pytest.MonkeyPatch, was: str, becomes: str, counts: bool
+) -> None:
+    monkeypatch.setattr(code, "_rows", cache(code._rows.__wrapped__))
+    (package / "used/it.py").write_text("x = numbers(__name__, 'usual_size')\n", "utf-8")
+
+    def digest(text: str) -> str:
+        (package / "used/facts.csv").write_text(text, "utf-8")
+        forget()
+        code._rows.cache_clear()
+        return code.code_digest("spinepipe.own")
+
+    assert was in FACTS
+    assert (digest(FACTS) != digest(FACTS.replace(was, becomes))) is counts

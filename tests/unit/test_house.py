@@ -29,6 +29,7 @@ ROOMS = (
         "units",
         "problems",
         "documents",
+        "facts",
         "files",
         "schema",
         "progress",

@@ -34,7 +34,7 @@ GROUPS = {
 }
 """What can be switched on and off."""
 
-_BONE = "#c8b89a"
+BONE = "#c8b89a"
 _BOX = 1.45
 _OWN_MM, _SAMPLED_MM, _ARROW_SHARE = 11.0, 16.0, 0.18
 TITLES = ("anterior (mm)", "superior (mm)", "right (mm)")
@@ -111,7 +111,7 @@ def _vertebrae(view: SpecimenView, cohort: Cohort) -> Iterator[Any]:
             i=i,
             j=j,
             k=k,
-            color=_BONE,
+            color=BONE,
             opacity=0.35,
             flatshading=True,
             hoverinfo="name",

@@ -11,15 +11,13 @@ from scipy import stats
 from spinepipe.calibrate import Problem
 from spinepipe.calibrate.profile import Reach
 from spinepipe.effects.contract import Array
-from spinepipe.studies.cohort_stiffness.stiffening import LINEAR, Growth
+from spinepipe.studies.cohort_stiffness.stiffening import AT_BOUND, LINEAR, Growth
 from spinepipe.units import COORDINATES, STIFFNESS_UNITS
 
 Row = dict[str, Any]
 
 LEVEL = 0.975
 """Upper end of the intervals: 95 % lie between the ends."""
-
-_BOUND = {-1: "lower", 0: "no", 1: "upper"}
 
 
 def stiffness_rows(
@@ -59,7 +57,7 @@ def stiffness_rows(
                     **interval(values[at], log_error[at], reach),
                     **ends,
                     "identifiable": None if identifiable is None else bool(identifiable[at]),
-                    "at_bound": _BOUND[int(at_bound[at])],
+                    "at_bound": AT_BOUND[int(at_bound[at])],
                     **(LINEAR if growth is None else growth.row(at)),
                 }
             )

@@ -29,7 +29,7 @@ Row = dict[str, Any]
 FIRST = 1
 """Place of the first of these effects in a model: the bushing they scale is before them."""
 
-_BOUND = {-1: "lower", 0: "no", 1: "upper"}
+AT_BOUND = {-1: "lower", 0: "no", 1: "upper"}
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Growth:
             "growth_open_below": below,
             "growth_open_above": above,
             "growth_identifiable": known,
-            "growth_at_bound": _BOUND[int(self.at_bound[at])],
+            "growth_at_bound": AT_BOUND[int(self.at_bound[at])],
         }
 
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.schema import Table
 from spinepipe.sensitivity.global_indices.convergence import convergence
 from spinepipe.sensitivity.global_indices.design import Design
 from spinepipe.sensitivity.global_indices.estimates import Index, Settings

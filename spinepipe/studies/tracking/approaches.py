@@ -17,11 +17,15 @@ from spinepipe.motion.skin import with_sliding_skin
 from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
 from spinepipe.studies.tracking.persons import Person, carrying
-from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Approach, Scales, Tracking
+from spinepipe.studies.tracking.settings import (
+    CONSTRAINED,
+    LEARNT,
+    OWN,
+    Approach,
+    Scales,
+    Tracking,
+)
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, ROTATIONS, TRANSLATIONS
-
-OWN = "optk_calibrated"
-"""The approach that calibrates passive elements on the motion itself."""
 
 _LENGTHS = len(TRANSLATIONS)
 

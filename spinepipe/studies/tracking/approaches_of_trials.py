@@ -3,10 +3,7 @@
 from spinepipe.cohort import Cohort
 from spinepipe.studies.tracking.forms import STANCE
 from spinepipe.studies.tracking.moved import kinds_of_trials
-from spinepipe.studies.tracking.settings import LEARNT, Approach, Tracking
-
-OWN: Approach = "optk_calibrated"
-"""The approach whose passive elements are calibrated on the motion itself."""
+from spinepipe.studies.tracking.settings import LEARNT, OWN, Approach, Tracking
 
 SMOOTH: Approach = "ik_smooth"
 """The approach that differs from inverse kinematics by time alone."""

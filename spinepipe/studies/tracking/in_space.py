@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.skeleton import BODIES
-from spinepipe.report.page.scene import TITLES, aspect, light_axis
+from spinepipe.report.page.scene import BONE, TITLES, aspect, light_axis
 from spinepipe.report.page.space import Space
 from spinepipe.report.style import BLUE, GREY, VERMILLION
 from spinepipe.report.words import count, fixed
@@ -34,7 +34,6 @@ GROUPS = {
 }
 """What can be switched on and off."""
 
-_BONE = "#c8b89a"
 _CORNERS = np.array([[x, y, z] for y in (0, 1) for x in (-0.5, 0.5) for z in (-0.5, 0.5)], float)
 _FACES = np.array(
     [
@@ -141,7 +140,7 @@ def _parts(one: Shown) -> Iterator[Any]:
     i, j, k = faces.T.tolist()
     yield go.Mesh3d(
         **corners,
-        **{"i": i, "j": j, "k": k, "color": _BONE, "opacity": 0.75, "flatshading": True},
+        **{"i": i, "j": j, "k": k, "color": BONE, "opacity": 0.75, "flatshading": True},
         **{"hoverinfo": "skip", "meta": BONES, "name": "vertebrae"},
     )
     yield go.Scatter3d(

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from spinepipe.anatomy.segments import MASS_PERCENT
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
@@ -47,9 +48,6 @@ from spinepipe.studies.tracking.forms import BOUNDS, PASSIVE, RATIOS, STANCE, TR
 from spinepipe.studies.tracking.settings import Scaling
 from spinepipe.studies.tracking.sizes import Sized, sized_by
 from spinepipe.units import MM_PER_M
-
-LOWER_TRUNK_PERCENT = {"male": 11.17, "female": 12.47}
-"""Share of body mass of the lower trunk, de Leva 1996 Table 4."""
 
 PELVIS_BELOW_M = 0.05
 """How far its centre is below L5S1 at the reference height: a choice. Nobody is asked for what
@@ -265,7 +263,7 @@ def _symmetric(six: Array) -> Array:
 def _usual(frames: tuple[Pose, ...], subject: Subject) -> tuple[Array, Array]:
     """Masses (18,) and centres (18, 3) m in bodies, where a cohort tells none."""
     tall = subject.height_m / REFERENCE.height_m
-    percents = (LOWER_TRUNK_PERCENT[subject.sex], *reversed(slice_percents()))
+    percents = (MASS_PERCENT[f"lower_trunk {subject.sex}"], *reversed(slice_percents()))
     com = half_way(tuple(frame.origin for frame in frames[1:]))
     com[PELVIS] = frames[PELVIS].origin - [0.0, tall * PELVIS_BELOW_M, 0.0]
     com[1:, 0] += tall * np.array(ahead_cm()[::-1]) / 100.0

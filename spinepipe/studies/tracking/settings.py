@@ -10,6 +10,9 @@ from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
 
 CONSTRAINED = "ik_constrained_"
+
+OWN = "optk_calibrated"
+"""The approach that calibrates passive elements on the motion itself."""
 """What the names of approaches with ratios begin with; the rest names the set."""
 
 APPROACHES = (

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from spinepipe.facts import number
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import BODIES
 from spinepipe.problems import Problem, Spelling
@@ -37,9 +38,8 @@ HEAVIEST_KG = 100.0
 METRES_MM = 2.0
 """Hands that are no farther away than this, mm, are in metres."""
 
-SHOULDERS_OF_HEIGHT = 0.27
-"""Height of the shoulders above L5S1 over that of the person; a spine T1-S1 is no longer
-(Ghezelbash 2016, section 2.7)."""
+SHOULDERS_OF_HEIGHT = number(__name__, "shoulders_over_height")
+"""Height of the shoulders above L5S1 over that of the person; a spine T1-S1 is no longer."""
 
 REACH_M = 0.9
 """From between the shoulders to the hand: half their breadth and an arm, of a tall person."""

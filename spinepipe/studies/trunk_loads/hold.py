@@ -160,7 +160,7 @@ def _masses(person: Person) -> Iterator[Row]:
             "share": float(mass.kg / subject.mass_kg),
             **{"x_mm": x, "y_mm": y, "z_mm": z},
         }
-    arms = {f"both {segment.name.replace('_', ' ')}s" for segment in ARM}
+    arms = {f"both {segment.replace('_', ' ')}s" for segment in ARM}
     for share in shares(subject):
         if share.part in arms or not share.carried:
             yield {

@@ -18,6 +18,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
+from spinepipe.facts import number, numbers, several
 from spinepipe.muscles.task import Exertion, Hands, Task
 from spinepipe.muscles.trunk import BODIES
 from spinepipe.studies.trunk_loads.forms import (
@@ -32,34 +33,34 @@ from spinepipe.studies.trunk_loads.forms import (
 from spinepipe.studies.trunk_loads.settings import TrunkAngle
 from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
 
-FLEXION_PERCENT = (18.7, 20.1, 16.9, 13.2, 14.1, 10.9, 6.0)
-LATERAL_PERCENT = (12.8, 25.6, 22.8, 18.3, 9.4, 2.8, 8.3)
-"""Ghezelbash 2016, section 2.6, L5S1 to T11T12; those of flexion sum to 99.9."""
+FLEXION_PERCENT = numbers(__name__, "flexion_percent")
+LATERAL_PERCENT = numbers(__name__, "lateral_percent")
+"""L5S1 to T11T12."""
 
-THORAX_DEG, PELVIS_DEG, LUMBAR_DEG = 121.0, 53.0, 60.2
-"""Tafazzol 2014, abstract: mean rotations of 8 men who bend forwards as far as they can."""
+_LARGEST = numbers(__name__, "largest_bend")
+THORAX_DEG = _LARGEST["thorax"]
 
-RATIOS = {15.0: 2.51, 105.0: 1.34}
-"""Tafazzol 2014, abstract: lumbar over pelvic rotation, mean over 30 deg of the thorax's about
-this one, deg."""
-
-SEEN_AT_THORAX = (PELVIS_DEG + LUMBAR_DEG) / THORAX_DEG
+SEEN_AT_THORAX = (_LARGEST["pelvis"] + _LARGEST["lumbar"]) / THORAX_DEG
 """Rotation of pelvis and lumbar spine over that measured at the thorax; the rest is bending of the
 thorax and where the sensor sat."""
 
-PELVIS_OF_BEND = 2.0 / 20.0
-"""Ghezelbash 2016, section 2.6: lateral rotation of the sacrum over that of the trunk."""
+_EARLY, _LATE = several(__name__, "lumbar_over_pelvis").values()
+"""Rotation of the thorax, deg, and lumbar over pelvic rotation about it."""
+
+_SACRUM_DEG, _TRUNK_DEG = several(__name__, "sacrum_over_trunk_bend")[""]
+PELVIS_OF_BEND = _SACRUM_DEG / _TRUNK_DEG
+"""Lateral rotation of the sacrum over that of the trunk."""
 
 Row = Mapping[Any, Any]
 """Cells of a row of tasks by column; empty ones are NaN."""
 
-USUAL_STRESS_MPA = 0.6
+USUAL_STRESS_MPA = number(__name__, "usual_muscle_stress")
 USUAL_VERTEBRA = "T9"
 
 
 def shares(axis: str) -> Array:
     """(7,) share of each level in the rotation between pelvis and trunk, L5S1 to T11T12."""
-    percent = np.array(FLEXION_PERCENT if axis == "extension" else LATERAL_PERCENT)
+    percent = np.array([*(FLEXION_PERCENT if axis == "extension" else LATERAL_PERCENT).values()])
     found: Array = percent / percent.sum()
     return found
 
@@ -80,7 +81,7 @@ def pelvis_share(thorax_deg: float) -> float:
 
     Linear between the two ratios that Tafazzol's abstract has, and on beyond them.
     """
-    (low, at_low), (high, at_high) = ((at, 1.0 / (1.0 + ratio)) for at, ratio in RATIOS.items())
+    (low, at_low), (high, at_high) = ((at, 1.0 / (1.0 + ratio)) for at, ratio in (_EARLY, _LATE))
     return at_low + (at_high - at_low) * (abs(thorax_deg) - low) / (high - low)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from spinepipe.anatomy.segments import MASS_PERCENT
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.disc_pressure import DiscPressure, disc_pressure
 from spinepipe.muscles.masses import ARM
@@ -64,7 +65,8 @@ def task_row(outcome: Outcome) -> Row:
     person, task, held = outcome.person, outcome.task, outcome.held
     turned = DEG_PER_RAD * (task.turned - (0.0 if task.from_upright else person.upright))
     subject = person.subject
-    arms = 0.02 * sum(segment.percent[subject.sex] for segment in ARM) * subject.mass_kg
+    percent = sum(MASS_PERCENT[f"{segment} {subject.sex}"] for segment in ARM)
+    arms = 0.02 * percent * subject.mass_kg
     row: Row = {
         "number": task.number,
         "trunk_extension_deg": float(turned[-1, 0]),

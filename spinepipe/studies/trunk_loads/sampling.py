@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.sensitivity.global_indices.spread import Normal, values_of
@@ -71,8 +70,3 @@ def drawn(design: pd.DataFrame, samples: range) -> list[dict[str, float]]:
     rows = design[design["sample"].isin(list(samples))]
     wide = rows.pivot(index="sample", columns="factor", values="value").sort_index()
     return [{str(k): float(v) for k, v in row.items()} for row in wide.to_dict("records")]
-
-
-def is_sampled(settings: TrunkLoads, cohort: Cohort) -> bool:
-    """Whether the study draws samples at all."""
-    return bool(settings.uncertain.tasks) and len(cohort.specimen_names) > 0

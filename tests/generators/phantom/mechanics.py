@@ -128,9 +128,10 @@ def _linear(loads, stiffness, _q):
 
 
 def _stiffening(loads, stiffness, q):
-    """Springs with the energy of `stiffening_energy`; the others' rotations are those of ``q``.
+    """Rotations r = angle / its reference store k reference^2 (r^2 / 2 + r^4 / 4) and, coupled,
+    r^2 C r^2 / 4; the others' rotations are those of ``q``.
 
-    With u = angle / its reference, u^3 + a u = s has the one root of the hyperbolic sine.
+    With u the joint's own r, u^3 + a u = s has the one root of the hyperbolic sine.
     """
     k, squares = stiffness[..., 3:], (q[..., 3:] / STIFFENS_AT_RAD) ** 2
     others = _coupling(k) @ squares[..., None]
@@ -145,14 +146,6 @@ def _coupling(k):
     """(..., 3, 3) N m rad, symmetric and without diagonal, so that an energy exists."""
     scale = np.sqrt(k) * STIFFENS_AT_RAD
     return COUPLING * scale[..., :, None] * scale[..., None, :] * (1.0 - np.eye(3))
-
-
-def stiffening_energy(stiffness: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """(...) J stored in joints of stiffness (..., 6) at q (..., 6) under the stiffening law."""
-    k, squares = stiffness[..., 3:], (q[..., 3:] / STIFFENS_AT_RAD) ** 2
-    own = (k * STIFFENS_AT_RAD**2 * (squares / 2.0 + squares**2 / 4.0)).sum(axis=-1)
-    shared = np.einsum("...i,...ij,...j->...", squares, _coupling(k), squares) / 4.0
-    return (stiffness[..., :3] * q[..., :3] ** 2).sum(axis=-1) / 2.0 + own + shared
 
 
 SPRINGS: dict[str, Springs] = {"linear": _linear, "stiffening": _stiffening}

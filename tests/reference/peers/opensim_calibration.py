@@ -49,13 +49,6 @@ def one_per_axis(n_joints: int) -> NDArray[np.int_]:
     return np.tile([FIXED, FIXED, FIXED, 0, 1, 2], (n_joints, 1))
 
 
-def one_per_joint_and_axis(n_joints: int) -> NDArray[np.int_]:
-    """Groups of 3J unknowns: each rotational stiffness of each level by itself."""
-    groups = np.full((n_joints, 6), FIXED)
-    groups[:, 3:] = np.arange(3 * n_joints).reshape(n_joints, 3)
-    return groups
-
-
 def static_predictor(chain: Chain, cases: Sequence[Case], tol: float = 1e-12) -> Predictor:
     """Stiffness (J, 6) -> equilibria (C, J, 6), each begun where the last one of its case ended."""
     models = [opensim_peer.build(chain.with_loads(*case), ramp_time=1.0) for case in cases]

@@ -34,10 +34,6 @@ UNIFORM = (51.0, 68.8, 291.0)
 LEVELS = {"L5S1": (51.0, 68.8, 183.4), "L4L5": (50.0, 13.8, 291.1), "L3L4": (49.5, 12.4, 291.1)}
 
 
-def frame_of(values: np.ndarray) -> pd.DataFrame:
-    return pd.DataFrame(values, index=JOINTS, columns=ROTATIONS)
-
-
 def assert_stiffness(found: pd.DataFrame, expected: np.ndarray, rtol: float = 1e-6) -> None:
     np.testing.assert_allclose(by_joint(found)[list(ROTATIONS)], expected, rtol=rtol)
 

@@ -10,6 +10,7 @@ from spinepipe.cohort.specimen import cables
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.design.extra_tests import MENU
 from spinepipe.studies.discrepancy.design.plans import (
+    PRELOAD_N,
     Plan,
     Planned,
     as_made,
@@ -17,7 +18,7 @@ from spinepipe.studies.discrepancy.design.plans import (
     thinned,
     with_preloads,
 )
-from spinepipe.studies.discrepancy.design.runs import PRELOAD_N, runs
+from spinepipe.studies.discrepancy.design.runs import runs
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 
 

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch, Rectangle
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import Array, finite
 from spinepipe.report.panels import explain_marks, head_line, lines_of
-from spinepipe.report.style import BLACK, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
+from spinepipe.report.style import BLACK, EMPTY, HATCH, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
 from spinepipe.report.words import POSITIVE, SIGNS, after_number, case, count, fixed, short
 from spinepipe.studies.cohort_stiffness.representations import (
     ASKED_FOR,
@@ -92,7 +92,6 @@ MOST_CASES = 6
 _ROW_MM, _LEAST_ROW_MM, _HEAD_MM, _KEY_MM, _NAMES_MM = 4.6, 1.0, 8.0, 34.0, 14.0
 _CELL_WITH_NUMBER_MM, _LINE_MM = 6.4, 2.6
 _LABEL_MM, _LETTERS, _NAME = 2.7, 135, 14
-_EMPTY, _HATCH = "#E4E4E4", "#9A9A9A"
 _FAR = 2.0
 """Where the largest error is more than this times the 95th percentile, the scale ends there."""
 
@@ -171,7 +170,7 @@ def _square(rows: pd.DataFrame, cohort: Cohort) -> Array:
 
 
 def _draw(axis: Axes, grid: Array, scale: Normalize, numbers: bool) -> AxesImage:
-    axis.set_facecolor(_EMPTY)
+    axis.set_facecolor(EMPTY)
     axis.add_patch(
         Rectangle(
             (-0.5, -0.5),
@@ -180,7 +179,7 @@ def _draw(axis: Axes, grid: Array, scale: Normalize, numbers: bool) -> AxesImage
             hatch="//////",
             lw=0,
             facecolor="none",
-            edgecolor=_HATCH,
+            edgecolor=HATCH,
             zorder=0,
         )
     )
@@ -277,8 +276,8 @@ def _explain(
     bar.outline.set_linewidth(0.4)
     handles = [
         Patch(
-            facecolor=_EMPTY,
-            edgecolor=_HATCH,
+            facecolor=EMPTY,
+            edgecolor=HATCH,
             hatch="//////",
             lw=0,
             label="not measured, or no result",

@@ -15,6 +15,9 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, RefusedModel
 from spinepipe.studies.discrepancy.design.plans import (
     HELD_S,
+    LARGER,
+    PRELOAD_N,
+    SLOWER,
     STEP_S,
     Plan,
     Planned,
@@ -42,10 +45,6 @@ from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Solve
 from spinepipe.studies.discrepancy.search.whitening import whitening, with_nuisances
 from spinepipe.studies.discrepancy.verdict import NotTestable
 from spinepipe.units import COORDINATES
-
-SLOWER = 10.0
-LARGER = 1.5
-PRELOAD_N = 400.0
 
 TRANSLATION_SD = 1e-4
 """m, of translations in tests where none were read and none is declared."""

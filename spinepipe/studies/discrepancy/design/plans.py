@@ -21,6 +21,11 @@ STEP_S = 10.0
 HELD_S = (30.0, 60.0, 120.0, 240.0, 420.0, 600.0)
 """When a held load is read."""
 
+SLOWER, LARGER = 10.0, 1.5
+"""Times slower, and times larger loads, that a laboratory could test with."""
+
+PRELOAD_N = 400.0
+
 NEAR, FALLEN = 0.05, 0.8
 """Shares of the largest load: how far from the way a load may be, and how far it must fall."""
 

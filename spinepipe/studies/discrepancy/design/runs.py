@@ -14,6 +14,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.discrepancy.design.plans import (
     HELD_S,
+    LARGER,
+    PRELOAD_N,
+    SLOWER,
     STEP_S,
     Planned,
     at_times,
@@ -26,9 +29,6 @@ from spinepipe.studies.discrepancy.design.plans import (
     summed_loads,
     times,
 )
-
-SLOWER, LARGER = 10.0, 1.5
-PRELOAD_N = 400.0
 
 ALONG = 0.9
 """Cosine from which two loads have the same direction."""

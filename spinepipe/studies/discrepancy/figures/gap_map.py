@@ -24,7 +24,9 @@ from spinepipe.report.marks import Array, finite
 from spinepipe.report.panels import explain_marks, head, head_line, lines_of, sections
 from spinepipe.report.style import (
     BLACK,
+    EMPTY,
     GREY,
+    HATCH,
     INK,
     OURS,
     SMALL_PT,
@@ -145,7 +147,7 @@ def _words_of_steps(places: list[tuple[Any, ...]], gap: pd.DataFrame) -> str:
 COLORS = LinearSegmentedColormap.from_list("gap", (WHITE, "#FEC44F", "#D95F0E", "#662506"))
 """From white to brown: it darkens steadily, for all kinds of eyes and for print."""
 
-_EMPTY, _HATCH, _EDGE = "#E4E4E4", "#9A9A9A", "#C4C4C4"
+_EDGE = "#C4C4C4"
 _DARK = 0.62
 
 
@@ -163,7 +165,7 @@ def draw_heat(
     pale : (rows, columns) cells that stay white, their numbers grey.
     """
     quiet = np.zeros(grid.shape, dtype=bool) if pale is None else pale
-    axis.set_facecolor(_EMPTY)
+    axis.set_facecolor(EMPTY)
     axis.add_patch(
         Rectangle(
             (-0.5, -0.5),
@@ -172,7 +174,7 @@ def draw_heat(
             hatch="//////",
             lw=0,
             facecolor="none",
-            edgecolor=_HATCH,
+            edgecolor=HATCH,
             zorder=0,
         )
     )
@@ -215,7 +217,7 @@ def name_cells(axis: Axes, rows: Sequence[str], columns: Sequence[str], turned: 
 
 def empty_cell(label: str) -> Patch:
     """The hatched cell as the key shows it."""
-    return Patch(facecolor=_EMPTY, edgecolor=_HATCH, hatch="//////", lw=0, label=label)
+    return Patch(facecolor=EMPTY, edgecolor=HATCH, hatch="//////", lw=0, label=label)
 
 
 MOST_TESTS = 6

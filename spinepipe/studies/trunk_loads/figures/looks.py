@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from spinepipe.report.looks import PURPLE, SKY, Look
-from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, WHITE
+from spinepipe.report.style import BLACK, BLUE, GREEN, VERMILLION
 from spinepipe.report.words import plain, short
 
 LOOKS = (
@@ -28,11 +28,6 @@ def look_of(number: int) -> Look:
 def key_of(labels: dict[str, Look]) -> list[Line2D]:
     """Marks of a legend."""
     return [Line2D([], [], **look.line(), label=name) for name, look in labels.items()]
-
-
-def hollow_mark() -> Line2D:
-    """Mark of what is not to be trusted."""
-    return Line2D([], [], marker="o", ls="", ms=3.4, mec=GREY, mfc=WHITE, label="not settled")
 
 
 def task_label(name: str) -> str:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
+from spinepipe.muscles.trunk import SIDES
 from spinepipe.report.panels import across_of, explain_marks, head, lines_of
 from spinepipe.report.style import BLUE, GREEN, GREY, WHITE, blank, saying
 from spinepipe.report.words import plain
@@ -18,7 +19,6 @@ from spinepipe.studies.trunk_loads.figures.looks import task_label
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import sound
 
-SIDES = ("right", "left")
 SAME_SHARE = 0.02
 """Sides that differ by less than this, of the largest force of the task, are drawn as one."""
 
