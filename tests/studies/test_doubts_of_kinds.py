@@ -65,7 +65,7 @@ def filled_down(table: pd.DataFrame) -> None:
 
 
 MISTAKES = [
-    (AIS, FILMS, times(CENTRE[:2], 0.1), "y_mm", "in cm and not mm; multiply y_mm, z_mm by 10"),
+    (AIS, FILMS, times(CENTRE[:2], 0.1), "y_mm", "in cm and not mm (0.1); multiply y_mm, z_mm"),
     (AIS, FILMS, times(CENTRE[:2], 1e-3), "y_mm", "in m and not mm"),
     (AIS, FILMS, times(CENTRE[:2], 1 / 25.4), "y_mm", "inches"),
     (AIS, FILMS, swapped("y_mm", "z_mm"), "y_mm", "y_mm and z_mm exchanged"),

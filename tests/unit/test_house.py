@@ -38,7 +38,16 @@ ROOMS = (
         "anatomy",
     ),
     *("effects", "model", "world", "statics", "calibrate", "muscles", "motion"),
-    *("designs", "statistics", "sensitivity", "cohort", "testing_machine", "tables", "comparison"),
+    *(
+        "designs",
+        "statistics",
+        "sensitivity",
+        "cohort",
+        "testing_machine",
+        "plausibility",
+        "tables",
+        "comparison",
+    ),
     *("studies", "report", "jobs", "kinds", "reference", "cli"),
 )
 """Ground floor first; a room imports only itself and rooms before it.
