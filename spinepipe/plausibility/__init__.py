@@ -1,1 +1,1 @@
-"""What is most likely wrong in files that are sound cell by cell, and what would mend it."""
+"""How well numbers fit what is usual, and which mistake would bring them back."""

@@ -7,7 +7,6 @@ the remedy, and how often it happens beside the other mistakes of the same quant
 """
 
 import csv
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -15,6 +14,8 @@ from math import inf, log
 from typing import final
 
 import pandas as pd
+
+PACKAGE = "spinepipe.plausibility"
 
 AGAINST = -0.9
 """Correlation of motion and load below which a joint moves against its load."""
@@ -94,9 +95,11 @@ class Hypothesis:
         return self.remedy.format(**known, **values)
 
 
-def _rows(name: str) -> Iterable[dict[str, str]]:
-    with files("spinepipe.plausibility").joinpath(f"{name}.csv").open(encoding="utf-8") as file:
-        yield from csv.DictReader(file)
+@cache
+def table(package: str, name: str) -> tuple[dict[str, str], ...]:
+    """Rows of a csv that lies beside the files of a package."""
+    with files(package).joinpath(f"{name}.csv").open(encoding="utf-8") as file:
+        return tuple(csv.DictReader(file))
 
 
 def _number(text: str) -> float:
@@ -108,7 +111,7 @@ def _number(text: str) -> float:
 @cache
 def _ranges() -> dict[str, Range]:
     found = {}
-    for row in _rows("ranges"):
+    for row in table(PACKAGE, "ranges"):
         low = _number(row["low"] or "-inf")
         high = _number(row["high"] or "inf")
         usual = (row["usual_low"], low), (row["usual_high"], high)
@@ -123,7 +126,7 @@ def hypotheses(what: str) -> tuple[Hypothesis, ...]:
         Hypothesis(
             _number(row["factor"]), row["table"], row["words"], row["remedy"], float(row["prior"])
         )
-        for row in _rows("hypotheses")
+        for row in table(PACKAGE, "hypotheses")
         if row["what"] == what
     )
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.subject import CM_PER_M
-from spinepipe.plausibility.bodies import person
-from spinepipe.plausibility.warning import Place, PlausibilityWarning
+from spinepipe.plausibility.warnings.bodies import person
+from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning
 from spinepipe.studies.subjects import SUBJECTS
 
 

@@ -7,8 +7,8 @@ from importlib import import_module
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.kept import kept_with_cohort
-from spinepipe.plausibility.judge import of_cohort
-from spinepipe.plausibility.warning import PlausibilityWarning
+from spinepipe.plausibility.warnings.judge import of_cohort
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import Problem
 from spinepipe.studies.registry import PACKAGE, every_kind
 

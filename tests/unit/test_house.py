@@ -289,6 +289,12 @@ def test_a_digest_hangs_on_its_own_kind_alone(kind: str, module: str) -> None:
     assert not others
 
 
+def test_no_result_hangs_on_the_words_of_warnings() -> None:
+    warnings = f"{PACKAGE}.plausibility.warnings"
+    hang = {m for _, m in parts_of_kinds() if any(n.startswith(warnings) for n in closure(m))}
+    assert not hang, "a warning that is reworded would have them all computed again"
+
+
 SOLVING = {
     "cohort_stiffness": {"fit", "literature", "left_out", "pool", "experiment"},
     "discrepancy": {"search"},

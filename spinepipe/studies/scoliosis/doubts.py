@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from spinepipe.anatomy.levels import spacing_mm
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.answers import typical
-from spinepipe.plausibility.columns import beyond_ranges
 from spinepipe.plausibility.score import suspect, usual
-from spinepipe.plausibility.warning import Place, PlausibilityWarning, warn
+from spinepipe.plausibility.warnings.columns import beyond_ranges
+from spinepipe.plausibility.warnings.levels import spacing_mm
+from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, warn
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film, by_reading, corners, placed
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 

@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.plausibility.score import suspect, usual
-from spinepipe.plausibility.warning import Place, PlausibilityWarning, warn
+from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, warn
 from spinepipe.problems import InputError
 from spinepipe.studies.doubtful_subjects import subject_doubts
 from spinepipe.studies.tracking.forms import MARKER_SET, STANCE, TRIALS

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from spinepipe.cohort import Cohort
-from spinepipe.plausibility.columns import beyond_ranges
-from spinepipe.plausibility.warning import PlausibilityWarning
+from spinepipe.plausibility.warnings.columns import beyond_ranges
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.studies.doubtful_subjects import subject_doubts
 
 

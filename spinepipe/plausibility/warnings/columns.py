@@ -5,10 +5,7 @@ must be compared with other columns, rows or tables is code: constant, repeated 
 zeros, slips of the decimal point, lost signs, rigs that hardly move.
 """
 
-import csv
 from collections.abc import Iterator, Sequence
-from functools import cache
-from importlib.resources import files
 from itertools import combinations
 from typing import Any
 
@@ -19,9 +16,10 @@ from spinepipe.cohort.cohort import Cohort, Group
 from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.cohort.load_tests import DRIVEN
 from spinepipe.cohort.supports import PRESCRIBED
-from spinepipe.plausibility.lengths import COLUMNS
-from spinepipe.plausibility.score import suspect, usual
-from spinepipe.plausibility.warning import Place, PlausibilityWarning, warn
+from spinepipe.plausibility.score import suspect, table, usual
+from spinepipe.plausibility.warnings.lengths import COLUMNS
+from spinepipe.plausibility.warnings.levels import PACKAGE
+from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, warn
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 LOADS = ["fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm"]
@@ -58,12 +56,6 @@ Warnings = Iterator[PlausibilityWarning]
 # --- one number of a column against its range -----------------------------------------------------
 
 
-@cache
-def _checks() -> tuple[dict[str, str], ...]:
-    with files("spinepipe.plausibility").joinpath("columns.csv").open(encoding="utf-8") as file:
-        return tuple(csv.DictReader(file))
-
-
 def beyond_ranges(cohort: Cohort, *quantities: str) -> Warnings:
     """Numbers beyond their ranges, as `columns.csv` asks; zeros and empty cells are none.
 
@@ -71,17 +63,17 @@ def beyond_ranges(cohort: Cohort, *quantities: str) -> Warnings:
     rows, where so many numbers are given as `at_least` says. Of several columns their norm is
     taken where that is said, else the largest.
     """
-    for check in _checks():
-        table = _table(cohort, check["table"])
-        if check["quantity"] not in quantities or table is None:
+    for check in table(PACKAGE, "columns"):
+        given = _table(cohort, check["table"])
+        if check["quantity"] not in quantities or given is None:
             continue
         ending = check["columns"].removeprefix("*")
         names = check["columns"].split()
         if ending != check["columns"]:
-            names = [str(name) for name in table if str(name).endswith(ending)]
-        if not set(names) <= set(table.columns):
+            names = [str(name) for name in given if str(name).endswith(ending)]
+        if not set(names) <= set(given.columns):
             continue
-        sizes = table[names].abs().fillna(0.0)
+        sizes = given[names].abs().fillna(0.0)
         norm = check["of_several"] == "norm"
         size = (sizes**2).sum(axis=1) ** 0.5 if norm else sizes.max(axis=1)
         size = size[size > 0.0]

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from spinepipe.anatomy.levels import EXTENSION_DEG, extension_range_deg, is_level
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.exchanged_landmarks import (
     ACROSS,
@@ -21,13 +20,20 @@ from spinepipe.cohort.exchanged_landmarks import (
     exchange,
 )
 from spinepipe.cohort.exchanged_landmarks import suspect as suspect_landmarks
-from spinepipe.cohort.neutral_pose import NeutralPose
 from spinepipe.cohort.specimen import landmarks
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS, rotation_zxy, zxy_angles
-from spinepipe.plausibility.lengths import stem_of_joints
 from spinepipe.plausibility.score import BETTER, usual
-from spinepipe.plausibility.warning import Found, Place, PlausibilityWarning, first_row, warn
+from spinepipe.plausibility.warnings.lengths import stem_of_joints
+from spinepipe.plausibility.warnings.levels import EXTENSION_DEG, extension_range_deg, is_level
+from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
+from spinepipe.plausibility.warnings.warning import (
+    Found,
+    Place,
+    PlausibilityWarning,
+    first_row,
+    warn,
+)
 from spinepipe.units import MM_PER_M
 
 AS_GOOD_DEG, AS_GOOD_SDS = 2.0, 0.5

@@ -1,10 +1,7 @@
 """Motion against the loads that drive it: too large or too small by a unit, or to the other side.
 
 Each joint's motion is held against what its load gives with published stiffness, without a fit: a
-mistake is told before anything runs, and where no fit would find a pose. Published stiffness of
-healthy joints spans a factor of two to six by level and person (Gould 2024b, Table 2); motion that
-differs from it by more than five is no stiffness that was measured before: a joint that is fused
-or cut, or a unit.
+mistake is told before anything runs, and where no fit would find a pose.
 
 Not told: units that leave the motion within a factor of five (lbf for N, kgf for N), joints whose
 moment is made by a force with a lever arm of less than a centimetre, and tests with supports,
@@ -15,7 +12,7 @@ import re
 from collections import defaultdict
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, log, sqrt
+from math import log, sqrt
 
 import numpy as np
 
@@ -24,10 +21,17 @@ from spinepipe.cohort.answers import Answer, answers_of_test, typical
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.load_tests import DRIVEN, PUSHED
 from spinepipe.cohort.loaded_cycles import LoadedCycle
-from spinepipe.plausibility.order import tests_of
-from spinepipe.plausibility.score import AGAINST, CLEAR, Hypothesis, suspect, usual
-from spinepipe.plausibility.warning import Place, PlausibilityWarning, file_of, first_row, warn
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS, to_si
+from spinepipe.plausibility.motion_size import geometric_mean, is_plausible, unit_like
+from spinepipe.plausibility.score import AGAINST, CLEAR, Hypothesis, usual
+from spinepipe.plausibility.warnings.order import tests_of
+from spinepipe.plausibility.warnings.warning import (
+    Place,
+    PlausibilityWarning,
+    file_of,
+    first_row,
+    warn,
+)
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, to_si
 
 USUAL_SD = 0.1
 """SD of one reading, deg and mm, of a cohort that does not tell its own."""
@@ -55,47 +59,6 @@ OTHER_SIDE: Mapping[str, str] = {
     **{"bending": "rotation", "rotation": "bending"},
 }
 """Words beside which a name tells no side."""
-
-
-# --- units, of whoever asks -----------------------------------------------------------------------
-
-
-def is_plausible(ratio: float) -> bool:
-    """Whether motion over the expected motion, above 0, is one that joints were seen to have."""
-    return usual("motion_over_expected").holds(ratio)
-
-
-def implausible(slope: float | None) -> str:
-    """What is wrong with measured over expected motion, in words; nothing where it may be right."""
-    if slope is None or slope <= 0.0 or is_plausible(slope):
-        return ""
-    return f"{slope:.3g} times the motion that published stiffness gives"
-
-
-def unit_of(slopes: Sequence[float], coordinate: str) -> str:
-    """The unit that explains the motion of all joints of a test, in words; nothing if none does.
-
-    One joint alone may be fused or cut; a unit is of all.
-    """
-    if not slopes or not all(implausible(slope) for slope in slopes):
-        return ""
-    unit = unit_like(geometric_mean(slopes), coordinate)
-    return "" if unit is None else f"{unit.words} ({unit.size})"
-
-
-def unit_like(
-    ratio: float, coordinate: str, quantity: str = "motion_over_expected"
-) -> Hypothesis | None:
-    """The mistaken unit that makes so large a motion of a coordinate; None if none does."""
-    return suspect("translation" if coordinate in TRANSLATIONS else "rotation", ratio, quantity)
-
-
-def geometric_mean(ratios: Sequence[float]) -> float:
-    """The mean on a scale of factors; all above 0."""
-    return exp(sum(map(log, ratios)) / len(ratios))
-
-
-# --- of a cohort ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

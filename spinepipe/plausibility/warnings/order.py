@@ -15,7 +15,7 @@ from spinepipe.cohort.load_tests import DRIVEN
 from spinepipe.cohort.loaded_cycles import LoadedCycle
 from spinepipe.effects.contract import Array
 from spinepipe.plausibility.score import AGAINST
-from spinepipe.plausibility.warning import Place, PlausibilityWarning, first_row, warn
+from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, first_row, warn
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 FOLLOWS, BEST = 0.75, 0.95

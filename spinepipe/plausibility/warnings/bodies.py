@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from spinepipe.anatomy.levels import least_kg
 from spinepipe.cohort.answers import typical
 from spinepipe.cohort.check_geometry import INERTIA
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.neutral_pose import NeutralPose
 from spinepipe.plausibility.score import BETTER, Hypothesis, suspect, usual
-from spinepipe.plausibility.warning import Place, PlausibilityWarning, first_row, warn
+from spinepipe.plausibility.warnings.levels import least_kg
+from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
+from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, first_row, warn
 
 
 def masses(cohort: Cohort, poses: Sequence[NeutralPose]) -> Iterator[PlausibilityWarning]:

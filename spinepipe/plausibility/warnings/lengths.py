@@ -12,15 +12,21 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from spinepipe.anatomy.levels import height_mm, spacing_mm
 from spinepipe.cohort.answers import typical
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.exchanged_landmarks import FAR_MM, XYZ, column_mistakes
-from spinepipe.cohort.neutral_pose import NeutralPose
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.plausibility.score import BETTER, hypotheses, suspect, usual
-from spinepipe.plausibility.warning import Found, Place, PlausibilityWarning, first_row, warn
+from spinepipe.plausibility.warnings.levels import height_mm, spacing_mm
+from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
+from spinepipe.plausibility.warnings.warning import (
+    Found,
+    Place,
+    PlausibilityWarning,
+    first_row,
+    warn,
+)
 
 MOST_ALIKE = 0.6
 """Share of the lengths of a specimen that are too large or small by one factor, if a unit is."""

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Sequence
 
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.loaded_cycles import LoadedCycle, loaded_cycles
-from spinepipe.cohort.neutral_pose import neutral_poses
-from spinepipe.plausibility import columns, lengths, postures
-from spinepipe.plausibility.bodies import masses, persons_of_specimens
-from spinepipe.plausibility.order import order
-from spinepipe.plausibility.response import responses
-from spinepipe.plausibility.warning import PlausibilityWarning, file_of
+from spinepipe.plausibility.warnings import columns, lengths, postures
+from spinepipe.plausibility.warnings.bodies import masses, persons_of_specimens
+from spinepipe.plausibility.warnings.neutral_pose import neutral_poses
+from spinepipe.plausibility.warnings.order import order
+from spinepipe.plausibility.warnings.response import responses
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning, file_of
 
 Warnings = Sequence[PlausibilityWarning]
 

@@ -1,10 +1,8 @@
 """A warning about files that are sound cell by cell, with its words from `warnings.csv`."""
 
-import csv
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +12,8 @@ from spinepipe.cohort.answers import of_specimens
 from spinepipe.cohort.cohort import Cohort, Group
 from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.cohort.csv_table import read_rows
-from spinepipe.plausibility.score import has_range, usual
+from spinepipe.plausibility.score import has_range, table, usual
+from spinepipe.plausibility.warnings.levels import PACKAGE
 from spinepipe.problems import Problem
 
 
@@ -63,8 +62,7 @@ class Place(NamedTuple):
 
 @cache
 def _texts() -> dict[str, dict[str, Any]]:
-    with files("spinepipe.plausibility").joinpath("warnings.csv").open(encoding="utf-8") as file:
-        return {row["warning"]: row for row in csv.DictReader(file)}
+    return {row["warning"]: row for row in table(PACKAGE, "warnings")}
 
 
 def warn(
