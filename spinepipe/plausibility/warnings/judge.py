@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.loaded_cycles import LoadedCycle, loaded_cycles
-from spinepipe.plausibility.warnings import columns, lengths, postures
+from spinepipe.plausibility.warnings import columns, lengths, postures, readings
 from spinepipe.plausibility.warnings.bodies import masses, persons_of_specimens
 from spinepipe.plausibility.warnings.neutral_pose import neutral_poses
 from spinepipe.plausibility.warnings.order import order
@@ -21,20 +21,20 @@ Warnings = Sequence[PlausibilityWarning]
 def of_cohort(cohort: Cohort) -> tuple[PlausibilityWarning, ...]:
     """Warnings about the tables that every cohort has."""
     geometry = tuple(_geometry(cohort) if cohort.has_frames else ())
-    readings = tuple(columns.readings(cohort))
+    read = tuple(readings.readings(cohort))
     rigs = (*columns.rigs(cohort), *persons_of_specimens(cohort))
-    cycles = tuple(_trusted(cohort, geometry, (*readings, *rigs)))
+    cycles = tuple(_trusted(cohort, geometry, (*read, *rigs)))
     other = order(cohort, cycles)
     motion = file_of(cohort, "motion")
-    spoilt = {str(one.problem.column) for one in readings if one.problem.file == motion}
+    spoilt = {str(one.problem.column) for one in read if one.problem.file == motion}
     answers = tuple(responses(cohort, cycles, other.places, spoilt))
     found = (
         *geometry,
         *rigs,
-        *(one for one in readings if not (other.warnings and one.group == "zeroing")),
+        *(one for one in read if not (other.warnings and one.group == "zeroing")),
         *other.warnings,
         *answers,
-        *(() if other.warnings or answers or geometry else columns.feeble(cohort)),
+        *(() if other.warnings or answers or geometry else readings.feeble(cohort)),
     )
     return tuple(dict.fromkeys(found))
 
