@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import pandas as pd
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 
-from spinepipe.cohort.doubt import Group
 from spinepipe.documents.names import LONGEST_NAME
+
+Group = Literal["lengths", "postures", "masses", "loads", "motion", "zeroing", "errors", "persons"]
+"""What can be meant though it looks wrong: ``i_mean_it`` in cohort.yaml."""
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 

@@ -98,31 +98,44 @@ def _height(of_one: Mapping[str, Array]) -> float:
 
 def _tried(points: Points) -> Iterator[tuple[str, str, Callable[[Points], Points]]]:
     """Words, column and what undoes each mistake."""
-    for first, second in combinations(range(3), 2):
-        order = [0, 1, 2]
-        order[first], order[second] = second, first
-        words = f"{XYZ[first]} and {XYZ[second]} exchanged"
-        yield words, XYZ[first], _moved(order, np.ones(3))
-    for axis, words in enumerate(("x_mm backwards", "y_mm downwards", "z_mm to the left")):
-        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
-        told = f"the sign of {XYZ[axis]}: counted {words.split(' ', 1)[1]}"
-        yield told, XYZ[axis], _moved([0, 1, 2], sign)
+    for words, column, undone in column_mistakes(XYZ):
+        yield words, column, _of_each(undone)
     yield "landmarks of left and right exchanged", "landmark", _renamed("left", "right")
     faces = "landmarks of superior and inferior endplates exchanged"
     yield faces, "landmark", _renamed("superior", "inferior")
     yield from _other_names(points)
 
 
-def _moved(order: Sequence[int], sign: Array) -> Callable[[Points], Points]:
+def column_mistakes(
+    columns: Sequence[str], ways: Sequence[str] = ("backwards", "downwards", "to the left")
+) -> Iterator[tuple[str, str, Callable[[Array], Array]]]:
+    """Words, column and what undoes each mistake of three columns (..., 3).
+
+    Parameters
+    ----------
+    ways : to which side a column with the wrong sign was counted, in words; of the first columns.
+    """
+    keep = np.ones(3)
+    for first, second in combinations(range(3), 2):
+        order = [0, 1, 2]
+        order[first], order[second] = second, first
+        words = f"{columns[first]} and {columns[second]} exchanged"
+        yield words, columns[first], _moved(order, keep)
+    for axis, way in enumerate(ways):
+        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
+        words = f"the sign of {columns[axis]}" + (f": counted {way}" if way else "")
+        yield words, columns[axis], _moved([0, 1, 2], sign)
+
+
+def _moved(order: Sequence[int], sign: Array) -> Callable[[Array], Array]:
     """Columns in another order, then with other signs."""
+    return lambda points: points[..., list(order)] * sign
 
-    def undone(points: Points) -> Points:
-        return {
-            v: {name: point[list(order)] * sign for name, point in one.items()}
-            for v, one in points.items()
-        }
 
-    return undone
+def _of_each(undone: Callable[[Array], Array]) -> Callable[[Points], Points]:
+    return lambda points: {
+        v: {name: undone(point) for name, point in one.items()} for v, one in points.items()
+    }
 
 
 def _renamed(first: str, second: str) -> Callable[[Points], Points]:

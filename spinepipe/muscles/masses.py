@@ -12,7 +12,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from spinepipe.anatomy.levels import SLICE_PERCENT
 from spinepipe.anatomy.segments import CENTRE, MASS_PERCENT, Sex
 from spinepipe.effects.contract import Array
 from spinepipe.facts import numbers
@@ -20,6 +19,9 @@ from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.task import Hands
 from spinepipe.muscles.trunk import SIDES, SLICES, THORAX, Mass, Trunk, body_of
 from spinepipe.units import STANDARD_GRAVITY
+
+SLICE_PERCENT = numbers(__name__, "slice_mass_percent")
+"""Share of body mass of the slices at T1 and at L5."""
 
 AHEAD_AT = numbers(__name__, "slice_ahead")
 """How far slices lie ahead of the vertebrae, cm: straight between these, 1 cm below L3L4."""
@@ -91,7 +93,7 @@ def masses_of(trunk: Trunk, subject: Subject, ahead_times: float = 1.0) -> tuple
 
 def slice_percents() -> tuple[float, ...]:
     """Share of body mass of each slice, T1 to L5, per cent."""
-    return tuple(np.linspace(*SLICE_PERCENT, len(SLICES)).tolist())
+    return tuple(np.linspace(SLICE_PERCENT["T1"], SLICE_PERCENT["L5"], len(SLICES)).tolist())
 
 
 def ahead_cm() -> tuple[float, ...]:

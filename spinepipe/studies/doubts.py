@@ -6,16 +6,16 @@ Each kind judges its own files (`Kind.doubts`), whatever study is asked for.
 from importlib import import_module
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.doubt import Doubt
-from spinepipe.cohort.doubts import suspicions as of_cohort
 from spinepipe.cohort.kept import kept_with_cohort
+from spinepipe.plausibility.warnings.judge import of_cohort
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import Problem
 from spinepipe.studies.registry import PACKAGE, every_kind
 
 
 @kept_with_cohort
-def suspicions(cohort: Cohort) -> tuple[Doubt, ...]:
-    """All that looks wrong; kept, as doubts and refusals are asked one after the other."""
+def suspicions(cohort: Cohort) -> tuple[PlausibilityWarning, ...]:
+    """All that looks wrong; kept, as warnings and refusals are asked one after the other."""
     found = list(of_cohort(cohort))
     for name, kind in every_kind().items():
         if kind.doubts is not None and any(form.stem in cohort.further for form in kind.forms):
@@ -37,5 +37,5 @@ def refusals(cohort: Cohort) -> tuple[Problem, ...]:
     return tuple(one.with_switch for one in suspicions(cohort) if _refused(cohort, one))
 
 
-def _refused(cohort: Cohort, one: Doubt) -> bool:
+def _refused(cohort: Cohort, one: PlausibilityWarning) -> bool:
     return one.certain and one.group not in cohort.i_mean_it

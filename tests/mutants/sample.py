@@ -27,7 +27,7 @@ AREAS = {
     "films": ("spinepipe/studies/scoliosis",),
     "trunk": ("spinepipe/muscles",),
     "tracking": ("spinepipe/motion",),
-    "cohort": ("spinepipe/cohort",),
+    "cohort": ("spinepipe/cohort", "spinepipe/plausibility"),
     "testing_machine": ("spinepipe/testing_machine",),
     "documents": ("spinepipe/documents",),
     "jobs": ("spinepipe/jobs",),

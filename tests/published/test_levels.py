@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.anatomy.levels import (
+from spinepipe.plausibility.score import usual
+from spinepipe.plausibility.warnings.levels import (
     DISC_MM,
     EXTENSION_DEG,
-    PEDICLES_MM,
     SPACING_MM,
     extension_range_deg,
     height_mm,
@@ -74,8 +74,9 @@ def test_pedicles_are_those_of_spines_in_ct(spines: Path) -> None:
     sides = [points.xs(f"{side}_pedicle", level="landmark") for side in ("left", "right")]
     apart = np.linalg.norm(sides[1] - sides[0], axis=1)
     assert (apart.min(), apart.max()) == pytest.approx((18.0, 60.3), abs=0.06)
-    assert PEDICLES_MM[0] * 1.8 * 1.2 < apart.min() * 1.01
-    assert apart.max() * 1.2 < PEDICLES_MM[1]
+    limits = usual("pedicles_apart")
+    assert limits.low * 1.8 * 1.2 < apart.min() * 1.01
+    assert apart.max() * 1.2 < limits.high
 
 
 def test_l5_is_that_of_two_men() -> None:

@@ -22,6 +22,9 @@ Table = Callable[[pd.DataFrame], None]
 
 CENTRE = ["y_mm", "z_mm", "orientation_deg"]
 FILMS, PEOPLE, TASKS, MARKERS = "films.csv", "subjects.csv", "tasks.csv", "marker_set.csv"
+HANDS_MM = ["hands_anterior_mm", "hands_superior_mm", "hands_right_mm"]
+PUSHES_N = ["push_anterior_n", "push_superior_n", "push_right_n"]
+PUSHES_NM = ["push_extension_nm", "push_right_bending_nm", "push_left_rotation_nm"]
 AIS, TRUNKS, TRACKED = "ais18_phantom_sd07", "trunk_volunteers", "tracking_phantom"
 
 
@@ -64,8 +67,23 @@ def filled_down(table: pd.DataFrame) -> None:
     table["orientation_deg"] = 2.0
 
 
+def small(columns: list[str], largest: float) -> Table:
+    """Numbers of all tasks, of the one unit that makes them small."""
+
+    def spoil(table: pd.DataFrame) -> None:
+        table[columns] = 0.0
+        table.loc[0, columns[0]] = largest
+
+    return spoil
+
+
+def radians(table: pd.DataFrame) -> None:
+    turns = [name for name in table if name.endswith("_deg")]
+    table[turns] *= np.pi / 180.0
+
+
 MISTAKES = [
-    (AIS, FILMS, times(CENTRE[:2], 0.1), "y_mm", "in cm and not mm; multiply y_mm, z_mm by 10"),
+    (AIS, FILMS, times(CENTRE[:2], 0.1), "y_mm", "in cm and not mm (0.1); multiply y_mm, z_mm"),
     (AIS, FILMS, times(CENTRE[:2], 1e-3), "y_mm", "in m and not mm"),
     (AIS, FILMS, times(CENTRE[:2], 1 / 25.4), "y_mm", "inches"),
     (AIS, FILMS, swapped("y_mm", "z_mm"), "y_mm", "y_mm and z_mm exchanged"),
@@ -81,6 +99,10 @@ MISTAKES = [
     (TRUNKS, TASKS, put("intra_abdominal_pressure_kpa", 45.0), "", "mmHg and not kPa; 6?"),
     (TRUNKS, TASKS, put("intra_abdominal_pressure_kpa", 0.01), "", "MPa, or bar"),
     (TRUNKS, TASKS, put("largest_stress_mpa", 60.0), "", "N/cm2 or kPa"),
+    (TRUNKS, TASKS, small(HANDS_MM, 5.0), "", "cm, inches or m"),
+    (TRUNKS, TASKS, small(PUSHES_N, 0.2), "", "kN and not N"),
+    (TRUNKS, TASKS, small(PUSHES_NM, 0.2), "", "kN m and not N m"),
+    (TRUNKS, TASKS, radians, "", "multiply the columns that end in _deg"),
     (TRACKED, PEOPLE, times(["mass_kg"], 1 / 0.45359237), "mass_kg", "mass in lb and not kg"),
     (TRACKED, MARKERS, times(["x_mm", "y_mm", "z_mm"], 0.1), "x_mm", "cm and not mm"),
     (TRACKED, MARKERS, times(["x_mm", "y_mm", "z_mm"], 1e-3), "x_mm", "m and not mm"),

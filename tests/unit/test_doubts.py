@@ -109,7 +109,7 @@ MISTAKES = [
     ("motion.csv", ANGLES, np.pi / 180.0, "radians and not degrees (0.0175)", "extension_deg"),
     ("loads.csv", MOMENTS, 1e3, "N mm and not N m (0.001)", "mz_nm"),
     ("loads.csv", MOMENTS, 1.0 / 0.112985, "lbf in and not N m (0.113)", "mz_nm"),
-    ("loads.csv", MOMENTS, 1e-3, "moments divided by 1000 (1e+03)", "mz_nm"),
+    ("loads.csv", MOMENTS, 1e-3, "moments in kN m and not N m (1e+03)", "mz_nm"),
     ("motion.csv", ANGLES, 57.29578, "turned into degrees once more (57.3)", "extension_deg"),
 ]
 

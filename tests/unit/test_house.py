@@ -40,7 +40,16 @@ ROOMS = (
         "anatomy",
     ),
     *("effects", "model", "world", "statics", "calibrate", "muscles", "motion"),
-    *("designs", "statistics", "sensitivity", "cohort", "testing_machine", "tables", "comparison"),
+    *(
+        "designs",
+        "statistics",
+        "sensitivity",
+        "cohort",
+        "testing_machine",
+        "plausibility",
+        "tables",
+        "comparison",
+    ),
     *("studies", "report", "jobs", "kinds", "reference", "cli"),
 )
 """Ground floor first; a room imports only itself and rooms before it.
@@ -280,6 +289,12 @@ def parts_of_kinds() -> Iterator[tuple[str, str]]:
 def test_a_digest_hangs_on_its_own_kind_alone(kind: str, module: str) -> None:
     others = {name for name in closure(module) if kind_named(name) not in (None, kind)}
     assert not others
+
+
+def test_no_result_hangs_on_the_words_of_warnings() -> None:
+    warnings = f"{PACKAGE}.plausibility.warnings"
+    hang = {m for _, m in parts_of_kinds() if any(n.startswith(warnings) for n in closure(m))}
+    assert not hang, "a warning that is reworded would have them all computed again"
 
 
 SOLVING = {

@@ -7,7 +7,7 @@ from math import pi
 
 from sweeps import sweep
 
-from spinepipe.cohort.motion_size import implausible, unit_of
+from spinepipe.plausibility.motion_size import implausible, unit_of
 
 
 @sweep("slope", [0.2, 0.6, 1.0, 5.0, -3.0, None])
@@ -23,7 +23,7 @@ def test_motion_of_a_measured_size_is_left_alone(slope: float | None) -> None:
         (180.0 / pi, "left_rotation", "degrees once more"),
         (1e-3, "right_bending", "N mm"),
         (1e-3, "anterior", "translations in m "),
-        (1e3, "extension", "divided by 1000"),
+        (1e3, "extension", "kN m and not N m"),
         (1.0 / 25.4, "superior", "inches"),
     ],
 )

@@ -188,7 +188,7 @@ def _turned(one: SpecimenReadings, test: str, factor: float = -1.0) -> SpecimenR
 
 @sweep(
     "factor, words",
-    [(1000.0, "N mm taken for N m"), (57.29578, "rad taken for deg"), (1e-3, "kN m")],
+    [(1000.0, "N mm and not N m"), (57.29578, "radians and not degrees"), (1e-3, "kN m and")],
 )
 def test_a_wrong_unit_everywhere_is_told_by_impossible_stiffness(factor: float, words: str) -> None:
     (error,) = suspected([_turned(one, "*", factor) for one in readings(2)])
@@ -200,7 +200,7 @@ def test_a_wrong_unit_of_one_specimen_is_told_beside_the_others() -> None:
     given = [_turned(one, "*", 1000.0) if one.specimen == "b" else one for one in readings(2)]
     (error,) = suspected(given)
     assert error.where == "b"
-    assert "N mm taken for N m" in error.what
+    assert "N mm and not N m" in error.what
 
 
 def test_a_wrong_unit_of_one_test_is_told_beside_the_other_specimens() -> None:
@@ -215,7 +215,7 @@ def test_motion_in_radians_taken_for_degrees_is_told() -> None:
     given = changed(readings(2), lambda specimen, test, cycles: np.deg2rad(cycles))
     (error,) = before_a_fit(given, JOINTS, np.deg2rad(SDS), zeroed=False)
     assert error.where == "all specimens"
-    assert "motion in rad taken for deg" in error.what
+    assert "radians and not degrees" in error.what
 
 
 # Markers -------------------------------------------------------------------------------------

@@ -79,7 +79,7 @@ def test_a_flipped_translation_moves_against_its_load() -> None:
     assert "move against the load" in error.evidence
 
 
-@sweep("force, words", [(1e-3, "kN taken for N"), (1e3, "motion in m taken for mm")])
+@sweep("force, words", [(1e-3, "kN and not N"), (1e3, "in m and not mm")])
 def test_a_wrong_unit_of_forces_is_told(force: float, words: str) -> None:
     (error,) = suspected(sheared(force=force))
     assert error.where == "all specimens"
@@ -96,7 +96,7 @@ def test_one_specimen_in_another_unit_is_told_beside_the_others() -> None:
     tiny = SD * 1e-4
     (error,) = before_a_fit(given, JOINTS, tiny, zeroed=False)
     assert error.where == "c"
-    assert "motion in m taken for mm" in error.what
+    assert "translations in m and not mm" in error.what
 
 
 def test_rotation_by_a_lever_as_short_as_centres_are_sure_tells_no_sign() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from spinepipe.cohort.answers import Answer, answers_of_test, joint_loads
 from spinepipe.effects.contract import Array
+from spinepipe.plausibility.score import CLEAR
 from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     bad_markers,
     beside_the_curve,
@@ -24,9 +25,6 @@ from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.store import Run
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES
-
-CLEAR = 5.0
-"""SDs of one reading that a joint's motion must exceed to tell a sign or a unit."""
 
 
 def suspected_errors(

@@ -23,37 +23,16 @@ from spinepipe.cohort.answers import (
     typical,
 )
 from spinepipe.effects.contract import Array
+from spinepipe.plausibility.motion_size import geometric_mean, is_plausible, unit_like
+from spinepipe.plausibility.score import AGAINST
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES, MM_PER_M, ROTATIONS, TRANSLATIONS
-
-AGAINST = -0.9
-"""Correlation of motion and load below which a joint moves against its load."""
-
-LIKE = 5.0
-"""Factor within which the size of an answer must be that of the other joints."""
 
 DECADES = 1.0
 """Beyond the published range, for one coordinate."""
 
 APART = 30.0
 """Factor between one specimen or test and the others that no anatomy and no preload makes."""
-
-MIX_UPS = {
-    ROTATIONS: {
-        1000.0: "loads in N mm taken for N m",
-        180.0 / np.pi: "motion in rad taken for deg",
-        np.pi / 180.0: "motion in deg taken for rad",
-        1e-3: "loads in kN m taken for N m",
-    },
-    TRANSLATIONS: {
-        1000.0: "motion in m taken for mm",
-        1e-3: "loads in kN taken for N, or motion in µm for mm",
-    },
-}
-"""Factor on the stiffness that each mistake makes, by the kind of coordinates."""
-
-NEAR = 5.0
-"""Factor within which a mistake counts as the one."""
 
 
 def wrong_signs(
@@ -82,8 +61,7 @@ def _split(found: Sequence[Answer]) -> tuple[list[Answer], list[Answer]]:
 
 
 def _is_against(answer: Answer, found: Sequence[Answer]) -> bool:
-    size = abs(answer.slope) / _usual(answer, found)
-    return answer.correlation < AGAINST and 1.0 / LIKE < size < LIKE
+    return answer.correlation < AGAINST and is_plausible(abs(answer.slope) / _usual(answer, found))
 
 
 def _usual(answer: Answer, found: Sequence[Answer]) -> float:
@@ -163,29 +141,27 @@ def wrong_units(found: Sequence[Answer]) -> list[SuspectedError]:
 
     Translations and rotations apart: a unit is of forces or of moments, of mm or of deg.
     """
-    kinds = ([a for a in found if a.coordinate in kind] for kind in MIX_UPS)
+    kinds = ([a for a in found if a.coordinate in kind] for kind in (ROTATIONS, TRANSLATIONS))
     return [error for of_kind in kinds for error in _of_kind(of_kind)]
 
 
 def _of_kind(found: Sequence[Answer]) -> list[SuspectedError]:
-    single = _of_specimens(found) or _of_tests(found)
-    if single:
-        return single
+    whole = {a.specimen: (a.specimen,) for a in found}
+    tests = {f"{a.specimen}, test {a.test}": (a.specimen, a.test) for a in found}
+    for places, everywhere in ((whole, True), (tests, False)):
+        errors = []
+        for where, place in places.items():
+            own = [a for a in found if (a.specimen, a.test)[: len(place)] == place]
+            others = [a for a in found if (a.specimen, a.test)[: len(place)] != place]
+            errors += _apart(where, own, others, everywhere=everywhere)
+        if errors:
+            return errors
     stiffness = _stiffness(found)
     if not _is_impossible(stiffness):
         return []
-    factors = [k / middle(name) for name, k in stiffness.items()]
-    factor = float(np.exp(np.mean(np.log(factors))))
-    evidence = f"{_words_of_unit(stiffness)}: {_times(factor)} the middle of the published range"
+    factor = geometric_mean([k / middle(name) for name, k in stiffness.items()])
+    evidence = f"{_words_of_unit(stiffness)}: {factor:.3g} times the middle of the published range"
     return [SuspectedError(ALL, _mix_up(factor, stiffness), evidence)]
-
-
-def _of_specimens(found: Sequence[Answer]) -> list[SuspectedError]:
-    errors = []
-    for name in dict.fromkeys(a.specimen for a in found):
-        own = [a for a in found if a.specimen == name]
-        errors += _apart(name, own, [a for a in found if a.specimen != name], everywhere=True)
-    return errors
 
 
 def _apart(
@@ -202,7 +178,7 @@ def _apart(
     if abs(logs.mean()) < np.log(APART) or np.ptp(logs) > np.log(APART) or here.sum() < there.sum():
         return []
     factor = float(np.exp(logs.mean()))
-    evidence = f"{_words_of_unit(mine)}: {_times(factor)} that of the others"
+    evidence = f"{_words_of_unit(mine)}: {factor:.3g} times that of the others"
     return [SuspectedError(where, _mix_up(factor, mine), evidence)]
 
 
@@ -213,36 +189,22 @@ def _stiffness(found: Sequence[Answer]) -> dict[str, float]:
 
 
 def _words_of_unit(stiffness: Mapping[str, float]) -> str:
-    sizes = ", ".join(f"{_size(n, k)} in {n.replace('_', ' ')}" for n, k in stiffness.items())
-    return f"stiffness about {sizes}"
-
-
-def _size(coordinate: str, stiffness: float) -> str:
     """In the units that testers use."""
-    if coordinate in TRANSLATIONS:
-        return f"{stiffness / MM_PER_M:.3g} N/mm"
-    return f"{stiffness:.3g} N m/rad"
-
-
-def _times(factor: float) -> str:
-    return f"{factor:.3g} times"
+    sizes = (
+        f"{k / MM_PER_M:.3g} N/mm in {name}"
+        if name in TRANSLATIONS
+        else f"{k:.3g} N m/rad in {name}"
+        for name, k in stiffness.items()
+    )
+    return f"stiffness about {', '.join(sizes)}".replace("_", " ")
 
 
 def _mix_up(factor: float, stiffness: Mapping[str, float]) -> str:
-    mix_ups = next(known for kind, known in MIX_UPS.items() if set(stiffness) & set(kind))
-    nearest = min(mix_ups, key=lambda known: abs(np.log(factor / known)))
-    if abs(np.log(factor / nearest)) < np.log(NEAR):
-        return f"unit: {mix_ups[nearest]} (a factor of {nearest:.3g})"
-    return "unit of loads or motion"
-
-
-def _of_tests(found: Sequence[Answer]) -> list[SuspectedError]:
-    errors = []
-    for specimen, test in dict.fromkeys((a.specimen, a.test) for a in found):
-        own = [a for a in found if (a.specimen, a.test) == (specimen, test)]
-        others = [a for a in found if (a.specimen, a.test) != (specimen, test)]
-        errors += _apart(f"{specimen}, test {test}", own, others, everywhere=False)
-    return errors
+    """The unit that makes stiffness so many times larger, and motion as many times smaller."""
+    unit = unit_like(1.0 / factor, next(iter(stiffness)), "stiffness_over_published")
+    return (
+        f"unit: {unit.words} (a factor of {unit.factor:.3g})" if unit else "unit of loads or motion"
+    )
 
 
 def _is_impossible(stiffness: Mapping[str, float]) -> bool:

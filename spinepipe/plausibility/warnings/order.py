@@ -5,19 +5,18 @@ Asked before units and signs: what is found here explains what these would say o
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from spinepipe.cohort.answers import of_specimens
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.doubt import Doubt
-from spinepipe.cohort.doubtful_places import file_of, first_row
 from spinepipe.cohort.load_tests import DRIVEN
 from spinepipe.cohort.loaded_cycles import LoadedCycle
 from spinepipe.effects.contract import Array
-from spinepipe.problems import Problem
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
+from spinepipe.plausibility.score import AGAINST
+from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, first_row, warn
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 FOLLOWS, BEST = 0.75, 0.95
 """Correlation, from zero, below which readings do not follow their loads, and that of the right
@@ -34,27 +33,36 @@ MORE = 4.0
 UNLOADED = 0.3
 """Of the motion of loaded joints: joints without a load that move more than that are loaded."""
 
-IN_A_ROW = 0.95
-"""Correlation of motion with the number of joints below: rotations in ground add up."""
-
-Place = tuple[str, str]
+Where = tuple[str, str]
 """Specimen and test."""
+
+Cycles = Mapping[Where, Sequence[LoadedCycle]]
 
 
 @dataclass(frozen=True)
 class Explained:
-    """Doubts, and the specimens and tests of which units and signs need not be asked."""
+    """Warnings, and the specimens and tests of which units and signs need not be asked."""
 
-    doubts: tuple[Doubt, ...]
-    places: frozenset[Place]
+    warnings: tuple[PlausibilityWarning, ...]
+    places: frozenset[Where]
 
 
-def doubtful_order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
+@dataclass(frozen=True)
+class _Order:
+    """What another order explains: a row of `warnings.csv`, column, table, and names in texts."""
+
+    warning: str
+    column: str
+    stem: str = "motion"
+    names: Mapping[str, Any] = field(default_factory=dict, compare=False)
+
+
+def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
     """What another order would explain, one line for each."""
-    of_place: dict[Place, list[LoadedCycle]] = defaultdict(list)
+    of_place: dict[Where, list[LoadedCycle]] = defaultdict(list)
     for cycle in cycles:
         of_place[cycle.specimen, cycle.test].append(cycle)
-    told: dict[tuple[str, str, str, str], list[Place]] = defaultdict(list)
+    told: dict[_Order, list[Where]] = defaultdict(list)
     for place, own in of_place.items():
         found = _steps(own) or _unloaded_joints(cohort, own)
         if found is not None:
@@ -63,21 +71,22 @@ def doubtful_order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
     rest = {place: own for place, own in of_place.items() if place not in seen}
     for key, places in (*_columns(rest), *_in_ground(rest)):
         told[key] += places
-    doubts = [_doubt(cohort, *key, places) for key, places in told.items()]
-    return Explained(tuple(doubts), frozenset(p for places in told.values() for p in places))
-
-
-def _doubt(
-    cohort: Cohort, stem: str, column: str, words: str, remedy: str, places: Sequence[Place]
-) -> Doubt:
-    tests = list(dict.fromkeys(test for _, test in places))
-    whose = of_specimens(dict.fromkeys(name for name, _ in places), cohort.specimen_names)
-    found = f"{words} ({whose}, test{'s' if len(tests) > 1 else ''} {', '.join(tests)})"
-    line = first_row(cohort, stem, places[0][0], places[0][1])
-    problem = Problem(
-        file_of(cohort, stem), line, column, found, "motion that follows the loads", remedy
+    return Explained(
+        tuple(_warning(cohort, key, places) for key, places in told.items()),
+        frozenset(place for places in told.values() for place in places),
     )
-    return Doubt(problem, "motion")
+
+
+def _warning(cohort: Cohort, key: _Order, places: Sequence[Where]) -> PlausibilityWarning:
+    specimen, test = places[0]
+    place = Place(key.stem, first_row(cohort, key.stem, specimen=specimen, test=test), key.column)
+    return warn(cohort, key.warning, place, whose=dict(places), tests=tests_of(places), **key.names)
+
+
+def tests_of(places: Sequence[Sequence[Any]]) -> str:
+    """Tests in words, of specimens and tests."""
+    tests = list(dict.fromkeys(test for _, test, *_ in places))
+    return f"test{'s' if len(tests) > 1 else ''} {', '.join(tests)}"
 
 
 def _driven(cycle: LoadedCycle) -> list[tuple[int, int]]:
@@ -91,7 +100,7 @@ def _driven(cycle: LoadedCycle) -> list[tuple[int, int]]:
     return found
 
 
-def _steps(cycles: Sequence[LoadedCycle]) -> tuple[str, str, str, str] | None:
+def _steps(cycles: Sequence[LoadedCycle]) -> _Order | None:
     """Steps in reverse, or readings one step late."""
     given, turned, late, steps = [], [], [], 0
     for cycle in cycles:
@@ -107,17 +116,12 @@ def _steps(cycles: Sequence[LoadedCycle]) -> tuple[str, str, str, str] | None:
         return None
     here = float(np.median(given))
     if all(map(_stands_still, cycles)):
-        remedy = "suspected: readings one step late; write them beside the step before"
-        return "motion", "step", "the readings of step 0 once more under the first load", remedy
+        return _Order("step_0_repeated", "step")
     if here < FOLLOWS and float(np.median(turned)) > BEST:
-        remedy = "suspected: steps in reverse order, here or in loads.csv; number them alike"
-        return "motion", "step", "readings that follow the loads from the last step back", remedy
+        return _Order("steps_reversed", "step")
     moved = here < FOLLOWS or (steps > FEW and here < LATE_FOLLOWS)
     limit = BEST if here < FOLLOWS else LATE_BEST
-    if moved and float(np.median(late)) > limit:
-        remedy = "suspected: readings one step late; write them beside the step before"
-        return "motion", "step", "readings that follow the load of the step before", remedy
-    return None
+    return _Order("steps_late", "step") if moved and float(np.median(late)) > limit else None
 
 
 def _stands_still(cycle: LoadedCycle) -> bool:
@@ -135,9 +139,7 @@ def _alike(load: Array, read: Array) -> float:
     return float(load @ read) / size if size > 0.0 else 0.0
 
 
-def _unloaded_joints(
-    cohort: Cohort, cycles: Sequence[LoadedCycle]
-) -> tuple[str, str, str, str] | None:
+def _unloaded_joints(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> _Order | None:
     """Joints that carry no load and move as those that do: the wrong vertebra is loaded."""
     moved: dict[bool, list[float]] = {True: [], False: []}
     names = []
@@ -148,41 +150,29 @@ def _unloaded_joints(
         names = [n for n, there in zip(cohort.joint_names, loaded, strict=True) if not there]
         for size, there in zip(sizes, loaded, strict=True):
             moved[bool(there)].append(float(size))
-    if not moved[True] or not moved[False]:
+    if not moved[True] or not moved[False] or not any(moved[True]):
         return None
-    if np.median(moved[False]) < UNLOADED * np.median(moved[True]) or not any(moved[True]):
+    if np.median(moved[False]) < UNLOADED * np.median(moved[True]):
         return None
-    found = f"{', '.join(names)} move without a load"
-    remedy = f"suspected: vertebra: the load is on one above {names[-1]}; correct the name"
-    return "loads", "vertebra", found, remedy
+    told = {"joints": ", ".join(names), "joint": names[-1]}
+    return _Order("joints_unloaded", "vertebra", "loads", told)
 
 
-_Key = tuple[str, str, str, str]
-
-
-def _columns(
-    of_place: Mapping[Place, Sequence[LoadedCycle]],
-) -> Iterator[tuple[_Key, list[Place]]]:
+def _columns(of_place: Cycles) -> Iterator[tuple[_Order, list[Where]]]:
     """Rotations that answer the moments that drive another one, and that one these of its own."""
-    answered: dict[tuple[int, int], list[Place]] = defaultdict(list)
+    answered: dict[tuple[int, int], list[Where]] = defaultdict(list)
     for place, cycles in of_place.items():
-        for cycle in cycles:
-            pair = _answering(cycle)
-            if pair is not None:
-                answered[pair].append(place)
+        for pair in filter(None, map(_answering, cycles)):
+            answered[pair].append(place)
     for first, second in ((3, 4), (3, 5), (4, 5)):
         there, back = answered[first, second], answered[second, first]
         right = [*answered[first, first], *answered[second, second]]
         if (there or back) and not right:
-            names = [COORDINATE_COLUMNS[k] for k in (first, second)]
-            moments = [f"m{'xyz'[DRIVEN.index(COORDINATES[k])]}_nm" for k in (first, second)]
-            words = f"{names[1 if there else 0]} answers the moment that drives the other"
-            remedy = (
-                f"suspected: {names[0]} and {names[1]} exchanged, or {moments[0]} and {moments[1]} "
-                "in loads.csv; exchange them back"
-            )
+            a, b = (COORDINATE_COLUMNS[k] for k in (first, second))
+            ma, mb = (f"m{'xyz'[DRIVEN.index(COORDINATES[k])]}_nm" for k in (first, second))
+            told = {"answers": b if there else a, "a": a, "b": b, "ma": ma, "mb": mb}
             places = list(dict.fromkeys([*there, *back]))
-            yield ("motion", names[0], words, remedy), places
+            yield _Order("rotations_exchanged", a, names=told), places
 
 
 def _answering(cycle: LoadedCycle) -> tuple[int, int] | None:
@@ -206,20 +196,22 @@ def _answer(cycle: LoadedCycle, main: int, number: int) -> float | None:
     """Median size of a rotation's answer to the main moment; None where it was not read."""
     found = []
     for joint in range(cycle.loads.shape[1]):
-        load, read = cycle.loads[:, joint, main], cycle.readings[:, joint, number]
-        there = np.isfinite(read)
-        load, read = load[there] - load[there].mean() if there.any() else load[there], read[there]
+        load, read = _centred(cycle.loads[:, joint, main], cycle.readings[:, joint, number])
         if load @ load > 0.0:
-            read = read - read.mean()
-            size = float(np.linalg.norm(load) * np.linalg.norm(read))
-            sure = size > 0.0 and abs(float(load @ read)) > 0.9 * size
+            sure = abs(_alike(load, read)) > -AGAINST
             found.append(abs(float(load @ read / (load @ load))) if sure else 0.0)
     return float(np.median(found)) if found else None
 
 
-def _in_ground(
-    of_place: Mapping[Place, Sequence[LoadedCycle]],
-) -> Iterator[tuple[_Key, list[Place]]]:
+def _centred(load: Array, read: Array) -> tuple[Array, Array]:
+    """Both less their means, where there is a reading."""
+    there = np.isfinite(read)
+    if not there.any():
+        return load[there], read[there]
+    return load[there] - load[there].mean(), read[there] - read[there].mean()
+
+
+def _in_ground(of_place: Cycles) -> Iterator[tuple[_Order, list[Where]]]:
     """Rotations that grow from joint to joint, as those of vertebrae in ground do."""
     grown, places, column = [], [], ""
     for place, cycles in of_place.items():
@@ -227,29 +219,16 @@ def _in_ground(
             driven = _driven(cycle)
             if cycle.pushed or len(driven) < 3 or len({number for _, number in driven}) > 1:
                 continue
-            slopes = np.array([_slope(cycle, *one) for one in driven])
+            pairs = [_centred(cycle.loads[:, j, n], cycle.readings[:, j, n]) for j, n in driven]
+            slopes = np.array([x @ y / (x @ x) if x @ x > 0.0 else 0.0 for x, y in pairs])
             if np.any(slopes <= 0.0):
                 return
             numbers = np.array([joint + 1.0 for joint, _ in driven])
             alike = float(np.corrcoef(slopes, numbers)[0, 1])
             wide = float(slopes[-1] / slopes[0]) * numbers[0] / numbers[-1]
-            grown.append(alike > IN_A_ROW and 0.5 < wide < 2.0)
+            grown.append(alike > BEST and 0.5 < wide < 2.0)
             places.append(place)
             column = column or COORDINATE_COLUMNS[driven[0][1]]
-    if len(grown) < 2 or not all(grown):
-        return
-    names = [name for name in COORDINATE_COLUMNS if name.removesuffix("_deg") in ROTATIONS]
-    remedy = (
-        f"suspected: {', '.join(names)} of vertebrae in ground; subtract those of the vertebra "
-        "below"
-    )
-    words = "rotations that add up from joint to joint"
-    yield ("motion", column, words, remedy), list(dict.fromkeys(places))
-
-
-def _slope(cycle: LoadedCycle, joint: int, number: int) -> float:
-    """Motion over load."""
-    load, read = cycle.loads[:, joint, number], cycle.readings[:, joint, number]
-    there = np.isfinite(read)
-    load, read = load[there] - load[there].mean(), read[there] - read[there].mean()
-    return float(load @ read / (load @ load)) if load @ load > 0.0 else 0.0
+    if len(grown) >= 2 and all(grown):
+        told = {"columns": ", ".join(COORDINATE_COLUMNS[3:])}
+        yield _Order("rotations_in_ground", column, names=told), list(dict.fromkeys(places))

@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from spinepipe.anatomy.levels import spacing_mm
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
+from spinepipe.plausibility.warnings.levels import spacing_mm
 from spinepipe.units import MM_PER_M
 
 USUAL_MM = 35.0

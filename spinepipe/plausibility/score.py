@@ -1,0 +1,155 @@
+"""The one scorer: how well a quantity fits its usual range once a mistake is undone.
+
+Its knowledge is two tables. `ranges.csv` has what a quantity is in sound data (`low` to `high`,
+told beyond) and what it should be once a mistake is undone (`usual_low` to `usual_high`), with the
+source of both. `hypotheses.csv` has what people get wrong: the factor that undoes it, its words,
+the remedy, and how often it happens beside the other mistakes of the same quantity.
+"""
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from math import inf, log
+from typing import final
+
+import pandas as pd
+
+PACKAGE = "spinepipe.plausibility"
+
+AGAINST = -0.9
+"""Correlation of motion and load below which a joint moves against its load."""
+
+CLEAR = 5.0
+"""SDs of one reading that motion must exceed to tell a sign or a unit."""
+
+BETTER = 2.0
+"""Times nearer that undoing a mistake must bring points and axes to where they should be, chosen:
+undone where it was not made, it takes them away as a rule."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """A row of `ranges.csv`; without a limit it is infinite."""
+
+    low: float
+    high: float
+    usual_low: float
+    usual_high: float
+
+    def holds(self, value: float) -> bool:
+        """Whether nothing is told of a value."""
+        return self.low <= value <= self.high
+
+    def holds_each(self, values: pd.Series) -> "pd.Series[bool]":
+        """The same of many values."""
+        return values.between(self.low, self.high)
+
+    def __str__(self) -> str:
+        """As messages say what is allowed."""
+        if self.low == -inf:
+            return f"at most {self.high:g}"
+        if self.high == inf:
+            return f"at least {self.low:g}"
+        factor = self.low < 1.0 and abs(self.low * self.high - 1.0) < 1e-9
+        return f"{'1/' if factor else ''}{self.high if factor else self.low:g} to {self.high:g}"
+
+    def likelihood(self, value: float) -> float:
+        """Logarithm of that of a value, from the middle of what is usual; none beyond its ends.
+
+        Normal on a scale of factors, the ends at one SD; where the range has one end, flat.
+        """
+        if not self.usual_low <= value <= self.usual_high:
+            return -inf
+        if self.usual_low <= 0.0 or self.usual_high == inf:
+            return 0.0
+        width = log(self.usual_high / self.usual_low) / 2.0
+        return -0.5 * (log(value / self.usual_low) / width - 1.0) ** 2
+
+
+@final
+@dataclass(frozen=True)
+class Hypothesis:
+    """A row of `hypotheses.csv`.
+
+    Attributes
+    ----------
+    factor : what the numbers must be multiplied by to undo the mistake. table : that has it.
+    """
+
+    factor: float
+    table: str
+    words: str
+    remedy: str
+    prior: float
+
+    @property
+    def size(self) -> str:
+        """How many times too large the mistake makes the numbers."""
+        return f"{1.0 / self.factor:.3g}"
+
+    def mend(self, **values: object) -> str:
+        """The remedy with its numbers and names filled in."""
+        factor = f"{round(self.factor, 4):g}"
+        known = {"words": self.words, "factor": factor, "size": self.size}
+        return self.remedy.format(**known, **values)
+
+
+@cache
+def table(package: str, name: str) -> tuple[dict[str, str], ...]:
+    """Rows of a csv that lies beside the files of a package."""
+    with files(package).joinpath(f"{name}.csv").open(encoding="utf-8") as file:
+        return tuple(csv.DictReader(file))
+
+
+def _number(text: str) -> float:
+    """``1/1.8`` too: a factor either way is easier to read so."""
+    over, _, under = text.partition("/")
+    return float(over) / float(under or 1.0)
+
+
+@cache
+def _ranges() -> dict[str, Range]:
+    found = {}
+    for row in table(PACKAGE, "ranges"):
+        low = _number(row["low"] or "-inf")
+        high = _number(row["high"] or "inf")
+        usual = (row["usual_low"], low), (row["usual_high"], high)
+        found[row["quantity"]] = Range(low, high, *(_number(t) if t else end for t, end in usual))
+    return found
+
+
+@cache
+def hypotheses(what: str) -> tuple[Hypothesis, ...]:
+    """Mistakes that are known of a quantity, in the order of the table."""
+    return tuple(
+        Hypothesis(
+            _number(row["factor"]), row["table"], row["words"], row["remedy"], float(row["prior"])
+        )
+        for row in table(PACKAGE, "hypotheses")
+        if row["what"] == what
+    )
+
+
+def usual(quantity: str) -> Range:
+    """The row of a quantity."""
+    return _ranges()[quantity]
+
+
+def has_range(quantity: str) -> bool:
+    """Whether there is such a row."""
+    return quantity in _ranges()
+
+
+def suspect(what: str, value: float, quantity: str) -> Hypothesis | None:
+    """The mistake that most likely explains a value; None where none makes it a usual one.
+
+    Posterior odds: the prior of each times the likelihood of the value with the mistake undone.
+    """
+    limits = usual(quantity)
+    odds = [
+        (log(one.prior) + limits.likelihood(value * one.factor), one)
+        for one in (hypotheses(what) if value > 0.0 else ())
+    ]
+    best = max(odds, key=lambda pair: pair[0], default=(-inf, None))
+    return best[1] if best[0] > -inf else None

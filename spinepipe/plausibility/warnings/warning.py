@@ -1,0 +1,133 @@
+"""A warning about files that are sound cell by cell, with its words from `warnings.csv`."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort.answers import of_specimens
+from spinepipe.cohort.cohort import Cohort, Group
+from spinepipe.cohort.columns import COHORT_YAML
+from spinepipe.cohort.csv_table import read_rows
+from spinepipe.plausibility.score import has_range, table, usual
+from spinepipe.plausibility.warnings.levels import PACKAGE
+from spinepipe.problems import Problem
+
+
+@dataclass(frozen=True)
+class PlausibilityWarning:
+    """One thing that looks wrong.
+
+    Attributes
+    ----------
+    group : what can be meant though it looks wrong: ``i_mean_it`` in cohort.yaml.
+    certain : it cannot be right; no run starts with it unless the cohort says that it is meant.
+    """
+
+    problem: Problem
+    group: Group
+    certain: bool = False
+
+    @property
+    def with_switch(self) -> Problem:
+        """The problem, with what to write where it is meant."""
+        told = self.problem
+        remedy = f"{told.remedy} (if you mean it: i_mean_it: [{self.group}] in cohort.yaml)"
+        place = (told.file, told.row, told.column)
+        return Problem(*place, told.found, told.allowed, remedy)
+
+
+class Found(NamedTuple):
+    """Warnings of one sort, and the specimens that they are about."""
+
+    warnings: tuple[PlausibilityWarning, ...]
+    specimens: frozenset[str]
+
+    @classmethod
+    def of(cls, warnings: Iterable[PlausibilityWarning], specimens: Iterable[str]) -> "Found":
+        """From anything that yields them."""
+        return cls(tuple(warnings), frozenset(specimens))
+
+
+class Place(NamedTuple):
+    """A table by its stem, a row as the table counts it from 0, and a column."""
+
+    stem: str
+    row: Any
+    column: str | None
+
+
+@cache
+def _texts() -> dict[str, dict[str, Any]]:
+    return {row["warning"]: row for row in table(PACKAGE, "warnings")}
+
+
+def warn(
+    cohort: Cohort,
+    name: str,
+    place: Place,
+    /,
+    *,
+    remedy: str | None = None,
+    certain: bool | None = None,
+    group: Group | None = None,
+    whose: Iterable[object] = (),
+    **values: object,
+) -> PlausibilityWarning:
+    """The warning of a row of `warnings.csv`, about a place in the tables of a cohort.
+
+    Parameters
+    ----------
+    remedy, certain, group : in place of those of the row. whose : specimens, ``{whose}`` in texts.
+    values : what the texts have in braces besides; ``{range}`` is that of the same name.
+    """
+    text = _texts()[name]
+    values["whose"] = of_specimens(dict.fromkeys(map(str, whose)), cohort.specimen_names)
+    if has_range(name):
+        values.setdefault("range", usual(name))
+    problem = Problem(
+        file_of(cohort, place.stem),
+        line_of(cohort, place),
+        place.column,
+        text["found"].format(**values),
+        text["allowed"].format(**values),
+        text["remedy"].format(**values) if remedy is None else remedy,
+    )
+    sure = text["certain"] == "yes" if certain is None else certain
+    return PlausibilityWarning(problem, group or text["group"], sure)
+
+
+def file_of(cohort: Cohort, stem: str) -> str:
+    """A table's file in messages."""
+    return f"{cohort.folder.resolve().name}/{stem if '.' in stem else f'{stem}.csv'}"
+
+
+def line_of(cohort: Cohort, place: Place) -> int | None:
+    """Line, as an editor shows it; tables that kinds read besides count rows by it already."""
+    stem, row, _ = place
+    if row is None or stem == COHORT_YAML:
+        return None
+    if stem in cohort.further:
+        return int(row)
+    rows, _ = read_rows(cohort.folder / f"{stem}.csv", stem)
+    return None if rows is None or row >= len(rows.lines) else rows.lines[int(row)]
+
+
+def first_row(
+    cohort: Cohort,
+    stem: str,
+    *,
+    filled: str | None = None,
+    **names: str,
+) -> int | None:
+    """The first row with these names, ``*`` for each; of a column one not empty or 0, if any."""
+    table: pd.DataFrame = getattr(cohort, stem)
+    rows = pd.Series(True, table.index)
+    for column, name in names.items():
+        rows &= table[column].isin([name, "*"])
+    chosen = rows if filled is None else rows & table[filled].notna() & (table[filled] != 0.0)
+    found = np.flatnonzero(chosen if chosen.any() else rows)
+    return int(found[0]) if len(found) else None
