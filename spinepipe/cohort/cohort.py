@@ -13,7 +13,7 @@ import pandas as pd
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 
 from spinepipe.cohort.doubt import Group
-from spinepipe.documents.names import LONGEST_NAME
+from spinepipe.documents.names import EVERYONE, LONGEST_NAME
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
@@ -194,10 +194,6 @@ class Cohort:
         names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion", *rigs)
         tables = {name: getattr(self, name) for name in names}
         return _PartDigests(shared, {**tables, **self.further})
-
-
-EVERYONE = "*"
-"""In the table of loads: the row is for every specimen."""
 
 
 class _PartDigests:

@@ -16,9 +16,9 @@ import numpy as np
 from spinepipe.anatomy.levels import ONE_SPREAD, SIZE_SPREAD, height_mm, spacing_mm
 from spinepipe.cohort.answers import of_specimens, typical
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.csv_table import read_rows
 from spinepipe.cohort.doubt import Doubt, Found, Group
 from spinepipe.cohort.neutral_pose import NeutralPose
+from spinepipe.documents.csv_table import read_rows
 from spinepipe.effects.contract import Array
 from spinepipe.problems import Problem
 

@@ -21,8 +21,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from spinepipe.cohort import columns as cohort_columns
 from spinepipe.cohort.cohort import CohortHeader
+from spinepipe.cohort.columns import TABLES
+from spinepipe.documents.form import TableForm
 from spinepipe.effects import Effect, Parameter, Trial, create, registered
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
@@ -111,9 +112,7 @@ def generators() -> dict[str, Callable[[], str]]:
     parts |= {f"table {name}": partial(result_table, shape) for name, shape in shapes.items()}
     parts |= {
         f"cohort {name}": partial(cohort_table, form)
-        for name, form in (
-            cohort_columns.TABLES | {form.stem: form for form in every_form()}
-        ).items()
+        for name, form in (TABLES | {form.stem: form for form in every_form()}).items()
     }
     parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
     parts["keys config.yaml"] = partial(key_table, Selection)
@@ -151,15 +150,15 @@ def _range(column: Column) -> str:
     return " and ".join(ends)
 
 
-def cohort_table(form: cohort_columns.TableForm) -> str:
+def cohort_table(form: TableForm) -> str:
     """Columns of a CSV file of a cohort."""
     rows = [
         (
-            f"**{code(c.name)}**" if c.required else code(c.name),
-            c.kind,
-            c.range_text,
+            code(c.name) if c.nullable else f"**{code(c.name)}**",
+            c.type,
+            ", ".join(map(code, c.allowed)) or c.range_text,
             c.meaning,
-            "not allowed" if c.required else "allowed",
+            "allowed" if c.nullable else "not allowed",
         )
         for c in form.columns
     ]
