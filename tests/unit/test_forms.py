@@ -3,16 +3,20 @@
 Catches a rule that lets a bad row pass, blames a sound one, or is told at another place.
 """
 
+from pathlib import Path
+from typing import get_args
+
 import pandas as pd
 import pytest
 
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.supports import FREE, HELD, MEASURED, PRESCRIBED
-from spinepipe.documents.form import Column, Rule, TableForm
+from spinepipe.documents.form import Column, Rule, TableForm, read_forms
 from spinepipe.documents.rules import Listed, Rows
 from spinepipe.motion.hanging import ARMS
 from spinepipe.motion.joint_tables import SIDES
 from spinepipe.motion.skeleton import BODIES
+from spinepipe.muscles import regressions
 from spinepipe.problems import Problem
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, FILMS, NEEDED
 from spinepipe.studies.tracking.forms import FORMS, MOVING, STANCE, TRIALS
@@ -132,6 +136,10 @@ def test_rows_beyond_the_most_are_told_each() -> None:
 
 
 def test_forms_allow_the_words_that_the_library_knows() -> None:
+    (table,) = read_forms(Path(regressions.__file__).with_name("forms.yaml")).values()
+    assert table.column("level").allowed == ("*", *regressions.REGRESSION_LEVELS)
+    assert table.column("quantity").allowed == regressions.QUANTITIES
+    assert table.column("form").allowed == get_args(regressions.Form)
     supports = TABLES["supports"]
     assert supports.column("coordinate").allowed == COORDINATES
     assert supports.column("state").allowed == (FREE, HELD, PRESCRIBED)
