@@ -203,19 +203,13 @@ def _inertias(draft: Draft) -> Iterator[Problem]:
     """Inertias that no body has; all of a file are looked at together."""
     rows = list(draft.rows("bodies", "mass_kg", *INERTIA))
     six = np.array([cells[1:] for _, cells in rows]).reshape(len(rows), len(INERTIA))
-    empty = np.isnan(six)
     moments = np.zeros((len(rows), 3))
-    whole = ~empty.any(axis=1)
+    whole = ~np.isnan(six).any(axis=1)
     moments[whole] = eigh(six[whole][:, SYMMETRIC])[0]
     file = draft.file("bodies")
-    for index in np.flatnonzero(~empty.all(axis=1)).tolist():
+    for index in np.flatnonzero(whole).tolist():
         line, (mass, *_) = rows[index]
-        if whole[index]:
-            yield from _moment_problems(file, line, mass, moments[index])
-            continue
-        column = INERTIA[int(np.argmax(empty[index]))]
-        remedy = "fill the row up, with 0 where a product is zero, or empty all six"
-        yield Problem(file, line, column, "an incomplete inertia", "all six or none", remedy)
+        yield from _moment_problems(file, line, mass, moments[index])
 
 
 def _moment_problems(file: str, line: int, mass: float, of_body: Array) -> Iterator[Problem]:

@@ -1,18 +1,14 @@
-"""Does ``supports.csv`` say of a rig what can be done? Names, states, values to be prescribed."""
+"""Does ``supports.csv`` say of a rig what can be done? Places, values to be prescribed."""
 
 from collections.abc import Iterator
 from functools import cache
 from math import isnan
 
-from spinepipe.cohort.cohort import EVERYONE
 from spinepipe.cohort.draft import Draft
-from spinepipe.cohort.supports import MEASURED, PRESCRIBED, REACTIONS, STATES, Rig
+from spinepipe.cohort.supports import MEASURED, PRESCRIBED, Rig
 from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem, Spelling, first_of
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
-
-WORDS = {"coordinate": COORDINATES, "state": STATES, "reaction": REACTIONS}
-"""What may stand in the columns whose cells are one of several words."""
+from spinepipe.problems import Problem, first_of
+from spinepipe.units import COORDINATE_COLUMNS, TRANSLATIONS
 
 
 def check_supports(draft: Draft, document: Document | None) -> Iterator[Problem]:
@@ -21,8 +17,6 @@ def check_supports(draft: Draft, document: Document | None) -> Iterator[Problem]
         return
     for found in (
         _places(draft),
-        _words(draft),
-        _tests(draft),
         _without_values(draft),
         _without_sd(draft, document),
     ):
@@ -45,27 +39,6 @@ def _places(draft: Draft) -> Iterator[Problem]:
             if not there[name]:
                 allowed = "a joint and a coordinate in every row"
                 yield Problem(*place, name, "an empty cell", allowed, f"name the {name}")
-
-
-def _words(draft: Draft) -> Iterator[Problem]:
-    for column, words in WORDS.items():
-        known = Spelling(words, "correct it")
-        for line, (cell,) in draft.rows("supports", column):
-            if isinstance(cell, str) and cell not in words:
-                place = (draft.file("supports"), line, column)
-                yield Problem(*place, f"'{cell}'", known.allowed, known.remedy(cell))
-
-
-def _tests(draft: Draft) -> Iterator[Problem]:
-    tests = dict.fromkeys((EVERYONE, *(load.test for load in draft.applied)))
-    known = Spelling(tests, "add its loads, zeros where nothing acts")
-    if "loads" not in draft.tables and "loads" not in draft.absent:
-        return
-    for line, (test,) in draft.rows("supports", "test"):
-        if isinstance(test, str) and test not in tests:
-            place = (draft.file("supports"), line, "test")
-            remedy = known.remedy(test)
-            yield Problem(*place, f"unknown test '{test}'", known.allowed, remedy)
 
 
 def _without_values(draft: Draft) -> Iterator[Problem]:

@@ -1,8 +1,7 @@
-"""Do the files of a cohort fit each other: names, keys, steps, loads and motion?
+"""Do the files of a cohort fit each other beyond what their forms declare?
 
-The vertebrae are a chain, tables speak of what exists and of each thing once, steps count 0, 1, 2
-without a gap, loads are unambiguous and act on something that can move, and every measured motion
-was caused by a load that is given.
+The vertebrae are a chain, steps count 0, 1, 2 without a gap, loads are unambiguous and act on
+something that can move, and every measured motion was caused by a load that is given.
 """
 
 import re
@@ -11,16 +10,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import isnan
 
-from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.draft import AppliedLoad, Draft
-from spinepipe.documents.names import (
-    ALLOWED,
-    ALLOWED_FOLDER,
-    COHORT_NAME,
-    folder_fault,
-    look_alike,
-    name_fault,
-)
+from spinepipe.documents.names import COHORT_NAME
 from spinepipe.documents.yaml_text import Document
 from spinepipe.model import MOST_JOINTS
 from spinepipe.problems import Problem, Spelling
@@ -77,36 +68,6 @@ def _height(name: str) -> tuple[int, int] | None:
     return (REGIONS.index(match[1]), -int(match[2])) if match else None
 
 
-def check_keys(draft: Draft) -> Iterator[Problem]:
-    """Repeated keys in every table but ``loads.csv``, whose wildcards ask for more care."""
-    for stem, form in draft.forms.items():
-        if stem != "loads":
-            yield from _repeated_keys(draft, stem, form.keys)
-
-
-def _repeated_keys(draft: Draft, stem: str, keys: tuple[str, ...]) -> Iterator[Problem]:
-    seen: dict[tuple[object, ...], int] = {}
-    for line, cells in draft.rows(stem, *keys):
-        cells = tuple(map(_numbered, keys, cells))
-        if any(isinstance(cell, float) and isnan(cell) for cell in cells):
-            continue  # a bad or empty cell, reported there
-        first = seen.setdefault(cells, line)
-        if first != line:
-            found = "again " + ", ".join(_shown(cell) for cell in cells)
-            allowed = f"one row per {' x '.join(keys)}"
-            remedy = f"delete one (the other is line {first})"
-            yield Problem(draft.file(stem), line, None, found, allowed, remedy)
-
-
-def _numbered(key: str, cell: object) -> object:
-    """The cell, an empty cycle as the first."""
-    return 1.0 if key == "cycle" and isinstance(cell, float) and isnan(cell) else cell
-
-
-def _shown(cell: object) -> str:
-    return f"{cell:g}" if isinstance(cell, float) else str(cell)
-
-
 POINT = ("px_mm", "py_mm", "pz_mm")
 FORCE = ("fx_n", "fy_n", "fz_n")
 
@@ -116,9 +77,8 @@ def check_loads(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Proble
     yield from _repeated_loads(draft, applied)
     for stem in ("loads", "preload"):
         yield from _on_the_fixed_vertebra(draft, stem)
-        yield from _partial_points(draft, stem)
     yield from _without_a_point(draft, applied)
-    yield from _preload(draft, applied)
+    yield from _preload(draft)
     yield from _times(draft)
     yield from _followers(draft)
 
@@ -139,18 +99,10 @@ def _repeated_loads(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Pr
             yield Problem(draft.file("loads"), load.line, None, found, allowed, remedy)
 
 
-def _preload(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
-    """A preload belongs to a test, and to a point of a vertebra if it is a force."""
-    if "loads" not in draft.tables and "loads" not in draft.absent:
-        return
-    tests = dict.fromkeys(("*", *(load.test for load in applied)))
-    known = Spelling(tests, "add its loads, zeros where nothing else acts")
-    for line, (test, *cells) in draft.rows("preload", "test", *POINT, *FORCE):
-        if isinstance(test, str) and test not in tests:
-            place = (draft.file("preload"), line, "test")
-            remedy = known.remedy(test)
-            yield Problem(*place, f"unknown test '{test}'", known.allowed, remedy)
-        if _pulls_without_a_point(tuple(cells)):
+def _preload(draft: Draft) -> Iterator[Problem]:
+    """A preload that is a force belongs to a point of a vertebra."""
+    for line, cells in draft.rows("preload", *POINT, *FORCE):
+        if _pulls_without_a_point(cells):
             place = (draft.file("preload"), line, "px_mm")
             remedy = "fill px_mm, py_mm, pz_mm"
             yield Problem(*place, "a force without a point", "a force with a point", remedy)
@@ -163,15 +115,6 @@ def _on_the_fixed_vertebra(draft: Draft, stem: str) -> Iterator[Problem]:
             found = f"a load on '{vertebra}', which is fixed to ground"
             allowed = "one of " + ", ".join(draft.vertebrae[1:])
             yield Problem(*place, found, allowed, "load a moving vertebra or delete the row")
-
-
-def _partial_points(draft: Draft, stem: str) -> Iterator[Problem]:
-    for line, point in draft.rows(stem, *POINT):
-        missing = [name for name, value in zip(POINT, point, strict=True) if isnan(value)]
-        if 0 < len(missing) < len(POINT):
-            place = (draft.file(stem), line, missing[0])
-            remedy = "fill the cell; without all three the force would act elsewhere"
-            yield Problem(*place, "an incomplete point", "all of px, py, pz or none", remedy)
 
 
 def _without_a_point(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
@@ -279,70 +222,6 @@ def _problem(file: str, line: int, key: tuple[object, ...], tests: Spelling) -> 
     if column == "test" and key[1] not in tests.known:
         remedy = tests.remedy(str(key[1]))
     return Problem(file, line, column, found, allowed, remedy)
-
-
-FOR_ALL = {
-    ("loads", "specimen"),
-    ("preload", "specimen"),
-    ("supports", "specimen"),
-    ("supports", "joint"),
-}
-"""Tables and columns in which * stands for all."""
-
-
-def check_names(draft: Draft) -> Iterator[Problem]:
-    """Unknown names in every table, and names that no folder, figure or row can have."""
-    for line, (name,) in draft.rows("specimens", "specimen"):
-        fault = folder_fault(name) if isinstance(name, str) else None
-        if fault is not None:
-            place = (draft.file("specimens"), line, "specimen")
-            yield Problem(*place, fault, ALLOWED_FOLDER, "rename the specimen in every file")
-    known = {
-        "specimen": draft.specimens,
-        "vertebra": draft.vertebrae,
-        "joint": draft.joint_names,
-    }
-    for stem, form in draft.forms.items():
-        for column, names in known.items():
-            if names and column in form.names and stem != "specimens":
-                wildcard = ("*",) if (stem, column) in FOR_ALL else ()
-                yield from _unknown(draft, stem, column, (*names, *wildcard))
-        for one in form.columns:
-            is_name = one.names or (one.name in form.keys and one.kind == "text")
-            if is_name and one.name not in known:
-                yield from _unfit(draft, stem, one.name)
-
-
-def _unfit(draft: Draft, stem: str, column: str) -> Iterator[Problem]:
-    """Names of tests, landmarks and the like that nothing can be called by."""
-    faults: dict[str, str | None] = {"*": None}
-    for line, (name,) in draft.rows(stem, column):
-        if isinstance(name, str):
-            if name not in faults:
-                faults[name] = name_fault(name)
-            fault = faults[name]
-            if fault is not None:
-                place = (draft.file(stem), line, column)
-                yield Problem(*place, fault, ALLOWED, "rename it in every file")
-
-
-def _unknown(draft: Draft, stem: str, column: str, names: tuple[str, ...]) -> Iterator[Problem]:
-    allowed = set(names)
-    source = "specimens.csv" if column == "specimen" else "vertebrae in cohort.yaml"
-    known = Spelling(names, f"correct the name or add it to {source}")
-    turned = dict(zip(joint_names(draft.vertebrae[::-1]), draft.joint_names[::-1], strict=True))
-    for line, (name,) in draft.rows(stem, column):
-        if isinstance(name, str) and name not in allowed:
-            place = (draft.file(stem), line, column)
-            remedy = known.remedy(name)
-            if column == "joint" and name in turned:
-                remedy = f"a joint is named upper vertebra first: '{turned[name]}'"
-            found = f"unknown {column} {look_alike(name) or _quoted(name)}"
-            yield Problem(*place, found, known.allowed, remedy)
-
-
-def _quoted(name: str) -> str:
-    return f"'{name}'"
 
 
 def check_steps(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:

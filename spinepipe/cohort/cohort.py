@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import pandas as pd
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 
-from spinepipe.documents.names import LONGEST_NAME
+from spinepipe.documents.names import EVERYONE, LONGEST_NAME
 
 Group = Literal["lengths", "postures", "masses", "loads", "motion", "zeroing", "errors", "persons"]
 """What can be meant though it looks wrong: ``i_mean_it`` in cohort.yaml."""
@@ -196,10 +196,6 @@ class Cohort:
         names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion", *rigs)
         tables = {name: getattr(self, name) for name in names}
         return _PartDigests(shared, {**tables, **self.further})
-
-
-EVERYONE = "*"
-"""In the table of loads: the row is for every specimen."""
 
 
 class _PartDigests:

@@ -10,7 +10,9 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.cohort.columns import TABLES, TableForm
+from spinepipe.cohort.columns import COHORT_YAML, TABLES
+from spinepipe.documents.form import TableForm
+from spinepipe.documents.rules import Listed
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,19 @@ class Draft:
     def joint_names(self) -> tuple[str, ...]:
         """Joints, caudal to cranial."""
         return joint_names(self.vertebrae)
+
+    def known(self, reference: str) -> Listed | None:
+        """Names that a column refers to, see `spinepipe.documents.rules`."""
+        if reference in ("vertebrae", "joints"):
+            chain = self.vertebrae if reference == "vertebrae" else self.joint_names
+            turned = zip(joint_names(self.vertebrae[::-1]), self.joint_names[::-1], strict=True)
+            instead = {a: f"a joint is named upper vertebra first: '{b}'" for a, b in turned}
+            return Listed(chain, f"vertebrae in {COHORT_YAML}", instead) if chain else None
+        stem, _, column = reference.partition(".")
+        if stem not in self.tables and (stem not in self.absent or stem == "specimens"):
+            return None  # a file that cannot be read, or that every cohort has
+        names = self.tables[stem][column].dropna().unique().tolist() if stem in self.tables else []
+        return Listed(names, f"{stem}.csv")
 
     def file(self, stem: str) -> str:
         """Name of a table's file in messages."""

@@ -13,20 +13,20 @@ from spinepipe.cohort.check_geometry import check_bodies, check_geometry
 from spinepipe.cohort.check_supports import check_supports
 from spinepipe.cohort.checks import (
     check_header,
-    check_keys,
     check_loads,
     check_motion,
-    check_names,
     check_steps,
     usable_vertebrae,
 )
 from spinepipe.cohort.cohort import Cohort, CohortHeader
-from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
-from spinepipe.cohort.csv_table import read_table
+from spinepipe.cohort.columns import COHORT_YAML, TABLES
 from spinepipe.cohort.draft import Draft, number_of_applied_loads
 from spinepipe.cohort.misnamed import misnamed
 from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
+from spinepipe.documents.csv_table import read_table
+from spinepipe.documents.form import TableForm
 from spinepipe.documents.inside import outside
+from spinepipe.documents.rules import Rows
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import Document, read_yaml
 from spinepipe.problems import InputError, Problem, first_of
@@ -127,6 +127,7 @@ def _outcome(folder: Path, name: str, forms: Mapping[str, TableForm]) -> _Outcom
         ),
         problems,
     )
+    problems += _broken_rules(draft, problems)
     problems += _checks(draft)
     problems += check_supports(draft, document)
     problems += check_zeroing(draft, document)
@@ -201,10 +202,17 @@ def _without(draft: Draft, *stems: str) -> Draft:
     return replace(draft, tables={s: t for s, t in draft.tables.items() if s not in stems})
 
 
+def _broken_rules(draft: Draft, problems: Sequence[Problem]) -> Iterator[Problem]:
+    """What the tables do not keep of their forms, where their cells could be read."""
+    for stem, table in draft.tables.items():
+        file = draft.file(stem)
+        refused = {(one.row, one.column) for one in problems if one.file == file}
+        rows = Rows(draft.forms[stem], file, table, refused, draft.known, draft.tables)
+        yield from first_of(rows.problems())
+
+
 def _checks(draft: Draft) -> Iterator[Problem]:
     for found in (
-        check_names(draft),
-        check_keys(draft),
         check_geometry(draft),
         check_bodies(draft),
         check_loads(draft, draft.applied),

@@ -13,15 +13,15 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort.cohort import EVERYONE, Cohort, MeasurementSd
+from spinepipe.cohort.cohort import Cohort, MeasurementSd
+from spinepipe.documents.names import EVERYONE
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, Support
 from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, COORDINATES
 
 FREE, HELD, PRESCRIBED = "free", "held", "prescribed"
 STATES = (FREE, HELD, PRESCRIBED)
-MEASURED, UNKNOWN = "measured", "unknown"
-REACTIONS = (UNKNOWN, MEASURED)
+MEASURED = "measured"
 
 
 class Fixed(NamedTuple):

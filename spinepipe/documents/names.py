@@ -16,6 +16,9 @@ LONGEST_NAME = 60
 MOST_BYTES = 200
 """Of a name in UTF-8: with what stands before it in a folder's name it stays within 255."""
 
+EVERYONE = "*"
+"""In place of a name: a row is for all of them."""
+
 SIGNS = " _-+.,:()%&*#·"
 """Signs that a name may have besides letters and digits."""
 

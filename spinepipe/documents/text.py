@@ -9,6 +9,7 @@ from spinepipe.problems import Problem
 MOST_YAML_BYTES = 1_000_000
 
 MOST_CSV_BYTES = 100_000_000
+"""Of tables and of recordings."""
 
 LONGEST_CELL = 200
 """Characters of a cell of a CSV file, a key of a YAML file, and a word of its texts."""
@@ -55,15 +56,9 @@ def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[Problem
     -------
     The text (empty when there is a problem) and the problems.
     """
-    try:
-        status = path.stat()
-        if not S_ISREG(status.st_mode):
-            return "", [_no_file(file)]
-        if status.st_size > most_bytes:
-            return "", [_too_large(file, status.st_size, most_bytes)]
-        data = path.read_bytes()
-    except OSError as error:
-        return "", [_unreadable(file, error)]
+    data, problems = read_bytes(path, file, most_bytes)
+    if problems:
+        return "", problems
     if not data.strip():
         return "", [Problem(file, None, None, "an empty file", "a file with content", "fill it")]
     try:
@@ -76,6 +71,19 @@ def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[Problem
     if hidden is not None:
         return "", [_invisible(file, text[: hidden.start()].count("\n") + 1, hidden[0])]
     return text, []
+
+
+def read_bytes(path: Path, file: str, most_bytes: int) -> tuple[bytes, list[Problem]]:
+    """What is in a file, empty when there is a problem, and the problems, as `read_text`."""
+    try:
+        status = path.stat()
+        if not S_ISREG(status.st_mode):
+            return b"", [_no_file(file)]
+        if status.st_size > most_bytes:
+            return b"", [_too_large(file, status.st_size, most_bytes)]
+        return path.read_bytes(), []
+    except OSError as error:
+        return b"", [_unreadable(file, error)]
 
 
 def _no_file(file: str) -> Problem:

@@ -93,6 +93,12 @@ _Loader.add_implicit_resolver(
 )
 
 
+def packaged_yaml(path: Path) -> dict[str, Any]:
+    """Keys and values of a file of this package, which is trusted."""
+    found: dict[str, Any] = yaml.load(path.read_text(encoding="utf-8"), Loader=_PARSER)
+    return found
+
+
 def _document(text: str, file: str) -> tuple[Document | None, list[Problem]]:
     """Keys and values of a text within bounds."""
     loader = _Loader(text)

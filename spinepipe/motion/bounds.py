@@ -7,7 +7,6 @@ raw range; how much wider a motion may be ("increased by 150 %", which is 1.5 or
 setting.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,18 +15,16 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.joint_tables import (
-    checked,
     coordinate_places,
     joint_places,
     packaged_rows,
     per_si,
+    with_status,
 )
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.problems import InputError, Problem
 from spinepipe.units import COORDINATES
 
 FILE = "bounds.csv"
-KEYS = ("joint", "coordinate")
 NUMBERS = ("low", "high")
 """mm or deg."""
 
@@ -55,37 +52,19 @@ class Bounds:
         return times * self.limits
 
 
-def bounds(own: pd.DataFrame | None = None, file: str = FILE) -> Bounds:
+def bounds(own: pd.DataFrame | None = None) -> Bounds:
     """The ranges that come along, with a cohort's own rows in place of theirs.
 
     Parameters
     ----------
-    own : columns joint, coordinate, low, high, source, indexed by line; mm, deg. None: what comes
-        along. file : its name in messages.
-
-    Raises
-    ------
-    InputError
-        With every fault of the cohort's rows.
+    own : sound rows of `bounds.csv`, mm and deg. None: what comes along.
     """
     limits = np.full((len(JOINTS), len(COORDINATES), len(NUMBERS)), np.nan)
     source, status = np.full((2, *limits.shape[:2]), "", dtype=object)
-    tables = [(packaged_rows(FILE, NUMBERS), FILE)]
-    if own is not None:
-        tables.append((own, file))
-    for table, name in tables:
-        rows = checked(table, name, KEYS, NUMBERS)
-        if problems := list(_faults(rows, name)):
-            raise InputError(problems)
+    tables = [packaged_rows(FILE, NUMBERS), *([] if own is None else [with_status(own)])]
+    for rows in tables:
         coordinate = coordinate_places(rows)
         at = joint_places(rows), coordinate
         limits[at] = rows[list(NUMBERS)].to_numpy(float) / per_si(coordinate)[:, None]
         source[at], status[at] = (rows[word].to_numpy(object) for word in ("source", "status"))
     return Bounds(limits, source, status)
-
-
-def _faults(rows: pd.DataFrame, file: str) -> Iterator[Problem]:
-    for line, low, high in zip(map(int, rows.index), rows["low"], rows["high"], strict=True):
-        if not (low <= 0.0 <= high and low < high):
-            found = f"{low:g} to {high:g}"
-            yield Problem(file, line, "low", found, "a range around zero", "correct both ends")

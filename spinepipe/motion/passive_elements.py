@@ -27,19 +27,17 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.motion.joint_tables import (
     SIDES,
-    checked,
     coordinate_places,
-    is_rotation,
     joint_places,
     packaged_rows,
     per_si,
+    with_status,
 )
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.problems import InputError, Problem
-from spinepipe.units import COORDINATES
+from spinepipe.units import COORDINATES, ROTATIONS
 
 FILE = "passive.csv"
-KEYS = ("joint", "coordinate", "side")
 NUMBERS = ("a", "b", "lower", "upper")
 """a in N or N m; b in 1/mm or 1/deg; factors of a."""
 
@@ -84,57 +82,38 @@ def passive_elements(own: pd.DataFrame | None = None, file: str = FILE) -> Passi
 
     Parameters
     ----------
-    own : columns joint, coordinate, side, a, b, lower, upper, source, indexed by line; mm, deg, N,
-        N m. None: what comes along. file : its name in messages.
+    own : sound rows of `passive.csv`, indexed by line; mm, deg, N, N m. None: what comes along.
+    file : its name in messages.
 
     Raises
     ------
     InputError
-        With every fault of the cohort's rows.
+        Of rates per radian, and of joints that have a kink at rest.
     """
     empty = np.full(SHAPE, np.nan)
     values = {name: empty.copy() for name in NUMBERS}
     words = {name: np.full(SHAPE, "", dtype=object) for name in ("source", "status")}
-    tables = [(packaged_rows(FILE, NUMBERS), FILE)]
-    if own is not None:
-        tables.append((own, file))
-    for rows, name in tables:
-        _put(checked(rows, name, KEYS, NUMBERS), name, values, words)
-    if own is not None and (problems := list(_slopes(own, values, file))):
+    for rows in [packaged_rows(FILE, NUMBERS), *([] if own is None else [with_status(own)])]:
+        coordinate = coordinate_places(rows)
+        side = np.array([SIDES.index(name) for name in rows["side"]], dtype=np.int64)
+        at = joint_places(rows), coordinate, side
+        for name in NUMBERS:
+            values[name][at] = rows[name].to_numpy(float)
+        values["b"][at] *= per_si(coordinate)
+        for name, text in words.items():
+            text[at] = rows[name].to_numpy(object)
+    if own is not None and (problems := [*_steep(own, file), *_slopes(own, values, file)]):
         raise InputError(problems)
     return PassiveElements(**values, **words)
 
 
-def _put(
-    rows: pd.DataFrame,
-    file: str,
-    values: dict[str, Array],
-    words: dict[str, NDArray[np.object_]],
-) -> None:
-    if problems := list(_value_faults(rows, file)):
-        raise InputError(problems)
-    coordinate = coordinate_places(rows)
-    side = np.array([SIDES.index(name) for name in rows["side"]], dtype=np.int64)
-    at = joint_places(rows), coordinate, side
-    for name in NUMBERS:
-        values[name][at] = rows[name].to_numpy(float)
-    values["b"][at] *= per_si(coordinate)
-    for name, text in words.items():
-        text[at] = rows[name].to_numpy(object)
-
-
-def _value_faults(rows: pd.DataFrame, file: str) -> Iterator[Problem]:
-    for line, row in zip(map(int, rows.index), rows.to_dict("records"), strict=True):
-        for name in NUMBERS:
-            if not row[name] > 0.0:
-                yield Problem(file, line, name, f"{row[name]:g}", "above 0", "correct it")
-        if not row["lower"] <= 1.0 <= row["upper"]:
-            found = f"{row['lower']:g} to {row['upper']:g}"
-            yield Problem(file, line, "lower", found, "factors around 1", "give factors of a")
-        if is_rotation(row["coordinate"]) and row["b"] > LARGEST_B_PER_DEG:
-            allowed = f"at most {LARGEST_B_PER_DEG:g} per degree"
-            remedy = "rates per radian are divided by 57.3"
-            yield Problem(file, line, "b", f"{row['b']:g}", allowed, remedy)
+def _steep(own: pd.DataFrame, file: str) -> Iterator[Problem]:
+    """Rates of rotations that are those of another unit."""
+    steep = own["coordinate"].isin(ROTATIONS) & (own["b"] > LARGEST_B_PER_DEG)
+    for line, rate in own["b"][steep].items():
+        allowed = f"at most {LARGEST_B_PER_DEG:g} per degree"
+        remedy = "rates per radian are divided by 57.3"
+        yield Problem(file, int(str(line)), "b", f"{rate:g}", allowed, remedy)
 
 
 def _slopes(own: pd.DataFrame, values: dict[str, Array], file: str) -> Iterator[Problem]:

@@ -16,17 +16,16 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.joint_tables import (
-    checked,
     coordinate_places,
     joint_places,
     packaged_rows,
+    with_status,
 )
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.problems import InputError, Problem
 from spinepipe.units import COORDINATES, ROTATIONS
 
 FILE = "ratios.csv"
-KEYS = ("set", "joint", "coordinate")
 NUMBERS = ("ratio",)
 
 SUM_DIFFERS = 2e-3
@@ -74,22 +73,18 @@ def ratio_sets(own: pd.DataFrame | None = None, file: str = FILE) -> dict[str, R
 
     Parameters
     ----------
-    own : columns set, joint, coordinate, ratio, source, indexed by line. None: what comes along.
+    own : sound rows of `ratios.csv`, indexed by line. None: what comes along.
     file : its name in messages.
 
     Raises
     ------
     InputError
-        With every fault of the cohort's rows.
+        Of shares that do not sum to 1.
     """
-    tables = [(packaged_rows(FILE, NUMBERS), FILE)]
-    if own is not None:
-        tables.append((own, file))
+    if own is not None and (problems := list(_faults(own, file))):
+        raise InputError(problems)
     found: dict[str, RatioSet] = {}
-    for table, name in tables:
-        rows = checked(table, name, KEYS, NUMBERS, ROTATIONS)
-        if problems := list(_faults(rows, name)):
-            raise InputError(problems)
+    for rows in [packaged_rows(FILE, NUMBERS), *([] if own is None else [with_status(own)])]:
         found |= {str(key): _set(str(key), part) for key, part in rows.groupby("set", sort=False)}
     return found
 
@@ -103,9 +98,7 @@ def _set(name: str, rows: pd.DataFrame) -> RatioSet:
 
 
 def _faults(rows: pd.DataFrame, file: str) -> Iterator[Problem]:
-    for line, ratio in zip(map(int, rows.index), rows["ratio"], strict=True):
-        if ratio < 0.0:
-            yield Problem(file, line, "ratio", f"{ratio:g}", "at least 0", "correct it")
+    """Shares of a rotation that are not all of it."""
     for (name, coordinate), part in rows.groupby(["set", "coordinate"], sort=False):
         total = float(part["ratio"].sum())
         if abs(total - 1.0) > SUM_DIFFERS:

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.documents.text import MOST_CSV_BYTES
 from spinepipe.effects.contract import Array
 from spinepipe.motion.reading_c3d import read_c3d
 from spinepipe.motion.reading_csv import read_csv
 from spinepipe.motion.reading_trc import read_trc
-from spinepipe.motion.recorded import MOST_BYTES, Recorded
+from spinepipe.motion.recorded import Recorded
 from spinepipe.problems import InputError, Problem
 
 DEFAULT_AXES = "x y z"
@@ -99,8 +100,8 @@ def read_motion(
         found = "no such file" if reader else f"a file '{path.suffix}'"
         allowed = f"a file of motion: {', '.join(READERS)}"
         raise InputError([Problem(name, None, None, found, allowed, "correct the name")])
-    if (size := path.stat().st_size) > MOST_BYTES:
-        found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_BYTES / 1e6:g} MB"
+    if (size := path.stat().st_size) > MOST_CSV_BYTES:
+        found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_CSV_BYTES / 1e6:g} MB"
         raise InputError([Problem(name, None, None, found, allowed, "crop it")])
     raw = reader(path, name)
     kept = _kept(raw.time_s, start_s, end_s)

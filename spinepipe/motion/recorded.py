@@ -49,8 +49,6 @@ def recorded(
     return Recorded(names, time_s, np.where(seen[..., None], raw, 0.0), seen, repaired)
 
 
-MOST_BYTES = 100_000_000
-
 MOST_CELLS = 10_000_000
 """Of a recording: six minutes of 80 markers at 100 frames a second."""
 

@@ -12,30 +12,31 @@ persons counts, so a quantity may have any unit. Forms, with u = intercept + sex
 named level. Each quantity needs a row for all muscles and levels.
 """
 
-import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from importlib.resources import files
 from math import exp, isfinite
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
+from spinepipe.documents.csv_table import read_table
+from spinepipe.documents.form import read_forms
+from spinepipe.documents.rules import Listed, Rows
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import SLICES
-from spinepipe.problems import InputError, Problem, Spelling, one_of
+from spinepipe.problems import InputError, Problem
 
 Quantity = Literal["ap_distance", "ml_distance", "pcsa", "rib_cage_area"]
 Form = Literal["linear", "exponential", "power"]
 
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-FORMS: tuple[Form, ...] = get_args(Form)
 REGRESSION_LEVELS = (*SLICES, "S1")
 """Vertebrae that a row may name."""
 
+(_FORM,) = read_forms(Path(__file__).with_name("forms.yaml")).values()
+
 ALL = "*"
 COEFFICIENTS = ("intercept", "sex", "age", "height", "weight")
-COLUMNS = ("muscle", "level", "quantity", "form", *COEFFICIENTS, "source")
 
 PACKAGED: Mapping[str, str] = {
     "ct_trends": "regressions.csv",
@@ -127,114 +128,44 @@ class Regressions:
 @cache
 def packaged(name: str = "ct_trends") -> Regressions:
     """A table that comes along, by its name in `PACKAGED`."""
-    text = files("spinepipe.muscles").joinpath(PACKAGED[name]).read_text(encoding="utf-8")
-    return _parsed(text, name)
+    return read_regressions(Path(__file__).with_name(PACKAGED[name]), name)
 
 
-def read_regressions(path: str | Path, file: str | None = None) -> Regressions:
+def read_regressions(path: Path, file: str) -> Regressions:
     """A user's table.
 
     Parameters
     ----------
-    path : CSV file. file : its name in messages; None: the path.
+    path : CSV file. file : its name in messages.
 
     Raises
     ------
     InputError
         With every fault of the table.
     """
-    named = str(path) if file is None else file
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        fault = Problem(named, None, None, str(error), "a CSV file in UTF-8", "check the file")
-        raise InputError([fault]) from error
-    return _parsed(text, named)
-
-
-def _parsed(text: str, file: str) -> Regressions:
-    lines = csv.DictReader(text.splitlines(), restkey="more", restval="")
-    missing = [name for name in COLUMNS if name not in (lines.fieldnames or ())]
-    if missing:
-        raise InputError(
-            Problem(file, 1, name, "no such column", one_of(COLUMNS), "add the column")
-            for name in missing
-        )
-    rows: list[Regression] = []
-    problems: list[Problem] = []
-    words = {column: Spelling(known, "name one of these") for column, known in _WORDS.items()}
-    for line, cells in enumerate(lines, start=2):
-        faults = list(_cell_problems(file, line, cells, words))
-        problems += faults
-        if not faults:
-            rows.append(_row(cells))
-    problems += _table_problems(file, rows) if not problems else []
+    table, problems = read_table(path, _FORM, file)
+    if table is None:
+        raise InputError(problems)
+    refused = {(one.row, one.column) for one in problems}
+    lists = {"quantities": Listed(QUANTITIES, file)}
+    problems += Rows(_FORM, file, table, refused, lists.get, {}).problems()
+    thorax = table[table["quantity"] == "rib_cage_area"]
+    for line, muscle, level in zip(thorax.index, thorax["muscle"], thorax["level"], strict=True):
+        if (muscle, level) != (ALL, ALL):
+            place, found = (file, int(line), "muscle"), f"{muscle}, {level}"
+            problems.append(Problem(*place, found, "*, * for rib_cage_area", "it has one row"))
     if problems:
         raise InputError(problems)
-    return Regressions(file, tuple(rows))
+    return Regressions(file, tuple(_row(cells) for cells in table.to_dict("records")))
 
 
-def _row(cells: Mapping[str, str]) -> Regression:
+def _row(cells: Mapping[Hashable, Any]) -> Regression:
     intercept, sex, age, height, weight = (float(cells[name]) for name in COEFFICIENTS)
     return Regression(
         cells["muscle"],
         cells["level"],
-        next(name for name in QUANTITIES if name == cells["quantity"]),
-        next(name for name in FORMS if name == cells["form"]),
+        cells["quantity"],
+        cells["form"],
         (intercept, sex, age, height, weight),
         cells["source"],
     )
-
-
-_WORDS: Mapping[str, Sequence[str]] = {
-    "level": (ALL, *REGRESSION_LEVELS),
-    "quantity": QUANTITIES,
-    "form": FORMS,
-}
-"""What the columns of words may say."""
-
-
-def _cell_problems(
-    file: str, line: int, cells: Mapping[str, str], words: Mapping[str, Spelling]
-) -> Iterator[Problem]:
-    for column, of in words.items():
-        if cells[column] not in of.known:
-            remedy = of.remedy(cells[column])
-            yield Problem(file, line, column, repr(cells[column]), of.allowed, remedy)
-    for column in COEFFICIENTS:
-        if not _is_number(cells[column]):
-            yield Problem(
-                file, line, column, repr(cells[column]), "a finite number", "0 if it has no effect"
-            )
-    for column in ("muscle", "source"):
-        if not cells[column].strip():
-            yield Problem(file, line, column, "nothing", "text", f"fill in the {column}")
-    if cells["quantity"] == "rib_cage_area" and (cells["muscle"], cells["level"]) != (ALL, ALL):
-        found = f"{cells['muscle']}, {cells['level']}"
-        yield Problem(file, line, "muscle", found, "*, * for rib_cage_area", "it has one row")
-
-
-def _table_problems(file: str, rows: list[Regression]) -> Iterator[Problem]:
-    places = [(row.quantity, row.muscle, row.level) for row in rows]
-    for at, place in enumerate(places):
-        if place in places[:at]:
-            yield Problem(
-                file, None, "quantity", " ".join(place), "each once", "remove one of the rows"
-            )
-    for quantity in QUANTITIES:
-        if (quantity, ALL, ALL) not in places:
-            yield Problem(
-                file,
-                None,
-                "quantity",
-                f"no row for {quantity} of all muscles at all levels",
-                "one row with * and *",
-                "add it; it holds wherever no other row does",
-            )
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return isfinite(float(cell))
-    except ValueError:
-        return False

@@ -21,8 +21,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from spinepipe.cohort import columns as cohort_columns
 from spinepipe.cohort.cohort import CohortHeader
+from spinepipe.cohort.columns import TABLES
+from spinepipe.documents.form import TableForm
 from spinepipe.effects import Effect, Parameter, Trial, create, registered
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, Problem, did_you_mean, one_of
@@ -96,9 +97,7 @@ def generators() -> dict[str, Callable[[], str]]:
     kinds = every_kind()
     parts |= {
         f"cohort {name}": partial(cohort_table, form)
-        for name, form in (
-            cohort_columns.TABLES | {form.stem: form for form in every_form()}
-        ).items()
+        for name, form in (TABLES | {form.stem: form for form in every_form()}).items()
     }
     parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
     parts["keys config.yaml"] = partial(key_table, Selection)
@@ -114,15 +113,15 @@ def licence_table() -> str:
     return table(("package", "version", "licence", "remark"), rows)
 
 
-def cohort_table(form: cohort_columns.TableForm) -> str:
+def cohort_table(form: TableForm) -> str:
     """Columns of a CSV file of a cohort."""
     rows = [
         (
-            f"**{code(c.name)}**" if c.required else code(c.name),
-            c.kind,
-            c.range_text,
+            code(c.name) if c.nullable else f"**{code(c.name)}**",
+            c.type,
+            ", ".join(map(code, c.allowed)) or c.range_text,
             c.meaning,
-            "not allowed" if c.required else "allowed",
+            "allowed" if c.nullable else "not allowed",
         )
         for c in form.columns
     ]

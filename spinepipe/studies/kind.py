@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.columns import TableForm
+from spinepipe.documents.form import TableForm
 from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem
 from spinepipe.schema import Table

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.columns import TableForm
+from spinepipe.documents.form import TableForm
 from spinepipe.documents.names import COHORT_NAME
 from spinepipe.documents.settings import validate
 from spinepipe.documents.strays import files_in, folders_in, strays_in

@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.columns import TableForm
+from spinepipe.documents.form import TableForm
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import StudyFiles

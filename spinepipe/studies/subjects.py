@@ -1,15 +1,14 @@
 """Who takes part: `subjects.csv`, for every kind that asks for sex, age, height and mass."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.columns import Column, TableForm
+from spinepipe.documents.form import read_forms
 from spinepipe.muscles.subject import CM_PER_M, Subject
-from spinepipe.problems import Problem, Spelling
-
-SEXES = ("male", "female")
+from spinepipe.problems import Problem
 
 HEIGHT_CM = (120.0, 220.0)
 MASS_KG = (30.0, 300.0)
@@ -22,19 +21,7 @@ M_PER_INCH, M_PER_FOOT = 0.0254, 0.3048
 
 STANDARD_GRAVITY = 9.80665
 
-SUBJECTS = TableForm(
-    "subjects",
-    "specimen",
-    (
-        Column("specimen", "person, as listed in specimens.csv", "text", required=True),
-        Column("sex", "male or female", "text", required=True),
-        Column("age_years", "age", required=True, low=0, high=130),
-        Column("height_cm", "standing height", required=True, low=0, open_low=True),
-        Column("mass_kg", "body mass", required=True, low=0, open_low=True),
-    ),
-    keys=("specimen",),
-    places=True,
-)
+(SUBJECTS,) = read_forms(Path(__file__).with_name("forms.yaml")).values()
 
 
 def subject_of(cohort: Cohort, specimen: str) -> Subject:
@@ -46,20 +33,9 @@ def subject_of(cohort: Cohort, specimen: str) -> Subject:
 
 
 def subject_problems(cohort: Cohort, rows: pd.DataFrame) -> Iterator[Problem]:
-    """One row for each specimen (the reader sees to it that it is one), and bodies that exist."""
-    file = f"{cohort.name}/{SUBJECTS.file}"
-    known = set(rows["specimen"])
-    for name in cohort.specimen_names:
-        if name not in known:
-            found = f"no row of '{name}'"
-            remedy = "add sex, age, height and mass, or delete it from specimens.csv"
-            yield Problem(file, None, "specimen", found, "every specimen of specimens.csv", remedy)
-    sexes = Spelling(SEXES, "write male or female")
+    """Bodies that nobody has."""
     for line, row in rows.iterrows():
-        place = (file, int(str(line)))
-        if row["sex"] not in SEXES:
-            remedy = sexes.remedy(str(row["sex"]).lower())
-            yield Problem(*place, "sex", f"'{row['sex']}'", sexes.allowed, remedy)
+        place = (f"{cohort.name}/{SUBJECTS.file}", int(str(line)))
         yield from _size(place, str(row["specimen"]), row["height_cm"], row["mass_kg"])
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import medfilt
 
-from spinepipe.documents.text import NUMBER
+from spinepipe.documents.text import MOST_CSV_BYTES, NUMBER, read_bytes
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
@@ -82,8 +82,11 @@ def read_recording(
     if not path.is_file():
         allowed = "a file, told relative to the YAML"
         return None, [Problem(file, None, None, "no such file", allowed, "correct the path")]
+    data, problems = read_bytes(path, file, MOST_CSV_BYTES)
+    if problems:
+        return None, problems
     try:
-        text = path.read_text(encoding=_codec(mapping.form))
+        text = data.decode(_codec(mapping.form))
     except UnicodeError:
         remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
         found = f"letters that are not {mapping.form.encoding}"

@@ -7,7 +7,6 @@ import pytest
 from spinepipe.motion.bounds import FILE, NUMBERS, bounds
 from spinepipe.motion.joint_tables import packaged_rows
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.problems import InputError
 from spinepipe.units import COORDINATES, DEG_PER_RAD, ROTATIONS
 
 WHITE_PANJABI_DEG = {
@@ -92,14 +91,6 @@ def test_a_range_may_end_at_zero(low: float, high: float) -> None:
     )
 
 
-def test_faults_are_told_at_their_place() -> None:
-    with pytest.raises(InputError) as caught:
-        bounds(own(low=2.0), "mine.csv")
-    (problem,) = caught.value.problems
-    assert (problem.file, problem.row, problem.column) == ("mine.csv", 2, "low")
-    assert problem.found == "2 to 8"
-
-
 def test_a_row_keeps_the_status_that_it_tells() -> None:
     at = JOINTS.index("L4L5"), COORDINATES.index("extension")
     assert bounds(own(status="derived")).status[at] == "derived"
@@ -124,18 +115,3 @@ def test_a_cohort_s_own_rows_take_the_place_of_those_that_come_along() -> None:
     assert (found.source[at], found.status[at]) == ("film", "given")
     moved = (found.limits != shipped.limits).any(axis=-1)
     assert moved.sum() == 1
-
-
-@pytest.mark.parametrize(
-    ("changed", "told"),
-    [
-        ({"low": 2.0}, "around zero"),
-        ({"low": 0.0, "high": 0.0}, "around zero"),
-        ({"high": float("inf")}, "finite"),
-        ({"joint": "S1L5"}, "L5S1"),
-        ({"source": None}, "where it comes from"),
-    ],
-)
-def test_faults_of_a_cohort_s_rows_are_told(changed: dict[str, object], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        bounds(own(**changed))

@@ -37,9 +37,9 @@ def problem_of(path: Path, **asked: object) -> Problem:
 def test_a_file_is_read_up_to_its_most_bytes(tmp_path: Path, monkeypatch) -> None:
     path = frames(tmp_path)
     size = path.stat().st_size
-    monkeypatch.setattr(reading, "MOST_BYTES", size)
+    monkeypatch.setattr(reading, "MOST_CSV_BYTES", size)
     assert len(read_motion(path).time_s) == 5
-    monkeypatch.setattr(reading, "MOST_BYTES", size - 1)
+    monkeypatch.setattr(reading, "MOST_CSV_BYTES", size - 1)
     assert problem_of(path).remedy == "crop it"
 
 

@@ -42,7 +42,7 @@ STILL = "".join(
 def table(tmp_path: Path, *rows: str, base: str = STILL) -> Regressions:
     path = tmp_path / "regressions.csv"
     path.write_text(HEADER + base + "".join(f"{row},made up\n" for row in rows))
-    return read_regressions(path)
+    return read_regressions(path, path.name)
 
 
 def arrays(trunk: Trunk) -> dict[str, np.ndarray]:
@@ -276,7 +276,7 @@ def test_the_row_that_names_most_applies_and_a_muscle_before_a_level(tmp_path: P
         ("*,L3,pcsa,linear,one,0,0,0,0", "'one'"),
         ("*,L3,pcsa,linear,nan,0,0,0,0", "finite"),
         ("*,L3,rib_cage_area,linear,1,0,0,0,0", "rib_cage_area"),
-        ("*,*,pcsa,linear,1,0,0,0,0", "each once"),
+        ("*,*,pcsa,linear,1,0,0,0,0", "the other is line 4"),
         (",*,pcsa,linear,1,0,0,0,0", "muscle"),
     ],
 )
@@ -293,9 +293,9 @@ def test_a_table_without_a_quantity_or_a_column_is_told(tmp_path: Path) -> None:
     path = tmp_path / "short.csv"
     path.write_text("muscle,level,quantity\n*,*,pcsa\n")
     with pytest.raises(InputError, match="intercept"):
-        read_regressions(path)
+        read_regressions(path, path.name)
     with pytest.raises(InputError, match=r"absent\.csv"):
-        read_regressions(tmp_path / "absent.csv")
+        read_regressions(tmp_path / "absent.csv", "absent.csv")
 
 
 def test_a_person_beyond_a_linear_regression_is_told(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from sweeps import sweep
 
 from spinepipe import cohort, problems
-from spinepipe.cohort import csv_table
+from spinepipe.documents import csv_table
 from spinepipe.documents.names import folder_fault, name_fault
 from spinepipe.documents.text import (
     LONGEST_CELL,

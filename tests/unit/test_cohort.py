@@ -11,8 +11,9 @@ import pytest
 from cohort_cases import NAME, Change, add, cell, joints, line, motion, swap, text, without, write
 
 from spinepipe import cohort
-from spinepipe.cohort.columns import TABLES, Column, TableForm
+from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.specimen import load_cases
+from spinepipe.documents.form import Column, TableForm
 
 LOADS_BY_CYCLE = """\
 specimen,test,cycle,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm
@@ -169,12 +170,12 @@ def test_digest_follows_the_bytes_that_count(tmp_path: Path) -> None:
     assert plain.digest != other.digest
 
 
-FOR_ALL = TableForm("tasks", "task", (Column("task", "task", "text", required=True),), ("task",))
+TASK = Column("task", "task", "text", key=True, nullable=False)
+FOR_ALL = TableForm("tasks", "task", (TASK,))
 OF_EACH = TableForm(
     "films",
     "specimen",
-    (Column("specimen", "specimen", "text", required=True), Column("film", "film", "text")),
-    ("specimen",),
+    (Column("specimen", "specimen", "text", key=True), Column("film", "film", "text")),
 )
 
 

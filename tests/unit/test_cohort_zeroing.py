@@ -75,7 +75,7 @@ def test_readings_stay_where_all_tests_are_alike(tmp_path: Path, value: str, ali
 
 def test_each_cycle_counts_from_its_own_start() -> None:
     rows = {"specimen": "a", "test": "x", "joint": "L3L4", "step": [0, 1, 0, 1]}
-    blank = dict.fromkeys(cohorts.columns.MOTION.names[5:], np.nan)
+    blank = dict.fromkeys(cohorts.columns.TABLES["motion"].names[5:], np.nan)
     motion = pd.DataFrame(rows | blank | {"cycle": [1, 1, 2, 2], "extension_deg": [1.0, 3, 2, 7]})
     found, together = zeroed_alike(motion, ["another"])
     assert found is not None

@@ -8,8 +8,8 @@ from pathlib import Path
 from installed import need_male
 from sweeps import sweep
 
-from spinepipe.cohort.csv_table import read_table
-from spinepipe.studies.trunk_loads.geometry_forms import (
+from spinepipe.documents.csv_table import read_table
+from spinepipe.studies.trunk_loads.forms import (
     GEOMETRY_FORMS,
     MUSCLE_PARAMETERS,
     MUSCLES,

@@ -11,7 +11,7 @@ import pandas as pd
 from spinepipe.cohort.answers import of_specimens
 from spinepipe.cohort.cohort import Cohort, Group
 from spinepipe.cohort.columns import COHORT_YAML
-from spinepipe.cohort.csv_table import read_rows
+from spinepipe.documents.csv_table import read_rows
 from spinepipe.plausibility.score import has_range, table, usual
 from spinepipe.plausibility.warnings.levels import PACKAGE
 from spinepipe.problems import Problem

@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import BaseModel, Field
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.columns import LARGEST_FOLLOWER_N
+from spinepipe.cohort.columns import TABLES
 from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem
 from spinepipe.studies.parts import (
@@ -61,7 +61,7 @@ class VirtualTests(BaseModel):
     follower_n: float = Field(
         default=0.0,
         ge=0,
-        le=LARGEST_FOLLOWER_N,
+        le=TABLES["loads"].column("follower_n").high,
         description="tension of a follower load through the joints' centres in all steps, N; "
         "motion is told from step 0, where it acts already",
     )

@@ -74,11 +74,6 @@ class _Place:
 def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Problem]:
     file = f"{cohort.name}/films.csv"
     known = list(dict.fromkeys(rows["position"]))
-    for needed in NEEDED:
-        if needed not in known:
-            found = f"no film of {patient} in position {needed}"
-            allowed = f"films {', '.join(NEEDED)} of every patient"
-            yield Problem(file, None, "position", found, allowed, "add its rows")
     shapes: dict[str, Film] = {}
     for position in known:
         film, place = rows[rows["position"] == position], _Place(file, patient, position)
@@ -131,11 +126,6 @@ def _film(cohort: Cohort, place: _Place, rows: pd.DataFrame) -> Iterator[Problem
             continue
         whole = reading[list(CORNERS)].notna().all(axis=1)
         centre = reading[list(CENTRE)].notna().all(axis=1)
-        for row in reading.index[~(whole | centre)].tolist():
-            vertebra = str(reading.loc[row, "vertebra"])
-            found = f"{vertebra} has neither its centre and tilt nor four corners"
-            allowed = "y_mm, z_mm and orientation_deg, or the eight numbers of the corners"
-            yield place.problem(int(row), None, found, allowed, "fill the cells")
         if centre.all() and not whole.all():
             yield from _lowest(cohort, place, reading)
 

@@ -8,13 +8,14 @@ its own lowest vertebra, which then lies at nought and stands upright.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.columns import Column, TableForm
 from spinepipe.cohort.kept import kept_with_cohort
+from spinepipe.documents.form import read_forms
 from spinepipe.effects.contract import Array
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -31,49 +32,7 @@ CORNERS = tuple(
 )
 
 
-_SPECIMEN = Column("specimen", "patient", "text", required=True)
-_FARTHEST_MM = 2000.0
-
-FILMS = TableForm(
-    "films",
-    "patient x position x vertebra x observer x repeat",
-    (
-        _SPECIMEN,
-        Column("position", "erect, right_bending, left_bending or another one", "text", True),
-        Column("vertebra", "vertebra, as listed in cohort.yaml", "text", required=True),
-        Column("observer", "who read the film", "text"),
-        Column("repeat", "which of the observer's readings", "integer", low=1, high=1000),
-        Column("y_mm", "centre of the body, to the left", low=-_FARTHEST_MM, high=_FARTHEST_MM),
-        Column(
-            "z_mm", "centre of the body, along the lowest", low=-_FARTHEST_MM, high=_FARTHEST_MM
-        ),
-        Column("orientation_deg", "tilt of the body, to the left", low=-90.0, high=90.0),
-        *(
-            Column(
-                name,
-                f"{' '.join(name.split('_')[:2])} corner, {'left' if 'y_mm' in name else 'up'}",
-                low=-_FARTHEST_MM,
-                high=_FARTHEST_MM,
-            )
-            for name in CORNERS
-        ),
-    ),
-    keys=("specimen", "position", "vertebra", "observer", "repeat"),
-    places=True,
-)
-
-PATIENTS = TableForm(
-    "patients",
-    "patient",
-    (
-        _SPECIMEN,
-        Column("sex", "sex", "text"),
-        Column("age_years", "age", low=0, high=130),
-        Column("lenke_class", "Lenke class, as in 1A", "text"),
-        Column("cobb_deg", "Cobb angle of the main curve on the erect film", low=0, high=180),
-    ),
-    keys=("specimen",),
-)
+FILMS, PATIENTS = read_forms(Path(__file__).with_name("forms.yaml")).values()
 
 
 @dataclass(frozen=True)

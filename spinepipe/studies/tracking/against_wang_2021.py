@@ -12,7 +12,6 @@ from spinepipe.motion.joint_tables import SIDES
 from spinepipe.motion.passive_elements import passive_elements
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.studies.tracking.forms import PASSIVE
-from spinepipe.studies.tracking.persons import own_rows
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import AGAINST_WANG_2021
 from spinepipe.tables import read_frames
@@ -28,7 +27,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 
 def facts(cohort: Cohort) -> dict[str, pd.DataFrame]:
     """Rows of the cohort's folder, and as `generic` the elements that calibrations begin with."""
-    elements = passive_elements(own_rows(cohort, PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}")
+    elements = passive_elements(cohort.further.get(PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}")
     rows = [
         (
             *(JOINTS[place[0]], COORDINATES[place[1]], SIDES[place[2]]),

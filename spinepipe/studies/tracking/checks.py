@@ -3,34 +3,26 @@
 Tables are checked whenever the study is read; files of motion, which take longer, when it starts.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.yaml_text import Document
-from spinepipe.motion.bounds import bounds
-from spinepipe.motion.joint_tables import STATUSES
 from spinepipe.motion.passive_elements import passive_elements
 from spinepipe.motion.skeleton import BODIES
-from spinepipe.problems import InputError, Problem, Spelling, one_of
+from spinepipe.problems import InputError, Problem, one_of
 from spinepipe.studies.places import at, unknown_names
-from spinepipe.studies.subjects import MASS_KG, SEXES, SUBJECTS, subject_of, subject_problems
+from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
 from spinepipe.studies.tracking.checks_of_trials import (
     recording_problems,
     row_problems,
-    set_problems,
 )
-from spinepipe.studies.tracking.forms import BOUNDS, MARKER_SET, PASSIVE, RATIOS, TRIALS
-from spinepipe.studies.tracking.forms import TRUTH_CENTRES as TRUTH
+from spinepipe.studies.tracking.forms import MARKER_SET, PASSIVE, RATIOS, TRIALS
 from spinepipe.studies.tracking.persons import (
-    of_specimen,
-    own_rows,
     ratio_sets,
     skeleton_in,
-    trial_rows,
 )
 from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Tracking
-from spinepipe.units import ROTATIONS
 
 NEEDED = (SUBJECTS, TRIALS, MARKER_SET)
 
@@ -42,14 +34,13 @@ are hung on T1, would add 0.16 to 0.17."""
 def check_tracking(document: Document, study: Tracking, cohort: Cohort) -> Iterator[Problem]:
     """Everything that is wrong with the tables of a cohort."""
     yield from _tables(document, cohort)
-    yield from _approaches(document, study, cohort)
-    yield from _own_tables(cohort)
+    if cohort.vertebrae == BODIES:  # rows of joints are those of the whole trunk
+        yield from _approaches(document, study, cohort)
+        yield from _own_laws(cohort)
     names = cohort.specimen_names
     yield from unknown_names(
         document, "profiles.specimens", "specimen", study.profiles.specimens, names
     )
-    if TRIALS.stem in cohort.further:
-        yield from _truth(cohort)
     yield from _recorded(cohort)
     if not list(_tables(document, cohort)):
         yield from _bodies(cohort)
@@ -62,8 +53,6 @@ def _recorded(cohort: Cohort) -> Iterator[Problem]:
         yield from subject_problems(cohort, further[SUBJECTS.stem])
     if TRIALS.stem in further:
         yield from row_problems(cohort)
-    if MARKER_SET.stem in further:
-        yield from set_problems(cohort)
 
 
 def check_recordings(
@@ -115,47 +104,12 @@ def _approaches(document: Document, study: Tracking, cohort: Cohort) -> Iterator
                 yield Problem(*place, found, one_of(kinds), "leave it out, or add such trials")
 
 
-def _own_tables(cohort: Cohort) -> Iterator[Problem]:
-    """Faults of the passive elements and ranges of motion that the cohort brings."""
-    readers: dict[str, Callable[..., object]] = {
-        PASSIVE.file: passive_elements,
-        BOUNDS.file: bounds,
-    }
-    for file, read in readers.items():
-        rows = own_rows(cohort, file.removesuffix(".csv"))
-        try:
-            read(rows, f"{cohort.name}/{file}")
-        except InputError as error:
-            yield from error.problems
-    for form in (PASSIVE, RATIOS, BOUNDS):
-        table = cohort.further.get(form.stem)
-        told = () if table is None else table["status"].dropna().items()
-        statuses = Spelling(STATUSES, "or leave it empty")
-        for line, word in told:
-            if word not in STATUSES:
-                place = (f"{cohort.name}/{form.file}", int(str(line)), "status")
-                remedy = statuses.remedy(str(word))
-                yield Problem(*place, f"'{word}'", statuses.allowed, remedy)
-
-
-def _truth(cohort: Cohort) -> Iterator[Problem]:
-    """True places of trials that are none, or turned about some axes only."""
-    rows = cohort.further.get(TRUTH.stem)
-    if rows is None:
-        return
-    file = f"{cohort.name}/{TRUTH.file}"
-    for specimen in cohort.specimen_names:
-        own = of_specimen(rows, specimen)
-        known = [row["trial"] for row in trial_rows(cohort, specimen)]
-        strange = own[~own["trial"].isin(known)].drop_duplicates("trial")
-        trials = Spelling(known, "correct the name")
-        for line, name in strange["trial"].items():
-            found, remedy = f"no trial '{name}' of '{specimen}'", trials.remedy(str(name))
-            yield Problem(file, int(str(line)), "trial", found, trials.allowed, remedy)
-    told = rows[[f"{axis}_deg" for axis in ROTATIONS]].notna().sum(axis=1)
-    for line in rows.index[(told > 0) & (told < len(ROTATIONS))]:
-        found = f"{told[line]} of 3 rotations"
-        yield Problem(file, int(line), None, found, "all three or none", "complete the row")
+def _own_laws(cohort: Cohort) -> Iterator[Problem]:
+    """Faults of the passive elements that the cohort brings."""
+    try:
+        passive_elements(cohort.further.get(PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}")
+    except InputError as error:
+        yield from error.problems
 
 
 def _bodies(cohort: Cohort) -> Iterator[Problem]:
@@ -164,7 +118,7 @@ def _bodies(cohort: Cohort) -> Iterator[Problem]:
     known = set(cohort.further[SUBJECTS.stem]["specimen"])
     for specimen in [name for name in cohort.specimen_names if name in known]:
         subject = subject_of(cohort, specimen)
-        if subject.sex not in SEXES or not MASS_KG[0] <= subject.mass_kg <= MASS_KG[1]:
+        if not MASS_KG[0] <= subject.mass_kg <= MASS_KG[1]:
             continue  # told in subjects.csv
         allowed = (
             f"{SLICES_SHARE[0]:.0%} to {SLICES_SHARE[1]:.0%} of {subject.mass_kg:g} kg: "

@@ -1,6 +1,6 @@
-"""Are the trials of a cohort sound: words and times of their rows, and the files they name?"""
+"""Are the trials of a cohort sound: the files they name, and what these hold?"""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,20 +9,18 @@ from numpy.typing import NDArray
 from spinepipe.cohort import Cohort
 from spinepipe.documents.inside import outside
 from spinepipe.effects.contract import Array
-from spinepipe.motion.hanging import ARMS
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
 from spinepipe.motion.recorded import Recorded
 from spinepipe.motion.skeleton import BODIES, MarkerSet
-from spinepipe.problems import InputError, Problem, Spelling, one_of
+from spinepipe.problems import InputError, Problem, Spelling
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.checks_of_motion import motion_problems
-from spinepipe.studies.tracking.forms import FLAGS, KINDS, MARKER_SET, STANCE, TRIALS
+from spinepipe.studies.tracking.forms import MARKER_SET, STANCE, TRIALS
 from spinepipe.studies.tracking.look import Look
 from spinepipe.studies.tracking.persons import (
     Row,
     marker_set,
-    of_specimen,
     recording,
     skeleton_in,
     static_trial,
@@ -31,33 +29,25 @@ from spinepipe.studies.tracking.persons import (
 )
 from spinepipe.units import COORDINATES
 
-WORDS: Mapping[str, Sequence[str]] = {"kind": KINDS, "arms": ARMS, "static": FLAGS}
-"""What the columns of words may say."""
-
 LISTED = 4
 """So many names are written out."""
 
 
 def row_problems(cohort: Cohort) -> Iterator[Problem]:
-    """Words, times and names in `trials.csv`, and trials that somebody lacks."""
+    """Files and axes in `trials.csv`, and persons without a trial that tells their size."""
     file = f"{cohort.name}/{TRIALS.file}"
-    words = {name: Spelling(known, "write one of these") for name, known in WORDS.items()}
     for specimen in cohort.specimen_names:
-        rows = trial_rows(cohort, specimen)
-        for row in rows:
-            yield from _words(file, row, words)
+        for row in trial_rows(cohort, specimen):
+            yield from _motion(file, row)
             yield from _led_out(file, row, cohort.folder)
-            yield from _crop(file, row)
-        yield from _needed(file, cohort, specimen, rows)
+        if static_trial(cohort, specimen) is None:
+            found = f"no static trial of '{specimen}'"
+            allowed = f"a trial of kind {STANCE}, or one marked static"
+            remedy = "add it: without it nobody's size is known"
+            yield Problem(file, None, "kind", found, allowed, remedy)
 
 
-def _words(file: str, row: Row, words: Mapping[str, Spelling]) -> Iterator[Problem]:
-    for column, spelling in words.items():
-        is_left_out = column == "static" and not isinstance(row[column], str)
-        if row[column] not in spelling.known and not is_left_out:
-            found = f"'{row[column]}' of trial {row['trial']}"
-            remedy = spelling.remedy(str(row[column]))
-            yield Problem(file, row["line"], column, found, spelling.allowed, remedy)
+def _motion(file: str, row: Row) -> Iterator[Problem]:
     if Path(row["file"]).suffix.lower() not in READERS:
         found, allowed = f"'{row['file']}'", f"a file of motion: {', '.join(READERS)}"
         yield Problem(file, row["line"], "file", found, allowed, "export it as one of these")
@@ -75,40 +65,6 @@ def _led_out(file: str, row: Row, folder: Path) -> Iterator[Problem]:
     led_out = outside(folder / name, folder, (file, row["line"], "file"), name)
     if led_out is not None:
         yield led_out
-
-
-def _crop(file: str, row: Row) -> Iterator[Problem]:
-    if row["start_s"] >= row["end_s"]:
-        found = f"{row['start_s']:g} s, and end_s {row['end_s']:g} s"
-        yield Problem(file, row["line"], "start_s", found, "a start before the end", "correct it")
-
-
-def _needed(file: str, cohort: Cohort, specimen: str, rows: Sequence[Row]) -> Iterator[Problem]:
-    if static_trial(cohort, specimen) is None:
-        found = f"no static trial of '{specimen}'"
-        allowed = f"a trial of kind {STANCE}, or one marked static"
-        remedy = "add it: without it nobody's size is known"
-        yield Problem(file, None, "kind", found, allowed, remedy)
-    marked = [row for row in rows if row["static"] == "yes"]
-    for row in marked[1:]:
-        found, allowed = f"a second static trial of '{specimen}'", "one for each person"
-        yield Problem(file, row["line"], "static", found, allowed, "leave one of them")
-    if rows and all(row["kind"] == STANCE for row in rows):
-        found = f"no motion of '{specimen}'"
-        allowed = one_of(kind for kind in KINDS if kind != STANCE)
-        yield Problem(file, None, "kind", found, allowed, "add a trial that moves")
-
-
-def set_problems(cohort: Cohort) -> Iterator[Problem]:
-    """Persons whose markers cannot tell where the pelvis is."""
-    file = f"{cohort.name}/{MARKER_SET.file}"
-    for specimen in cohort.specimen_names:
-        rows = of_specimen(cohort.further["marker_set"], specimen)
-        count = int((rows["vertebra"] == BODIES[0]).sum())
-        if count < 3:
-            found = f"{count} markers of '{specimen}' on {BODIES[0]}"
-            remedy = "add the markers of the pelvis: it moves freely, and all else moves with it"
-            yield Problem(file, None, "vertebra", found, "at least 3", remedy)
 
 
 def recording_problems(cohort: Cohort) -> Iterator[Problem]:

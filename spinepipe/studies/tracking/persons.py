@@ -24,7 +24,6 @@ from spinepipe.motion import passive_elements as laws
 from spinepipe.motion import ratios
 from spinepipe.motion.bounds import Bounds
 from spinepipe.motion.hanging import ARMS, hung
-from spinepipe.motion.joint_tables import GIVEN
 from spinepipe.motion.passive_elements import PassiveElements
 from spinepipe.motion.ratios import RatioSet
 from spinepipe.motion.reading import DEFAULT_AXES, NoFrameError, read_motion
@@ -134,8 +133,8 @@ def _as_told(cohort: Cohort, specimen: str, folder: Path) -> Person:
             trial_of(row, markers, recording(row, cohort.name, folder))
             for row in trial_rows(cohort, specimen)
         ),
-        laws.passive_elements(own_rows(cohort, PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}"),
-        ranges.bounds(own_rows(cohort, BOUNDS.stem), f"{cohort.name}/{BOUNDS.file}"),
+        laws.passive_elements(cohort.further.get(PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}"),
+        ranges.bounds(cohort.further.get(BOUNDS.stem)),
         centres_of(cohort, specimen, skeleton),
         static_trial(cohort, specimen),
     )
@@ -149,13 +148,7 @@ def carrying(person: Person, trial: Trial) -> Skeleton:
 
 def ratio_sets(cohort: Cohort) -> Mapping[str, RatioSet]:
     """Sets of ratios that come along, and the cohort's own."""
-    return ratios.ratio_sets(own_rows(cohort, RATIOS.stem), f"{cohort.name}/{RATIOS.file}")
-
-
-def own_rows(cohort: Cohort, stem: str) -> pd.DataFrame | None:
-    """A table of joints that the cohort brings, as the core wants it; None where it has none."""
-    rows = cohort.further.get(stem)
-    return None if rows is None else rows.assign(status=rows["status"].fillna(GIVEN))
+    return ratios.ratio_sets(cohort.further.get(RATIOS.stem), f"{cohort.name}/{RATIOS.file}")
 
 
 def of_specimen(table: pd.DataFrame, specimen: str) -> pd.DataFrame:

@@ -16,8 +16,7 @@ from spinepipe.studies.places import at, unknown_names
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
 from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
-from spinepipe.studies.trunk_loads.forms import TASKS
-from spinepipe.studies.trunk_loads.geometry_forms import MUSCLE_PARAMETERS, MUSCLES
+from spinepipe.studies.trunk_loads.forms import MUSCLE_PARAMETERS, MUSCLES, TASKS
 from spinepipe.studies.trunk_loads.persons import regressions_of, source_of
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 

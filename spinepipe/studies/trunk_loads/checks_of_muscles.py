@@ -17,8 +17,6 @@ CARRIERS = tuple(dict.fromkeys((*BODIES, *reversed(SLICES))))
 PLACES = (*CARRIERS, *PELVIS, SHEATH)
 """Bodies that a point of a muscle may belong to, where the cohort tells of no others."""
 
-STRENGTHS = ("pcsa_mm2", "max_isometric_force_n")
-
 
 def muscle_problems(cohort: Cohort) -> Iterator[Problem]:
     """Everything that is wrong with muscles.csv, muscle_parameters.csv, body_frames.csv and columns
@@ -30,10 +28,7 @@ def muscle_problems(cohort: Cohort) -> Iterator[Problem]:
         yield from _frames(f"{name}/body_frames.csv", further["body_frames"], not frames.empty)
     if points is not None:
         yield from _points(f"{name}/muscles.csv", points, frames)
-    if muscles is not None:
-        yield from _parameters(f"{name}/muscle_parameters.csv", muscles)
     if points is not None and muscles is not None:
-        yield from _both(name, points, muscles)
         yield from _sides(f"{name}/muscles.csv", points, muscles, frames)
     for stem, rows in further.items():
         if "level" in rows:
@@ -53,11 +48,6 @@ def _frames(file: str, rows: pd.DataFrame, has_owner: bool) -> Iterator[Problem]
     if not has_owner:
         found, allowed = "no row of the first specimen of joints.csv", "a frame for each body"
         yield Problem(file, None, "specimen", found, allowed, "add its rows, or delete the file")
-    carriers = Spelling(CARRIERS, "ribs, arms and head move with a vertebra")
-    for line, body in rows["carried_by"].items():
-        if body not in CARRIERS:
-            place, found = (file, int(str(line)), "carried_by"), f"unknown vertebra '{body}'"
-            yield Problem(*place, found, carriers.allowed, carriers.remedy(str(body)))
     as_written = {name.casefold(): name for name in CARRIERS}
     for line, body in rows["body"].items():
         if body not in CARRIERS and (meant := as_written.get(str(body).casefold())):
@@ -74,42 +64,6 @@ def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Itera
     for line, body in rows["body"][~rows["body"].isin(known)].items():
         place, found = (file, int(str(line)), "body"), f"unknown body '{body}'"
         yield Problem(*place, found, bodies.allowed, bodies.remedy(str(body)))
-    counted = rows["muscle"].map(rows["muscle"].value_counts())
-    for line, name in rows["muscle"][counted == 1].items():
-        found, allowed = f"{name} has one point", "two points or more, from end to end"
-        yield Problem(file, int(str(line)), "muscle", found, allowed, "add its other end")
-
-
-def _parameters(file: str, rows: pd.DataFrame) -> Iterator[Problem]:
-    there = [name for name in STRENGTHS if name in rows]
-    sides = Spelling(SIDES, "write right or left")
-    for line, row in rows.iterrows():
-        place, name = (file, int(str(line))), row["muscle"]
-        if row["side"] not in SIDES:
-            remedy = sides.remedy(str(row["side"]))
-            yield Problem(*place, "side", f"'{row['side']}'", sides.allowed, remedy)
-        given = {column: float(row[column]) for column in there if not pd.isna(row[column])}
-        for column, value in given.items():
-            if value <= 0.0:
-                found = f"{name} has {value:g}"
-                remedy = "write its size, or delete the muscle"
-                yield Problem(*place, column, found, "above 0: it could not pull", remedy)
-        if not given:
-            found, allowed = f"neither of {name}", " or ".join(STRENGTHS)
-            yield Problem(*place, STRENGTHS[0], found, allowed, "fill one of the cells")
-
-
-def _both(cohort: str, points: pd.DataFrame, muscles: pd.DataFrame) -> Iterator[Problem]:
-    """Muscles that one of the two files has and the other has not."""
-    files = {"muscles": points["muscle"], "muscle_parameters": muscles["muscle"]}
-    for stem, other in (("muscles", "muscle_parameters"), ("muscle_parameters", "muscles")):
-        known = files[other].drop_duplicates().tolist()
-        alone = files[stem].drop_duplicates()
-        spelling = Spelling(known, f"add it to {other}.csv or delete it")
-        for line, name in alone[~alone.isin(known)].items():
-            place = (f"{cohort}/{stem}.csv", int(str(line)), "muscle")
-            found, allowed = f"'{name}' is not in {other}.csv", f"a muscle of {other}.csv"
-            yield Problem(*place, found, allowed, spelling.remedy(str(name)))
 
 
 def _sides(

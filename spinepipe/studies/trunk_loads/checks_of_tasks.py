@@ -1,7 +1,6 @@
-"""What may be wrong with a row of `tasks.csv`: names, posture, hands, what pushes, muscles."""
+"""What rows of `tasks.csv` may have wrong beyond their form: posture, hands, pushes, muscles."""
 
-import re
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,15 +9,13 @@ import pandas as pd
 from spinepipe.facts import number
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import BODIES
-from spinepipe.problems import Problem, Spelling
+from spinepipe.problems import Problem, one_of
 from spinepipe.studies.trunk_loads.forms import (
     FORCE,
     HANDS,
     PUSH_N,
     PUSH_NM,
-    PUSHED_AT,
     TASKS,
-    WORDS,
     turn,
 )
 from spinepipe.studies.trunk_loads.postures import THORAX_DEG, Row, rhythm, turned_deg
@@ -26,9 +23,6 @@ from spinepipe.studies.trunk_loads.settings import TrunkAngle
 from spinepipe.units import MM_PER_M, ROTATIONS
 
 PUSHED = "applied_at"
-
-PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-"""Tasks become names of files."""
 
 MOST_EXTENSION_DEG = 40.0
 SAME_DEG = 0.1
@@ -68,7 +62,7 @@ class _Row:
 
     def word(self, column: str) -> str:
         """One of the words of a column, the first where the cell is empty."""
-        return str(self.cells[column]) if self.given(column) else WORDS[column][0]
+        return str(self.cells[column]) if self.given(column) else TASKS.column(column).allowed[0]
 
 
 def task_problems(
@@ -82,29 +76,15 @@ def task_problems(
     means : as the study reads the rotation of the trunk.
     """
     first: dict[tuple[Hashable, ...], str] = {}
-    words = {name: Spelling(of, "correct it or leave it empty") for name, of in WORDS.items()}
-    words[PUSHED] = Spelling(PUSHED_AT, "name a vertebra of the thorax")
     for line, cells in zip(rows.index.tolist(), rows.to_dict("records"), strict=True):
         row = _Row(file, int(line), cells)
         postures = list(_posture(row, means))
-        yield from _names(row, words)
         yield from postures
         yield from _load(row)
         yield from _place_of_hands(row, means, None if postures else tallest_m)
-        yield from _push(row, words[PUSHED])
+        yield from _push(row)
         yield from _muscles(row)
         yield from _again(row, first)
-
-
-def _names(row: _Row, words: Mapping[str, Spelling]) -> Iterator[Problem]:
-    if not PLAIN.fullmatch(str(row.cells["task"])):
-        allowed = "letters A-Z a-z, digits, _ . - and a letter or digit first"
-        yield row.problem("task", "a name for no file", allowed, "rename the task")
-    for column, known in WORDS.items():
-        word = row.word(column)
-        if word not in known:
-            spelling = words[column]
-            yield row.problem(column, f"'{word}'", spelling.allowed, spelling.remedy(word))
 
 
 def _posture(row: _Row, means: TrunkAngle) -> Iterator[Problem]:
@@ -114,13 +94,9 @@ def _posture(row: _Row, means: TrunkAngle) -> Iterator[Problem]:
         yield row.problem(None, "no posture", allowed, "write trunk_extension_deg, 0 for upright")
         return
     for axis in ROTATIONS:
-        bodies = [body for body in BODIES if row.given(turn(body, axis))]
+        bodies = row.given(turn(BODIES[0], axis))  # all of them or none, says the form
         trunk, pelvis = (row.given(turn(what, axis)) for what in ("trunk", "pelvis"))
-        if bodies and len(bodies) < len(BODIES):
-            lacking = [body for body in BODIES if body not in bodies]
-            found, allowed = f"no rotation of {', '.join(lacking)}", "all eight bodies or none"
-            yield row.problem(turn(lacking[0], axis), found, allowed, "fill or empty the cells")
-        elif bodies:
+        if bodies:
             yield from _sums(row, axis)
         elif pelvis and not trunk:
             found, allowed = "the pelvis turns and nothing is said of the trunk", "both"
@@ -168,14 +144,7 @@ def _load(row: _Row) -> Iterator[Problem]:
 
 
 def _place_of_hands(row: _Row, means: TrunkAngle, tallest_m: float | None) -> Iterator[Problem]:
-    given = [name for name in HANDS if row.given(name)]
-    if not given:
-        return
-    if len(given) < len(HANDS):
-        lacking = [name for name in HANDS if name not in given]
-        remedy = "fill the cells, or empty all: hands hang below the shoulders"
-        found = f"no {' and '.join(lacking)}"
-        yield row.problem(lacking[0], found, "all three numbers or none", remedy)
+    if not row.given(HANDS[0]):  # all three or none, says the form
         return
     place = np.array([row.number(name) for name in HANDS])
     if 0.0 < np.abs(place).max() <= METRES_MM:
@@ -193,15 +162,11 @@ def _place_of_hands(row: _Row, means: TrunkAngle, tallest_m: float | None) -> It
             yield row.problem(farthest, found, f"{REACH_M:g} m at most, an arm's reach", remedy)
 
 
-def _push(row: _Row, vertebrae: Spelling) -> Iterator[Problem]:
+def _push(row: _Row) -> Iterator[Problem]:
     pushes = [name for name in (*PUSH_N, *PUSH_NM) if row.number(name) != 0.0]
-    where = str(row.cells[PUSHED]) if row.given(PUSHED) else None
-    if where is not None and where not in PUSHED_AT:
-        found = f"unknown vertebra '{where}'"
-        yield row.problem(PUSHED, found, vertebrae.allowed, vertebrae.remedy(where))
-    if pushes and where is None:
-        remedy = "write the vertebra that is pushed"
-        yield row.problem(PUSHED, f"{pushes[0]} and no vertebra", vertebrae.allowed, remedy)
+    if pushes and not row.given(PUSHED):
+        allowed, remedy = one_of(TASKS.column(PUSHED).allowed), "write the vertebra that is pushed"
+        yield row.problem(PUSHED, f"{pushes[0]} and no vertebra", allowed, remedy)
     bends = any(row.number(name) != 0.0 for name in PUSH_NM[:2])
     if row.word("applied_as") == FORCE and not bends:
         found = "a force that makes a moment, and no moment"

@@ -9,8 +9,8 @@ from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
+from spinepipe.studies.trunk_loads.forms import GEOMETRY_FORMS
 from spinepipe.studies.trunk_loads.forms import TASKS as TASK_FORM
-from spinepipe.studies.trunk_loads.geometry_forms import GEOMETRY_FORMS
 from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
 from spinepipe.studies.trunk_loads.sampling import batches, sampled
 from spinepipe.studies.trunk_loads.settings import TrunkLoads

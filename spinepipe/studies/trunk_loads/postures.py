@@ -26,8 +26,8 @@ from spinepipe.studies.trunk_loads.forms import (
     HANDS,
     PUSH_N,
     PUSH_NM,
+    TASKS,
     UPRIGHT,
-    WORDS,
     turn,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkAngle
@@ -172,4 +172,4 @@ def _number(row: Row, name: str, empty: float) -> float:
 
 def _word(row: Row, name: str) -> Any:
     """One of the words of a column."""
-    return WORDS[name][0] if pd.isna(row[name]) else str(row[name])
+    return TASKS.column(name).allowed[0] if pd.isna(row[name]) else str(row[name])

@@ -38,8 +38,11 @@ def told(folder: Path, sound: Path, change: Callable[[pd.DataFrame], pd.DataFram
     for file in ("cohort.yaml", "specimens.csv", "patients.csv"):
         (folder / file).write_bytes((sound / file).read_bytes())
     change(pd.read_csv(sound / "films.csv")).to_csv(folder / "films.csv", index=False)
-    cohort = cohorts.read(folder, (FILMS, PATIENTS))
     document = Document("s.yaml", {"cohort": "ais"}, {})
+    try:
+        cohort = cohorts.read(folder, (FILMS, PATIENTS))
+    except InputError as error:
+        return [str(problem) for problem in error.problems]
     return [str(problem) for problem in check_scoliosis(document, STUDY, cohort)]
 
 
@@ -162,9 +165,7 @@ def test_a_vertebra_that_does_not_exist_is_told_by_the_reader(tmp_path: Path, so
         table.loc[row, "vertebra"] = "T13"
         return table
 
-    with pytest.raises(InputError) as error:
-        told(tmp_path, sound, change)
-    assert "unknown vertebra 'T13'" in str(error.value)
+    assert any("unknown vertebra 'T13'" in line for line in told(tmp_path, sound, change))
 
 
 def test_neutral_and_traction_may_be_missing(tmp_path: Path, sound: Path) -> None:

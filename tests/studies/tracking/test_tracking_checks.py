@@ -165,7 +165,7 @@ TABLES = [
     Case(
         "half a turn",
         text("truth_centres.csv", f"{TRUTH}a,stance,0,L4,0,0,0,1,,\n"),
-        *("truth_centres.csv", 2, None, "1 of 3 rotations", "complete"),
+        *("truth_centres.csv", 2, "right_bending_deg", "no right_bending_deg", "complete"),
     ),
 ]
 
@@ -377,12 +377,12 @@ def test_several_faults_are_told_at_once(tmp_path: Path) -> None:
     problems = told(
         folder,
         both(trial("arms", "up"), trial("kind", "twist", BENDING)),
-        cell(PEOPLE, 2, "height_cm", "1.75"),
+        cell(PEOPLE, 2, "sex", "man"),
     )
     assert {(p.row, p.column) for p in problems} >= {
         (FLEXION, "arms"),
         (BENDING, "kind"),
-        (2, "height_cm"),
+        (2, "sex"),
     }
 
 

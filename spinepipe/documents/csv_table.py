@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from spinepipe.cohort.columns import Column, TableForm
+from spinepipe.documents.form import Column, TableForm
 from spinepipe.documents.names import ALLOWED, LONGEST_NAME, name_fault
 from spinepipe.documents.text import (
     LONGEST_CELL,
@@ -79,7 +79,7 @@ def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | N
     if rows is None:
         return None, problems
     problems += _column_problems(rows, form)
-    lacking = any(column.required and column.name not in rows.header for column in form.columns)
+    lacking = any(not column.nullable and column.name not in rows.header for column in form.columns)
     if lacking or not rows.cells:
         return None, problems
     texts = dict(zip(rows.header, map(list, zip(*rows.cells, strict=True)), strict=True))
@@ -108,7 +108,7 @@ def _column_problems(rows: Rows, form: TableForm) -> Iterator[Problem]:
         elif name and (fault := name_fault(name)) is not None:
             yield Problem(rows.file, 1, None, fault, f"columns of {ALLOWED}", "rename the column")
     for column in form.columns:
-        if column.required and column.name not in rows.header:
+        if not column.nullable and column.name not in rows.header:
             yield Problem(
                 rows.file, 1, column.name, "no such column", column.meaning, "add the column"
             )
@@ -132,13 +132,13 @@ def _meant(name: str, absent: Sequence[str]) -> str | None:
 def _converted(
     cells: list[str], column: Column, rows: Rows, problems: list[Problem]
 ) -> "pd.Series":
-    if column.required:
+    if not column.nullable:
         problems += first_of(
             Problem(rows.file, line, column.name, "an empty cell", column.meaning, "fill it")
             for line, cell in zip(rows.lines, cells, strict=True)
             if not cell and line not in rows.ragged
         )
-    if column.kind == "text":
+    if column.type == "text":
         return _text_series(cells, rows.index)
     numbers = _numbers(cells)
     wrong = [index for index in np.flatnonzero(_is_wrong(numbers, column)).tolist() if cells[index]]
@@ -171,7 +171,7 @@ def _is_wrong(numbers: NDArray[np.float64], column: Column) -> NDArray[np.bool_]
     """Which numbers of a column it may not have; also what is none."""
     with np.errstate(invalid="ignore"):
         wrong = ~np.isfinite(numbers)
-        if column.kind == "integer":
+        if column.type == "integer":
             wrong |= numbers != np.trunc(numbers)
         wrong |= numbers <= column.low if column.open_low else numbers < column.low
         wrong |= numbers >= column.high if column.open_high else numbers > column.high
@@ -195,16 +195,17 @@ def _remedy(number: float, column: Column) -> str:
     for end, (factor, words) in _MISTAKEN.items():
         if column.name.endswith(end) and column.low < factor * number < column.high:
             return f"suspected: {words}; multiply the column by {factor:.3g}"
-    return "correct it; check its unit, its sign, and for a slip of the decimal point"
+    check = "correct it; check its unit, its sign, and for a slip of the decimal point"
+    return column.otherwise or check
 
 
 def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str]:
     """What is allowed and what to do about a number that is wrong."""
     if not isfinite(number):
-        remedy = "correct it" if column.required else "leave the cell empty if not measured"
+        remedy = "correct it" if not column.nullable else "leave the cell empty if not measured"
         remedy = "write a decimal point" if "," in cell else remedy
         return "a finite number with a decimal point", remedy
-    if column.kind == "integer" and number != int(number):
+    if column.type == "integer" and number != int(number):
         return "a whole number", "correct it"
     return f"{column.meaning}: {column.range_text}", _remedy(number, column)
 
