@@ -12,8 +12,7 @@ from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.cohort.supports import PRESCRIBED
 from spinepipe.plausibility.score import suspect, table, usual
-from spinepipe.plausibility.warnings.levels import PACKAGE
-from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, warn
+from spinepipe.plausibility.warnings.warning import PACKAGE, Place, PlausibilityWarning, warn
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 FORCES = ["fx_n", "fy_n", "fz_n"]

@@ -13,8 +13,9 @@ from spinepipe.cohort.cohort import Cohort, Group
 from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.documents.csv_table import read_rows
 from spinepipe.plausibility.score import has_range, table, usual
-from spinepipe.plausibility.warnings.levels import PACKAGE
 from spinepipe.problems import Problem
+
+PACKAGE = "spinepipe.plausibility.warnings"
 
 
 @dataclass(frozen=True)
