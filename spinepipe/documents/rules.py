@@ -19,7 +19,10 @@ from spinepipe.documents.names import (
     look_alike,
     name_fault,
 )
-from spinepipe.problems import Problem, Spelling
+from spinepipe.problems import MOST_LISTED, Problem, Spelling
+
+HEADER = 1
+"""Line of the names of columns."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ class Rows:
     def problem(
         self, line: int | None, column: str | None, found: str, allowed: str, remedy: str
     ) -> Problem:
-        """A fault, with the words by which rows of this table are told."""
+        """A fault of a row, with the words by which rows of this table are told."""
         if self.form.titled and line is not None:
             found = self.form.titled.format(**self.table.loc[line]) + found
         return Problem(self.file, line, column, found, allowed, remedy)
@@ -80,8 +83,9 @@ class Rows:
                 yield from self._unfit(column, cells)
         if self.form.unique:
             yield from self._repeated()
-        for rule in self.form.rules:
-            yield from self._broken(rule)
+        if not any(line == HEADER for line, _ in self.refused):  # a column may be misnamed
+            for rule in self.form.rules:
+                yield from self._broken(rule)
 
     def _unknown(self, column: Column, cells: "pd.Series[str]") -> Iterator[Problem]:
         """Names that do not stand where they should."""
@@ -95,23 +99,29 @@ class Rows:
         otherwise = f"correct the name or add it to {listed.source}"
         spelling = Spelling(names, column.otherwise or otherwise)
         called = column.called or column.name
+        many = len(names) > MOST_LISTED
+        allowed = f"a {called} of {listed.source}" if many else spelling.allowed
         for line, name in cells[~cells.isin(names)].items():
             found = f"unknown {called} {look_alike(name) or _quoted(name)}"
             remedy = listed.instead.get(name) or spelling.remedy(name)
-            yield self.problem(_line(line), column.name, found, spelling.allowed, remedy)
+            yield Problem(self.file, _line(line), column.name, found, allowed, remedy)
 
     def _unknown_of_each(self, column: Column, cells: "pd.Series[str]") -> Iterator[Problem]:
         """The same where names are those of a specimen, say, and not of another."""
         stem, _, name = column.references.partition(".")
-        of_each = self.tables[stem].groupby(column.per)[name].agg(list)
+        listed = self.tables[stem]
+        pairs = set(zip(listed[column.per], listed[name], strict=True))
         whose = self.table.loc[cells.index, column.per]
+        spellings: dict[object, Spelling] = {}
         for line, cell, owner in zip(cells.index, cells, whose, strict=True):
-            names = of_each.get(owner, [])
-            if cell not in names:
-                spelling = Spelling(names, column.otherwise)
+            if (owner, cell) not in pairs:
+                if owner not in spellings:
+                    names = listed[name][listed[column.per] == owner].dropna()
+                    spellings[owner] = Spelling(names, column.otherwise)
+                spelling = spellings[owner]
                 found = f"no {column.called or column.name} '{cell}' of '{owner}'"
-                remedy = spelling.remedy(cell)
-                yield self.problem(_line(line), column.name, found, spelling.allowed, remedy)
+                place = (self.file, _line(line), column.name)
+                yield Problem(*place, found, spelling.allowed, spelling.remedy(cell))
 
     def _not_allowed(self, column: Column, cells: "pd.Series[str]") -> Iterator[Problem]:
         """Words that are none of those that a column may hold."""
@@ -178,22 +188,21 @@ class Rows:
             cells, declared = self.table[name], self.form.column(name).allowed
             unknown = cells.notna() & ~cells.isin(declared) & bool(declared)
             counts &= cells.isin(words) | unknown
-        groups = self.table[rule.per][counts]
-        sizes = groups.value_counts()
+        groups = self.table[rule.per][counts].dropna()
+        lines_of = groups.groupby(groups, sort=False).groups
         listed = self.known(rule.among) if rule.among else None
-        if rule.among and listed is None:
-            return
-        names = groups.dropna().unique() if listed is None else listed.names
-        for name in names:
-            count = int(sizes.get(name, 0))
-            lines = [_line(line) for line in groups.index[groups == name]]
+        if rule.among and (listed is None or not self.table[rule.per].isin(listed.names).all()):
+            return  # rows of names that are told as unknown may be those that lack
+        for group in lines_of if listed is None else listed.names:
+            lines = list(map(_line, lines_of.get(group, ())))
+            count = len(lines)
             if rule.at_most and count > rule.at_most:
                 faulty: list[int | None] = [*lines[rule.at_most :]]
             elif count < rule.at_least:
                 faulty = [None if listed else lines[0]]
             else:
                 continue
-            found = rule.found.format(**{rule.per: name, "count": count})
+            found = rule.found.format(**{rule.per: group, "count": count})
             for line in faulty:
                 column = rule.at or rule.per
                 yield Problem(self.file, line, column, found, rule.allowed, rule.remedy)
