@@ -39,7 +39,7 @@ def descriptor(name: str, title: str, tables: Iterable[tuple[Table, str]]) -> st
 def _resource(table: Table, path: str) -> dict[str, Any]:
     suffix = PurePath(path).suffix
     # An empty cell of a key would be no key of this standard.
-    known = all(table.column(name).required for name in table.key)
+    known = not any(table.column(name).nullable for name in table.key)
     key = {"primaryKey": list(table.key)} if known else {"uniqueKeys": [list(table.key)]}
     return {
         "$schema": f"{_PROFILES}/dataresource.json",
@@ -59,12 +59,12 @@ def _resource(table: Table, path: str) -> dict[str, Any]:
 
 
 def _field(column: Column) -> dict[str, Any]:
-    field: dict[str, Any] = {"name": column.name, "type": _TYPES[column.kind]}
+    field: dict[str, Any] = {"name": column.name, "type": _TYPES[column.type]}
     if column.unit:
         field["unit"] = column.unit
     empty = f"; empty: {column.empty}" if column.empty else ""
     field["description"] = column.meaning + empty
-    limits: dict[str, Any] = {"required": True} if column.required else {}
+    limits: dict[str, Any] = {} if column.nullable else {"required": True}
     limits |= {"minimum": column.low} if isfinite(column.low) else {}
     limits |= {"maximum": column.high} if isfinite(column.high) else {}
     limits |= {"enum": list(column.allowed)} if column.allowed else {}

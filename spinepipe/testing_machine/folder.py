@@ -150,14 +150,14 @@ def _shape(form: TableForm, text: str) -> Table:
     declared = {
         one.name: Column(
             *(one.name, one.kind, one.meaning, _UNITS.get(one.name.rpartition("_")[2], "")),
-            required=one.required,
+            nullable=not one.required,
             low=one.low,
             high=one.high,
         )
         for one in form.columns
     }
     header = next(csv.reader(StringIO(text)), [])
-    own = {name: Column(name, "text", "carried through", required=False) for name in header}
+    own = {name: Column(name, "text", "carried through", nullable=True) for name in header}
     columns = tuple((own | declared)[name] for name in header)
     keys = tuple(key for key in form.keys if key in header)
     return Table(form.stem, f"One row per {form.row}", keys, columns)

@@ -132,7 +132,7 @@ def test_only_meaning_counts(tmp_path: Path, one: str, other: str, same: bool) -
     assert (first == second) is same
 
 
-ROWS = """table,column,kind,unit,key,low,high,allowed,empty,meaning
+ROWS = """table,column,type,unit,key,low,high,allowed,empty,meaning
 @place,{}_mm,number,mm,,,,,was not read,where {} is
 one,,table,,,,,,,About it.
 one,specimen,text,,key,,,,,which it is

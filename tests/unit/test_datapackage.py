@@ -85,7 +85,7 @@ TABLE = Table(
     (
         Column("specimen", "text", "which"),
         Column("step", "integer", "load step", low=0),
-        Column("angle_deg", "number", "angle", "deg", required=False, high=90, empty="not read"),
+        Column("angle_deg", "number", "angle", "deg", nullable=True, high=90, empty="not read"),
         Column("sure", "flag", "whether it is"),
         Column("side", "text", "of the body", allowed=("left", "")),
     ),
@@ -124,7 +124,7 @@ def test_pandas_finds_the_types_units_and_empty_cells_that_are_told(tmp_path: Pa
 
 
 def test_a_key_that_may_be_empty_is_no_primary_key() -> None:
-    cycle = Column("cycle", "integer", "repeat", required=False)
+    cycle = Column("cycle", "integer", "repeat", nullable=True)
     table = Table("loads", "About.", ("cycle",), (cycle,))
     (told,) = read(descriptor("a", "A", [(table, "loads.csv")]))["resources"]
     assert "primaryKey" not in told["schema"]

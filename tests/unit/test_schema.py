@@ -25,7 +25,7 @@ from spinepipe.studies.scoliosis.population import PER_SEGMENT
 from spinepipe.studies.scoliosis.settings import MODELS
 from spinepipe.units import COORDINATES
 
-HEAD = "table,column,kind,unit,key,low,high,allowed,empty,meaning\n"
+HEAD = "table,column,type,unit,key,low,high,allowed,empty,meaning\n"
 ROWS = f"""{HEAD}@end,{{}}_low_mm,number,mm,,0,,,,lower end of {{}}
 @end,{{}}_high_mm,number,mm,,,9,,never read,
 @ends,first,@end,,,,,,,the {{}}
@@ -46,7 +46,7 @@ def tables(path: Path, text: str) -> dict[str, Table]:
 
 def test_rows_are_columns_and_groups_are_filled_in(tmp_path: Path) -> None:
     (table,) = tables(tmp_path, ROWS).values()
-    not_seen = {"required": False, "empty": "not seen"}
+    not_seen = {"nullable": True, "empty": "not seen"}
     assert table == Table(
         "sizes",
         "One row per person.",
@@ -57,12 +57,12 @@ def test_rows_are_columns_and_groups_are_filled_in(tmp_path: Path) -> None:
             Column("width_low_mm", "number", "lower end of the width", "mm", low=0, **not_seen),
             Column(
                 *("width_high_mm", "number", "the width", "mm"),
-                **{"required": False, "high": 9, "empty": "never read"},
+                **{"nullable": True, "high": 9, "empty": "never read"},
             ),
             Column("first_low_mm", "number", "lower end of the length", "mm", low=0),
             Column(
                 *("first_high_mm", "number", "the length", "mm"),
-                **{"required": False, "high": 9, "empty": "never read"},
+                **{"nullable": True, "high": 9, "empty": "never read"},
             ),
             Column("side", "text", "side", allowed=("left", "right", "")),
         ),
@@ -70,10 +70,10 @@ def test_rows_are_columns_and_groups_are_filled_in(tmp_path: Path) -> None:
     )
 
 
-@sweep("kind", ["", "txt", "@end_of", "end"])
-def test_a_kind_that_is_none_is_told_with_its_place(kind: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=rf"tables\.csv: sizes, side: .*'{kind}'"):
-        tables(tmp_path, ROWS.replace("side,text", f"side,{kind}"))
+@sweep("of", ["", "txt", "@end_of", "end"])
+def test_a_type_that_is_none_is_told_with_its_place(of: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=rf"tables\.csv: sizes, side: .*'{of}'"):
+        tables(tmp_path, ROWS.replace("side,text", f"side,{of}"))
 
 
 def test_columns_that_a_folder_carries_are_left_out_of_the_key_too(tmp_path: Path) -> None:
