@@ -225,7 +225,7 @@ def _bound(entry: ast.stmt) -> list[str]:
     if isinstance(entry, ast.FunctionDef | ast.ClassDef):
         return [entry.name]
     targets = entry.targets if isinstance(entry, ast.Assign) else []
-    return [to.id for to in targets if isinstance(to, ast.Name)]
+    return [to.id for target in targets for to in ast.walk(target) if isinstance(to, ast.Name)]
 
 
 @cache

@@ -1,15 +1,21 @@
-"""Job: a page of a study of any kind, one HTML file: its report, or what `full` makes of it."""
+"""Job: a page of a study of any kind, one HTML file: its report, or what `full` makes of it.
+
+Beside it is written what the tables are that the study has by then, for other programs to read. It
+says nothing that the tables and their code do not, so no digest holds it and nothing reads it here.
+"""
 
 from collections.abc import Collection
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+from spinepipe.files import appearing
 from spinepipe.jobs.digest import report_digest
 from spinepipe.jobs.inputs import study_of
 from spinepipe.marks import write_marked
 from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.words import listed
+from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.tables import Tables, read_metadata
 
@@ -35,6 +41,15 @@ def run(
         more = f"{listed(added)} (`make full` makes them and the page full.html, which shows them)"
         document = replace(document, left_out=(*document.left_out, more))
     write_marked(document.html(settings, cohort), output, report_digest(page, settings, cohort))
+    folder, has = Path(output).parent, files_of(settings, cohort).tables
+    shapes = [
+        (shape, f"{shape.name}.parquet")
+        for shape in kind_of(settings.kind).tables
+        if shape.name in has and (folder / f"{shape.name}.parquet").is_file()
+    ]
+    title = f"Results of the study {study} ({settings.kind}) of the cohort {cohort.name}"
+    with appearing(folder / FILE) as temporary:
+        temporary.write_text(descriptor(study, title, shapes), "utf-8")
 
 
 def results_of(

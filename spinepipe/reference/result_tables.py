@@ -26,7 +26,7 @@ def columns_page() -> str:
 
 def _told(shape: Table) -> str:
     rows = [
-        (code(c.name), c.kind, c.unit, _range(c), c.meaning, c.empty or "never empty")
+        (code(c.name), c.type, c.unit, _range(c), c.meaning, c.empty or "never empty")
         for c in shape.columns
     ]
     key = f"Unique by {', '.join(map(code, shape.key))}."

@@ -2,10 +2,10 @@
 
 A row is a column of a table. Its cells are those of `Column`; a cell ``key`` says that it belongs
 to what makes rows unique, ``allowed`` lists values with bars between them, and a column of which
-``empty`` says nothing is required. Besides there are rows of kind ``table``, which say what a row
-of the table stands for, and rows of kind ``note``, which say more of how to read it.
+``empty`` says nothing is never empty. Besides there are rows of type ``table``, which say what a
+row of the table stands for, and rows of type ``note``, which say more of how to read it.
 
-Columns that come again are a group, a table whose name begins with ``@``. A row whose kind is the
+Columns that come again are a group, a table whose name begins with ``@``. A row whose type is the
 name of a group stands for its rows: what these leave blank is as that row has it, and their ``{}``
 is its cell of the same column. Groups of several kinds of studies are in the file beside this one.
 """
@@ -16,7 +16,7 @@ from functools import cache
 from math import inf
 from pathlib import Path
 
-from spinepipe.schema.table import KINDS, Column, Table
+from spinepipe.schema.table import TYPES, Column, Table
 
 FILE = "tables.csv"
 GROUP = "@"
@@ -47,7 +47,7 @@ def read_tables(path: Path) -> dict[str, Table]:
     Raises
     ------
     ValueError
-        For a kind of column or a group that there is not, with file, table and column.
+        For a type or a group that there is not, with file, table and column.
     """
     rows = _rows(path)
     groups = {**_rows(_SHARED), **rows}
@@ -69,23 +69,23 @@ def _rows(path: Path) -> dict[str, list[Row]]:
 
 def _leaves(row: Row, groups: Mapping[str, list[Row]], path: Path) -> Iterator[Row]:
     """The row itself; of a group its rows, filled in."""
-    kind = row["kind"]
-    if kind in (*KINDS, "table", "note"):
+    name = row["type"]
+    if name in (*TYPES, "table", "note"):
         yield row
-    elif kind.startswith(GROUP) and kind in groups:
-        for one in groups[kind]:
+    elif name.startswith(GROUP) and name in groups:
+        for one in groups[name]:
             filled = {
-                name: cell.replace("{}", row[name]) if "{}" in cell else cell or row[name]
-                for name, cell in one.items()
+                head: cell.replace("{}", row[head]) if "{}" in cell else cell or row[head]
+                for head, cell in one.items()
             }
             yield from _leaves(filled, groups, path)
     else:
-        raise ValueError(f"{path}: {row['table']}, {row['column']}: no kind or group {kind!r}")
+        raise ValueError(f"{path}: {row['table']}, {row['column']}: no type or group {name!r}")
 
 
 def _table(name: str, rows: list[Row]) -> Table:
-    words = {row["kind"]: row["meaning"] for row in rows if row["kind"] in ("table", "note")}
-    columns = [row for row in rows if row["kind"] not in ("table", "note")]
+    words = {row["type"]: row["meaning"] for row in rows if row["type"] in ("table", "note")}
+    columns = [row for row in rows if row["type"] not in ("table", "note")]
     return Table(
         name,
         words["table"],
@@ -98,10 +98,10 @@ def _table(name: str, rows: list[Row]) -> Table:
 def _column(row: Row) -> Column:
     return Column(
         row["column"],
-        row["kind"],
+        row["type"],
         row["meaning"],
         row["unit"],
-        required=not row["empty"],
+        nullable=bool(row["empty"]),
         low=float(row["low"] or -inf),
         high=float(row["high"] or inf),
         allowed=tuple(row["allowed"].split("|")) if row["allowed"] else (),

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from math import inf
 
-KINDS = ("text", "integer", "number", "flag")
+TYPES = ("text", "integer", "number", "flag")
 
 
 @dataclass(frozen=True)
@@ -12,18 +12,18 @@ class Column:
 
     Attributes
     ----------
-    kind : ``text``, ``integer``, ``number`` or ``flag``.
-    required : whether no cell may be empty.
+    type : ``text``, ``integer``, ``number`` or ``flag``.
+    nullable : whether cells may be empty.
     low, high : closed range of numbers.
     allowed : the only values a text may take.
     empty : what an empty cell means, where one may be.
     """
 
     name: str
-    kind: str
+    type: str
     meaning: str
     unit: str = ""
-    required: bool = True
+    nullable: bool = False
     low: float = -inf
     high: float = inf
     allowed: tuple[str, ...] = ()
@@ -61,7 +61,7 @@ class Table:
         return [
             *(self.name, list(self.key)),
             *(
-                [one.name, one.kind, one.unit, one.required, one.low, one.high, *one.allowed]
+                [one.name, one.type, one.unit, one.nullable, one.low, one.high, *one.allowed]
                 for one in self.columns
             ),
         ]

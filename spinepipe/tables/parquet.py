@@ -39,7 +39,7 @@ class BadTable(ValueError):
 def arrow_schema(table: Table) -> pa.Schema:
     """Names and types of a table's columns; those that may be empty are nullable."""
     return pa.schema(
-        pa.field(column.name, TYPES[column.kind], nullable=not column.required)
+        pa.field(column.name, TYPES[column.type], nullable=column.nullable)
         for column in table.columns
     )
 
@@ -81,9 +81,9 @@ def _typed(values: Sequence[Any], kind: pa.DataType) -> pa.Array:
 
 
 def _array(table: str, column: Column, values: Sequence[Any]) -> pa.Array:
-    kind = TYPES[column.kind]
+    kind = TYPES[column.type]
     try:
-        if column.kind == "number":
+        if column.type == "number":
             array = pa.array(np.asarray(values, dtype=float), type=kind, from_pandas=True)
         else:
             array = _typed(values, kind)
@@ -96,11 +96,11 @@ def _array(table: str, column: Column, values: Sequence[Any]) -> pa.Array:
 
 
 def _problem(column: Column, array: pa.Array) -> str | None:
-    if column.required and array.null_count:
+    if not column.nullable and array.null_count:
         return f"{array.null_count} empty cells"
     if len(array) == array.null_count:
         return None
-    if column.kind in ("number", "integer"):
+    if column.type in ("number", "integer"):
         numbers = array.to_numpy(zero_copy_only=False)  # of few rows, ten times as fast as Arrow
         low, high = np.fmin.reduce(numbers), np.fmax.reduce(numbers)
         if not (np.isfinite(low) and np.isfinite(high)):

@@ -12,10 +12,12 @@ import numpy as np
 import yaml
 
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.cohort.columns import COHORT_YAML
+from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import read_yaml
 from spinepipe.problems import InputError, Problem
+from spinepipe.schema import Column, Table
+from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.recording import Recording, read_recording
 from spinepipe.testing_machine.settings import MachineMapping, check_mapping
@@ -31,6 +33,12 @@ NOT_READ = {"deg": 0.1, "mm": 0.1}
 
 _POINT = ("px_mm", "py_mm", "pz_mm")
 _FRAME = ("x_mm", "y_mm", "z_mm", "extension_deg", "right_bending_deg", "left_rotation_deg")
+
+_UNITS = {
+    **{"mm": "mm", "deg": "deg", "n": "N", "nm": "N m", "s": "s"},
+    **{"kg": "kg", "m": "m", "m2": "kg m2", "years": "years"},
+}
+"""Units as names of columns end with them."""
 
 Rows = list[Sequence[object]]
 
@@ -115,6 +123,10 @@ def write(imported: Imported, folder: Path, replace: bool) -> list[str]:
         "motion.csv": _table(_motion(imported)),
     }
     stay = [name for name in BY_HAND if (folder / name).exists()]
+    here = texts | {name: (folder / name).read_text("utf-8", "replace") for name in stay}
+    forms = [form for form in TABLES.values() if form.file in here]
+    tables = [(_shape(form, here[form.file]), form.file) for form in forms]
+    texts[FILE] = descriptor(imported.mapping.cohort, imported.mapping.title, tables)
     folder.parent.mkdir(parents=True, exist_ok=True)
     temporary = folder.with_name(f".{folder.name}.{os.getpid()}")
     shutil.rmtree(temporary, ignore_errors=True)
@@ -131,6 +143,24 @@ def write(imported: Imported, folder: Path, replace: bool) -> list[str]:
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return stay
+
+
+def _shape(form: TableForm, text: str) -> Table:
+    """What the columns of a file of a cohort are, in its own order; somebody's own are text."""
+    declared = {
+        one.name: Column(
+            *(one.name, one.kind, one.meaning, _UNITS.get(one.name.rpartition("_")[2], "")),
+            nullable=not one.required,
+            low=one.low,
+            high=one.high,
+        )
+        for one in form.columns
+    }
+    header = next(csv.reader(StringIO(text)), [])
+    own = {name: Column(name, "text", "carried through", nullable=True) for name in header}
+    columns = tuple((own | declared)[name] for name in header)
+    keys = tuple(key for key in form.keys if key in header)
+    return Table(form.stem, f"One row per {form.row}", keys, columns)
 
 
 def _header(imported: Imported) -> str:

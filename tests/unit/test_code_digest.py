@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from spinepipe.jobs import code
+from spinepipe.studies.registry import every_kind, place_of
 
 MODULE = "spinepipe.jobs.collect"
 
@@ -31,6 +32,17 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     forget()
     yield path
     forget()
+
+
+def test_a_job_hangs_on_the_tables_that_it_writes_and_on_none_of_another_kind() -> None:
+    for kind, declared in every_kind().items():
+        own = f"spinepipe.studies.{kind}#"
+        for job in declared.jobs:
+            used = code.closure(place_of(kind, job.name).partition(":")[0])
+            tables = {name for name in used if "#" in name}
+            assert tables >= {f"{own}{table}" for table in job.writes}, job.name
+            assert {name for name in tables if not name.startswith(own)} == set(), job.name
+            assert not {f"{own}*", f"spinepipe.studies.{kind}.tables"} & used, job.name
 
 
 def test_what_was_kept_gives_the_same_digest(kept: Path) -> None:
@@ -120,7 +132,7 @@ def test_only_meaning_counts(tmp_path: Path, one: str, other: str, same: bool) -
     assert (first == second) is same
 
 
-ROWS = """table,column,kind,unit,key,low,high,allowed,empty,meaning
+ROWS = """table,column,type,unit,key,low,high,allowed,empty,meaning
 @place,{}_mm,number,mm,,,,,was not read,where {} is
 one,,table,,,,,,,About it.
 one,specimen,text,,key,,,,,which it is

@@ -273,6 +273,33 @@ def test_nothing_is_overwritten_unless_told(tmp_path: Path) -> None:
     assert [one.name for one in folder.parent.iterdir()] == ["rig"]
 
 
+def test_what_its_tables_are_is_told_beside_them_and_changes_no_result(tmp_path: Path) -> None:
+    command = ["--root", str(tmp_path), "import", str(written(tmp_path))]
+    assert main(command) == 0
+    folder = tmp_path / "config/cohorts/rig"
+    (folder / "specimens.csv").write_text("specimen,age_years,donor\ns01,61,x\n")
+    assert main([*command, "--replace"]) == 0
+    told = json.loads((folder / "datapackage.json").read_text("utf-8"))
+    paths = [resource["path"] for resource in told["resources"]]
+    assert paths == ["specimens.csv", "joints.csv", "loads.csv", "motion.csv"]
+    for resource in told["resources"]:
+        fields = resource["schema"]["fields"]
+        frame = pd.read_csv(folder / resource["path"])
+        assert [field["name"] for field in fields] == list(frame)
+        for field in fields:
+            if field["type"] == "string":
+                assert not pd.api.types.is_numeric_dtype(frame[field["name"]])
+            else:
+                assert pd.api.types.is_numeric_dtype(frame[field["name"]])
+            if field.get("constraints", {}).get("required"):
+                assert frame[field["name"]].notna().all()
+    age = told["resources"][0]["schema"]["fields"][1]
+    assert (age["type"], age["unit"], age["constraints"]["maximum"]) == ("number", "years", 130)
+    digest = cohorts.read(folder).digest
+    (folder / "datapackage.json").unlink()
+    assert cohorts.read(folder).digest == digest
+
+
 LOAD = DOCUMENT["loads"][0]
 MOTION = DOCUMENT["motion"][0]
 FILE = DOCUMENT["files"][0]

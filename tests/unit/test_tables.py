@@ -24,8 +24,8 @@ TABLE = Table(
         Column("specimen", "text", "name of the specimen"),
         Column("pose", "integer", "number", low=0, high=99),
         Column("width_mm", "number", "width", "mm", low=0.0, high=10.0),
-        Column("depth_mm", "number", "depth", "mm", required=False, empty="not measured"),
-        Column("sure", "flag", "whether it is", required=False, empty="held fixed"),
+        Column("depth_mm", "number", "depth", "mm", nullable=True, empty="not measured"),
+        Column("sure", "flag", "whether it is", nullable=True, empty="held fixed"),
         Column("status", "text", "how the test ended", allowed=tuple(Status)),
         Column("message", "text", "why"),
     ),
@@ -167,7 +167,7 @@ def test_every_result_table_is_complete(table: Table) -> None:
     assert arrow_schema(table).names == names
     for column in table.columns:
         assert column.meaning
-        assert column.required or (column.empty and column.name not in table.key)
+        assert not column.nullable or (column.empty and column.name not in table.key)
         for unit in ("mm", "deg"):
             assert not column.name.endswith(f"_{unit}") or column.unit == unit
     without = table.without("specimen")

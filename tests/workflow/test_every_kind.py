@@ -7,6 +7,7 @@ made. That results say nothing of the machine
 is asked when the project is built (`small_project.Shared`).
 """
 
+import json
 import re
 from dataclasses import replace
 from importlib import import_module
@@ -85,6 +86,11 @@ def look_at_results(project: Project, kind: str, full: bool) -> None:
     look_at_page(page, files, full=False)
     if files.adds:
         assert "`make full` makes them" in page
+    package = json.loads(project.path(f"{files.folder}/datapackage.json").read_text("utf-8"))
+    assert {one["name"] for one in package["resources"]} == set(files.tables_of(full))
+    for one in package["resources"]:
+        names = pq.read_schema(project.path(f"{files.folder}/{one['path']}")).names
+        assert [field["name"] for field in one["schema"]["fields"]] == names
 
 
 def test_a_study_that_is_all_computed_is_whole(eight: Project) -> None:

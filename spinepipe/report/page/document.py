@@ -260,7 +260,7 @@ def sortable(
     if len(frame) > len(shown):
         note = f"The first {len(shown)} of {len(frame)} rows; all of them are in {name}.parquet."
     values = [[_cell(value, c) for value in shown[c.name]] for c in kept]
-    heads = tuple(Head(_title(c), _unit(c), _meaning(c), c.kind in _NUMERIC) for c in kept)
+    heads = tuple(Head(_title(c), _unit(c), _meaning(c), c.type in _NUMERIC) for c in kept)
     return Sortable(name, title, about, heads, tuple(zip(*values, strict=True)), note)
 
 
@@ -288,11 +288,11 @@ def _says_something(values: pd.Series) -> bool:
 def _cell(value: Any, column: Column) -> Cell:
     if value is None or (isinstance(value, float) and pd.isna(value)) or value is pd.NA:
         return Cell("", None)
-    if column.kind == "number":
+    if column.type == "number":
         return Cell(number(float(value)), float(value))
-    if column.kind == "integer":
+    if column.type == "integer":
         return Cell(f"{int(value):,}".replace(",", "\u2009"), float(value))
-    if column.kind == "flag":
+    if column.type == "flag":
         return Cell("yes" if value else "no", None)
     return Cell(str(value), None)
 

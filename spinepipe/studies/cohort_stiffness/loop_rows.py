@@ -40,7 +40,7 @@ AGAINST = "moves against the {side} moment: no stiffness there"
 
 def empty(table: Table) -> Row:
     """A row without numbers."""
-    return {column.name: None for column in table.columns if not column.required}
+    return {column.name: None for column in table.columns if column.nullable}
 
 
 @dataclass(frozen=True)

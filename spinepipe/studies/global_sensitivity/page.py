@@ -116,7 +116,7 @@ def _ranking(indices: pd.DataFrame, measures: Measures) -> Sortable:
             "negligible",
             "integer",
             "factors whose ST has its interval below 1 %",
-            required=False,
+            nullable=True,
             empty="no ST",
         ),
     ]

@@ -94,14 +94,14 @@ FOLDED = (
         "effect_lowest",
         "number",
         "smallest effect significant after Bonferroni",
-        required=False,
+        nullable=True,
         empty=_NO_EFFECT,
     ),
     Column(
         "effect_highest",
         "number",
         "largest effect significant after Bonferroni",
-        required=False,
+        nullable=True,
         empty=_NO_EFFECT,
     ),
 )

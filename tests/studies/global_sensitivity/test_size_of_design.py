@@ -123,7 +123,7 @@ def test_stated_bytes_per_row_hold(tmp_path: Path) -> None:
     """Random numbers cannot be packed: no rows take more than these."""
     rows = 20_000
     rng = np.random.default_rng(3)
-    columns = {c.name: rng.normal(size=rows) for c in RESPONSES.columns if c.kind == "number"}
+    columns = {c.name: rng.normal(size=rows) for c in RESPONSES.columns if c.type == "number"}
     samples = np.repeat(np.arange(rows // 4), 4).tolist()
     names = {
         "specimen": ["s01"] * rows,

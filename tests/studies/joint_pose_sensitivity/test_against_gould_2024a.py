@@ -53,7 +53,7 @@ def frame(table: str, rows: list[dict[str, Any]]) -> pd.DataFrame:
     """Rows with all columns of a table, read as from a file; what is not given is empty."""
     columns = TABLES[table].columns
     whole = [dict.fromkeys(c.name for c in columns) | {"specimen": "s01"} | row for row in rows]
-    kinds = {c.name: "float" for c in columns if c.kind == "number"}
+    kinds = {c.name: "float" for c in columns if c.type == "number"}
     return pd.DataFrame(whole, columns=[c.name for c in columns]).astype(kinds)
 
 

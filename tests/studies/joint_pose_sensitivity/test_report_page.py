@@ -376,7 +376,7 @@ def test_repeated_tests_are_folded_and_counted() -> None:
 def test_columns_that_say_nothing_are_left_out_and_units_stand_in_the_heading() -> None:
     columns = [
         Column("specimen", "text", "name"),
-        Column("sd_mm", "number", "spread", "mm", required=False, empty="none"),
+        Column("sd_mm", "number", "spread", "mm", nullable=True, empty="none"),
         Column("message", "text", "words"),
         Column("kept", "flag", "whether"),
     ]
