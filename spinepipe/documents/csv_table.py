@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from spinepipe.documents.form import Column, TableForm
+from spinepipe.documents.form import InputColumn, TableForm
 from spinepipe.documents.names import ALLOWED, LONGEST_NAME, name_fault
 from spinepipe.documents.text import (
     LONGEST_CELL,
@@ -130,7 +130,7 @@ def _meant(name: str, absent: Sequence[str]) -> str | None:
 
 
 def _converted(
-    cells: list[str], column: Column, rows: Rows, problems: list[Problem]
+    cells: list[str], column: InputColumn, rows: Rows, problems: list[Problem]
 ) -> "pd.Series":
     if not column.nullable:
         problems += first_of(
@@ -167,7 +167,7 @@ def _number(cell: str) -> float:
     return float(cell) if cell[:1] in "+-.0123456789" and NUMBER.fullmatch(cell) else nan
 
 
-def _is_wrong(numbers: NDArray[np.float64], column: Column) -> NDArray[np.bool_]:
+def _is_wrong(numbers: NDArray[np.float64], column: InputColumn) -> NDArray[np.bool_]:
     """Which numbers of a column it may not have; also what is none."""
     with np.errstate(invalid="ignore"):
         wrong = ~np.isfinite(numbers)
@@ -190,7 +190,7 @@ _MISTAKEN = {
 """By the end of a column's name: by what a number in another unit must be multiplied, and which."""
 
 
-def _remedy(number: float, column: Column) -> str:
+def _remedy(number: float, column: InputColumn) -> str:
     """What to do with a number out of range: the unit that brings it back, where there is one."""
     for end, (factor, words) in _MISTAKEN.items():
         if column.name.endswith(end) and column.low < factor * number < column.high:
@@ -199,7 +199,7 @@ def _remedy(number: float, column: Column) -> str:
     return column.otherwise or check
 
 
-def _number_fault(cell: str, number: float, column: Column) -> tuple[str, str]:
+def _number_fault(cell: str, number: float, column: InputColumn) -> tuple[str, str]:
     """What is allowed and what to do about a number that is wrong."""
     if not isfinite(number):
         remedy = "correct it" if not column.nullable else "leave the cell empty if not measured"

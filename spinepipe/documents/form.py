@@ -11,24 +11,20 @@ from pathlib import Path
 from typing import Any, Literal
 
 from spinepipe.documents.yaml_text import packaged_yaml
+from spinepipe.schema import Column
 
-__all__ = ["Column", "Rule", "TableForm", "read_forms"]
+__all__ = ["InputColumn", "Rule", "TableForm", "read_forms"]
 
 
 @dataclass(frozen=True)
-class Column:
-    """One declared column.
+class InputColumn(Column):
+    """A column of a file that people write; its name says unit and positive direction.
 
     Attributes
     ----------
-    name : header text, unit and positive direction included.
-    meaning : what a cell says.
-    type : text, number (decimal point) or integer.
     key : whether it is one of those that together may occur only once.
     nullable : whether cells may be empty, and the column absent.
-    low, high : range of a number.
     open_low, open_high : whether the limit itself is outside the range.
-    allowed : the words that a text may be.
     references : where each of its names must stand: ``table.column``, or a list that the reader
         knows by name (vertebrae, joints).
     per : the column by which names referred to are told apart: trials of the same specimen.
@@ -41,16 +37,9 @@ class Column:
         of range.
     """
 
-    name: str
-    meaning: str
-    type: Literal["text", "number", "integer"] = "number"
     key: bool = False
-    nullable: bool = True
-    low: float = -inf
-    high: float = inf
     open_low: bool = False
     open_high: bool = False
-    allowed: tuple[str, ...] = ()
     references: str = ""
     per: str = ""
     wildcard: bool = False
@@ -122,7 +111,7 @@ class TableForm:
 
     stem: str
     row: str
-    columns: tuple[Column, ...]
+    columns: tuple[InputColumn, ...]
     rules: tuple[Rule, ...] = ()
     unique: bool = True
     carries: bool = False
@@ -144,7 +133,7 @@ class TableForm:
         """Columns that together may occur only once."""
         return tuple(column.name for column in self.columns if column.key)
 
-    def column(self, name: str) -> Column:
+    def column(self, name: str) -> InputColumn:
         """A declared column."""
         return next(column for column in self.columns if column.name == name)
 
@@ -152,20 +141,22 @@ class TableForm:
 def read_forms(path: Path) -> dict[str, TableForm]:
     """The forms that a file of the package declares, by stem.
 
-    A key is never empty unless it says ``nullable: true``; other columns may be empty unless they
-    say ``nullable: false``.
+    Columns are of numbers unless their ``type`` says otherwise. A key is never empty unless it says
+    ``nullable: true``; other columns may be empty unless they say ``nullable: false``.
     """
     return {stem: _form(stem, told) for stem, told in packaged_yaml(path).items()}
 
 
 def _form(stem: str, told: Mapping[str, Any]) -> TableForm:
-    columns = (
-        Column(name, **({"nullable": not one.get("key", False)} | _as_tuples(one)))
-        for name, one in told["columns"].items()
-    )
+    columns = (_column(name, _as_tuples(one)) for name, one in told["columns"].items())
     rules = (Rule(**_as_tuples(rule)) for rule in told.get("rules", ()))
     rest = {key: value for key, value in told.items() if key not in ("columns", "rules")}
     return TableForm(stem, columns=tuple(columns), rules=tuple(rules), **rest)
+
+
+def _column(name: str, told: Mapping[str, Any]) -> InputColumn:
+    unsaid: dict[str, Any] = {"type": "number", "nullable": not told.get("key", False)}
+    return InputColumn(name, **(unsaid | dict(told)))
 
 
 def _as_tuples(told: Mapping[str, Any]) -> dict[str, Any]:

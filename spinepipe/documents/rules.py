@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from spinepipe.documents.form import Column, Rule, TableForm
+from spinepipe.documents.form import InputColumn, Rule, TableForm
 from spinepipe.documents.names import (
     ALLOWED,
     ALLOWED_FOLDER,
@@ -87,7 +87,7 @@ class Rows:
             for rule in self.form.rules:
                 yield from self._broken(rule)
 
-    def _unknown(self, column: Column, cells: "pd.Series[str]") -> Iterator[Problem]:
+    def _unknown(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[Problem]:
         """Names that do not stand where they should."""
         listed = self.known(column.references)
         if listed is None or not (listed.names or column.wildcard):
@@ -106,7 +106,7 @@ class Rows:
             remedy = listed.instead.get(name) or spelling.remedy(name)
             yield Problem(self.file, _line(line), column.name, found, allowed, remedy)
 
-    def _unknown_of_each(self, column: Column, cells: "pd.Series[str]") -> Iterator[Problem]:
+    def _unknown_of_each(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[Problem]:
         """The same where names are those of a specimen, say, and not of another."""
         stem, _, name = column.references.partition(".")
         listed = self.tables[stem]
@@ -123,7 +123,7 @@ class Rows:
                 place = (self.file, _line(line), column.name)
                 yield Problem(*place, found, spelling.allowed, spelling.remedy(cell))
 
-    def _not_allowed(self, column: Column, cells: "pd.Series[str]") -> Iterator[Problem]:
+    def _not_allowed(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[Problem]:
         """Words that are none of those that a column may hold."""
         spelling = Spelling(column.allowed, column.otherwise or "correct it")
         lower = all(word == word.lower() for word in column.allowed)
@@ -132,7 +132,7 @@ class Rows:
             remedy = spelling.remedy(word.lower() if lower else word)
             yield self.problem(_line(line), column.name, found, spelling.allowed, remedy)
 
-    def _unfit(self, column: Column, cells: "pd.Series[str]") -> Iterator[Problem]:
+    def _unfit(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[Problem]:
         """Names that nothing can be called by."""
         is_folder = column.names == "folder"
         fault_of, allowed = (folder_fault, ALLOWED_FOLDER) if is_folder else (name_fault, ALLOWED)

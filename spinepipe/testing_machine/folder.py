@@ -5,6 +5,7 @@ import os
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from dataclasses import replace as with_values
 from io import StringIO
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import numpy as np
 import yaml
 
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.cohort.columns import COHORT_YAML, TABLES, TableForm
+from spinepipe.cohort.columns import COHORT_YAML, TABLES
+from spinepipe.documents.form import TableForm
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import read_yaml
 from spinepipe.problems import InputError, Problem
@@ -147,13 +149,8 @@ def write(imported: Imported, folder: Path, replace: bool) -> list[str]:
 
 def _shape(form: TableForm, text: str) -> Table:
     """What the columns of a file of a cohort are, in its own order; somebody's own are text."""
-    declared = {
-        one.name: Column(
-            *(one.name, one.kind, one.meaning, _UNITS.get(one.name.rpartition("_")[2], "")),
-            nullable=not one.required,
-            low=one.low,
-            high=one.high,
-        )
+    declared: dict[str, Column] = {
+        one.name: with_values(one, unit=_UNITS.get(one.name.rpartition("_")[2], ""))
         for one in form.columns
     }
     header = next(csv.reader(StringIO(text)), [])

@@ -13,7 +13,7 @@ from cohort_cases import NAME, Change, add, cell, joints, line, motion, swap, te
 from spinepipe import cohort
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.specimen import load_cases
-from spinepipe.documents.form import Column, TableForm
+from spinepipe.documents.form import InputColumn, TableForm
 
 LOADS_BY_CYCLE = """\
 specimen,test,cycle,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm
@@ -170,12 +170,12 @@ def test_digest_follows_the_bytes_that_count(tmp_path: Path) -> None:
     assert plain.digest != other.digest
 
 
-TASK = Column("task", "task", "text", key=True, nullable=False)
+TASK = InputColumn("task", "text", "task", key=True)
 FOR_ALL = TableForm("tasks", "task", (TASK,))
 OF_EACH = TableForm(
     "films",
     "specimen",
-    (Column("specimen", "specimen", "text", key=True), Column("film", "film", "text")),
+    (InputColumn("specimen", "text", "specimen", key=True), InputColumn("film", "text", "film")),
 )
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.supports import FREE, HELD, MEASURED, PRESCRIBED
-from spinepipe.documents.form import Column, Rule, TableForm, read_forms
+from spinepipe.documents.form import InputColumn, Rule, TableForm, read_forms
 from spinepipe.documents.rules import Listed, Rows
 from spinepipe.motion.hanging import ARMS
 from spinepipe.motion.joint_tables import SIDES
@@ -27,13 +27,13 @@ from spinepipe.units import COORDINATES
 Place = tuple[int, str]
 
 COLUMNS = (
-    Column("name", "name", "text", key=True, nullable=False, names="name"),
-    Column("repeat", "repeat", "integer", key=True, empty_is=1.0),
-    Column("low", "lowest"),
-    Column("high", "highest"),
-    Column("way", "way", "text", allowed=("up", "down")),
-    Column("joint", "joint", "text", references="joints", wildcard=True),
-    Column("trial", "trial", "text", references="trials.trial", per="name"),
+    InputColumn("name", "text", "name", key=True, nullable=False, names="name"),
+    InputColumn("repeat", "integer", "repeat", key=True, nullable=True, empty_is=1.0),
+    InputColumn("low", "number", "lowest", nullable=True),
+    InputColumn("high", "number", "highest", nullable=True),
+    InputColumn("way", "text", "way", nullable=True, allowed=("up", "down")),
+    InputColumn("joint", "text", "joint", nullable=True, references="joints", wildcard=True),
+    InputColumn("trial", "text", "trial", nullable=True, references="trials.trial", per="name"),
 )
 
 

@@ -10,7 +10,7 @@ from cohort_cases import Change, Files, add, both, cell, line, swap, text, witho
 from installed import need_male
 
 from spinepipe import cohort as cohorts
-from spinepipe.documents.form import Column, TableForm
+from spinepipe.documents.form import InputColumn, TableForm
 from spinepipe.documents.yaml_text import Document
 from spinepipe.muscles import myo_sim
 from spinepipe.muscles.trunk import LEVELS
@@ -56,8 +56,8 @@ VALID: Files = {
 """Two persons, four tasks, three muscles; tasks begin in line 2."""
 
 
-def _key(name: str) -> Column:
-    return Column(name, name, "text", key=True, nullable=False)
+def _key(name: str) -> InputColumn:
+    return InputColumn(name, "text", name, key=True)
 
 
 FORMS = (
@@ -65,7 +65,7 @@ FORMS = (
     TableForm(
         "muscle_regressions",
         "muscle x level",
-        (_key("muscle"), _key("level"), Column("factor", "factor")),
+        (_key("muscle"), _key("level"), InputColumn("factor", "number", "factor", nullable=True)),
     ),
 )
 """The last stands for any table with levels, whatever else its columns be."""
