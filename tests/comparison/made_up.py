@@ -42,7 +42,7 @@ def whole(kind: Any, tables: Frames, **same: Any) -> Frames:
     for name, given in tables.items():
         columns = kind.table(name).columns
         filled = given.assign(**{key: value for key, value in same.items() if key not in given})
-        numbers = {one.name: "float" for one in columns if one.kind == "number"}
+        numbers = {one.name: "float" for one in columns if one.type == "number"}
         found[name] = filled.reindex(columns=[one.name for one in columns]).astype(numbers)
     return found
 

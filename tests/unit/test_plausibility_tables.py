@@ -18,8 +18,8 @@ from mistaken_cohorts import good, told
 from spinepipe.cohort import read
 from spinepipe.plausibility import score
 from spinepipe.plausibility.score import hypotheses, suspect, table, usual
-from spinepipe.plausibility.warnings.levels import PACKAGE
 from spinepipe.plausibility.warnings.readings import feeble
+from spinepipe.plausibility.warnings.warning import PACKAGE
 
 ROOT = Path(__file__).resolve().parents[2] / "spinepipe"
 WARNINGS = table(PACKAGE, "warnings")
