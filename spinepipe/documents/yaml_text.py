@@ -95,7 +95,7 @@ _Loader.add_implicit_resolver(
 
 def packaged_yaml(path: Path) -> dict[str, Any]:
     """Keys and values of a file of this package, which is trusted."""
-    found: dict[str, Any] = yaml.load(path.read_text(encoding="utf-8"), Loader=_PARSER)
+    found: dict[str, Any] = _PARSER(path.read_text(encoding="utf-8")).get_single_data()
     return found
 
 

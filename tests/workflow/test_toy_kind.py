@@ -29,7 +29,11 @@ def test_its_tables_figure_and_report_are_built(toy: Project) -> None:
 
 
 def test_full_adds_to_all_and_all_after_it_has_nothing_to_do(toy_copy: Project) -> None:
-    assert toy_copy.rerun("full") == {"counted/shares.parquet", "counted/full.html"}
+    assert toy_copy.rerun("full") == {
+        "counted/shares.parquet",
+        "counted/full.html",
+        "counted/datapackage.json",
+    }
     assert toy_copy.planned("all") == set()
 
 

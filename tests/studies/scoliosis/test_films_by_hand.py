@@ -248,7 +248,7 @@ def test_what_no_film_shows_is_refused_by_the_reader() -> None:
     assert (limits["repeat"], limits["age_years"]) == ((1, 1000), (0, 130))
     assert limits["cobb_deg"] == (0, 180)
     assert FILMS.places
-    required = {c.name for form in (FILMS, PATIENTS) for c in form.columns if c.required}
+    required = {c.name for form in (FILMS, PATIENTS) for c in form.columns if not c.nullable}
     assert required == {"specimen", "position", "vertebra"}
 
 

@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 from sweeps import sweep
 
+from spinepipe.plausibility.score import table
+from spinepipe.plausibility.warnings.warning import PACKAGE
 from spinepipe.studies.scoliosis import checks, doubts
-from spinepipe.studies.scoliosis.films import CORNERS, Film
+from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film
 
 LEVELS = ("L4", "L3", "L2", "L1")
 PLACE = checks._Place("ais/films.csv", "p1", "erect")
@@ -126,9 +128,12 @@ def test_the_lowest_vertebra_is_at_nought(read: float, told: int) -> None:
     assert [problem.row for problem in found] == [3] * told
 
 
+CERTAIN = {row["warning"]: row["certain"] == "yes" for row in table(PACKAGE, "warnings")}
+
+
 def fault(found: Any) -> tuple[str, bool] | None:
     """Column, and whether certain."""
-    return None if found is None else (found[0], found[5])
+    return None if found is None else (found.column, CERTAIN[found.warning])
 
 
 def seen(up: float, across: float) -> Film:
@@ -144,15 +149,15 @@ def seen(up: float, across: float) -> Film:
     ],
 )
 def test_spines_that_lie_or_stand_on_their_heads(up: float, across: float, column: str) -> None:
-    for corners, name in ((False, f"{column}_mm"), (True, f"upper_left_{column}_mm")):
-        found = fault(doubts._direction([seen(up, across)], corners))
+    for columns, name in ((CENTRE, f"{column}_mm"), (CORNERS, f"upper_left_{column}_mm")):
+        found = fault(doubts._direction([seen(up, across)], *columns[:2]))
         assert found == (None if column is None else (name, True))
 
 
 def test_most_films_decide_which_way_a_spine_stands() -> None:
     films = [seen(0.3, 0.0), seen(-0.3, 0.0), seen(0.3, 0.0)]
-    assert doubts._direction(films, False) is None
-    assert fault(doubts._direction([seen(-0.3, 0.0), *films[1:]], False)) == ("z_mm", True)
+    assert doubts._direction(films, *CENTRE[:2]) is None
+    assert fault(doubts._direction([seen(-0.3, 0.0), *films[1:]], *CENTRE[:2])) == ("z_mm", True)
 
 
 @sweep(
@@ -169,14 +174,14 @@ def test_vertebrae_are_as_far_apart_as_those_of_a_spine_to_a_factor(
     usual = np.array([doubts.spacing_mm(name) for name in LEVELS]) / 1e3
     up = size * np.concatenate([[0.0], np.cumsum((usual[1:] + usual[:-1]) / 2.0)])
     films = [Film(0.6 * up, 0.8 * up, np.zeros(4))] * 2
-    for corners, column in ((False, "y_mm"), (True, "upper_left_y_mm")):
-        found = fault(doubts._size(COHORT, films, corners))
+    for columns, column in ((CENTRE[:2], "y_mm"), (CORNERS, "upper_left_y_mm")):
+        found = fault(doubts._size(COHORT, films, columns))
         assert found == (None if told is None else (column, told))
 
 
 def test_names_that_are_no_levels_have_no_size() -> None:
     cohort: Any = SimpleNamespace(vertebrae=("a", "b", "c", "d"))
-    assert doubts._size(cohort, [leaning(0, 0, 0, 0, apart=5.0)], False) is None
+    assert doubts._size(cohort, [leaning(0, 0, 0, 0, apart=5.0)], CENTRE[:2]) is None
 
 
 def curved(size: float, factor: float, mixed: float = 0.0) -> list[Film]:
@@ -208,7 +213,7 @@ def curved(size: float, factor: float, mixed: float = 0.0) -> list[Film]:
         (curved(10.0, 0.29 / 57.2958), None),
         (curved(10.0, 0.72 / 57.3, 0.70 / 57.3), "radians"),
         (curved(10.0, 0.69 / 57.3, 0.72 / 57.3), None),
-        (curved(10.0, 0.0), "filled down"),
+        (curved(10.0, 0.0), "alike"),
         (curved(3.9, 0.0), None),
     ],
 )
@@ -218,9 +223,8 @@ def test_tilts_go_with_the_line_of_the_centres(films: list[Film], told: str | No
         assert found is None
         return
     assert found is not None
-    column, words, _, remedy, _, certain = found
-    assert (column, certain) == ("orientation_deg", False)
-    assert told in f"{words} {remedy}"
+    assert fault(found) == ("orientation_deg", False)
+    assert told in f"{found.warning} {found.remedy}"
 
 
 def boxes(turn: float, mirror: float = 1.0) -> pd.DataFrame:
@@ -254,8 +258,7 @@ def test_corners_are_where_their_names_say(turn: float, mirror: float, column: s
 
 def test_mirrored_corners_are_told_apart_from_bodies_on_their_sides() -> None:
     told = doubts._corners(boxes(0, -1)), doubts._corners(boxes(61))
-    assert "left corners to the right" in str(told[0])
-    assert "lie on their sides" in str(told[1])
+    assert [one and one.warning for one in told] == ["corners_left_right", "corners_aside"]
 
 
 @sweep("largest, told", [(3.1, True), (3.2, False), (0.01, True), (0.0, False), (50.0, False)])
