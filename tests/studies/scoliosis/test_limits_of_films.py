@@ -3,6 +3,7 @@
 Would catch a limit that has moved, or is kept on one side only.
 """
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,7 @@ import pandas as pd
 from sweeps import sweep
 
 from spinepipe.plausibility.score import table
+from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PACKAGE
 from spinepipe.studies.scoliosis import checks, doubts
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film
@@ -264,7 +266,9 @@ def test_mirrored_corners_are_told_apart_from_bodies_on_their_sides() -> None:
 @sweep("largest, told", [(3.1, True), (3.2, False), (0.01, True), (0.0, False), (50.0, False)])
 def test_cobb_angles_below_a_half_turn_in_radians_are_radians(largest: float, told: bool) -> None:
     patients = pd.DataFrame({"cobb_deg": [0.0, largest, np.nan]}, index=[5, 6, 7])
-    cohort: Any = SimpleNamespace(name="ais", further={"patients": patients})
-    found = list(doubts._cobb(cohort))
+    cohort: Any = SimpleNamespace(
+        name="ais", further={"patients": patients}, folder=Path("ais"), specimen_names=()
+    )
+    found = list(beyond_ranges(cohort, "subject_cobb"))
     assert [doubt.problem.row for doubt in found] == ([6] if told else [])
     assert all(not doubt.certain for doubt in found)
