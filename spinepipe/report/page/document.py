@@ -297,6 +297,16 @@ def _cell(value: Any, column: Column) -> Cell:
     return Cell(str(value), None)
 
 
+def page_tables(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]:
+    """A result table as a page has it: none without rows, a paper's numbers in two parts."""
+    if frame.empty:
+        return []
+    if shape.name.startswith("against_"):
+        return beside_paper(shape, title, frame)
+    whole = sortable(shape.name, title, shape.about, frame, shape.columns)
+    return [whole] if whole.rows else []
+
+
 _PAPER_ORDER = (
     *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
     *("limit", "verdict", "reason", "where", "evidence"),

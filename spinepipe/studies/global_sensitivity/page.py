@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Results, Sortable, sortable
+from spinepipe.report.page.document import Document, Results, Sortable, page_tables, sortable
 from spinepipe.report.words import fixed, number
 from spinepipe.schema import Column
 from spinepipe.studies.global_sensitivity.figures.panels import (
@@ -94,8 +94,7 @@ def _rests_on(results: Results) -> Iterator[Sortable]:
             rows = rows[rows["verdict"] != "not_measured"]
         if shape is FAILED_RUNS and len(rows):
             rows = rows[rows["failed"] > 0]
-        if len(rows):
-            yield sortable(shape.name, title, shape.about, rows, shape.columns)
+        yield from page_tables(shape, title, rows)
 
 
 def _ranking(indices: pd.DataFrame, measures: Measures) -> Sortable:

@@ -13,7 +13,7 @@ from spinepipe.report.page.document import (
     Picture,
     Results,
     Sortable,
-    beside_paper,
+    page_tables,
     sortable,
 )
 from spinepipe.schema import Column, all_declared
@@ -26,7 +26,6 @@ from spinepipe.studies.joint_pose_sensitivity.findings import findings, settling
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import (
-    AGAINST_GOULD_2024A,
     IMPORTANCE,
     STATISTICS,
 )
@@ -187,10 +186,8 @@ def _of(
         yield _folded(frame, study.significance)
     elif name == "importance":
         yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
-    elif name == AGAINST_GOULD_2024A.name:
-        yield from beside_paper(AGAINST_GOULD_2024A, title, frame)
     else:
-        yield sortable(name, title, about, frame, _SHAPES[name].columns)
+        yield from page_tables(_SHAPES[name], title, frame)
 
 
 def _trees(importance: pd.DataFrame) -> pd.DataFrame:

@@ -7,8 +7,7 @@ from spinepipe.report.page.document import (
     Headline,
     Results,
     Sortable,
-    beside_paper,
-    sortable,
+    page_tables,
 )
 from spinepipe.studies.tracking.findings import findings
 from spinepipe.studies.tracking.headline import headline
@@ -93,18 +92,14 @@ def _joined(words: str) -> str:
 
 def shown_tables(results: Results) -> list[Sortable]:
     """Tables that the study has; those without rows are left out."""
-    found = []
+    found: list[Sortable] = []
     for shape, title in _TITLES.items():
         rows = results.table(shape.name)
-        if len(rows):
-            if shape in _SORTED:
-                columns, rising = _SORTED[shape]
-                rows = rows.sort_values(columns, ascending=rising, kind="stable")
-            if shape is AGAINST_WANG_2021:
-                found += beside_paper(shape, title, rows)
-            else:
-                found.append(sortable(shape.name, title, shape.about, rows, shape.columns))
-    return [table for table in found if table.rows]
+        if shape in _SORTED and len(rows):
+            columns, rising = _SORTED[shape]
+            rows = rows.sort_values(columns, ascending=rising, kind="stable")
+        found += page_tables(shape, title, rows)
+    return found
 
 
 def left_out(study: Tracking, results: Results) -> tuple[str, ...]:

@@ -7,8 +7,7 @@ from spinepipe.report.page.document import (
     Headline,
     Results,
     Sortable,
-    beside_paper,
-    sortable,
+    page_tables,
 )
 from spinepipe.studies.trunk_loads.findings import findings
 from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
@@ -86,14 +85,11 @@ def _joined(words: str) -> str:
 
 def shown_tables(results: Results) -> list[Sortable]:
     """Tables that the study has; those without rows are left out."""
-    found = []
-    for shape, title in _TITLES.items():
-        rows = results.table(shape.name)
-        if shape is AGAINST_GHEZELBASH_2016 and len(rows):
-            found += beside_paper(shape, title, rows)
-        elif len(rows):
-            found.append(sortable(shape.name, title, shape.about, rows, shape.columns))
-    return [table for table in found if table.rows]
+    return [
+        table
+        for shape, title in _TITLES.items()
+        for table in page_tables(shape, title, results.table(shape.name))
+    ]
 
 
 def left_out(study: TrunkLoads) -> tuple[str, ...]:
