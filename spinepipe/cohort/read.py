@@ -26,7 +26,7 @@ from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
 from spinepipe.documents.csv_table import read_table
 from spinepipe.documents.form import TableForm
 from spinepipe.documents.inside import outside
-from spinepipe.documents.rules import Rows
+from spinepipe.documents.rules import TableCheck
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import Document, read_yaml
 from spinepipe.problems import InputError, Problem, first_of
@@ -207,8 +207,8 @@ def _broken_rules(draft: Draft, problems: Sequence[Problem]) -> Iterator[Problem
     for stem, table in draft.tables.items():
         file = draft.file(stem)
         refused = {(one.row, one.column) for one in problems if one.file == file}
-        rows = Rows(draft.forms[stem], file, table, refused, draft.known, draft.tables)
-        yield from first_of(rows.problems())
+        check = TableCheck(draft.forms[stem], file, table, refused, draft.known, draft.tables)
+        yield from first_of(check.problems())
 
 
 def _checks(draft: Draft) -> Iterator[Problem]:

@@ -45,8 +45,8 @@ Known = Callable[[str], Listed | None]
 
 
 @dataclass(frozen=True)
-class Rows:
-    """A table that was read.
+class TableCheck:
+    """A table that was read, to be held against its form.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ from typing import Any, Literal, get_args
 
 from spinepipe.documents.csv_table import read_table
 from spinepipe.documents.form import read_forms
-from spinepipe.documents.rules import Listed, Rows
+from spinepipe.documents.rules import Listed, TableCheck
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import SLICES
 from spinepipe.problems import InputError, Problem
@@ -148,7 +148,7 @@ def read_regressions(path: Path, file: str) -> Regressions:
         raise InputError(problems)
     refused = {(one.row, one.column) for one in problems}
     lists = {"quantities": Listed(QUANTITIES, file)}
-    problems += Rows(_FORM, file, table, refused, lists.get, {}).problems()
+    problems += TableCheck(_FORM, file, table, refused, lists.get, {}).problems()
     thorax = table[table["quantity"] == "rib_cage_area"]
     for line, muscle, level in zip(thorax.index, thorax["muscle"], thorax["level"], strict=True):
         if (muscle, level) != (ALL, ALL):

@@ -12,7 +12,7 @@ import pytest
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.supports import FREE, HELD, MEASURED, PRESCRIBED
 from spinepipe.documents.form import InputColumn, Rule, TableForm, read_forms
-from spinepipe.documents.rules import Listed, Rows
+from spinepipe.documents.rules import Listed, TableCheck
 from spinepipe.motion.hanging import ARMS
 from spinepipe.motion.joint_tables import SIDES
 from spinepipe.motion.skeleton import BODIES
@@ -52,8 +52,8 @@ def told(
         "names": Listed(["n0", "n9"], "names.csv"),
         **other,
     }
-    rows_ = Rows(form, "t.csv", table, {bad}, lists.get, {"trials": trials})
-    return list(rows_.problems())
+    check = TableCheck(form, "t.csv", table, {bad}, lists.get, {"trials": trials})
+    return list(check.problems())
 
 
 def places(problems: list[Problem]) -> list[tuple[int | None, str | None, str]]:
