@@ -278,7 +278,8 @@ def _is_cosmetic(node: ast.stmt) -> bool:
 
 def _data_files(names: frozenset[str]) -> list[Path]:
     """Data files beside the modules, in a fixed order; of tables only those that are used count."""
-    sources = (_source(name) or _source(name.rpartition(".")[0]) for name in names)
+    modules = (name for name in names if _TABLE not in name)
+    sources = (_source(name) or _source(name.rpartition(".")[0]) for name in modules)
     files = (
         file for folder in {path.parent for path in sources if path} for file in folder.iterdir()
     )
