@@ -7,29 +7,19 @@ min_version("9.27")
 sys.path.insert(0, workflow.basedir)
 
 
-include: "workflow/rules/scheduling.smk"
 include: "workflow/rules/common.smk"
-include: "workflow/rules/disk.smk"
-include: "workflow/rules/lock.smk"
-include: "workflow/rules/marks.smk"
-include: "workflow/rules/execution.smk"
-
-
-SELECTION = selection()
-# A submitted job has work to do, and Snakemake leaves out onstart.
-if not workflow.is_main_process:
-    warm_up(modules_of_many(KINDS_IN_USE))
 
 
 wildcard_constraints:
     study="[a-z0-9_]+",
     specimen="[^/=]+",
+    block="[0-9]{3,5}|[a-z]+",
 
 
 include: "workflow/rules/generic.smk"
 
 
-for kind in KINDS_IN_USE:
+for kind in PROJECT.kinds:
 
     include: f"workflow/rules/{kind}.smk"
 
@@ -37,36 +27,24 @@ for kind in KINDS_IN_USE:
 rule all:
     default_target: True
     input:
-        everything(SELECTION.studies),
+        PROJECT.everything(PROJECT.selection.studies),
 
 
 # The long studies of config.yaml, read only when asked for, and what takes long of the others.
 rule full:
     input:
-        lambda wildcards: everything(SELECTION.studies + SELECTION.full, full=True),
+        lambda wildcards: PROJECT.everything(
+            PROJECT.selection.studies + PROJECT.selection.full, full=True
+        ),
 
 
 onstart:
-    check_environment()
-    check_engine()
-    check_writable()
-    warm_up_the_pool()
-    tell_remade()
-    tell_how_many_lost()
-    tell_doubts()
-    lift_rate_limit()
-    look_at_few()
-    keep_the_graph()
-    tell_what_is_ahead()
+    PROJECT.begin()
 
 
 onsuccess:
-    tell_how_many_lost()
-    sweep_logs()
-    keep_costs()
+    PROJECT.sweep_logs()
 
 
 onerror:
-    tell_how_many_lost()
-    sweep_logs()
-    tell_failed()
+    PROJECT.sweep_logs()

@@ -214,6 +214,14 @@ def read_mark(path: str | Path) -> str:
     return found.mark if found is not None and whole else ""
 
 
+def mark_in(path: str | Path) -> str | None:
+    """The mark of a file as `read_mark` tells it; None where there is no file."""
+    try:
+        return read_mark(path)
+    except FileNotFoundError:
+        return None
+
+
 def check_whole(path: str | Path, file: BinaryIO) -> None:
     """Refuse a file, open for reading, that has marks and is not as it was written.
 

@@ -1,6 +1,6 @@
-"""Job: the rows of many files as one table, block by block and then as a whole."""
+"""The rows of many files as one table."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
@@ -9,7 +9,6 @@ from spinepipe.jobs.code import code_digest
 from spinepipe.jobs.digest import value_digest
 from spinepipe.marks import KEY
 from spinepipe.schema import Table
-from spinepipe.studies.registry import kind_of
 from spinepipe.tables import arrow_schema, join, metadata_of, read
 
 NO_MARK = "none"
@@ -19,27 +18,25 @@ class StaleFile(ValueError):
     """A file to be joined that hangs on other settings, data or code than the table does."""
 
 
-def run(kind: str, table: str, inputs: list[str], expected: list[str], output: str) -> None:
+def join_files(table: Table, marks: Mapping[str, str], output: str) -> None:
     """Join files of a table; what their folders say of them becomes columns again.
 
     Parameters
     ----------
-    kind : of the study, which declares the table.
-    expected : the mark that each of the inputs must have.
+    marks : the files, with the mark that each must have.
 
     Raises
     ------
     StaleFile
         For a file with another mark.
     """
-    parts = [read(path) for path in inputs]
+    parts = [read(path) for path in marks]
     found = [metadata_of(part) for part in parts]
-    for path, wanted, metadata in zip(inputs, expected, found, strict=True):
+    for (path, wanted), metadata in zip(marks.items(), found, strict=True):
         _check(path, wanted, metadata.get(KEY, ""))
-    shape = kind_of(kind).table(table)
-    rows = [_with_folders(shape, path, part) for path, part in zip(inputs, parts, strict=True)]
-    mark = joined_digest(shape, inputs, expected)
-    join(shape, rows, output, {**_together(found), KEY: mark})
+    rows = [_with_folders(table, path, part) for path, part in zip(marks, parts, strict=True)]
+    mark = joined_digest(table, list(marks), list(marks.values()))
+    join(table, rows, output, {**_together(found), KEY: mark})
 
 
 def joined_digest(table: Table, parts: Sequence[str], marks: Sequence[str]) -> str:

@@ -3,7 +3,8 @@
 import hashlib
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -62,6 +63,22 @@ def settings_of(study: Study, ignored: Mapping[str, Any]) -> dict[str, Any]:
     return study.model_dump(mode="json", exclude=dict(ignored))
 
 
+_read: list[str] = []
+
+
+@contextmanager
+def reading(paths: Iterable[str]) -> Iterator[None]:
+    """What is written meanwhile hangs on the marks of these files, which a job is about to read.
+
+    So that a job that makes tables of tables need not say what it has read: its rule did.
+    """
+    _read[:] = [mark_of(path) for path in paths]
+    try:
+        yield
+    finally:
+        _read.clear()
+
+
 def digest_of(
     job: str,
     study: Study,
@@ -80,7 +97,7 @@ def digest_of(
         _code(study, job),
         settings_of(study, kind_of(study.kind).job(job).ignores),
         _data_digest(cohort, specimens),
-        list(others),
+        [*others, *_read],
     )
 
 
@@ -94,21 +111,26 @@ def _mark(where: Stamp) -> str:
     return read_mark(where[0])
 
 
-def figure_digest(figure: str, study: Study, cohort: Cohort) -> str:
-    """The mark of a figure."""
+def figure_digest(figure: str, study: Study, cohort: Cohort, read: Sequence[str]) -> str:
+    """The mark of a figure; ``read`` are those of what it is drawn from."""
     kind = kind_of(study.kind)
     module = f"{PACKAGE}.{study.kind}.{kind.figure(figure).at.partition(':')[0]}"
     code = [code_digest("spinepipe.jobs.draw"), code_digest(module)]
     ignored = dict.fromkeys(kind.ignored_by_figures, True)
-    return value_digest(code, settings_of(study, ignored), cohort.digest)
+    return value_digest(code, settings_of(study, ignored), cohort.digest, list(read))
 
 
-def report_digest(page: str, study: Study, cohort: Cohort) -> str:
-    """The mark of a page (`report` or `full`), which prints all settings."""
+def report_digest(page: str, study: Study, cohort: Cohort, read: Sequence[str]) -> str:
+    """The mark of a page (`report` or `full`), which prints all settings.
+
+    Parameters
+    ----------
+    read : marks of the tables, figures and other results that it shows, then its captions.
+    """
     module = f"{PACKAGE}.{study.kind}.page"
     titles = [figure.title for figure in kind_of(study.kind).figures]
     code = [code_digest("spinepipe.jobs.report"), code_digest(module), titles]
-    return value_digest(page, code, settings_of(study, {}), cohort.digest)
+    return value_digest(page, code, settings_of(study, {}), cohort.digest, list(read))
 
 
 def provenance(

@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from spinepipe.jobs.digest import figure_digest
+from spinepipe.jobs.digest import figure_digest, mark_of
 from spinepipe.jobs.inputs import study_of
 from spinepipe.report.style import save, style
 from spinepipe.studies.registry import PACKAGE, kind_of
@@ -16,7 +16,8 @@ def run(
     settings, cohort = study_of(root, study)
     module, _, function = kind_of(settings.kind).figure(figure).at.partition(":")
     draw = getattr(import_module(f"{PACKAGE}.{settings.kind}.{module}"), function)
+    read = [mark_of(path) for path in [*tables, *others.values()]]
     with style():
         drawn = draw(settings, cohort, Tables.read(tables, others))
         for path in (svg, png):
-            save(drawn, path, figure_digest(figure, settings, cohort))
+            save(drawn, path, figure_digest(figure, settings, cohort, read))

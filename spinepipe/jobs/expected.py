@@ -3,7 +3,7 @@
 A job writes the mark of what it read; here is told beforehand what that will be.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -38,18 +38,21 @@ class Expected:
         return files_of(self.study, self.cohort)
 
     @cached_property
-    def _known(self) -> dict[Any, str]:
+    def _known(self) -> dict[tuple[str, ...], str]:
         return {}
+
+    def _once(self, key: tuple[str, ...], made: Callable[[], str]) -> str:
+        if key not in self._known:
+            self._known[key] = made()
+        return self._known[key]
 
     def of_job(self, job: str, place: Place) -> str:
         """The mark of the files of a job."""
         declared = kind_of(self.study.kind).job(job)
         others = self._others(declared, place)
         specimens = self._specimens(declared, place)
-        key = job, specimens, tuple(others)
-        if key not in self._known:
-            self._known[key] = digest_of(job, self.study, self.cohort, specimens, others)
-        return self._known[key]
+        key = job, str(specimens), *others
+        return self._once(key, lambda: digest_of(job, self.study, self.cohort, specimens, others))
 
     def of_part(self, table: str, path: str) -> str:
         """The mark of a file that is joined with others: a job file or a block of a table."""
@@ -60,23 +63,48 @@ class Expected:
 
     def of_block(self, table: str, specimen: str, block: str) -> str:
         """The mark of a block of a table."""
-        return self._joined(table, self.files.job_files(table, specimen, block))
+        files = self.files
+        key = "block", table, specimen, block
+        return self._once(key, lambda: self._joined(table, files.job_files(table, specimen, block)))
 
     def of_table(self, table: str) -> str:
         """The mark of a table that is joined from job files."""
-        return self._joined(table, self.files.block_files(table))
+        files = self.files
+        return self._once(("table", table), lambda: self._joined(table, files.block_files(table)))
 
     def _joined(self, table: str, parts: Sequence[str]) -> str:
         shape = kind_of(self.study.kind).table(table)
         return joined_digest(shape, parts, [self.of_part(table, part) for part in parts])
 
-    def of_figure(self, figure: str) -> str:
+    def of_result(self, name: str) -> str:
+        """The mark of a table, or of another result by its name with a dot."""
+        if name in (*self.files.made_of_jobs, *self.files.by_specimen):
+            return self.of_table(name)
+        return self.of_job(kind_of(self.study.kind).maker(name).name, {})
+
+    def _of_results(self, names: Sequence[str], full: bool) -> list[str]:
+        return [self.of_result(name) for name in self.files.has(names, full)]
+
+    def of_figure(self, name: str) -> str:
         """The mark of a figure."""
-        return figure_digest(figure, self.study, self.cohort)
+        figure = self.files.figure(name)
+        full = bool(set(figure.tables) & set(self.files.full))
+        read = self._of_results((*figure.reads, *figure.also), full)
+        return self._once(
+            ("figure", name), lambda: figure_digest(name, self.study, self.cohort, read)
+        )
 
     def of_report(self, page: str) -> str:
         """The mark of a page: `report`, or `full`."""
-        return report_digest(page, self.study, self.cohort)
+        files, full = self.files, page == "full"
+        drawn = files.figures(full)
+        read = [
+            *self._of_results(files.tables, full),
+            *map(self.of_figure, drawn),
+            *self._of_results(files.told_in_report, full),
+            *(Path(self.root, files.caption(name)).read_text("utf-8") for name in drawn),
+        ]
+        return report_digest(page, self.study, self.cohort, read)
 
     def _specimens(self, job: Job, place: Place) -> tuple[str, ...] | None:
         if job.header_alone:
@@ -88,7 +116,9 @@ class Expected:
     def _others(self, job: Job, place: Place) -> list[str]:
         """What else a job reads that decides, as the job itself names it."""
         base = self._base if job.reads_base else []
-        return [*base, *(job.also(self, place) if job.also else [])]
+        also = job.also(self, place) if job.also else []
+        full = bool(job.writes) and set(job.writes) <= set(self.files.full)
+        return [*base, *also, *self._of_results(job.reads, full)]
 
     @cached_property
     def _base(self) -> list[str]:

@@ -28,6 +28,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from spinepipe.jobs.digest import reading
+
 _JOBS = Path(__file__).resolve().parent
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 _SECONDS_TO_DIE = 5
@@ -78,7 +80,9 @@ _starting = threading.Lock()
 _CONTEXT = multiprocessing.get_context("forkserver")
 
 
-def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None:
+def submit_and_wait(
+    job: str, function: str, log: str, read: Sequence[str] = (), **arguments: Any
+) -> None:
     """Run ``module:name`` in a worker and return when it is done.
 
     There are as many workers as calls that wait at the same time.
@@ -91,6 +95,8 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
         ``package.module:name`` of the function.
     log
         File that gets the message and the traceback; written on failure only.
+    read
+        Files on whose marks hangs what the job writes, see `spinepipe.jobs.digest.reading`.
     arguments
         Passed to the function by keyword; plain strings, numbers and lists of them.
 
@@ -101,7 +107,7 @@ def submit_and_wait(job: str, function: str, log: str, **arguments: Any) -> None
     """
     worker = _ready()
     try:
-        worker.connection.send((function, arguments))
+        worker.connection.send((function, read, arguments))
         wait([worker.connection, worker.process.sentinel])
         failure, grown_kb = worker.connection.recv()
     except (EOFError, OSError):
@@ -126,7 +132,7 @@ def warm_up(modules: Sequence[str] = ()) -> None:
     with _starting, _environment():
         if modules:
             _CONTEXT.set_forkserver_preload(
-                ["spinepipe.jobs.collect", "spinepipe.jobs.draw", *modules]
+                ["spinepipe.jobs.block", "spinepipe.jobs.draw", *modules]
             )
         forkserver.ensure_running()
 
@@ -190,10 +196,10 @@ def _serve(connection: Connection) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
         try:
-            function, arguments = connection.recv()
+            function, read, arguments = connection.recv()
         except EOFError:
             return
-        failure = _answer(function, arguments)
+        failure = _answer(function, read, arguments)
         largest_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         connection.send((failure, largest_kb - begun_kb))
 
@@ -205,11 +211,12 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _answer(function: str, arguments: dict[str, Any]) -> _Failure | None:
+def _answer(function: str, read: Sequence[str], arguments: dict[str, Any]) -> _Failure | None:
     """Call the function; what it raises becomes text, since not every exception can be sent."""
     try:
         module, name = function.split(":")
-        getattr(importlib.import_module(module), name)(**arguments)
+        with reading(read):
+            getattr(importlib.import_module(module), name)(**arguments)
     except BaseException as error:
         message = f"{type(error).__name__}: {error}"
         if isinstance(error, OSError):

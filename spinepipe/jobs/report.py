@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from spinepipe.files import appearing
-from spinepipe.jobs.digest import report_digest
+from spinepipe.jobs.digest import mark_of, report_digest
 from spinepipe.jobs.inputs import study_of
 from spinepipe.marks import write_marked
 from spinepipe.report.page.document import Picture, Results
@@ -40,7 +40,10 @@ def run(
     if page == "report" and added:
         more = f"{listed(added)} (`make full` makes them and the page full.html, which shows them)"
         document = replace(document, left_out=(*document.left_out, more))
-    write_marked(document.html(settings, cohort), output, report_digest(page, settings, cohort))
+    read = [mark_of(path) for path in [*tables, *figures, *others.values()]]
+    read += [_text(path) for path in captions]
+    digest = report_digest(page, settings, cohort, read)
+    write_marked(document.html(settings, cohort), output, digest)
     folder, has = Path(output).parent, files_of(settings, cohort).tables
     shapes = [
         (shape, f"{shape.name}.parquet")

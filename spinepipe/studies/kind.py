@@ -40,10 +40,14 @@ class Job:
     writes : the tables it makes of them.
     ignores : settings that it does not look at: their names, with what of each is ignored. All
         others count, so that one added later is not overlooked.
+    makes : of a job with a rule of its own, the results that it writes as a whole: tables, and
+        other files by their names with a dot.
     header_alone : whether it reads no specimen; else it reads the one that its files are of, or all
         where they are of none.
     reads_base : whether it reads the model file that the study builds on.
     many : whether it comes by the hundreds, so that workers import it beforehand.
+    in_blocks : the table of its files, where these come by the thousands and are made block by
+        block, each in one process: the function takes ``parts``, paths with the wildcards of each.
     also : what else it reads that decides, such as marks of other files; asked with what is
         expected of the study (`spinepipe.jobs.expected`) and the job's wildcards.
     """
@@ -53,9 +57,11 @@ class Job:
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()
     ignores: Mapping[str, Any] = field(default_factory=dict)
+    makes: tuple[str, ...] = ()
     header_alone: bool = False
     reads_base: bool = False
     many: bool = False
+    in_blocks: str = ""
     also: Callable[[Any, Mapping[str, str]], list[str]] | None = None
 
     @property
@@ -140,6 +146,10 @@ class Kind:
         """The job of that name."""
         return next(job for job in self.jobs if job.name == name)
 
+    def maker(self, result: str) -> Job:
+        """The job that writes a table, or another file by its name with a dot, as a whole."""
+        return next(job for job in self.jobs if result in (*job.writes, *job.makes))
+
     def table(self, name: str) -> Table:
         """The table of that name."""
         return next(table for table in self.tables if table.name == name)
@@ -152,6 +162,12 @@ class Kind:
     def figures(self) -> tuple[Figure, ...]:
         """Its figures, in the order of the report."""
         return self.files.drawings
+
+    @property
+    def joined(self) -> tuple[str, ...]:
+        """Tables joined from files that jobs with rules of their own make, a file each."""
+        in_blocks = {job.in_blocks for job in self.jobs}
+        return tuple(name for name in self.files.joined if name not in in_blocks)
 
     @property
     def analyses(self) -> tuple[Job, ...]:

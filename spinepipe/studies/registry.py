@@ -61,6 +61,6 @@ def modules_of_many(kinds: Iterable[str]) -> list[str]:
             place_of(name, job.name).partition(":")[0]
             for name in kinds
             for job in kind_of(name).jobs
-            if job.many
+            if job.many or job.in_blocks
         }
     )

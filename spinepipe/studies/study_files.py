@@ -14,7 +14,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.study import Study
 
 MOST_FILES_PER_BLOCK = 300
-"""Job files that are joined to one block."""
+"""Job files that are made and joined as one block."""
+
+LEAST_BLOCKS = 16
+"""Blocks of a table, where it has as many job files: they keep several cores at work."""
 
 
 @dataclass(frozen=True)
@@ -62,12 +65,6 @@ class StudyFiles(ABC):
 
     full: ClassVar[tuple[str, ...]] = ()
     """Tables that `full` alone makes, with the figures drawn from them and a page, full.html."""
-
-    known_by_mark: ClassVar[tuple[str, ...]] = ()
-    """Tables of so many job files that Snakemake is told only of those without the right mark.
-
-    The marks of these files hold those of what they are made from.
-    """
 
     told_in_report: ClassVar[tuple[str, ...]] = ()
     """Files other than tables and figures that the report reads."""
@@ -146,6 +143,11 @@ class StudyFiles(ABC):
         """The file of what is said below a figure."""
         return f"spinepipe/studies/{self.study.kind}/figures/{figure}.rst"
 
+    def has(self, names: Sequence[str], full: bool) -> list[str]:
+        """Of these results those that the study has, tables first; a name with a dot is none."""
+        tables = [name for name in names if name in self.tables_of(full)]
+        return tables + [name for name in names if "." in name]
+
     def figure(self, name: str) -> Figure:
         """The figure of that name."""
         return next(drawing for drawing in self.drawings if drawing.name == name)
@@ -205,11 +207,16 @@ class StudyFiles(ABC):
 
 def numbered_blocks(specimens: Sequence[str], files: int) -> list[tuple[str, str]]:
     """(specimen, block) of a table with so many job files of each specimen."""
-    count = -(-files // MOST_FILES_PER_BLOCK)
+    count = -(-files // _per_block(len(specimens), files))
     return [(name, f"{block:03d}") for name in specimens for block in range(count)]
 
 
-def files_of_block(block: str, files: int) -> range:
+def files_of_block(block: str, specimens: int, files: int) -> range:
     """Numbers of the job files of a block, of so many of the specimen."""
-    first = int(block) * MOST_FILES_PER_BLOCK
-    return range(first, min(first + MOST_FILES_PER_BLOCK, files))
+    size = _per_block(specimens, files)
+    return range(int(block) * size, min((int(block) + 1) * size, files))
+
+
+def _per_block(specimens: int, files: int) -> int:
+    """Job files of a block: some, but not so many that cores have nothing to do at the end."""
+    return min(MOST_FILES_PER_BLOCK, max(1, -(-specimens * files // LEAST_BLOCKS)))

@@ -59,12 +59,12 @@ import signal
 import threading
 jobs_left = {count}
 one_at_a_time = threading.Lock()
-whole_execute = execute
+whole_run_job = run_job
 
 
-def execute(rule, function, wildcards, log, arguments):
+def run_job(job, rule, *others):
     global jobs_left
-    whole_execute(rule, function, wildcards, log, arguments)
+    whole_run_job(job, rule, *others)
     with one_at_a_time:
         jobs_left -= rule == "{rule}"
         if not jobs_left:
@@ -169,13 +169,14 @@ class Project:
         lines = self.path("workers").read_text().splitlines()
         return [(int(pid), float(start)) for pid, start in map(str.split, lines)]
 
-    def files(self) -> dict[str, int]:
-        """Result files and when each was written, ns; logs left out."""
+    def files(self) -> dict[str, str]:
+        """Result files, each with its number on the disk and its date; logs left out."""
         results = self.path("results")
+        found = {path: path.stat() for path in results.rglob("*") if path.is_file()}
         return {
-            path.relative_to(results).as_posix(): path.stat().st_mtime_ns
-            for path in results.rglob("*")
-            if path.is_file() and "logs" not in path.parts
+            path.relative_to(results).as_posix(): f"{state.st_ino} {state.st_mtime_ns}"
+            for path, state in found.items()
+            if "logs" not in path.parts
         }
 
     def contents(self) -> dict[str, bytes]:
@@ -187,9 +188,13 @@ class Project:
         return Project(folder)
 
 
-def written(before: Mapping[str, int], after: Mapping[str, int]) -> set[str]:
-    """Files that were computed between two looks."""
-    return {name for name, time in after.items() if before.get(name) != time}
+def written(before: Mapping[str, str], after: Mapping[str, str]) -> set[str]:
+    """Files that were computed between two looks; those that were dated anew are none of them."""
+    return {
+        name
+        for name, state in after.items()
+        if name not in before or before[name].split()[0] != state.split()[0]
+    }
 
 
 def copy_project(folder: Path, solves: bool = True) -> Project:

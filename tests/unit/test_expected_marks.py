@@ -13,9 +13,9 @@ import pyarrow.parquet as pq
 import pytest
 from mistaken_cohorts import good
 
-from spinepipe.jobs import collect, inputs
+from spinepipe.jobs import block, collect, inputs
 from spinepipe.jobs.collect import StaleFile
-from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import DamagedFile, read_mark
 from spinepipe.model.file import EffectEntry, ModelFile, write_model
@@ -29,6 +29,16 @@ SETTINGS = (
     "virtual_tests: {moment_nm: 7.5, tests: [flexion, left_rotation], steps: 3}\n"
 )
 BLOCK = f"results/{STUDY}/blocks/range_of_motion/specimen=a/block=000.parquet"
+
+
+def job_files(told: Expected, specimen: str) -> list[str]:
+    """All job files of a specimen."""
+    return [
+        path
+        for place in told.files.blocks("range_of_motion")
+        if place[0] == specimen
+        for path in told.files.job_files("range_of_motion", *place)
+    ]
 
 
 @pytest.fixture
@@ -48,16 +58,14 @@ def made(root: Path) -> Expected:
     frames, sets = told.files.specimen_file("frames", "a"), "results/sets.parquet"
     draw.sample_frames(str(root), STUDY, "a", frames)
     draw.draw_stiffness(str(root), STUDY, sets)
-    for path in told.files.job_files("range_of_motion", "a", "000"):
-        pose, stiffness = (part.split("=")[1].split(".")[0] for part in path.split("/")[-2:])
-        simulate.run(str(root), STUDY, frames, sets, "a", pose, stiffness, path)
+    parts = {path: place_of(path) for path in job_files(told, "a")}
+    simulate.run(str(root), STUDY, frames, sets, "a", parts)
     return told
 
 
 def join(told: Expected) -> None:
     files = told.files.job_files("range_of_motion", "a", "000")
-    marks = [told.of_part("range_of_motion", path) for path in files]
-    collect.run("range_of_motion", "range_of_motion", files, marks, BLOCK)
+    block.run_joined(told.root, STUDY, "range_of_motion", files, BLOCK)
 
 
 def test_jobs_write_the_marks_that_are_expected(root: Path) -> None:
@@ -130,7 +138,7 @@ def jobs(told: Expected) -> dict[str, str]:
         for s, block in told.files.blocks(table):
             files = told.files.job_files(table, s, block)
             marks |= {path: told.of_part(table, path) for path in files}
-            marks[f"block {table} {s}"] = told.of_block(table, s, block)
+            marks[f"block {table} {s} {block}"] = told.of_block(table, s, block)
         marks[f"table {table}"] = told.of_table(table)
     return marks
 
@@ -153,8 +161,10 @@ def test_a_changed_number_of_a_specimen_changes_what_it_makes_and_is_joined_to(r
     joints = root / "config/cohorts/stack/joints.csv"
     again = changed(lambda: expected(root), lambda: replace(joints, "b,L2L3,0,36,", "b,L2L3,0,37,"))
     files = expected(root).files
-    own = set(files.job_files("range_of_motion", "b", "000"))
-    of_it = {"frames b", "table frames", "block range_of_motion b", "table range_of_motion"}
+    own = set(job_files(expected(root), "b"))
+    blocks = {f"block range_of_motion {one} {n}" for one, n in files.blocks("range_of_motion")}
+    of_it = {"frames b", "table frames", "table range_of_motion"}
+    of_it |= {name for name in blocks if " b " in name}
     assert again == own | of_it
 
 

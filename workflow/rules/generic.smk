@@ -2,43 +2,95 @@
 # Which they are stands in the declaration of the kind, spinepipe/studies/<kind>/kind.py.
 
 
+def inputs_of(kind, job):
+    """Input of a job that reads tables: of those that the study at hand has, and other files."""
+    full = set(job.writes) <= set(kind.files.full)
+    tables = lambda wildcards: layout(wildcards.study).table_files(job.reads, full)
+    folder = f"{RESULTS}/{kind.files.subfolder}"
+    others = [name for name in job.reads if "." in name]
+    return {
+        "tables": tables,
+        **{name.split(".")[0]: f"{folder}{name}" for name in others},
+    }
+
+
+def outputs_of(place, kind, job):
+    """Output of a job that makes tables: one is called `output`, several by their names."""
+    folder = f"{place}/{kind.files.subfolder}"
+    files = {name: update(f"{folder}{name}.parquet") for name in job.writes}
+    return files if len(files) > 1 else {"output": files[job.writes[0]]}
+
+
+def inputs_of_figure(wildcards):
+    files = layout(wildcards.study)
+    figure = files.figure(wildcards.figure)
+    full = bool(set(figure.tables) & set(files.full))
+    tables = files.table_files((*figure.reads, *figure.also), full)
+    return {"tables": tables, **files.other_files(figure.reads)}
+
+
+def inputs_of_page(wildcards):
+    files = layout(wildcards.study)
+    full = wildcards.page == "full"
+    figures = files.figures(full)
+    return {
+        "tables": files.table_files(files.tables, full),
+        "figures": [f"{files.folder}/figures/{figure}.svg" for figure in figures],
+        "captions": [files.caption(figure) for figure in figures],
+        **files.other_files(files.told_in_report),
+    }
+
+
+def caption_of_figure(wildcards):
+    return Path(layout(wildcards.study).caption(wildcards.figure)).read_text("utf-8")
+
+
 # One set of rules for each kind of study that has a study file: their patterns name the studies, so
 # that a file is tried against the rules of its own kind alone.
-for kind in KINDS_IN_USE:
+for kind in PROJECT.kinds:
     place = results_of(kind)
     made = kind_of(kind)
+    drawn = (
+        f"{place}/{made.files.subfolder}figures/{{figure,{one_of(f.name for f in made.figures)}}}"
+    )
 
-    if made.files.joined:
+    if made.joined:
 
         rule:
             name:
                 f"{kind}_block"
             input:
-                jobs_of_block,
+                outdated(f"{kind}_block"),
+                inputs=lambda wildcards: layout(wildcards.study).job_files(
+                    wildcards.table, wildcards.specimen, wildcards.block
+                ),
             output:
-                f"{place}/blocks/{{table,{one_of(made.files.joined)}}}/specimen={{specimen}}/block={{block}}.parquet",
+                output=update(
+                    f"{place}/blocks/{{table,{one_of(made.joined)}}}/specimen={{specimen}}/block={{block}}.parquet"
+                ),
             log:
                 f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
-            wildcard_constraints:
-                block="[0-9]{3,5}|[a-z]+",
             params:
-                digest=block_digest,
+                digest=block_digest(),
             run:
-                collect(rule, wildcards, input, output, log)
+                run_job(JOIN, rule, wildcards, input, output, params, log)
+
+    if made.files.joined:
 
         rule:
             name:
                 f"{kind}_table"
             input:
-                blocks_of_table,
+                outdated(f"{kind}_table"),
+                inputs=lambda wildcards: layout(wildcards.study).block_files(wildcards.table),
             output:
-                f"{place}/{{table,{one_of(made.files.joined)}}}.parquet",
+                output=update(f"{place}/{{table,{one_of(made.files.joined)}}}.parquet"),
             log:
                 f"{LOGS}/{{table}}.log",
             params:
                 digest=table_digest,
             run:
-                collect(rule, wildcards, input, output, log)
+                run_job(JOIN, rule, wildcards, input, output, params, log)
 
     # Tables computed from tables: a rule for each job, as a job may make several.
     for job in made.analyses:
@@ -47,6 +99,7 @@ for kind in KINDS_IN_USE:
             name:
                 f"{kind}_{job.name}"
             input:
+                outdated(f"{kind}_{job.name}"),
                 **inputs_of(made, job),
             output:
                 **outputs_of(place, made, job),
@@ -56,7 +109,7 @@ for kind in KINDS_IN_USE:
                 digest=digest(job.name),
                 job=job.name,
             run:
-                run_job(rule, params.job, wildcards, input, output, log)
+                run_job(params.job, rule, wildcards, input, output, params, log)
 
     if made.figures:
 
@@ -64,32 +117,36 @@ for kind in KINDS_IN_USE:
             name:
                 f"{kind}_figure"
             input:
+                outdated(f"{kind}_figure"),
                 unpack(inputs_of_figure),
             output:
                 svg=report(
-                    f"{place}/{made.files.subfolder}figures/{{figure,{one_of(f.name for f in made.figures)}}}.svg",
+                    update(f"{drawn}.svg"),
                     caption="../report/figure.rst",
                     category="{study}",
                 ),
-                png=f"{place}/{made.files.subfolder}figures/{{figure,{one_of(f.name for f in made.figures)}}}.png",
+                png=update(f"{drawn}.png"),
             log:
                 f"{LOGS}/figure_{{figure}}.log",
             params:
-                digest=figure_digest,
+                digest=lambda wildcards: PROJECT.expected(wildcards.study).of_figure(
+                    wildcards.figure
+                ),
                 caption=caption_of_figure,
             run:
-                run_core(rule, "draw", wildcards, input, output, log)
+                run_job(DRAW, rule, wildcards, input, output, params, log)
 
     rule:
         name:
             f"{kind}_report"
         input:
+            outdated(f"{kind}_report"),
             unpack(inputs_of_page),
         output:
-            output=f"{place}/{made.files.subfolder}{{page,report|full}}.html",
+            output=update(f"{place}/{made.files.subfolder}{{page,report|full}}.html"),
         log:
             f"{LOGS}/{{page}}.log",
         params:
-            digest=report_digest,
+            digest=lambda wildcards: PROJECT.expected(wildcards.study).of_report(wildcards.page),
         run:
-            run_core(rule, "report", wildcards, input, output, log)
+            run_job(REPORT, rule, wildcards, input, output, params, log)

@@ -9,66 +9,110 @@ wildcard_constraints:
 
 
 rule draw_design:
+    input:
+        outdated("draw_design"),
     output:
-        output=f"{SENSITIVITIES}/design.parquet",
+        output=update(f"{SENSITIVITIES}/design.parquet"),
     log:
         f"{LOGS}/draw_design.log",
     params:
         digest=digest("design"),
     run:
-        run_job(rule, "design", wildcards, input, output, log)
+        run_job("design", rule, wildcards, input, output, params, log)
 
 
 # The spine of each specimen before any factor changes it, beside its measured motion.
 rule base_of_specimen:
+    input:
+        outdated("base_of_specimen"),
     output:
-        base_stiffness=f"{SENSITIVITIES}/base/specimen={{specimen}}/base_stiffness.parquet",
-        base_motion=f"{SENSITIVITIES}/base/specimen={{specimen}}/base_motion.parquet",
+        base_stiffness=update(f"{SENSITIVITIES}/base/specimen={{specimen}}/base_stiffness.parquet"),
+        base_motion=update(f"{SENSITIVITIES}/base/specimen={{specimen}}/base_motion.parquet"),
     log:
         f"{LOGS}/base_of_specimen/specimen={{specimen}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("base"),
     run:
-        run_job(rule, "base", wildcards, input, output, log)
+        run_job("base", rule, wildcards, input, output, params, log)
 
 
-# One batch of samples; how many are in one is the study's samples_per_target.
+# Batches of samples; how many are in one is the study's samples_per_target.
+rule responses_block:
+    input:
+        outdated("responses_block"),
+        design=f"{RESULTS}/design.parquet",
+        base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
+    output:
+        output=update(
+            f"{SENSITIVITIES}/blocks/{{table,responses}}/specimen={{specimen}}/block={{block}}.parquet"
+        ),
+    log:
+        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+    params:
+        digest=block_digest("responses"),
+    run:
+        run_job(BLOCK, rule, wildcards, input, output, params, log)
+
+
+# One file by its name, such as one that got lost.
 rule respond:
     input:
+        outdated("respond"),
         design=f"{RESULTS}/design.parquet",
         base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
     output:
-        output=f"{SENSITIVITIES}/jobs/responses/specimen={{specimen}}/batch={{batch}}.parquet",
+        output=update(
+            f"{SENSITIVITIES}/jobs/responses/specimen={{specimen}}/batch={{batch}}.parquet"
+        ),
     log:
         f"{LOGS}/respond/specimen={{specimen}}/batch={{batch}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("respond"),
+        table="responses",
     run:
-        run_job(rule, "respond", wildcards, input, output, log, base=[])
+        run_job(PART, rule, wildcards, input, output, params, log)
 
 
-rule calibrate_samples:
+# Stiffness fitted anew in each sample.
+rule calibrated_block:
     input:
+        outdated("calibrated_block"),
         design=f"{RESULTS}/design.parquet",
         base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
     output:
-        output=f"{SENSITIVITIES}/jobs/calibrated/specimen={{specimen}}/batch={{batch}}.parquet",
+        output=update(
+            f"{SENSITIVITIES}/blocks/{{table,calibrated}}/specimen={{specimen}}/block={{block}}.parquet"
+        ),
+    log:
+        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+    params:
+        digest=block_digest("calibrated"),
+    run:
+        run_job(BLOCK, rule, wildcards, input, output, params, log)
+
+
+# One file by its name, such as one that got lost.
+rule calibrate_samples:
+    input:
+        outdated("calibrate_samples"),
+        design=f"{RESULTS}/design.parquet",
+        base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
+    output:
+        output=update(
+            f"{SENSITIVITIES}/jobs/calibrated/specimen={{specimen}}/batch={{batch}}.parquet"
+        ),
     log:
         f"{LOGS}/calibrate_samples/specimen={{specimen}}/batch={{batch}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("calibrate"),
+        table="calibrated",
     run:
-        run_job(rule, "calibrate", wildcards, input, output, log, base=[])
+        run_job(PART, rule, wildcards, input, output, params, log)
 
 
 rule index_factors:
     input:
+        outdated("index_factors"),
         design=f"{RESULTS}/design.parquet",
         responses=lambda wildcards: layout(wildcards.study).blocks_of(
             "responses", wildcards.specimen
@@ -77,21 +121,12 @@ rule index_factors:
             "calibrated", wildcards.specimen
         ),
     output:
-        indices=f"{SENSITIVITIES}/analysis/specimen={{specimen}}/indices.parquet",
-        convergence=f"{SENSITIVITIES}/analysis/specimen={{specimen}}/convergence.parquet",
-        failed_runs=f"{SENSITIVITIES}/analysis/specimen={{specimen}}/failed_runs.parquet",
+        indices=update(f"{SENSITIVITIES}/analysis/specimen={{specimen}}/indices.parquet"),
+        convergence=update(f"{SENSITIVITIES}/analysis/specimen={{specimen}}/convergence.parquet"),
+        failed_runs=update(f"{SENSITIVITIES}/analysis/specimen={{specimen}}/failed_runs.parquet"),
     log:
         f"{LOGS}/index_factors/specimen={{specimen}}.log",
     params:
         digest=digest("analyse"),
     run:
-        run_job(
-            rule,
-            "analyse",
-            wildcards,
-            input,
-            output,
-            log,
-            responses=[],
-            calibrated=[],
-        )
+        run_job("analyse", rule, wildcards, input, output, params, log)

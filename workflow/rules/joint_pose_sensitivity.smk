@@ -13,163 +13,218 @@ wildcard_constraints:
     sd_mm="[0-9.e+-]+",
 
 
-include: "ranking.smk"
-
-
 rule start_model:
+    input:
+        outdated("start_model"),
     output:
-        output=f"{POSES}/model.yaml",
+        output=update(f"{POSES}/model.yaml"),
     log:
         f"{LOGS}/start_model.log",
     params:
         digest=digest("start_model"),
     run:
-        run_job(rule, "start_model", wildcards, input, output, log)
+        run_job("start_model", rule, wildcards, input, output, params, log)
 
 
 rule sample_landmarks:
+    input:
+        outdated("sample_landmarks"),
     output:
-        output=f"{POSES}/landmarks/specimen={{specimen}}.parquet",
+        output=update(f"{POSES}/landmarks/specimen={{specimen}}.parquet"),
     log:
         f"{LOGS}/sample_landmarks/specimen={{specimen}}.log",
     params:
         digest=digest("sample_landmarks"),
     run:
-        run_job(rule, "sample_landmarks", wildcards, input, output, log)
+        run_job("sample_landmarks", rule, wildcards, input, output, params, log)
 
 
 rule build_models:
     input:
+        outdated("build_models"),
         landmarks=f"{RESULTS}/landmarks/specimen={{specimen}}.parquet",
     output:
-        output=f"{POSES}/poses/specimen={{specimen}}.parquet",
+        output=update(f"{POSES}/poses/specimen={{specimen}}.parquet"),
     log:
         f"{LOGS}/build_models/specimen={{specimen}}.log",
     params:
         digest=digest("build_models"),
     run:
-        run_job(rule, "build_models", wildcards, input, output, log)
+        run_job("build_models", rule, wildcards, input, output, params, log)
 
 
-rule calibrate:
+# Poses of a specimen, fitted side by side.
+rule calibrations_block:
     input:
+        outdated("calibrations_block"),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
-        output=f"{POSES}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet",
+        output=update(
+            f"{POSES}/blocks/{{table,calibrations}}/specimen={{specimen}}/block={{block}}.parquet"
+        ),
+    log:
+        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+    params:
+        digest=block_digest("calibrations"),
+    run:
+        run_job(BLOCK, rule, wildcards, input, output, params, log)
+
+
+# One file by its name, such as one that got lost.
+rule calibrate:
+    input:
+        outdated("calibrate"),
+        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+    output:
+        output=update(f"{POSES}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet"),
     log:
         f"{LOGS}/calibrate/specimen={{specimen}}/pose={{pose}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("calibrate"),
+        table="calibrations",
     run:
-        run_job(rule, "calibrate", wildcards, input, output, log)
+        run_job(PART, rule, wildcards, input, output, params, log)
 
 
-# A checkpoint, so that a ranking that comes out the same as before computes no simulation again.
-checkpoint rank_models:
+rule rank_models:
     input:
+        outdated("rank_models"),
         calibrations=f"{RESULTS}/calibrations.parquet",
         success=f"{RESULTS}/success.parquet",
     output:
-        output=f"{POSES}/best.json",
+        output=update(f"{POSES}/best.json"),
     log:
         f"{LOGS}/rank_models.log",
     params:
         digest=digest("rank"),
     run:
-        run_job(rule, "rank", wildcards, input, output, log)
+        run_job("rank", rule, wildcards, input, output, params, log)
 
 
+# Each pose with its own stiffness and with the best sets of all poses.
+rule simulations_block:
+    input:
+        outdated("simulations_block"),
+        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+        calibrations=lambda wildcards: layout(wildcards.study).blocks_of_calibrations(
+            wildcards.specimen
+        ),
+        best=f"{RESULTS}/best.json",
+    output:
+        output=update(
+            f"{POSES}/blocks/{{table,simulations}}/specimen={{specimen}}/block={{block}}.parquet"
+        ),
+    log:
+        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+    params:
+        digest=block_digest("simulations"),
+    run:
+        run_job(BLOCK, rule, wildcards, input, output, params, log)
+
+
+# One file by its name, such as one that got lost.
 rule simulate:
     input:
-        unpack(stiffness_source),
+        outdated("simulate"),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+        calibrations=lambda wildcards: layout(wildcards.study).blocks_of_calibrations(
+            wildcards.specimen
+        ),
+        best=f"{RESULTS}/best.json",
     output:
-        output=f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness,calibrated|best[0-9]{{2}}}}.parquet",
+        output=update(
+            f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness,calibrated|best[0-9]{{2}}}}.parquet"
+        ),
     log:
         f"{LOGS}/simulate/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("simulate"),
+        table="simulations",
     run:
-        run_job(
-            rule, "simulate", wildcards, input, output, log, calibration="", best=""
-        )
+        run_job(PART, rule, wildcards, input, output, params, log)
 
 
 rule bootstrap:
+    input:
+        outdated("bootstrap"),
     output:
-        output=f"{POSES}/bootstrap/specimen={{specimen}}/bootstrap={{bootstrap}}/loading={{loading}}/batch={{batch}}.parquet",
+        output=update(
+            f"{POSES}/bootstrap/specimen={{specimen}}/bootstrap={{bootstrap}}/loading={{loading}}/batch={{batch}}.parquet"
+        ),
     log:
         f"{LOGS}/bootstrap/specimen={{specimen}}/{{bootstrap}}-{{loading}}-{{batch}}.log",
     params:
         digest=digest("bootstrap"),
     run:
-        run_job(rule, "bootstrap", wildcards, input, output, log)
+        run_job("bootstrap", rule, wildcards, input, output, params, log)
 
 
 rule fit_by_method:
     input:
+        outdated("fit_by_method"),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
-        output=f"{POSES}/methods/specimen={{specimen}}/pose={{pose}}/method={{method}}.parquet",
+        output=update(
+            f"{POSES}/methods/specimen={{specimen}}/pose={{pose}}/method={{method}}.parquet"
+        ),
     log:
         f"{LOGS}/methods/specimen={{specimen}}/pose={{pose}}-{{method}}.log",
     params:
         digest=digest("fit_by_method"),
     run:
-        run_job(rule, "fit_by_method", wildcards, input, output, log)
+        run_job("fit_by_method", rule, wildcards, input, output, params, log)
 
 
 rule landmark_errors:
+    input:
+        outdated("landmark_errors"),
     output:
-        output=f"{POSES}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.parquet",
+        output=update(f"{POSES}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.parquet"),
     log:
         f"{LOGS}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.log",
     params:
         digest=digest("landmark_errors"),
     run:
-        run_job(rule, "landmark_errors", wildcards, input, output, log)
+        run_job("landmark_errors", rule, wildcards, input, output, params, log)
 
 
 rule spread_over_landmark_sd:
+    input:
+        outdated("spread_over_landmark_sd"),
     output:
-        output=f"{POSES}/spread_over_landmark_sd/specimen={{specimen}}.parquet",
+        output=update(f"{POSES}/spread_over_landmark_sd/specimen={{specimen}}.parquet"),
     log:
         f"{LOGS}/spread_over_landmark_sd/specimen={{specimen}}.log",
     params:
         digest=digest("spread_over_landmark_sd"),
     run:
-        run_job(rule, "spread_over_landmark_sd", wildcards, input, output, log)
+        run_job("spread_over_landmark_sd", rule, wildcards, input, output, params, log)
 
 
 rule over_load_point:
+    input:
+        outdated("over_load_point"),
     output:
-        output=f"{POSES}/stiffness_over_load_point/specimen={{specimen}}.parquet",
+        output=update(f"{POSES}/stiffness_over_load_point/specimen={{specimen}}.parquet"),
     log:
         f"{LOGS}/over_load_point/specimen={{specimen}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("over_load_point"),
     run:
-        run_job(rule, "over_load_point", wildcards, input, output, log)
+        run_job("over_load_point", rule, wildcards, input, output, params, log)
 
 
 rule posterior:
     input:
+        outdated("posterior"),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
-        posterior=f"{POSES}/posterior/specimen={{specimen}}.parquet",
-        posterior_motion=f"{POSES}/posterior_motion/specimen={{specimen}}.parquet",
-        pose_weights=f"{POSES}/pose_weights/specimen={{specimen}}.parquet",
+        posterior=update(f"{POSES}/posterior/specimen={{specimen}}.parquet"),
+        posterior_motion=update(f"{POSES}/posterior_motion/specimen={{specimen}}.parquet"),
+        pose_weights=update(f"{POSES}/pose_weights/specimen={{specimen}}.parquet"),
     log:
         f"{LOGS}/posterior/specimen={{specimen}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("posterior"),
     run:
-        run_job(rule, "posterior", wildcards, input, output, log)
+        run_job("posterior", rule, wildcards, input, output, params, log)

@@ -5,38 +5,63 @@ MOTIONS = results_of("range_of_motion")
 
 
 rule sample_frames:
+    input:
+        outdated("sample_frames"),
     output:
-        output=f"{MOTIONS}/frames/specimen={{specimen}}.parquet",
+        output=update(f"{MOTIONS}/frames/specimen={{specimen}}.parquet"),
     log:
         f"{LOGS}/sample_frames/specimen={{specimen}}.log",
     params:
         digest=digest("sample_frames"),
     run:
-        run_job(rule, "sample_frames", wildcards, input, output, log)
+        run_job("sample_frames", rule, wildcards, input, output, params, log)
 
 
 rule draw_stiffness:
+    input:
+        outdated("draw_stiffness"),
     output:
-        output=f"{MOTIONS}/stiffness_sets.parquet",
+        output=update(f"{MOTIONS}/stiffness_sets.parquet"),
     log:
         f"{LOGS}/draw_stiffness.log",
     params:
         digest=digest("draw_stiffness"),
     run:
-        run_job(rule, "draw_stiffness", wildcards, input, output, log)
+        run_job("draw_stiffness", rule, wildcards, input, output, params, log)
 
 
-rule move:
+# Drawn frames with drawn stiffness.
+rule moves_block:
     input:
+        outdated("moves_block"),
         frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
         stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
     output:
-        output=f"{MOTIONS}/jobs/specimen={{specimen}}/pose={{pose,[0-9]+}}/stiffness={{stiffness,[0-9]+}}.parquet",
+        output=update(
+            f"{MOTIONS}/blocks/{{table,range_of_motion}}/specimen={{specimen}}/block={{block}}.parquet"
+        ),
+    log:
+        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+    params:
+        digest=block_digest("range_of_motion"),
+    run:
+        run_job(BLOCK, rule, wildcards, input, output, params, log)
+
+
+# One file by its name, such as one that got lost.
+rule move:
+    input:
+        outdated("move"),
+        frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
+        stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
+    output:
+        output=update(
+            f"{MOTIONS}/jobs/specimen={{specimen}}/pose={{pose,[0-9]+}}/stiffness={{stiffness,[0-9]+}}.parquet"
+        ),
     log:
         f"{LOGS}/move/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("simulate"),
+        table="range_of_motion",
     run:
-        run_job(rule, "simulate", wildcards, input, output, log)
+        run_job(PART, rule, wildcards, input, output, params, log)

@@ -6,47 +6,44 @@ HELD = "specimen={specimen}/model={model,[a-z_]+}"
 
 
 rule population:
+    input:
+        outdated("population"),
     output:
-        output=f"{PATIENTS}/population.parquet",
+        output=update(f"{PATIENTS}/population.parquet"),
     log:
         f"{LOGS}/population.log",
     priority: 1
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("population"),
     run:
-        run_job(rule, "population", wildcards, input, output, log)
+        run_job("population", rule, wildcards, input, output, params, log)
 
 
 rule personalise:
     input:
-        population=lambda wildcards: layout(wildcards.study).population_files(
-            wildcards.model
-        ),
+        outdated("personalise"),
+        population=lambda wildcards: layout(wildcards.study).population_files(wildcards.model),
     output:
-        laws=f"{PATIENTS}/jobs/{HELD}/laws.parquet",
-        positions=f"{PATIENTS}/jobs/{HELD}/positions.parquet",
-        displacements=f"{PATIENTS}/jobs/{HELD}/displacements.parquet",
-        curves=f"{PATIENTS}/jobs/{HELD}/curves.parquet",
+        laws=update(f"{PATIENTS}/jobs/{HELD}/laws.parquet"),
+        positions=update(f"{PATIENTS}/jobs/{HELD}/positions.parquet"),
+        displacements=update(f"{PATIENTS}/jobs/{HELD}/displacements.parquet"),
+        curves=update(f"{PATIENTS}/jobs/{HELD}/curves.parquet"),
     log:
         f"{LOGS}/personalise/specimen={{specimen}}/{{model}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("personalise"),
     run:
-        run_job(rule, "personalise", wildcards, input, output, log)
+        run_job("personalise", rule, wildcards, input, output, params, log)
 
 
 rule variants:
+    input:
+        outdated("variants"),
     output:
-        output=f"{PATIENTS}/variants/specimen={{specimen}}.parquet",
+        output=update(f"{PATIENTS}/variants/specimen={{specimen}}.parquet"),
     log:
         f"{LOGS}/variants/specimen={{specimen}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("variants"),
     run:
-        run_job(rule, "variants", wildcards, input, output, log)
+        run_job("variants", rule, wildcards, input, output, params, log)

@@ -5,77 +5,96 @@ TRUNKS = results_of("trunk_loads")
 
 
 rule hold:
+    input:
+        outdated("hold"),
     output:
-        tasks=f"{TRUNKS}/jobs/specimen={{specimen}}/tasks.parquet",
-        levels=f"{TRUNKS}/jobs/specimen={{specimen}}/levels.parquet",
-        muscles=f"{TRUNKS}/jobs/specimen={{specimen}}/muscles.parquet",
-        paths=f"{TRUNKS}/jobs/specimen={{specimen}}/paths.parquet",
-        iterations=f"{TRUNKS}/jobs/specimen={{specimen}}/iterations.parquet",
-        upright=f"{TRUNKS}/jobs/specimen={{specimen}}/upright.parquet",
-        masses=f"{TRUNKS}/jobs/specimen={{specimen}}/masses.parquet",
-        scaling=f"{TRUNKS}/jobs/specimen={{specimen}}/scaling.parquet",
-        remarks=f"{TRUNKS}/jobs/specimen={{specimen}}/remarks.parquet",
+        tasks=update(f"{TRUNKS}/jobs/specimen={{specimen}}/tasks.parquet"),
+        levels=update(f"{TRUNKS}/jobs/specimen={{specimen}}/levels.parquet"),
+        muscles=update(f"{TRUNKS}/jobs/specimen={{specimen}}/muscles.parquet"),
+        paths=update(f"{TRUNKS}/jobs/specimen={{specimen}}/paths.parquet"),
+        iterations=update(f"{TRUNKS}/jobs/specimen={{specimen}}/iterations.parquet"),
+        upright=update(f"{TRUNKS}/jobs/specimen={{specimen}}/upright.parquet"),
+        masses=update(f"{TRUNKS}/jobs/specimen={{specimen}}/masses.parquet"),
+        scaling=update(f"{TRUNKS}/jobs/specimen={{specimen}}/scaling.parquet"),
+        remarks=update(f"{TRUNKS}/jobs/specimen={{specimen}}/remarks.parquet"),
     log:
         f"{LOGS}/hold/specimen={{specimen}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("hold"),
     run:
-        run_job(rule, "hold", wildcards, input, output, log)
+        run_job("hold", rule, wildcards, input, output, params, log)
 
 
 rule simplify:
+    input:
+        outdated("simplify"),
     output:
-        output=f"{TRUNKS}/jobs/specimen={{specimen}}/simplified.parquet",
+        output=update(f"{TRUNKS}/jobs/specimen={{specimen}}/simplified.parquet"),
     log:
         f"{LOGS}/simplify/specimen={{specimen}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("simplify"),
     run:
-        run_job(rule, "simplify", wildcards, input, output, log)
+        run_job("simplify", rule, wildcards, input, output, params, log)
 
 
 rule tune:
+    input:
+        outdated("tune"),
     output:
-        pressures=f"{TRUNKS}/pressures.parquet",
-        tuning=f"{TRUNKS}/tuning.parquet",
-        agreement=f"{TRUNKS}/agreement.parquet",
+        pressures=update(f"{TRUNKS}/pressures.parquet"),
+        tuning=update(f"{TRUNKS}/tuning.parquet"),
+        agreement=update(f"{TRUNKS}/agreement.parquet"),
     log:
         f"{LOGS}/tune.log",
     priority: 1
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("tune"),
     run:
-        run_job(rule, "tune", wildcards, input, output, log)
+        run_job("tune", rule, wildcards, input, output, params, log)
 
 
 rule draw_inputs:
+    input:
+        outdated("draw_inputs"),
     output:
-        output=f"{TRUNKS}/design.parquet",
+        output=update(f"{TRUNKS}/design.parquet"),
     log:
         f"{LOGS}/draw_inputs.log",
     params:
         digest=digest("draw"),
     run:
-        run_job(rule, "draw", wildcards, input, output, log)
+        run_job("draw", rule, wildcards, input, output, params, log)
 
 
-# One batch of samples of one person; how many are in one is the study's samples_per_target.
-rule sample_loads:
+# Batches of samples of a person; how many are in one is the study's samples_per_target.
+rule samples_block:
     input:
+        outdated("samples_block"),
         design=f"{RESULTS}/design.parquet",
     output:
-        output=f"{TRUNKS}/jobs/specimen={{specimen}}/batch={{batch}}/responses.parquet",
+        output=update(
+            f"{TRUNKS}/blocks/{{table,responses}}/specimen={{specimen}}/block={{block}}.parquet"
+        ),
+    log:
+        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+    params:
+        digest=block_digest("responses"),
+    run:
+        run_job(BLOCK, rule, wildcards, input, output, params, log)
+
+
+# One file by its name, such as one that got lost.
+rule sample_loads:
+    input:
+        outdated("sample_loads"),
+        design=f"{RESULTS}/design.parquet",
+    output:
+        output=update(f"{TRUNKS}/jobs/specimen={{specimen}}/batch={{batch}}/responses.parquet"),
     log:
         f"{LOGS}/sample_loads/specimen={{specimen}}/batch={{batch}}.log",
-    resources:
-        tmpdir=TMPDIR,
     params:
         digest=digest("respond"),
+        table="responses",
     run:
-        run_job(rule, "respond", wildcards, input, output, log)
+        run_job(PART, rule, wildcards, input, output, params, log)

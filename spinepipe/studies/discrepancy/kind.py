@@ -11,6 +11,7 @@ from spinepipe.studies.kind import Job, Kind
 from spinepipe.studies.study_files import Figure, StudyFiles
 
 VERDICT = "verdict.json"
+TABLES = tuple(table.name for table in all_declared(__file__))
 """The answer; each figure may draw from it."""
 
 OTHERS = (VERDICT, "design.csv", "model_base.yaml", "model_with_effects.yaml")
@@ -77,7 +78,7 @@ class DiscrepancyFiles(StudyFiles):
     @property
     def tables(self) -> tuple[str, ...]:
         """The tables that every study has."""
-        return tuple(table.name for table in all_declared(__file__))
+        return TABLES
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -92,7 +93,7 @@ KIND = Kind(
     checks_of_files=(BaseCheck(own_bushings=False),),
     tables=all_declared(__file__),
     # every setting says something about the search
-    jobs=(Job("search", at="job", reads_base=True),),
+    jobs=(Job("search", at="job", reads_base=True, makes=(*TABLES, VERDICT)),),
     makes_models="search",
     holds=True,
     exports="export:exported",

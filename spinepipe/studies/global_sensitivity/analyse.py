@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.sensitivity.global_indices.convergence import convergence
 from spinepipe.sensitivity.global_indices.design import Design
@@ -80,12 +80,12 @@ def run(
     root: str,
     study: str,
     design: str,
-    responses: list[str],
-    calibrated: list[str],
+    responses: Sequence[str],
     specimen: str,
     indices: str,
     convergence: str,
     failed_runs: str,
+    calibrated: Sequence[str] = (),
 ) -> None:
     """Write what the blocks of one specimen's samples say: indices, how they settle, who failed."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
@@ -93,7 +93,8 @@ def run(
         *response_outputs(responses, settings),
         *calibrated_outputs(calibrated, settings),
     ]
-    made_by = provenance("analyse", settings, cohort, [specimen])
+    read = [mark_of(path) for path in (design, *responses, *calibrated)]
+    made_by = provenance("analyse", settings, cohort, [specimen], read)
     drawn = design_of(settings)
     each = [_analysed(settings, drawn, one) for one in outputs]
     for place, (table, path) in enumerate(((INDICES, indices), (CONVERGENCE, convergence))):

@@ -1,5 +1,6 @@
 """Job: stiffness of one specimen calibrated to its measured motion, in one batch of samples."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from spinepipe.calibrate import Fit, Problem, fit
@@ -24,14 +25,26 @@ STARTS = 1
 
 
 def run(
-    root: str, study: str, design: str, base: list[str], specimen: str, batch: str, output: str
+    root: str,
+    study: str,
+    design: str,
+    specimen: str,
+    parts: Mapping[str, Mapping[str, str]],
+    base: Sequence[str] = (),
 ) -> None:
-    """Write one row per sample: stiffness that all joints share.
+    """Write a file of each batch, one row per sample: stiffness that all joints share.
 
     Parameters
     ----------
     base : file of the specimen's fitted stiffness, where factors start from it.
     """
+    for path, place in parts.items():
+        _run(root, study, design, base, specimen, place["batch"], path)
+
+
+def _run(
+    root: str, study: str, design: str, base: Sequence[str], specimen: str, batch: str, output: str
+) -> None:
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     one = batch_of(root, settings, cohort, design, base, specimen, int(batch), all_steps=True)
     rows = [_refused(one.first + sample, why) for sample, why in one.varied.refused.items()]

@@ -41,7 +41,6 @@ class SensitivityFiles(StudyFiles):
     """
 
     joined = OF_JOBS
-    known_by_mark = ("responses", "calibrated")
     drawings = (
         Figure(
             "factor_indices",
@@ -93,7 +92,7 @@ class SensitivityFiles(StudyFiles):
         """The job files of which a block is made."""
         if table in _BY_SPECIMEN:
             return [f"{self.folder}/{_FOLDER[table]}/specimen={specimen}/{table}.parquet"]
-        numbers = files_of_block(block, self.n_batches)
+        numbers = files_of_block(block, len(self.specimens), self.n_batches)
         return [self._batch_file(table, specimen, number) for number in numbers]
 
     def blocks_of(self, table: str, specimen: str) -> list[str]:
@@ -122,6 +121,17 @@ def _of_batch(expected: Any, place: Mapping[str, str]) -> list[str]:
     return [size, design] if base is None else [size, design, base]
 
 
+def _of_blocks(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Marks of the design and of the blocks of a specimen's samples."""
+    files, specimen = expected.files, place["specimen"]
+    blocks = [
+        expected.of_part(table, path)
+        for table in ("responses", "calibrated")
+        for path in files.blocks_of(table, specimen)
+    ]
+    return [expected.of_job("design", {}), *blocks]
+
+
 _DRAWING = ("factors", "design", "dummy", "samples_per_target")
 _RESPONDING = (
     *("specimens", "tests", "steps", "stiffness", "level_stiffness", "damping", "loading"),
@@ -137,16 +147,26 @@ KIND = Kind(
     settled=calibration_settled,
     tables=all_declared(__file__),
     jobs=(
-        Job("design", ignores=ignoring(*_RESPONDING, *_ANALYSING), header_alone=True),
+        Job(
+            "design",
+            makes=("design",),
+            ignores=ignoring(*_RESPONDING, *_ANALYSING),
+            header_alone=True,
+        ),
         Job("base", ignores=ignoring(*_DRAWING, *_ANALYSING, "steps")),
         Job(
             "respond",
-            many=True,
+            in_blocks="responses",
             ignores=ignoring(*_ANALYSING, "calibration", "seed"),
             also=_of_batch,
         ),
-        Job("calibrate", ignores=ignoring(*_ANALYSING, "steps"), also=_of_batch),
-        Job("analyse"),
+        Job(
+            "calibrate",
+            in_blocks="calibrated",
+            ignores=ignoring(*_ANALYSING, "steps"),
+            also=_of_batch,
+        ),
+        Job("analyse", also=_of_blocks),
     ),
     exports="export:exported",
 )

@@ -1,7 +1,7 @@
 """Job: motion and joint loads of one specimen in one batch of samples, in all tests."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,14 +27,26 @@ LOADS = tuple(c.name for c in RESPONSES.columns if c.name.startswith("load_"))
 
 
 def run(
-    root: str, study: str, design: str, base: list[str], specimen: str, batch: str, output: str
+    root: str,
+    study: str,
+    design: str,
+    specimen: str,
+    parts: Mapping[str, Mapping[str, str]],
+    base: Sequence[str] = (),
 ) -> None:
-    """Write the rows of a batch: sample by sample, test by test, step by step, joint by joint.
+    """Write a file of each batch: sample by sample, test by test, step by step, joint by joint.
 
     Parameters
     ----------
     base : file of the specimen's fitted stiffness, where factors start from it.
     """
+    for path, place in parts.items():
+        _run(root, study, design, base, specimen, place["batch"], path)
+
+
+def _run(
+    root: str, study: str, design: str, base: Sequence[str], specimen: str, batch: str, output: str
+) -> None:
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     every = settings.steps == "all"
     one = batch_of(root, settings, cohort, design, base, specimen, int(batch), every)

@@ -1,8 +1,6 @@
-"""Job: stiffness of one specimen with one sampled joint pose."""
+"""Job: stiffness of one specimen with sampled joint poses."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +8,6 @@ import numpy as np
 from spinepipe.calibrate import Fit, Problem, fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import mark_of, provenance
-from spinepipe.jobs.waiting import alone_at, is_to_make, take, waiting
-from spinepipe.marks import KEY
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
@@ -25,55 +21,19 @@ from spinepipe.units import COORDINATE_COLUMNS
 
 _Rows = list[dict[str, Any]]
 
-BLOCK = 50
-"""Poses that are fitted side by side: together they take as long as about twenty one by one."""
 
+def run(
+    root: str, study: str, poses: str, specimen: str, parts: Mapping[str, Mapping[str, str]]
+) -> None:
+    """Write the calibration rows of poses, a file each.
 
-def run(root: str, study: str, poses: str, specimen: str, pose: str, output: str) -> None:
-    """Write the calibration row of one pose, and of its neighbours without any to wait for them."""
+    They are fitted side by side: fifty together take as long as about twenty one by one.
+    """
     settings, cohort = study_and_cohort(root, study)
     made_by = provenance("calibrate", settings, cohort, [specimen], [mark_of(poses)])
-    mark, number = made_by[KEY], int(pose)
-    if take(output, mark):
-        return
-    sampled = [n for name, n in sampled_poses(poses).frames if name == specimen]
-    with _neighbours(sampled, Path(output).parent, number, mark) as places:
-        others = [n for n in places if n != number]
-        for n, rows in _beside(root, settings, specimen, [number, *others], poses).items():
-            if n == number or is_to_make(places[n], mark):  # nobody has done so meanwhile
-                table = from_rows(CALIBRATIONS, rows)
-                write(table, output if n == number else waiting(places[n]), made_by)
-    waiting(output).unlink(missing_ok=True)  # of another job that began with the same poses
-
-
-@contextmanager
-def _neighbours(
-    sampled: Sequence[int], folder: Path, pose: int, mark: str
-) -> Iterator[dict[int, Path]]:
-    """Files still to be made of the block of a pose; of a later one where others are at that."""
-    first, last = pose // BLOCK, max(sampled, default=pose) // BLOCK
-    for block in range(first, last + 1):
-        with alone_at(folder / f".block={block:04d}.lock") as alone:
-            places = {n: folder / f"pose={n:04d}.parquet" for n in sampled if n // BLOCK == block}
-            to_make = {n: place for n, place in places.items() if is_to_make(place, mark)}
-            if alone and (to_make or block == first):
-                yield to_make
-                return
-    yield {}
-
-
-def _beside(
-    root: str, settings: JointPoseSensitivity, specimen: str, poses: Sequence[int], poses_file: str
-) -> dict[int, _Rows]:
-    """Rows of poses, of the first alone where any of them ends in an error."""
-    try:
-        return _calibrated(root, settings, specimen, poses, poses_file)
-    except Exception:  # whatever it is: each pose fails in its own job, or not at all
-        pass
-    try:
-        return _calibrated(root, settings, specimen, poses[:1], poses_file)
-    except RefusedModel as error:
-        return {poses[0]: [_refused(specimen, poses[0], str(error))]}
+    numbers = {int(place["pose"]): path for path, place in parts.items()}
+    for number, rows in _calibrated(root, settings, specimen, list(numbers), poses).items():
+        write(from_rows(CALIBRATIONS, rows), numbers[number], made_by)
 
 
 def _calibrated(
@@ -83,13 +43,7 @@ def _calibrated(
     poses: Sequence[int],
     poses_file: str,
 ) -> dict[int, _Rows]:
-    """Rows of poses of one specimen, fitted side by side.
-
-    Raises
-    ------
-    RefusedModel
-        As `fit_alike` does.
-    """
+    """Rows of poses of one specimen."""
     rows: dict[int, _Rows] = {}
     problems: dict[int, Problem] = {}
     for pose in poses:
@@ -100,11 +54,17 @@ def _calibrated(
             problems[pose] = calibration_problem(root, settings, specimen, frames)
         except RefusedModel as error:
             rows[pose] = [_refused(specimen, pose, str(error))]
+    if not problems:
+        return rows
     seeds = [specimen_seed(settings.seed, f"{specimen}/{pose}") for pose in problems]
     options = settings.calibration
-    fits = fit_alike(
-        list(problems.values()), options.starts, seeds, options.identifiable_below, profiled=True
-    )
+    below = options.identifiable_below
+    try:
+        fits = fit_alike(list(problems.values()), options.starts, seeds, below, profiled=True)
+    except RefusedModel as error:
+        if len(problems) > 1:  # which of them it is, is found one by one
+            raise
+        return {**rows, **{pose: [_refused(specimen, pose, str(error))] for pose in problems}}
     for (pose, problem), found in zip(problems.items(), fits, strict=True):
         rows[pose] = _fitted(settings, specimen, pose, problem, found)
     return rows

@@ -13,7 +13,7 @@ from spinepipe.calibrate.forward_runs import (
     relative_error,
 )
 from spinepipe.effects.contract import Array
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel
 from spinepipe.statics import Course, moved
 from spinepipe.status import Status
@@ -56,7 +56,9 @@ def run(
         refused = Status.REFUSED.value
         row.update(evaluations=0, claims_success=False, status=refused, message=str(error))
     table = from_rows(METHOD_FITS, [row])
-    write(table, output, provenance("fit_by_method", settings, cohort, [specimen]))
+    write(
+        table, output, provenance("fit_by_method", settings, cohort, [specimen], [mark_of(poses)])
+    )
 
 
 def _fit(settings: JointPoseSensitivity, problem: Problem, method: str) -> dict[str, Any]:

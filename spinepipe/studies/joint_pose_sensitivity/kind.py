@@ -1,6 +1,5 @@
 """The kind joint_pose_sensitivity: how much of the answer hangs on where joints were placed."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +11,6 @@ from spinepipe.schema import all_declared
 from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
-from spinepipe.studies.joint_pose_sensitivity.ranking import is_whole, ranked_set
 from spinepipe.studies.joint_pose_sensitivity.settings import (
     SETS_PER_BATCH,
     JointPoseSensitivity,
@@ -99,7 +97,6 @@ class Layout(StudyFiles):
 
     joined = OF_JOBS
     full = FULL
-    known_by_mark = ("calibrations", "simulations", "bootstrap")
     drawings = (
         Figure(
             "stiffness",
@@ -236,9 +233,10 @@ class Layout(StudyFiles):
         numbers = range(first, min(first + size, self._count(table)))
         return [self._job_file(table, specimen, number) for number in numbers]
 
-    def simulations_to_do(self) -> int:
-        """Number of simulations that have no file yet."""
-        return len(self.absent("simulations", joined=False))
+    def blocks_of_calibrations(self, specimen: str) -> list[str]:
+        """The blocks that hold the calibrations of a specimen."""
+        blocks = (one for one in self.blocks("calibrations") if one[0] == specimen)
+        return [self.block_file("calibrations", *one) for one in blocks]
 
     def _count(self, table: str) -> int:
         """Number of job files of a table per specimen."""
@@ -293,13 +291,14 @@ def _frames(expected: Any, place: Mapping[str, str]) -> list[str]:
 
 
 def _simulated(expected: Any, place: Mapping[str, str]) -> list[str]:
-    """The mark of the joint frames, then that of the calibration or a set of the ranking."""
-    frames = _frames(expected, place)
+    """The mark of the joint frames, then those of the calibrations or of the ranking."""
     if place["stiffness"] == "calibrated":
-        return [*frames, expected.of_job("calibrate", place)]
-    best = os.path.join(expected.root, expected.files.folder, "best.json")
-    chosen = place["specimen"], place["stiffness"]
-    return [*frames, ranked_set(best, *chosen) if is_whole(best) else ""]
+        blocks = expected.files.blocks_of_calibrations(place["specimen"])
+        return [
+            *_frames(expected, place),
+            *(expected.of_part("calibrations", one) for one in blocks),
+        ]
+    return [*_frames(expected, place), expected.of_result("best.json")]
 
 
 _SOLVING = ("loading", "settle_time_s")
@@ -336,14 +335,19 @@ _SAMPLED = (
     ),
     Job(
         "calibrate",
-        many=True,
+        in_blocks="calibrations",
         ignores=ignoring("poses", *_SOLVING, *_GROUPING, *_PARTS),
         also=_frames,
     ),
-    Job("rank", ignores=ignoring("block", *_NOT_JUDGED)),
+    Job(
+        "rank",
+        reads=("calibrations", "success"),
+        makes=("best.json",),
+        ignores=ignoring("block", *_NOT_JUDGED),
+    ),
     Job(
         "simulate",
-        many=True,
+        in_blocks="simulations",
         ignores=ignoring("poses", "calibration", "stiffness", *_GROUPING, *_PARTS),
         also=_simulated,
     ),
@@ -377,6 +381,7 @@ _ADDED = (
             methods={"poses"},
             success={"failed_when", "outlier_times_start"},
         ),
+        also=_frames,
     ),
     Job(
         "spread_over_landmark_sd",
@@ -401,6 +406,7 @@ _ADDED = (
             *("methods", "landmark_precision", "load_point", *_SOLVING, *_GROUPING),
             *(*_BOOTSTRAPS, *_JUDGING),
         ),
+        also=_frames,
     ),
 )
 

@@ -20,7 +20,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.landmark_frames import displacement
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel
 from spinepipe.statics import FreeParameter
 from spinepipe.status import Status
@@ -68,7 +68,7 @@ def run(
 ) -> None:
     """Write the three tables of one specimen."""
     settings, cohort = study_and_cohort(root, study)
-    made_by = provenance("posterior", settings, cohort, [specimen])
+    made_by = provenance("posterior", settings, cohort, [specimen], [mark_of(poses)])
     found = _rows(root, settings, cohort, specimen, poses)
     shapes = (POSTERIOR, POSTERIOR_MOTION, POSE_WEIGHTS)
     outputs = (posterior, posterior_motion, pose_weights)

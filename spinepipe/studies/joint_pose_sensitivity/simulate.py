@@ -1,8 +1,7 @@
-"""Job: motion of one specimen, joint pose and stiffness set under all its tests."""
+"""Job: motion of one specimen in joint poses with stiffness sets, under all its tests."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -11,7 +10,6 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen
 from spinepipe.effects.contract import Array
-from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel, SpineModel
@@ -24,96 +22,73 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
     specimen_inputs,
     study_and_cohort,
 )
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranked_set, ranking
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import SIMULATIONS
-from spinepipe.tables import read, to_arrow, write
+from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS, from_si
 from spinepipe.world import Chain
 
 TABLE = SIMULATIONS.without("specimen", "pose")
 """A job file: specimen and pose are in its folders' names."""
 
-BLOCK = 25
-"""Poses whose ranked sets are solved together."""
-
-MOST_BLOCKS = 128
-"""Whose ends a worker remembers, some 100 kB each."""
-
 
 def run(
     root: str,
     study: str,
     poses: str,
-    calibration: str,
+    calibrations: Sequence[str],
     best: str,
     specimen: str,
-    pose: str,
-    stiffness: str,
-    output: str,
+    parts: Mapping[str, Mapping[str, str]],
 ) -> None:
-    """Write the rows of one specimen, pose and stiffness set."""
+    """Write the rows of poses and stiffness sets, a file each; all are solved in one stack.
+
+    Parameters
+    ----------
+    calibrations : files that hold those of the specimen. best : the ranked sets.
+    """
     settings, cohort = study_and_cohort(root, study)
     inputs = specimen_inputs(root, study, specimen, cohort.digest)
-    frames, no_frames = sampled_poses(poses).of(specimen, int(pose))
-    if frames is None:
-        ended, tested = _refused(inputs, no_frames), inputs.tested
-    elif calibration:
-        (ended,) = _solve_all(settings, cohort, inputs, [(frames, _calibrated(calibration))])
-        tested = _in_frames(inputs, frames)
-    else:
-        width = 1 if settings.loading == "settle" else BLOCK  # runs in time take no stack
-        first = int(pose) - int(pose) % width
-        block = _ranked_ends(
-            settings, root, specimen, range(first, first + width), stamp(poses), stamp(best)
-        )
-        ranked, tested = block[int(pose)]
-        lacking = f"fewer fits in the reduced dataset than {stiffness} asks for"
-        ended = ranked.get(stiffness) or _refused(inputs, lacking)
-    rows = [
-        {**row, "stiffness": stiffness, "joint": cohort.joint_names[row["joint"]]}
-        for one, steps in zip(tested, ended, strict=True)
-        for row in _case_rows(one, _zeroed(steps) if one.zeroed else steps)
-    ]
-    columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
-    chosen = mark_of(calibration) if calibration else ranked_set(best, specimen, stiffness)
-    made_by = provenance("simulate", settings, cohort, [specimen], [mark_of(poses), chosen])
-    write(to_arrow(TABLE, columns), output, made_by)
-
-
-def _calibrated(path: str) -> Array | str:
-    """Stiffness (J or 1, 6) that was calibrated, or why there is none."""
-    rows = read(path, [*STIFFNESS_COLUMNS, "message"])
-    values = np.array([rows[name].to_numpy(zero_copy_only=False) for name in STIFFNESS_COLUMNS]).T
-    if np.isfinite(values.astype(float)).all():
-        return values
-    return f"not calibrated: {rows['message'][0].as_py()}"
-
-
-@lru_cache(maxsize=MOST_BLOCKS)
-def _ranked_ends(
-    settings: JointPoseSensitivity,
-    root: str,
-    specimen: str,
-    block: range,
-    poses: Stamp,
-    best: Stamp,
-) -> dict[int, tuple[dict[str, "_Ends"], tuple[MeasuredCycle, ...]]]:
-    """How each ranked set of a specimen ends in neighbouring poses, and what was measured there.
-
-    Their jobs come in any order: together they cost little more than two or three of them alone.
-    """
-    _, cohort = study_and_cohort(root, settings.study)
-    inputs = specimen_inputs(root, settings.study, specimen, cohort.digest)
-    sets = {one["name"]: np.array(one["stiffness"]) for one in ranking(best[0]).get(specimen, [])}
-    sampled = ((pose, sampled_poses(poses[0]).of(specimen, pose)[0]) for pose in block)
-    placed = {pose: frames for pose, frames in sampled if frames is not None}
-    asked = [(frames, values) for frames in placed.values() for values in sets.values()]
-    ends = iter(_solve_all(settings, cohort, inputs, asked))
-    return {
-        pose: ({name: next(ends) for name in sets}, _in_frames(inputs, frames))
-        for pose, frames in placed.items()
+    calibrated = {pose: values for path in calibrations for pose, values in _fits(path).items()}
+    ranked = {one["name"]: np.array(one["stiffness"]) for one in ranking(best).get(specimen, [])}
+    sampled = sampled_poses(poses)
+    asked: list[tuple[tuple[Pose, ...] | str, Array | str]] = []
+    for place in parts.values():
+        placed, no_frames = sampled.of(specimen, int(place["pose"]))
+        if place["stiffness"] == "calibrated":
+            values = calibrated[int(place["pose"])]
+        else:
+            lacking = f"fewer fits in the reduced dataset than {place['stiffness']} asks for"
+            values = ranked.get(place["stiffness"], lacking)
+        asked.append((no_frames if placed is None else placed, values))
+    made_by = {
+        name: provenance("simulate", settings, cohort, [specimen], list(map(mark_of, read)))
+        for name, read in (("calibrated", [poses, *calibrations]), ("best", [poses, best]))
     }
+    ends = _solve_all(settings, cohort, inputs, asked)
+    for (path, place), (frames, _), ended in zip(parts.items(), asked, ends, strict=True):
+        tested = inputs.tested if isinstance(frames, str) else _in_frames(inputs, frames)
+        rows = [
+            {**row, "stiffness": place["stiffness"], "joint": cohort.joint_names[row["joint"]]}
+            for one, steps in zip(tested, ended, strict=True)
+            for row in _case_rows(one, _zeroed(steps) if one.zeroed else steps)
+        ]
+        columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
+        kind = "calibrated" if place["stiffness"] == "calibrated" else "best"
+        write(to_arrow(TABLE, columns), path, made_by[kind])
+
+
+def _fits(path: str) -> dict[int, Array | str]:
+    """Pose to the stiffness (J or 1, 6) that was calibrated, or why there is none."""
+    found: dict[int, Array | str] = {}
+    fitted = read_frame(path)
+    for pose in fitted["pose"].unique():
+        rows = fitted[fitted["pose"] == pose]
+        values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)
+        whole = np.isfinite(values).all()
+        found[int(pose)] = values if whole else f"not calibrated: {rows['message'].iloc[0]}"
+    return found
 
 
 def _in_frames(inputs: MeasuredSpecimen, frames: tuple[Pose, ...]) -> tuple[MeasuredCycle, ...]:
@@ -143,15 +118,15 @@ def _solve_all(
     settings: JointPoseSensitivity,
     cohort: Cohort,
     inputs: MeasuredSpecimen,
-    placed: Sequence[tuple[tuple[Pose, ...], Array | str]],
+    placed: Sequence[tuple[tuple[Pose, ...] | str, Array | str]],
 ) -> list[_Ends]:
-    """Ends of all steps of all cases in poses with a stiffness each; refused where it is none."""
+    """Ends of all steps of all cases in poses with a stiffness each; refused where one is none."""
     ends: list[_Ends | None] = []
     models: list[SpineModel] = []
     for frames, values in placed:
         try:
-            if isinstance(values, str):
-                raise RefusedModel(values)
+            if isinstance(frames, str) or isinstance(values, str):
+                raise RefusedModel(frames if isinstance(frames, str) else str(values))
             models.append(bushing_model(settings, cohort, inputs.specimen, frames, values))
             ends.append(None)
         except RefusedModel as error:

@@ -27,7 +27,6 @@ class RangeOfMotionFiles(StudyFiles):
     """The result files of one range-of-motion study."""
 
     joined = OF_JOBS
-    known_by_mark = _JOBS
     drawings = (
         Figure(
             "range_of_motion", "Range of motion", "figures.motion:levels_figure", ("rom_summary",)
@@ -72,7 +71,7 @@ class RangeOfMotionFiles(StudyFiles):
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        numbers = files_of_block(block, self._per_specimen)
+        numbers = files_of_block(block, len(self.specimens), self._per_specimen)
         return [self._job_file(specimen, number) for number in numbers]
 
     @property
@@ -106,10 +105,16 @@ KIND = Kind(
         Job(
             "draw_stiffness",
             at="draw:draw_stiffness",
+            makes=("stiffness_sets",),
             ignores=ignoring(*_MOVING, *_FRAMES),
             header_alone=True,
         ),
-        Job("simulate", many=True, ignores=ignoring("seed", *_SETS, *_FRAMES), also=_drawn),
+        Job(
+            "simulate",
+            in_blocks="range_of_motion",
+            ignores=ignoring("seed", *_SETS, *_FRAMES),
+            also=_drawn,
+        ),
         Job("rom_summary", "summary", ("range_of_motion",), ("rom_summary",)),
         Job("rom_variance", "variance", ("range_of_motion",), ("rom_variance",)),
     ),

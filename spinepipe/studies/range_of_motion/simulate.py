@@ -1,6 +1,6 @@
-"""Job: motion of one specimen with one set of joint frames and one stiffness set, in all tests."""
+"""Job: motion of one specimen with sets of joint frames and of stiffness, in all tests."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
@@ -41,31 +42,42 @@ def run(
     frames: str,
     stiffness_sets: str,
     specimen: str,
-    pose: str,
-    stiffness: str,
-    output: str,
+    parts: Mapping[str, Mapping[str, str]],
 ) -> None:
-    """Write the rows of one specimen, pose and stiffness set."""
+    """Write the rows of joint frames and stiffness sets, a file each."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
     tests = asked_tests(root, study, specimen, cohort.digest)
-    placed = drawn_frames(frames).of(specimen, int(pose))
-    values = drawn_stiffness(stiffness_sets)[int(stiffness)]
+    drawn = [mark_of(frames), mark_of(stiffness_sets)]
+    made_by = provenance("simulate", settings, cohort, [specimen], drawn)
+    for path, place in parts.items():
+        placed = drawn_frames(frames).of(specimen, int(place["pose"]))
+        values = drawn_stiffness(stiffness_sets)[int(place["stiffness"])]
+        ends = _solved(settings, cohort, specimen, placed, values, tests)
+        columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
+        columns["stiffness"] = [int(place["stiffness"])] * len(columns["test"])
+        write(to_arrow(TABLE, columns), path, made_by)
+
+
+def _solved(
+    settings: RangeOfMotion,
+    cohort: Cohort,
+    specimen: str,
+    placed: tuple[Pose, ...],
+    values: Array,
+    tests: Sequence[AskedTest],
+) -> list[Ends]:
+    """Ends of all tests of one spine; refused where it is none."""
     damping = np.array(settings.damping.in_order())
     try:
         tension_n = virtual_tensions(settings)
         model = on_bushings(cohort, specimen, placed, values, damping, tension_n=tension_n)
-        ends = _ends(model, tests)
+        return _ends(model, tests)
     except RefusedModel as error:
         nowhere = np.full(values.shape, np.nan)
-        ends = [
+        return [
             [(nowhere, Status.REFUSED, str(error))] * len(test.case.steps[test.stored])
             for test in tests
         ]
-    columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
-    columns["stiffness"] = [int(stiffness)] * len(columns["test"])
-    drawn = [mark_of(frames), mark_of(stiffness_sets)]
-    made_by = provenance("simulate", settings, cohort, [specimen], drawn)
-    write(to_arrow(TABLE, columns), output, made_by)
 
 
 def _ends(model: SpineModel, tests: Sequence[AskedTest]) -> list[Ends]:

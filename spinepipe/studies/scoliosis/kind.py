@@ -147,7 +147,7 @@ KIND = Kind(
     tables=all_declared(__file__),
     jobs=(
         Job("personalise", many=True, ignores=ignoring("models"), also=_population),
-        Job("population", "learn", ignores=ignoring("models")),
+        Job("population", "learn", makes=("population",), ignores=ignoring("models")),
         Job("variants", ignores=ignoring("models")),
         *_ANALYSES,
     ),

@@ -1,6 +1,8 @@
 """The kind trunk_loads: muscle forces, joint loads and disc pressure of persons in tasks."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
@@ -132,19 +134,28 @@ class TrunkFiles(StudyFiles):
         """The job that writes a file of which a table is made."""
         return {"simplified": "simplify", "responses": "respond"}.get(table, "hold")
 
+    @property
+    def _sampled(self) -> Sequence[str]:
+        return sampled(self.study, self.specimens)
+
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per person, of samples as many as it takes."""
         if table == "responses":
-            return numbered_blocks(sampled(self.study, self.specimens), batches(self.study))
+            return numbered_blocks(self._sampled, batches(self.study))
         return numbered_blocks(self.specimens, 1)
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
         place = f"{self.folder}/jobs/specimen={specimen}"
         if table == "responses":
-            numbers = files_of_block(block, batches(self.study))
+            numbers = files_of_block(block, len(self._sampled), batches(self.study))
             return [f"{place}/batch={number:05d}/responses.parquet" for number in numbers]
         return [f"{place}/{table}.parquet"]
+
+
+def _source_and_design(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """The marks of the trunk's source and of the drawn inputs."""
+    return [*marks_of_source(expected, place), expected.of_job("draw", {})]
 
 
 _NO_TASK_OF_ITS_OWN = ignoring("uncertain", "volunteer", "simplified_tasks")
@@ -164,15 +175,16 @@ KIND = Kind(
         ),
         Job(
             "tune",
+            makes=TUNED,
             ignores=ignoring("uncertain", "drawn_tasks", "simplified_tasks"),
             also=marks_of_source,
         ),
-        Job("draw", "draw_design", header_alone=True),
+        Job("draw", "draw_design", makes=("design",), header_alone=True),
         Job(
             "respond",
-            many=True,
+            in_blocks="responses",
             ignores=ignoring("volunteer", "drawn_tasks", "simplified_tasks"),
-            also=marks_of_source,
+            also=_source_and_design,
         ),
         _SPREAD,
         _AGAINST,

@@ -1,10 +1,10 @@
-"""Job: a batch of samples of one person: all sampled tasks, inputs as drawn."""
+"""Job: batches of samples of one person: all sampled tasks, inputs as drawn."""
 
 import sys
 from collections.abc import Iterator, Mapping
 
 from spinepipe.cohort import Cohort
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.settle import held
 from spinepipe.progress import Progress
@@ -25,19 +25,19 @@ from spinepipe.studies.trunk_loads.tables import QUANTITIES, RESPONSES
 from spinepipe.tables import from_rows, read_frame, write
 
 
-def run(root: str, study: str, specimen: str, batch: str, design: str, output: str) -> None:
-    """Write the rows of the batch."""
+def run(
+    root: str, study: str, specimen: str, design: str, parts: Mapping[str, Mapping[str, str]]
+) -> None:
+    """Write the rows of batches, a file each."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
-    samples = of_batch(settings, int(batch))
-    values = drawn(read_frame(design), samples)
+    read = [*marks_of(settings, cohort), mark_of(design)]
+    made_by = provenance("respond", settings, cohort, [specimen], read)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
-    numbered = dict(zip(samples, values, strict=True))
-    rows = list(rows_of(settings, cohort, specimen, numbered, progress))
-    write(
-        from_rows(RESPONSES, rows),
-        output,
-        provenance("respond", settings, cohort, [specimen], marks_of(settings, cohort)),
-    )
+    for path, place in parts.items():
+        samples = of_batch(settings, int(place["batch"]))
+        numbered = dict(zip(samples, drawn(read_frame(design), samples), strict=True))
+        rows = list(rows_of(settings, cohort, specimen, numbered, progress))
+        write(from_rows(RESPONSES, rows), path, made_by)
 
 
 def rows_of(

@@ -1,10 +1,12 @@
 # Study kind joint_count, made for a test.
 rule count_joints:
+    input:
+        outdated("count_joints"),
     output:
-        output=f"{results_of('joint_count')}/joints/specimen={{specimen}}.parquet",
+        output=update(f"{results_of('joint_count')}/joints/specimen={{specimen}}.parquet"),
     log:
         f"{LOGS}/count_joints/specimen={{specimen}}.log",
     params:
         digest=digest("count"),
     run:
-        run_job(rule, "count", wildcards, input, output, log)
+        run_job("count", rule, wildcards, input, output, params, log)

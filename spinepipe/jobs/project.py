@@ -1,0 +1,199 @@
+"""What the rules of a project ask: its studies, their files, and the marks these must have.
+
+A result file is what it should be if it carries the mark that its rule expects (`spinepipe.marks`),
+whatever its age and whatever Snakemake's record says. `Project.outdated` tells Snakemake so by a
+public door: an input that is newer than the file, where the file carries another mark.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import NoReturn, TextIO
+
+from spinepipe.files import appearing, sweep
+from spinepipe.jobs.digest import versions
+from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.run_lock import AtWork, lock
+from spinepipe.marks import mark_in
+from spinepipe.problems import InputError
+from spinepipe.studies import read as studies
+from spinepipe.studies.doubts import doubts, refusals
+from spinepipe.studies.registry import kind_names
+from spinepipe.studies.study_files import StudyFiles
+
+OUTDATED = ".snakemake/spinepipe-outdated"
+"""Newer than the files that count as outdated; nothing reads what it says."""
+
+RUNNING = ".snakemake/spinepipe-running"
+"""The lock of the run that is at work."""
+
+_MOST_NAMED = 5
+_PARENT = "SPINEPIPE_RUN"
+"""Environment variable with the process that plans a run: those that it starts inherit it."""
+
+
+def stop(message: object) -> NoReturn:
+    """End with a message for people: Snakemake would add where in its rules it was raised."""
+    raise SystemExit(f"Nothing was run. {message}")
+
+
+def warn(message: object) -> None:
+    """Say what a run goes on with."""
+    print(f"warn  {message}", file=sys.stderr)
+
+
+class Project:
+    """The folder of a Snakefile with its studies, each read when first asked for.
+
+    Attributes
+    ----------
+    plans : whether this process plans the run; else it is one that a run has started.
+    """
+
+    def __init__(self, root: str) -> None:
+        self.root = root
+        me = str(os.getpid())
+        self.plans = os.environ.setdefault(_PARENT, me) == me
+        self.names = studies.names_by_kind(Path(root))
+        self.kinds = [name for name in kind_names() if name in self.names]
+        self._expected: dict[str, Expected] = {}
+        self._marks: dict[str, str | None] = {}
+        self._lost: list[str] = []
+        self._lock: TextIO | None = None
+        kept = Path(".snakemake" if os.path.isdir(".snakemake") else ".")
+        if self.plans and not os.access(kept, os.W_OK):  # else Snakemake ends with a Python stack
+            stop(
+                f"{kept.resolve()} cannot be written, where Snakemake keeps its record. Change its "
+                "permissions or owner, or copy the project to a folder of your own."
+            )
+
+    @cached_property
+    def selection(self) -> studies.Selection:
+        """Which studies are built; those of `all` are validated, all problems told at once."""
+        if not self.plans:  # it was validated before it was submitted
+            return studies.Selection.model_construct(studies=(), full=())
+        problems = []
+        try:
+            chosen = studies.read_selection(Path(self.root))
+        except InputError as error:
+            stop(error)
+        for name in chosen.studies:
+            try:
+                self._check(name)
+            except InputError as error:
+                problems.append(f"study {name}: {error}")
+        if problems:
+            stop("\n".join(problems))
+        return chosen
+
+    def _check(self, name: str) -> Expected:
+        if name not in self._expected:
+            checked = studies.check(Path(self.root), name, starting=self.plans)
+            self._expected[name] = Expected(self.root, *checked)
+        return self._expected[name]
+
+    def expected(self, name: str) -> Expected:
+        """What tells the marks that results of a study must have."""
+        try:
+            return self._check(name)
+        except InputError as error:
+            stop(f"study {name}: {error}")
+
+    def files(self, name: str) -> StudyFiles:
+        """The result files of a study."""
+        return self.expected(name).files
+
+    @property
+    def at_work(self) -> list[str]:
+        """Names of the studies that were asked for files so far."""
+        return sorted(self._expected)
+
+    def everything(self, names: Iterable[str], full: bool = False) -> list[str]:
+        """Results of these studies, with those of `full` or without, and lost job files."""
+        return [
+            file
+            for name in names
+            for file in self.files(name).results(full) + self.files(name).lost(full)
+        ]
+
+    def mark(self, job: str, place: Mapping[str, str]) -> str:
+        """The mark of the files of a job."""
+        return self.expected(place["study"]).of_job(job, {**place})
+
+    def outdated(self, files: Iterable[str], mark: str) -> list[str]:
+        """Nothing if the files that are there carry a mark, else an input newer than they."""
+        wrong = [path for path in files if self._mark_in(path) not in (None, mark)]
+        if not wrong or not self.plans:
+            return []
+        newest = max(os.stat(path).st_mtime for path in wrong)
+        now = time.time()
+        with appearing(OUTDATED) as temporary:
+            temporary.write_text(str(time.time_ns()))  # another content, else it is not news
+            os.utime(temporary, (now, max(now, newest + 1)))
+        return [OUTDATED]
+
+    def _mark_in(self, path: str) -> str | None:
+        if path not in self._marks:
+            self._marks[path] = mark_in(path)
+            if self._marks[path] == "":
+                self._lost.append(path)
+                if len(self._lost) <= _MOST_NAMED:
+                    warn(
+                        f"{path} is damaged, cut off, empty or of an older version: it counts as "
+                        "lost and is computed again"
+                    )
+        return self._marks[path]
+
+    def begin(self) -> None:
+        """What is said and done before the first job of a run, alone in the project from now on.
+
+        Raises
+        ------
+        SystemExit
+            Where a run cannot end well, with the reason.
+        """
+        try:
+            versions()
+            self._lock = lock(Path(RUNNING))
+        except ImportError as error:
+            stop(error)
+        except AtWork as run:
+            stop(f"A run is at work in this folder: {run}. Wait until it ends, or end it.")
+        for folder in ["results", *(f"results/{name}" for name in self.at_work)]:
+            try:
+                with appearing(Path(folder, "probe")) as probe:
+                    probe.write_text("1")
+                Path(folder, "probe").unlink()
+            except OSError as error:
+                stop(
+                    f"results cannot be written to {Path(folder).resolve()}: {error.strerror}. "
+                    "Make room or change permissions, then run again (finished jobs are kept)."
+                )
+        cohorts = {one.cohort.digest: one.cohort for one in self._expected.values()}
+        for doubt in (doubt for cohort in cohorts.values() for doubt in doubts(cohort)):
+            warn(doubt)
+        refused = [str(one) for cohort in cohorts.values() for one in refusals(cohort)]
+        if refused:
+            stop("\n".join(refused))
+        if len(self._lost) > _MOST_NAMED:
+            warn(f"so do {len(self._lost) - _MOST_NAMED} more files below results")
+        for name in self.at_work:
+            sweep(f"results/{name}")
+
+    def sweep_logs(self) -> None:
+        """Remove the empty logs that Snakemake leaves for every job that went well.
+
+        A folder of logs that is a link is somebody's own.
+        """
+        for logs in (f"results/{name}/logs" for name in self.at_work):
+            for folder, _, files in (
+                os.walk(logs, topdown=False) if not os.path.islink(logs) else ()
+            ):
+                for path in (os.path.join(folder, file) for file in files):
+                    if not os.path.getsize(path):
+                        os.unlink(path)
+                if not os.listdir(folder):
+                    os.rmdir(folder)

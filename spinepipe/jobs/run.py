@@ -1,0 +1,96 @@
+"""How a job of a rule is run: what is there is kept, what is made is looked at.
+
+A job whose files all carry the mark that they must have has nothing to do, whatever made Snakemake
+start it: its files are dated anew. After a job its files are looked at: another mark means that
+settings, data or code have changed since the run was planned, and the job has failed.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from spinepipe.jobs.pool import JobFailed, submit_and_wait
+from spinepipe.jobs.project import Project
+from spinepipe.marks import mark_in
+from spinepipe.studies.registry import kind_of
+from spinepipe.studies.registry import place_of as function_of
+
+_OF_RULES = ("digest", "job", "caption")
+"""Params that tell Snakemake something, and no job."""
+
+_FORCE = ("-f", "-F", "-R", "--force", "--forceall", "--forcerun")
+
+
+def run_job(
+    project: Project,
+    job: str,
+    rule: str,
+    wildcards: Mapping[str, str],
+    input: Any,
+    output: Any,
+    params: Any,
+    log: Any,
+) -> None:
+    """Run a job in the warm pool on the files and wildcards of a rule.
+
+    Named input and output files and the wildcards become arguments of the same name.
+
+    Parameters
+    ----------
+    job : of the study's kind, or ``module:function`` of one that serves every kind.
+    params : with the mark that its files must have, ``digest``; further ones are arguments too.
+
+    Raises
+    ------
+    JobFailed
+        With the job's name, why it failed, and where its log is.
+    """
+    inputs, outputs = [str(path) for path in input], [str(path) for path in output]
+    name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
+    forced = not project.plans or any(option in sys.argv for option in _FORCE)
+    if forced or not _carry(outputs, params.digest):
+        named = {key: _plain(files) for key, files in [*input.items(), *output.items()]}
+        others = {key: value for key, value in params.items() if key not in _OF_RULES}
+        kind = project.expected(wildcards["study"]).study.kind
+        function, read = job, []
+        if ":" not in job:
+            function = function_of(kind, job)
+            read = (
+                _flat(files for _, files in input.items()) if kind_of(kind).job(job).reads else []
+            )
+        arguments = {"root": project.root, **others, **wildcards, **named}
+        submit_and_wait(name, function, str(log), read, **arguments)
+        if not _carry(outputs, params.digest):
+            raise JobFailed(
+                f"job {name}: settings, data or code have changed since this run was planned. Run "
+            XX
+            )
+    _date(outputs, inputs)
+    if outputs[0].endswith(".html"):
+        page = Path(project.root, outputs[0]).as_uri()
+        print(f"{wildcards['study']}: {page}", file=sys.stderr)
+
+
+def _carry(paths: Sequence[str], mark: str) -> bool:
+    return all(mark_in(path) == mark for path in paths)
+
+
+def _date(outputs: Sequence[str], inputs: Sequence[str]) -> None:
+    """Date files as made now, and not before what they are made of, whatever clocks say."""
+    there = (os.stat(path).st_mtime_ns for path in inputs if os.path.exists(path))
+    now = max([time.time_ns(), *there])
+    for path in outputs:
+        os.utime(path, ns=(now, now))
+
+
+def _plain(files: Any) -> Any:
+    """Paths as plain strings: Snakemake's own carry the whole rule with them."""
+    return str(files) if isinstance(files, str) else [str(path) for path in files]
+
+
+def _flat(files: Any) -> list[str]:
+    plain = [_plain(one) for one in files]
+    return [path for one in plain for path in ([one] if isinstance(one, str) else one)]
