@@ -66,7 +66,7 @@ def run_job(
         if not _carry(outputs, params.digest):
             raise JobFailed(
                 f"job {name}: settings, data or code have changed since this run was planned. Run "
-            XX
+                "the same command again"
             )
     _date(outputs, inputs)
     if outputs[0].endswith(".html"):

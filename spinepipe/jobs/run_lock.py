@@ -31,8 +31,9 @@ def lock(path: Path) -> TextIO:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        file.seek(0)
-        raise AtWork(file.read().strip()) from None
+        with file:
+            file.seek(0)
+            raise AtWork(file.read().strip()) from None
     except OSError:
         pass
     file.truncate(0)

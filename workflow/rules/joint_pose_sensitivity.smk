@@ -90,7 +90,6 @@ rule rank_models:
     input:
         outdated("rank_models"),
         calibrations=f"{RESULTS}/calibrations.parquet",
-        success=f"{RESULTS}/success.parquet",
     output:
         output=update(f"{POSES}/best.json"),
     log:
@@ -109,7 +108,6 @@ rule simulations_block:
         calibrations=lambda wildcards: layout(wildcards.study).blocks_of_calibrations(
             wildcards.specimen
         ),
-        best=f"{RESULTS}/best.json",
     output:
         output=update(
             f"{POSES}/blocks/{{table,simulations}}/specimen={{specimen}}/block={{block}}.parquet"
@@ -130,7 +128,6 @@ rule simulate:
         calibrations=lambda wildcards: layout(wildcards.study).blocks_of_calibrations(
             wildcards.specimen
         ),
-        best=f"{RESULTS}/best.json",
     output:
         output=update(
             f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness,calibrated|best[0-9]{{2}}}}.parquet"

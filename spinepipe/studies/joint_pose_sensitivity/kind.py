@@ -11,6 +11,7 @@ from spinepipe.schema import all_declared
 from spinepipe.studies.free import calibration_settled
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
+from spinepipe.studies.joint_pose_sensitivity.ranking import judging
 from spinepipe.studies.joint_pose_sensitivity.settings import (
     SETS_PER_BATCH,
     JointPoseSensitivity,
@@ -291,14 +292,11 @@ def _frames(expected: Any, place: Mapping[str, str]) -> list[str]:
 
 
 def _simulated(expected: Any, place: Mapping[str, str]) -> list[str]:
-    """The mark of the joint frames, then those of the calibrations or of the ranking."""
-    if place["stiffness"] == "calibrated":
-        blocks = expected.files.blocks_of_calibrations(place["specimen"])
-        return [
-            *_frames(expected, place),
-            *(expected.of_part("calibrations", one) for one in blocks),
-        ]
-    return [*_frames(expected, place), expected.of_result("best.json")]
+    """The marks of joint frames and calibrations; of the best sets also what decides of them."""
+    blocks = expected.files.blocks_of_calibrations(place["specimen"])
+    read = [expected.of_part("calibrations", one) for one in blocks]
+    rule = [] if place["stiffness"] == "calibrated" else [judging(expected.study)]
+    return [*_frames(expected, place), *read, *rule]
 
 
 _SOLVING = ("loading", "settle_time_s")
@@ -341,7 +339,7 @@ _SAMPLED = (
     ),
     Job(
         "rank",
-        reads=("calibrations", "success"),
+        reads=("calibrations",),
         makes=("best.json",),
         ignores=ignoring("block", *_NOT_JUDGED),
     ),

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen
@@ -22,7 +23,7 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
     specimen_inputs,
     study_and_cohort,
 )
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
+from spinepipe.studies.joint_pose_sensitivity.ranking import judging, ranked
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import SIMULATIONS
 from spinepipe.tables import read_frame, to_arrow, write
@@ -38,7 +39,6 @@ def run(
     study: str,
     poses: str,
     calibrations: Sequence[str],
-    best: str,
     specimen: str,
     parts: Mapping[str, Mapping[str, str]],
 ) -> None:
@@ -46,12 +46,13 @@ def run(
 
     Parameters
     ----------
-    calibrations : files that hold those of the specimen. best : the ranked sets.
+    calibrations : files that hold those of the specimen.
     """
     settings, cohort = study_and_cohort(root, study)
     inputs = specimen_inputs(root, study, specimen, cohort.digest)
-    calibrated = {pose: values for path in calibrations for pose, values in _fits(path).items()}
-    ranked = {one["name"]: np.array(one["stiffness"]) for one in ranking(best).get(specimen, [])}
+    fits = pd.concat([read_frame(path) for path in calibrations])
+    calibrated = _fits(fits)
+    best = {one["name"]: np.array(one["stiffness"]) for one in ranked(settings, fits)}
     sampled = sampled_poses(poses)
     asked: list[tuple[tuple[Pose, ...] | str, Array | str]] = []
     for place in parts.values():
@@ -60,11 +61,12 @@ def run(
             values = calibrated[int(place["pose"])]
         else:
             lacking = f"fewer fits in the reduced dataset than {place['stiffness']} asks for"
-            values = ranked.get(place["stiffness"], lacking)
+            values = best.get(place["stiffness"], lacking)
         asked.append((no_frames if placed is None else placed, values))
+    read = [mark_of(path) for path in (poses, *calibrations)]
     made_by = {
-        name: provenance("simulate", settings, cohort, [specimen], list(map(mark_of, read)))
-        for name, read in (("calibrated", [poses, *calibrations]), ("best", [poses, best]))
+        of_pose: provenance("simulate", settings, cohort, [specimen], [*read, *rule])
+        for of_pose, rule in ((True, []), (False, [judging(settings)]))
     }
     ends = _solve_all(settings, cohort, inputs, asked)
     for (path, place), (frames, _), ended in zip(parts.items(), asked, ends, strict=True):
@@ -75,16 +77,14 @@ def run(
             for row in _case_rows(one, _zeroed(steps) if one.zeroed else steps)
         ]
         columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
-        kind = "calibrated" if place["stiffness"] == "calibrated" else "best"
-        write(to_arrow(TABLE, columns), path, made_by[kind])
+        write(to_arrow(TABLE, columns), path, made_by[place["stiffness"] == "calibrated"])
 
 
-def _fits(path: str) -> dict[int, Array | str]:
+def _fits(fits: pd.DataFrame) -> dict[int, Array | str]:
     """Pose to the stiffness (J or 1, 6) that was calibrated, or why there is none."""
     found: dict[int, Array | str] = {}
-    fitted = read_frame(path)
-    for pose in fitted["pose"].unique():
-        rows = fitted[fitted["pose"] == pose]
+    for pose in fits["pose"].unique():
+        rows = fits[fits["pose"] == pose]
         values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)
         whole = np.isfinite(values).all()
         found[int(pose)] = values if whole else f"not calibrated: {rows['message'].iloc[0]}"

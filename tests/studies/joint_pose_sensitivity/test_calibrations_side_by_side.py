@@ -1,7 +1,6 @@
-"""Calibrations of neighbouring poses in one stack, and the files that wait for their own jobs.
+"""Calibrations of the poses of a block in one stack.
 
-Would catch a pose whose fit hangs on its neighbours, one whose failure spoils theirs, and a waiting
-file that is taken although it is damaged, of another setting, or older than what it hangs on.
+Would catch a pose whose fit hangs on its neighbours, and one whose refusal gets lost.
 """
 
 import shutil
@@ -12,9 +11,6 @@ import pytest
 
 from spinepipe.calibrate import fit_alike
 from spinepipe.designs import specimen_seed
-from spinepipe.files import stamp
-from spinepipe.jobs.waiting import alone_at, is_to_make, take, waiting
-from spinepipe.marks import write_marked
 from spinepipe.model import RefusedModel
 from spinepipe.studies.joint_pose_sensitivity import calibrate, poses
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
@@ -49,106 +45,40 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def run(root: Path, folder: Path, pose: int) -> Path:
-    output = folder / f"pose={pose:04d}.parquet"
-    calibrate.run(
-        str(root), STUDY, str(root / "poses.parquet"), SPECIMEN, f"{pose:04d}", str(output)
-    )
-    return output
+def run(root: Path, folder: Path, *numbers: int) -> dict[int, Any]:
+    """Row of each pose from the file that the job writes of it."""
+    folder.mkdir(exist_ok=True)
+    files = {n: folder / f"pose={n:04d}.parquet" for n in numbers}
+    parts = {str(path): {"pose": f"{n:04d}"} for n, path in files.items()}
+    calibrate.run(str(root), STUDY, str(root / "poses.parquet"), SPECIMEN, parts)
+    return {n: read_frame(path).iloc[0] for n, path in files.items()}
 
 
 def test_a_pose_alone_is_as_among_its_neighbours(root: Path, tmp_path: Path) -> None:
-    run(root, tmp_path, 1)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        *(f".pose={pose:04d}.parquet" for pose in (0, 2, 3)),
-        "pose=0001.parquet",
-    ]
-    settings, _ = study_and_cohort(str(root), STUDY)
-    sampled = str(root / "poses.parquet")
+    together = run(root, tmp_path, *range(COUNT))
     for pose in range(COUNT):
-        found = read_frame(run(root, tmp_path, pose))
-        (alone,) = calibrate._calibrated(str(root), settings, SPECIMEN, [pose], sampled)[pose]
+        alone = run(root, tmp_path / "alone", pose)[pose]
         assert alone["status"] == "converged"
         for name, value in alone.items():
             if isinstance(value, float):
-                assert found[name][0] == pytest.approx(value, rel=TO_SUM), name
+                assert together[pose][name] == pytest.approx(value, rel=TO_SUM), name
             elif value is not None:
-                assert found[name][0] == value, name
-    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+                assert together[pose][name] == value, name
 
 
-def test_who_finds_a_block_at_work_takes_the_next(
+def test_a_pose_that_is_refused_by_the_fit_is_told_in_its_row(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(calibrate, "BLOCK", 2)
-    with alone_at(tmp_path / ".block=0000.lock") as alone:
-        assert alone
-        run(root, tmp_path, 1)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        *(f".pose={pose:04d}.parquet" for pose in (2, 3)),
-        "pose=0001.parquet",
-    ]
+    """Among others it is an error, after which each is fitted alone (`spinepipe.jobs.block`)."""
+    bad = specimen_seed(study_and_cohort(str(root), STUDY)[0].seed, f"{SPECIMEN}/1")
 
+    def fitted(problems: Any, starts: int, seeds: Any, *others: Any, **named: Any) -> Any:
+        if bad in seeds:
+            raise RefusedModel("not taken")
+        return fit_alike(problems, starts, seeds, *others, **named)
 
-def test_only_what_is_lost_is_made_again(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for pose in range(COUNT):
-        run(root, tmp_path, pose)
-    before = {path: stamp(path) for path in tmp_path.iterdir()}
-    asked: list[Any] = []
-    whole = calibrate._calibrated
-
-    def seen(*given: Any) -> Any:
-        asked.append(given[3])
-        return whole(*given)
-
-    monkeypatch.setattr(calibrate, "_calibrated", seen)
-    (lost := tmp_path / "pose=0002.parquet").unlink()
-    assert run(root, tmp_path, 2) == lost
-    assert asked == [[2]]
-    after = {path: stamp(path) for path in tmp_path.iterdir()}
-    assert {path for path in after if after[path] != before[path]} == {lost}
-
-
-def test_a_pose_that_fails_harms_no_neighbour(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    whole, seed = fit_alike, study_and_cohort(str(root), STUDY)[0].seed
-    bad = specimen_seed(seed, f"{SPECIMEN}/1")
-
-    def failing(trouble: Exception) -> Any:
-        def fitted(problems: Any, starts: int, seeds: Any, *others: Any, **named: Any) -> Any:
-            if bad in seeds:
-                raise trouble
-            return whole(problems, starts, seeds, *others, **named)
-
-        return fitted
-
-    for trouble in (RuntimeError("lost"), RefusedModel("not taken")):
-        folder = tmp_path / type(trouble).__name__
-        monkeypatch.setattr(calibrate, "fit_alike", failing(trouble))
-        assert read_frame(run(root, folder, 0))["status"][0] == "converged"
-        if isinstance(trouble, RefusedModel):
-            row = read_frame(run(root, folder, 1))
-            assert (row["status"][0], row["message"][0]) == ("refused", "not taken")
-        else:
-            with pytest.raises(RuntimeError, match="lost"):
-                run(root, folder, 1)
-
-
-def test_a_waiting_file_is_taken_only_if_it_is_what_the_job_would_write(tmp_path: Path) -> None:
-    output, mark = tmp_path / "file.csv", "a" * 64
-    assert is_to_make(output, mark)
-    assert not take(output, mark)
-    write_marked("1\n", waiting(output), mark)
-    assert not is_to_make(output, mark)
-    assert not take(output, "b" * 64)
-    sound = waiting(output).read_bytes()
-    waiting(output).write_bytes(sound.replace(b"1\n", b"2\n", 1))
-    assert not take(output, mark)
-    waiting(output).write_bytes(sound)
-    assert take(output, mark)
-    assert output.read_bytes() == sound
-    assert not waiting(output).exists()
-    assert not is_to_make(output, mark)
+    monkeypatch.setattr(calibrate, "fit_alike", fitted)
+    with pytest.raises(RefusedModel, match="not taken"):
+        run(root, tmp_path, 0, 1)
+    row = run(root, tmp_path, 1)[1]
+    assert (row["status"], row["message"]) == ("refused", "not taken")
