@@ -13,7 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 from mistaken_cohorts import good
 
-from spinepipe.jobs import block, collect, inputs
+from spinepipe.jobs import collect, inputs
+from spinepipe.jobs.block import run_joined
 from spinepipe.jobs.collect import StaleFile
 from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.jobs.model_mark import base_marks
@@ -65,7 +66,7 @@ def made(root: Path) -> Expected:
 
 def join(told: Expected) -> None:
     files = told.files.job_files("range_of_motion", "a", "000")
-    block.run_joined(told.root, STUDY, "range_of_motion", files, BLOCK)
+    run_joined(told.root, STUDY, "range_of_motion", files, BLOCK)
 
 
 def test_jobs_write_the_marks_that_are_expected(root: Path) -> None:
