@@ -43,8 +43,8 @@ onstart:
 
 
 onsuccess:
-    PROJECT.sweep_logs()
+    PROJECT.end()
 
 
 onerror:
-    PROJECT.sweep_logs()
+    PROJECT.end()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
+from spinepipe.cli import check_results
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort, Reader
 from spinepipe.problems import InputError, Problem
@@ -30,11 +31,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="STUDY",
         help="studies or cohorts; all of config/ when none is named",
     )
+    parser.add_argument(
+        "--results",
+        action="store_true",
+        help="look at result files instead; those that are not as written are removed",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Print one line for what is sound and all problems of what is not."""
     root: Path = options.root
+    if options.results:
+        return check_results.run(root, options.names)
     told: set[Problem] = set()
     warned: dict[str, tuple[Problem, ...]] = {}
     if not options.names:

@@ -40,7 +40,9 @@ def run_part(root: str, study: str, table: str, specimen: str, output: str, **in
     _make(expected, table, [output], root=root, study=study, specimen=specimen, **inputs)
 
 
-def run_joined(root: str, study: str, table: str, inputs: list[str], output: str) -> None:
+def run_joined(
+    root: str, study: str, table: str, inputs: list[str], output: str, **_place: str
+) -> None:
     """Join files that other jobs have made: job files to a block, or blocks to a table."""
     expected = Expected(root, *study_of(root, study))
     marks = {path: expected.of_part(table, path) for path in inputs}

@@ -7,6 +7,7 @@ public door: an input that is newer than the file, where the file carries anothe
 
 import os
 import sys
+import threading
 import time
 from collections.abc import Iterable, Mapping
 from functools import cached_property
@@ -24,7 +25,7 @@ from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.registry import kind_names
 from spinepipe.studies.study_files import StudyFiles
 
-OUTDATED = ".snakemake/spinepipe-outdated"
+OUTDATED = ".snakemake/changed_settings_data_or_code"
 """Newer than the files that count as outdated; nothing reads what it says."""
 
 RUNNING = ".snakemake/spinepipe-running"
@@ -183,11 +184,15 @@ class Project:
         for name in self.at_work:
             sweep(f"results/{name}")
 
-    def sweep_logs(self) -> None:
+    def end(self) -> None:
         """Remove the empty logs that Snakemake leaves for every job that went well.
 
         A folder of logs that is a link is somebody's own.
         """
+        # Snakemake's limit of jobs per time starts one at each look; none may hold up the end.
+        for thread in threading.enumerate():
+            if isinstance(thread, threading.Timer):
+                thread.cancel()
         for logs in (f"results/{name}/logs" for name in self.at_work):
             for folder, _, files in (
                 os.walk(logs, topdown=False) if not os.path.islink(logs) else ()

@@ -134,6 +134,19 @@ class Project:
         assert done.returncode == 0, done.stdout
         return done.stdout
 
+    def spinepipe(self, *arguments: str) -> str:
+        """What `spinepipe` said to these arguments, on both streams."""
+        return subprocess.run(
+            [sys.executable, "-m", "spinepipe.cli", *arguments],
+            cwd=self.folder,
+            env=self.environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=_HANGS_S,
+            check=False,
+        ).stdout
+
     def rerun(self, *targets: str) -> set[str]:
         """Run again; the result files that were written."""
         before = self.files()
@@ -149,7 +162,8 @@ class Project:
         done = self.snakemake("-n", *arguments)
         assert done.returncode == 0, done.stdout
         lines = re.findall(r"^    output: (.*)$", done.stdout, re.MULTILINE)
-        files = {name for line in lines for name in line.split(", ")}
+        files = {re.sub(r" \(.*", "", name) for line in lines for name in line.split(", ")}
+        files -= {name for name in files if name.endswith(")")}  # of "(report, update)"
         assert bool(files) != ("Nothing to be done" in done.stdout)
         return {name.removeprefix("results/") for name in files}, done.stdout
 

@@ -36,13 +36,17 @@ def layout(study):
     return PROJECT.files(study)
 
 
-def outdated(rule):
-    """Input function: nothing while the files of a rule carry their mark, see `Project.outdated`."""
+def outdated(rule, mark=None):
+    """Input function: nothing while the files of a rule carry their mark, see `Project.outdated`.
+
+    The mark is that of the job of the rule's name, of another job, or told by a function.
+    """
+    mark = mark if callable(mark) else digest(mark or rule)
 
     def asked(wildcards):
-        made = getattr(rules, rule)
-        files = [pattern.format(**wildcards) for pattern in made.output]
-        return PROJECT.outdated(files, made.params.digest(wildcards))
+        patterns = getattr(rules, rule).output
+        files = [pattern.format(**wildcards) for pattern in patterns]
+        return PROJECT.outdated(files, mark(wildcards))
 
     return asked
 
@@ -69,3 +73,13 @@ def base_model(wildcards):
     base = PROJECT.expected(wildcards.study).study.base
     model = base and base.model
     return [os.path.relpath(os.path.join(PROJECT.root, model))] if model else []
+
+
+def figure_digest(wildcards):
+    """Params function: the mark of a figure."""
+    return PROJECT.expected(wildcards.study).of_figure(wildcards.figure)
+
+
+def page_digest(wildcards):
+    """Params function: the mark of a page."""
+    return PROJECT.expected(wildcards.study).of_report(wildcards.page)

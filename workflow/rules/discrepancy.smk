@@ -7,7 +7,7 @@ DISCREPANCIES = f"{results_of('discrepancy')}/discrepancy"
 # One job: each step of the search depends on what the last one found.
 rule discrepancy_search:
     input:
-        outdated("discrepancy_search"),
+        outdated("discrepancy_search", "search"),
         base_model,
     output:
         verdict=update(f"{DISCREPANCIES}/verdict.json"),

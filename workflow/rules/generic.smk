@@ -60,7 +60,7 @@ for kind in PROJECT.kinds:
             name:
                 f"{kind}_block"
             input:
-                outdated(f"{kind}_block"),
+                outdated(f"{kind}_block", block_digest()),
                 inputs=lambda wildcards: layout(wildcards.study).job_files(
                     wildcards.table, wildcards.specimen, wildcards.block
                 ),
@@ -81,7 +81,7 @@ for kind in PROJECT.kinds:
             name:
                 f"{kind}_table"
             input:
-                outdated(f"{kind}_table"),
+                outdated(f"{kind}_table", table_digest),
                 inputs=lambda wildcards: layout(wildcards.study).block_files(wildcards.table),
             output:
                 output=update(f"{place}/{{table,{one_of(made.files.joined)}}}.parquet"),
@@ -99,7 +99,7 @@ for kind in PROJECT.kinds:
             name:
                 f"{kind}_{job.name}"
             input:
-                outdated(f"{kind}_{job.name}"),
+                outdated(f"{kind}_{job.name}", job.name),
                 **inputs_of(made, job),
             output:
                 **outputs_of(place, made, job),
@@ -117,7 +117,7 @@ for kind in PROJECT.kinds:
             name:
                 f"{kind}_figure"
             input:
-                outdated(f"{kind}_figure"),
+                outdated(f"{kind}_figure", figure_digest),
                 unpack(inputs_of_figure),
             output:
                 svg=report(
@@ -129,9 +129,7 @@ for kind in PROJECT.kinds:
             log:
                 f"{LOGS}/figure_{{figure}}.log",
             params:
-                digest=lambda wildcards: PROJECT.expected(wildcards.study).of_figure(
-                    wildcards.figure
-                ),
+                digest=figure_digest,
                 caption=caption_of_figure,
             run:
                 run_job(DRAW, rule, wildcards, input, output, params, log)
@@ -140,13 +138,13 @@ for kind in PROJECT.kinds:
         name:
             f"{kind}_report"
         input:
-            outdated(f"{kind}_report"),
+            outdated(f"{kind}_report", page_digest),
             unpack(inputs_of_page),
         output:
             output=update(f"{place}/{made.files.subfolder}{{page,report|full}}.html"),
         log:
             f"{LOGS}/{{page}}.log",
         params:
-            digest=lambda wildcards: PROJECT.expected(wildcards.study).of_report(wildcards.page),
+            digest=page_digest,
         run:
             run_job(REPORT, rule, wildcards, input, output, params, log)

@@ -10,7 +10,7 @@ wildcard_constraints:
 
 rule draw_design:
     input:
-        outdated("draw_design"),
+        outdated("draw_design", "design"),
     output:
         output=update(f"{SENSITIVITIES}/design.parquet"),
     log:
@@ -24,7 +24,7 @@ rule draw_design:
 # The spine of each specimen before any factor changes it, beside its measured motion.
 rule base_of_specimen:
     input:
-        outdated("base_of_specimen"),
+        outdated("base_of_specimen", "base"),
     output:
         base_stiffness=update(f"{SENSITIVITIES}/base/specimen={{specimen}}/base_stiffness.parquet"),
         base_motion=update(f"{SENSITIVITIES}/base/specimen={{specimen}}/base_motion.parquet"),
@@ -39,7 +39,7 @@ rule base_of_specimen:
 # Batches of samples; how many are in one is the study's samples_per_target.
 rule responses_block:
     input:
-        outdated("responses_block"),
+        outdated("responses_block", block_digest("responses")),
         design=f"{RESULTS}/design.parquet",
         base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
     output:
@@ -76,7 +76,7 @@ rule respond:
 # Stiffness fitted anew in each sample.
 rule calibrated_block:
     input:
-        outdated("calibrated_block"),
+        outdated("calibrated_block", block_digest("calibrated")),
         design=f"{RESULTS}/design.parquet",
         base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
     output:
@@ -94,7 +94,7 @@ rule calibrated_block:
 # One file by its name, such as one that got lost.
 rule calibrate_samples:
     input:
-        outdated("calibrate_samples"),
+        outdated("calibrate_samples", "calibrate"),
         design=f"{RESULTS}/design.parquet",
         base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
     output:
@@ -112,7 +112,7 @@ rule calibrate_samples:
 
 rule index_factors:
     input:
-        outdated("index_factors"),
+        outdated("index_factors", "analyse"),
         design=f"{RESULTS}/design.parquet",
         responses=lambda wildcards: layout(wildcards.study).blocks_of(
             "responses", wildcards.specimen

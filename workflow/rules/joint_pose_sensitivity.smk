@@ -56,7 +56,7 @@ rule build_models:
 # Poses of a specimen, fitted side by side.
 rule calibrations_block:
     input:
-        outdated("calibrations_block"),
+        outdated("calibrations_block", block_digest("calibrations")),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
         output=update(
@@ -88,7 +88,7 @@ rule calibrate:
 
 rule rank_models:
     input:
-        outdated("rank_models"),
+        outdated("rank_models", "rank"),
         calibrations=f"{RESULTS}/calibrations.parquet",
     output:
         output=update(f"{POSES}/best.json"),
@@ -103,7 +103,7 @@ rule rank_models:
 # Each pose with its own stiffness and with the best sets of all poses.
 rule simulations_block:
     input:
-        outdated("simulations_block"),
+        outdated("simulations_block", block_digest("simulations")),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
         calibrations=lambda wildcards: layout(wildcards.study).blocks_of_calibrations(
             wildcards.specimen

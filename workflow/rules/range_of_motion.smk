@@ -33,7 +33,7 @@ rule draw_stiffness:
 # Drawn frames with drawn stiffness.
 rule moves_block:
     input:
-        outdated("moves_block"),
+        outdated("moves_block", block_digest("range_of_motion")),
         frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
         stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
     output:
@@ -51,7 +51,7 @@ rule moves_block:
 # One file by its name, such as one that got lost.
 rule move:
     input:
-        outdated("move"),
+        outdated("move", "simulate"),
         frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
         stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
     output:

@@ -8,7 +8,7 @@ PERSON = f"{TRACKED}/jobs/specimen={{specimen}}"
 # Passive elements from the trials of one kind, or of two kinds together.
 rule calibrate_passive:
     input:
-        outdated("calibrate_passive"),
+        outdated("calibrate_passive", "calibrate"),
     output:
         output=update(f"{PERSON}/law={{law,[a-z_]+}}/stiffness.parquet"),
     log:
@@ -39,7 +39,7 @@ rule track:
 
 rule profile_stiffness:
     input:
-        outdated("profile_stiffness"),
+        outdated("profile_stiffness", "profile"),
     output:
         profiles=update(
             f"{PERSON}/region={{region}}/coordinate={{coordinate,[a-z_]+}}/profiles.parquet"
@@ -57,7 +57,7 @@ rule profile_stiffness:
 
 rule weigh_loads:
     input:
-        outdated("weigh_loads"),
+        outdated("weigh_loads", "weigh"),
     output:
         output=update(f"{PERSON}/weights.parquet"),
     log:
@@ -71,7 +71,7 @@ rule weigh_loads:
 # Clusters, size and what is remarkable of a person's recordings.
 rule examine_recordings:
     input:
-        outdated("examine_recordings"),
+        outdated("examine_recordings", "examine"),
     output:
         clusters=update(f"{PERSON}/clusters.parquet"),
         remarks=update(f"{PERSON}/remarks.parquet"),
@@ -87,7 +87,7 @@ rule examine_recordings:
 # What OpenSim replays.
 rule export_skeleton:
     input:
-        outdated("export_skeleton"),
+        outdated("export_skeleton", "skeleton"),
     output:
         output=update(f"{TRACKED}/opensim/{{specimen}}.osim"),
     log:
@@ -100,7 +100,7 @@ rule export_skeleton:
 
 rule export_motion:
     input:
-        outdated("export_motion"),
+        outdated("export_motion", "motion"),
         tracked=f"{RESULTS}/jobs/specimen={{specimen}}/trial={{trial}}/approach={{approach}}/tracked.parquet",
     output:
         output=update(f"{TRACKED}/opensim/{{specimen}}/{{trial}}/{{approach,[a-z_0-9]+}}.mot"),

@@ -56,7 +56,7 @@ rule tune:
 
 rule draw_inputs:
     input:
-        outdated("draw_inputs"),
+        outdated("draw_inputs", "draw"),
     output:
         output=update(f"{TRUNKS}/design.parquet"),
     log:
@@ -70,7 +70,7 @@ rule draw_inputs:
 # Batches of samples of a person; how many are in one is the study's samples_per_target.
 rule samples_block:
     input:
-        outdated("samples_block"),
+        outdated("samples_block", block_digest("responses")),
         design=f"{RESULTS}/design.parquet",
     output:
         output=update(
@@ -87,7 +87,7 @@ rule samples_block:
 # One file by its name, such as one that got lost.
 rule sample_loads:
     input:
-        outdated("sample_loads"),
+        outdated("sample_loads", "respond"),
         design=f"{RESULTS}/design.parquet",
     output:
         output=update(f"{TRUNKS}/jobs/specimen={{specimen}}/batch={{batch}}/responses.parquet"),
