@@ -1,7 +1,7 @@
 # Study kind joint_count, made for a test.
 rule count_joints:
     input:
-        outdated("count_joints"),
+        outdated("count_joints", "count"),
     output:
         output=update(f"{results_of('joint_count')}/joints/specimen={{specimen}}.parquet"),
     log:
