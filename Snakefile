@@ -57,16 +57,13 @@ onstart:
     lift_rate_limit()
     look_at_few()
     keep_the_graph()
-    tell_what_is_ahead()
 
 
 onsuccess:
     tell_how_many_lost()
     sweep_logs()
-    keep_costs()
 
 
 onerror:
     tell_how_many_lost()
     sweep_logs()
-    tell_failed()

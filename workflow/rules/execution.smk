@@ -1,20 +1,13 @@
-# How jobs are run: checks before the first one, the warm worker pool, and progress.
+# How jobs are run: checks before the first one, and the warm worker pool. What a run says: workflow/plugins.
 import os
 import sys
-import time
-from collections import Counter
-from functools import cache
 from pathlib import Path
 
 from snakemake.executors.local import Executor as LocalExecutor
-from snakemake.logging import logger
-from snakemake.settings.enums import Quietness
-from snakemake_interface_logger_plugins.common import LogEvent
 
 from spinepipe.jobs import code
 from spinepipe.jobs.digest import versions
-from spinepipe.jobs.pool import JobFailed, submit_and_wait, warm_up
-from spinepipe.jobs.time_left import TimeLeft, costs
+from spinepipe.jobs.pool import submit_and_wait, warm_up
 from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.registry import place_of
 
@@ -63,62 +56,6 @@ def share_a_process():
 share_a_process()
 
 
-PER_JOB = {
-    *(LogEvent.JOB_INFO, LogEvent.GROUP_INFO, LogEvent.SHELLCMD, LogEvent.JOB_FINISHED),
-    *(LogEvent.PROGRESS, LogEvent.RESOURCES_INFO, LogEvent.RUN_INFO),
-}
-"""What Snakemake tells of each job, and what the first line of a run tells better."""
-
-
-def to_the_point(record):
-    """Log filter: no lines per job that starts, and of a failed job only its own words."""
-    text, event = str(record.msg), getattr(record, "event", None)
-    if workflow.dryrun:  # known when jobs are, not yet when rules are read
-        return True
-    # Who chooses what to be told is told it.
-    if workflow.output_settings.quiet == {Quietness.HOST}:
-        if event in (LogEvent.JOB_ERROR, LogEvent.GROUP_ERROR):
-            return not workflow.local_exec and is_news_of_the_queue(record)
-        if event in PER_JOB or getattr(record, "quietness", None) is Quietness.RULES:
-            return False
-    if "JobFailed in file" in text:
-        noise = ("RuleException", "JobFailed in file", '  File "')
-        record.msg = "\n".join(
-            line for line in text.splitlines() if not line.startswith(noise)
-        )
-    return not text.startswith(("Select jobs to execute", "Execute "))
-
-
-def is_news_of_the_queue(record):
-    """Whether it is the first failure of a submitted job of its rule, or of its group.
-
-    Snakemake drops what was said when a group was refused, and lists its jobs instead, twice.
-    """
-    group = record.event is LogEvent.GROUP_ERROR
-    if not group and not record.rule_msg:
-        return False
-    name = f"group {record.groupid}" if group else f"rule {record.rule_name}"
-    if group:
-        submitted = getattr(record, "external_jobid", None)
-        record.event = None
-        record.msg = f"Error in {name} of {len(record.job_error_info)} jobs: " + (
-            f"submitted job {submitted} failed, see its log."
-            if submitted
-            else "it was not submitted. `--verbose` shows the call, which tells why if you run it; "
-            'remedies: docs/cluster.md, "What the queue refuses".'
-        )
-    NOT_DONE[name] += 1
-    return NOT_DONE[name] == 1
-
-
-NOT_DONE = Counter()
-"""How often submitted jobs failed or were refused, by rule or group."""
-
-
-if workflow.is_main_process:
-    logger.addFilter(to_the_point)
-
-
 def check_writable():
     """Say so at once when results cannot be written."""
     for folder in ["results", *(f"results/{name}" for name in studies_at_work())]:
@@ -155,11 +92,6 @@ def studies_at_work():
     )
 
 
-def keep_costs():
-    """What jobs took here, for the first line of the next run."""
-    time_left.keep(Path(ROOT))
-
-
 def sweep_logs():
     """Remove the empty logs that Snakemake leaves for every job that went well.
 
@@ -173,28 +105,6 @@ def sweep_logs():
                     os.unlink(path)
             if not os.listdir(folder):
                 os.rmdir(folder)
-
-
-def totals():
-    """Jobs per rule in this run, also of rules whose jobs Snakemake does not know yet."""
-    jobs = [*workflow.dag.finished_jobs, *workflow.dag.needrun_jobs()]
-    counts = Counter(job.rule.name for job in jobs)
-    for rule, foreseen in FORESEEN.items():
-        if not counts[rule]:
-            counts[rule] = foreseen(jobs)
-    return counts
-
-
-# How many jobs are to come that Snakemake does not know yet, by names of rules; functions of jobs.
-FORESEEN = {}
-time_left = TimeLeft(totals, costs(Path(ROOT)), workflow.resource_settings.cores or 1)
-
-
-def tell_what_is_ahead():
-    """The first line of a run: what it will make, and how long that takes here."""
-    if workflow.is_main_process and (names := studies_at_work()):
-        what = f"{len(names)} studies" if len(names) > 1 else names[0]
-        print(f"{what}: {time_left.ahead()}", file=sys.stderr)
 
 
 def run_job(rule, job, wildcards, input, output, log, **others):
@@ -243,39 +153,4 @@ def plain(value):
 
 def execute(rule, function, wildcards, log, arguments):
     name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
-    begun = time.monotonic()
-    try:
-        submit_and_wait(name, function, str(log), **arguments)
-    except JobFailed:
-        FAILED.append(name)
-        raise
-    time_left.finish(rule, time.monotonic() - begun)
-    page = arguments.get("output", "")
-    if str(page).endswith(".html"):
-        print(f"{wildcards.study}: {Path(ROOT, page).as_uri()}", file=sys.stderr)
-
-
-MOST_FAILED_NAMED = 5
-FAILED = []
-
-
-def tell_failed():
-    """Name the jobs that failed once more at the end, of many the first ones: their words are far up."""
-    for name, times in NOT_DONE.items():
-        if times > 1:
-            print(f"{name}: {times} times in all", file=sys.stderr)
-    if len(FAILED) < 2:
-        return
-    shown = FAILED[:MOST_FAILED_NAMED]
-    more = len(FAILED) - len(shown)
-    lines = [
-        f"{len(FAILED)} jobs failed:",
-        *(f"  {name}" for name in shown),
-        *([f"  and {more} more"] if more else []),
-        f"Each has a log below {listed_logs()}. Run the same command again: what is finished is kept.",
-    ]
-    print("\n".join(lines), file=sys.stderr)
-
-
-def listed_logs():
-    return ", ".join(f"results/{name}/logs" for name in studies_at_work())
+    submit_and_wait(name, function, str(log), **arguments)

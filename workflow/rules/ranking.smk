@@ -23,16 +23,4 @@ def when_ranked(wildcards):
         checkpoints.rank_models.get(study=wildcards.study)
 
 
-@cache
-def simulations_to_do(name):
-    """Simulations of a study that had no file when first asked for: none is made before the ranking."""
-    return layout(name).simulations_to_do()
-
-
-def simulations_foreseen(jobs):
-    names = {job.wildcards.study for job in jobs if job.rule.name == "rank_models"}
-    return sum(simulations_to_do(name) for name in names)
-
-
 WAITING["simulations"] = [when_ranked]
-FORESEEN["simulate"] = simulations_foreseen

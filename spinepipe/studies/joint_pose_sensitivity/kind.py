@@ -236,10 +236,6 @@ class Layout(StudyFiles):
         numbers = range(first, min(first + size, self._count(table)))
         return [self._job_file(table, specimen, number) for number in numbers]
 
-    def simulations_to_do(self) -> int:
-        """Number of simulations that have no file yet."""
-        return len(self.absent("simulations", joined=False))
-
     def _count(self, table: str) -> int:
         """Number of job files of a table per specimen."""
         study = self.study
