@@ -46,10 +46,9 @@ class LogHandler(LogHandlerBase):
         self._started: Counter[str] = Counter()
         self._newest = ""  # rule of the last job that was not planned at the start
         self._jobs: dict[int, Any] = {}
-        self._last: Any = None  # the job that finished last
         self._failed: dict[int, Any] = {}
         self._submitted_failed: Counter[str] = Counter()
-        self._line_at = 0.0
+        self._last, self._line_at = "", 0.0  # job that finished last; when a line was written
 
     @property
     def writes_to_stream(self) -> bool:
@@ -134,19 +133,20 @@ class LogHandler(LogHandlerBase):
         self._jobs[job.jobid] = job
 
     def _finish(self, record: Any) -> str:
-        job = self._last = self._jobs[record.job_id]
+        job = self._jobs[record.job_id]
         self._failed.pop(record.job_id, None)
         self._time_left.finish(job.rule_name, record.created - job.created)
-        pages = [path for path in job.output or () if path.endswith(".html")]
-        return "\n".join(f"{study_of(job)}{Path(self._root, page).as_uri()}" for page in pages)
+        study = job.wildcards.get("study", "")
+        self._last = ": ".join(filter(None, [study, job.rule_name]))
+        pages = [Path(self._root, path) for path in job.output or () if path.endswith(".html")]
+        return "\n".join(f"{study}: {page.as_uri()}" for page in pages)
 
     def _progress(self, record: Any) -> str | None:
         if record.created - self._line_at < SECONDS_BETWEEN_LINES:
             return None
         self._line_at = record.created
         left = self._time("  ·  {} left", record.total - self._planned.total())
-        last = study_of(self._last) + self._last.rule_name
-        return f"{record.done:,} of {record.total:,} jobs{left}  ·  {last}"
+        return f"{record.done:,} of {record.total:,} jobs{left}  ·  {self._last}"
 
     def _news(self, name: str, why: str) -> str | None:
         """The first failure of a submitted job of its rule or group; others are counted."""
@@ -178,8 +178,3 @@ def own_words(text: str) -> str:
     if "JobFailed in " not in text:
         return text
     return "\n".join(line for line in text.splitlines() if not line.startswith(WHERE_RAISED))
-
-
-def study_of(job: Any) -> str:
-    study = (job.wildcards or {}).get("study")
-    return f"{study}: " if study else ""
