@@ -19,7 +19,10 @@ from snakemake_logger_plugin_spinepipe.time_left import TimeLeft, duration, job_
 
 SECONDS_BETWEEN_LINES = 2.0
 MOST_FAILED_NAMED = 5
-OBVIOUS = ("Assuming unrestricted", "Using shell", "Select jobs", "Group jobs: inactive")
+UNSAID = (
+    *("Assuming unrestricted", "Using shell", "Group jobs: inactive", "Select jobs"),
+    *("Job rate limit reached", "Trying to restart job"),
+)
 WHERE_RAISED = ("RuleException", "JobFailed in ", '  File "')
 """Lines about a failed job that are Snakemake's, not the job's own."""
 
@@ -100,7 +103,7 @@ class LogHandler(LogHandlerBase):
                 submitted = getattr(record, "external_jobid", None)
                 why = f"submitted job {submitted} failed, see its log." if submitted else REFUSED
                 return self._news(f"group {record.groupid}", why)
-            case None if record.levelno >= WARNING or not record.msg.startswith(OBVIOUS):
+            case None if record.levelno >= WARNING or not record.msg.startswith(UNSAID):
                 return record.msg
         return None
 
