@@ -71,9 +71,9 @@ dev-env: $(VENV)/dev.done
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/runtime.done: $(VENV)/bin/python requirements.lock pyproject.toml
+$(VENV)/runtime.done: $(VENV)/bin/python requirements.lock pyproject.toml workflow/plugins/pyproject.toml
 	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
-	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable . --editable workflow/plugins
 	$(BIN)/python -m spinepipe.cli.engine >/dev/null  # compiles the kernels, else the first study waits for it
 	touch $@
 

@@ -9,7 +9,6 @@ import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from spinepipe.jobs.pool import JobFailed, submit_and_wait
@@ -69,9 +68,6 @@ def run_job(
                 "the same command again"
             )
     _date(outputs, inputs)
-    if outputs[0].endswith(".html"):
-        page = Path(project.root, outputs[0]).as_uri()
-        print(f"{wildcards['study']}: {page}", file=sys.stderr)
 
 
 def _carry(paths: Sequence[str], mark: str) -> bool:

@@ -102,8 +102,9 @@ class Project:
         self.path(name).write_text(text.replace(old, new))
 
     def environment(self) -> dict[str, str]:
-        """Without the path of the original package: the copy must find itself."""
-        return {key: value for key, value in os.environ.items() if key not in _NOT_PASSED_ON}
+        """Without the path of the original package: the copy must find itself, and its plug-ins."""
+        kept = {key: value for key, value in os.environ.items() if key not in _NOT_PASSED_ON}
+        return {**kept, "PYTHONPATH": str(self.path("workflow/plugins"))}
 
     def snakemake(
         self, *arguments: str, python: str = sys.executable

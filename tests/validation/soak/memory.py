@@ -150,7 +150,7 @@ def looks(folder: Path, studies: int = STUDIES) -> pd.DataFrame:
         cwd=project.folder,
         env={
             **project.environment(),
-            "PYTHONPATH": str(project.folder),
+            "PYTHONPATH": f"{project.folder}:{project.path('workflow/plugins')}",
             "OMP_NUM_THREADS": "1",
             "TMPDIR": str(scratch),
         },

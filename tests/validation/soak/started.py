@@ -80,7 +80,7 @@ def start(project: Project, *arguments: str) -> Iterator[Started]:
     said = project.path("said.txt")
     environment = {
         **project.environment(),
-        "PYTHONPATH": str(project.folder),
+        "PYTHONPATH": f"{project.folder}:{project.path('workflow/plugins')}",
         "OMP_NUM_THREADS": "1",
         "TMPDIR": str(scratch),
     }
