@@ -152,9 +152,9 @@ def test_warnings_and_words_without_an_event_are_passed_on(capsys: Said) -> None
     run.send(None, "Building DAG of jobs...", levelno=logging.INFO)
     run.send(None, "Select jobs to execute...", levelno=logging.INFO)
     run.send(None, "Job rate limit reached, waiting for free slots.", levelno=logging.INFO)
-    run.send(None, "Using shell with a fault", levelno=logging.WARNING)
+    run.send(None, "Something is odd", levelno=logging.WARNING)
     run.send(LogEvent.JOB_STARTED, "Execute 2 jobs...")
-    assert capsys.readouterr().err == "Building DAG of jobs...\nUsing shell with a fault\n"
+    assert capsys.readouterr().err == "Building DAG of jobs...\nSomething is odd\n"
 
 
 @pytest.mark.parametrize(

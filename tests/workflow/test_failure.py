@@ -192,3 +192,33 @@ def test_of_many_damaged_files_five_are_named(toy_copy: Project) -> None:
     assert said.count("is damaged, cut off, empty") == 5
     assert f"so do {len(SPECIMENS) - 5} more files" in said
     assert toy_copy.contents() == content
+
+
+CHANGED = """
+
+whole_run_job = run_job
+
+
+def run_job(job, rule, *others):
+    whole_run_job(job, rule, *others)
+    if rule == "joint_count_table":
+        study = Path("config/studies/counted.yaml")
+        study.write_text(study.read_text().replace("times: 2", "times: 3"))
+"""
+"""Added to the Snakefile: once a table is joined, somebody changes a setting of the study."""
+
+
+@pytest.mark.full
+def test_settings_changed_in_mid_run_are_told_and_mix_nothing(toy_copy: Project) -> None:
+    content, snakefile = toy_copy.contents(), toy_copy.path("Snakefile")
+    whole = snakefile.read_text()
+    shutil.rmtree(toy_copy.path("results"))
+    snakefile.write_text(whole + CHANGED)
+    ended = toy_copy.snakemake("-j1", "all")
+    assert ended.returncode != 0
+    assert "settings, data or code have changed since this run was planned" in ended.stdout
+    assert "Traceback" not in ended.stdout
+    snakefile.write_text(whole)
+    toy_copy.edit("config/studies/counted.yaml", "times: 3", "times: 2")
+    toy_copy.run()
+    assert toy_copy.contents() == content
