@@ -22,22 +22,25 @@ class PartsFailed(Exception):
     """Some job files of a block could not be made; the text says which and why."""
 
 
-def run(
-    root: str, study: str, table: str, specimen: str, block: str, output: str, **inputs: Any
-) -> None:
-    """Make what is missing of the job files of a block, and join them."""
+def run(root: str, study: str, table: str, specimen: str, output: str, **inputs: Any) -> None:
+    """Make what is missing of the job files of a block and join them, or make one job file.
+
+    Parameters
+    ----------
+    output : the block or the job file; the names and values in its path are no inputs.
+    """
     expected = Expected(root, *study_of(root, study))
-    parts = expected.files.job_files(table, specimen, block)
+    place = place_of(output)
+    given = {name: value for name, value in inputs.items() if name not in place}
+    given |= {"root": root, "study": study, "specimen": specimen}
+    if "block" not in place:
+        _make(expected, table, [output], given)
+        return
+    parts = expected.files.job_files(table, specimen, place["block"])
     marks = {path: expected.of_part(table, path) for path in parts}
     missing = [path for path, mark in marks.items() if mark_in(path) != mark]
-    _make(expected, table, missing, root=root, study=study, specimen=specimen, **inputs)
+    _make(expected, table, missing, given)
     join_files(kind_of(expected.study.kind).table(table), marks, output)
-
-
-def run_part(root: str, study: str, table: str, specimen: str, output: str, **inputs: Any) -> None:
-    """Make one job file that was asked for by its name."""
-    expected = Expected(root, *study_of(root, study))
-    _make(expected, table, [output], root=root, study=study, specimen=specimen, **inputs)
 
 
 def run_joined(
@@ -49,7 +52,9 @@ def run_joined(
     join_files(kind_of(expected.study.kind).table(table), marks, output)
 
 
-def _make(expected: Expected, table: str, paths: Sequence[str], **arguments: Any) -> None:
+def _make(
+    expected: Expected, table: str, paths: Sequence[str], arguments: Mapping[str, Any]
+) -> None:
     """Compute job files together; one by one where that fails, so that the others are there."""
     if not paths:
         return

@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import NoReturn, TextIO
+from typing import Any, NoReturn, TextIO
 
 from spinepipe.files import appearing, sweep
 from spinepipe.jobs.digest import versions
@@ -123,6 +123,47 @@ class Project:
     def mark(self, job: str, place: Mapping[str, str]) -> str:
         """The mark of the files of a job."""
         return self.expected(place["study"]).of_job(job, {**place})
+
+    def mark_of_block(self, place: Any) -> str:
+        """The mark of a block of a table."""
+        return self.expected(place.study).of_block(place.table, place.specimen, place.block)
+
+    def mark_of_table(self, place: Any) -> str:
+        """The mark of a table that is joined from others."""
+        return self.expected(place.study).of_table(place.table)
+
+    def mark_of_figure(self, place: Any) -> str:
+        """The mark of a figure."""
+        return self.expected(place.study).of_figure(place.figure)
+
+    def mark_of_page(self, place: Any) -> str:
+        """The mark of a page."""
+        return self.expected(place.study).of_report(place.page)
+
+    def base_model(self, place: Any) -> list[str]:
+        """The model file that a study builds on, or nothing; another study may make it."""
+        study: Any = self.expected(place.study).study
+        model = study.base and study.base.model
+        return [os.path.relpath(Path(self.root) / model)] if model else []
+
+    def inputs_of_figure(self, place: Any) -> dict[str, Any]:
+        """Tables and other results that a figure is drawn from."""
+        files = self.files(place.study)
+        figure = files.figure(place.figure)
+        full = bool(set(figure.tables) & set(files.full))
+        tables = files.table_files((*figure.reads, *figure.also), full)
+        return {"tables": tables, **files.other_files(figure.reads)}
+
+    def inputs_of_page(self, place: Any) -> dict[str, Any]:
+        """All that a page shows."""
+        files, full = self.files(place.study), place.page == "full"
+        drawn = files.figures(full)
+        return {
+            "tables": files.table_files(files.tables, full),
+            "figures": [f"{files.folder}/figures/{figure}.svg" for figure in drawn],
+            "captions": [files.caption(figure) for figure in drawn],
+            **files.other_files(files.told_in_report),
+        }
 
     def outdated(self, files: Iterable[str], mark: str) -> list[str]:
         """Nothing if the files that are there carry a mark, else an input newer than they."""

@@ -15,11 +15,11 @@ wildcard_constraints:
 rule literature:
     input:
         outdated("literature"),
-        base_model,
+        PROJECT.base_model,
     output:
-        stiffness=update(f"{COHORTS}/literature/specimen={{specimen}}/stiffness.parquet"),
-        errors=update(f"{COHORTS}/literature/specimen={{specimen}}/errors.parquet"),
-        sign_checks=update(f"{COHORTS}/literature/specimen={{specimen}}/sign_checks.parquet"),
+        **tables_in(
+            f"{COHORTS}/literature/specimen={{specimen}}", "stiffness", "errors", "sign_checks"
+        ),
     log:
         f"{LOGS}/literature/specimen={{specimen}}.log",
     params:
@@ -31,12 +31,9 @@ rule literature:
 rule fit:
     input:
         outdated("fit"),
-        base_model,
+        PROJECT.base_model,
     output:
-        stiffness=update(f"{COHORTS}/fits/{OWN}/stiffness.parquet"),
-        fits=update(f"{COHORTS}/fits/{OWN}/fits.parquet"),
-        errors=update(f"{COHORTS}/fits/{OWN}/errors.parquet"),
-        nuisances=update(f"{COHORTS}/fits/{OWN}/nuisances.parquet"),
+        **tables_in(f"{COHORTS}/fits/{OWN}", "stiffness", "fits", "errors", "nuisances"),
     log:
         f"{LOGS}/fits/{OWN}.log",
     params:
@@ -48,14 +45,13 @@ rule fit:
 rule left_out:
     input:
         outdated("left_out"),
-        base_model,
+        PROJECT.base_model,
         # Fits of the other specimens, of which the left-out one takes the median.
         others=lambda wildcards: layout(wildcards.study).fits_of_others(
             wildcards.specimen, wildcards.representation, wildcards.fitted_to
         ),
     output:
-        stiffness=update(f"{COHORTS}/left_out/{OWN}/stiffness.parquet"),
-        errors=update(f"{COHORTS}/left_out/{OWN}/errors.parquet"),
+        **tables_in(f"{COHORTS}/left_out/{OWN}", "stiffness", "errors"),
     log:
         f"{LOGS}/left_out/{OWN}.log",
     params:
@@ -67,12 +63,9 @@ rule left_out:
 rule pool:
     input:
         outdated("pool"),
-        base_model,
+        PROJECT.base_model,
     output:
-        stiffness=update(f"{COHORTS}/pooled/{POOL}/stiffness.parquet"),
-        fits=update(f"{COHORTS}/pooled/{POOL}/fits.parquet"),
-        errors=update(f"{COHORTS}/pooled/{POOL}/errors.parquet"),
-        pooling=update(f"{COHORTS}/pooled/{POOL}/pooling.parquet"),
+        **tables_in(f"{COHORTS}/pooled/{POOL}", "stiffness", "fits", "errors", "pooling"),
     log:
         f"{LOGS}/pooled/{POOL}.log",
     params:
@@ -84,14 +77,13 @@ rule pool:
 rule experiment:
     input:
         outdated("experiment"),
-        base_model,
+        PROJECT.base_model,
         # The specimen's own fit to all load cases, with which its tests are simulated.
         fitted=lambda wildcards: layout(wildcards.study).simulated_fit(wildcards.specimen),
     output:
-        load_displacement=update(
-            f"{COHORTS}/experiment/specimen={{specimen}}/load_displacement.parquet"
+        **tables_in(
+            f"{COHORTS}/experiment/specimen={{specimen}}", "load_displacement", "helical_axes"
         ),
-        helical_axes=update(f"{COHORTS}/experiment/specimen={{specimen}}/helical_axes.parquet"),
     log:
         f"{LOGS}/experiment/specimen={{specimen}}.log",
     params:

@@ -13,10 +13,10 @@ PROJECT = Project(os.getcwd())
 run_job = partial(run.run_job, PROJECT)
 RESULTS = "results/{study}"
 LOGS = "results/{study}/logs"
+OF_BLOCK = "specimen={specimen}/block={block}"
 
 # Jobs that serve every kind of study.
 BLOCK = "spinepipe.jobs.block:run"
-PART = "spinepipe.jobs.block:run_part"
 JOIN = "spinepipe.jobs.block:run_joined"
 DRAW = "spinepipe.jobs.draw:run"
 REPORT = "spinepipe.jobs.report:run"
@@ -30,6 +30,11 @@ def one_of(names):
 def results_of(kind):
     """Where results of studies of a kind go: the pattern names the studies."""
     return f"results/{{study,{one_of(PROJECT.names.get(kind, ['none of this kind']))}}}"
+
+
+def tables_in(folder, *names):
+    """Output of several tables in one folder, by their names."""
+    return {name: update(f"{folder}/{name}.parquet") for name in names}
 
 
 def layout(study):
@@ -51,35 +56,12 @@ def outdated(rule, mark=None):
     return asked
 
 
+def outdated_block(rule, part, job):
+    """The same for a block, and for the rule that makes a single job file of one."""
+    block, single = outdated(rule, PROJECT.mark_of_block), outdated(part, job)
+    return lambda wildcards: (block if "block" in wildcards.keys() else single)(wildcards)
+
+
 def digest(job):
     """Params function: the mark that the files of a job for the study at hand must have."""
     return lambda wildcards: PROJECT.mark(job, wildcards)
-
-
-def table_digest(wildcards):
-    """Params function: the mark of a table that is joined from others."""
-    return PROJECT.expected(wildcards.study).of_table(wildcards.table)
-
-
-def block_digest(table=None):
-    """Params function: the mark of a block of a table."""
-    return lambda wildcards: PROJECT.expected(wildcards.study).of_block(
-        table or wildcards.table, wildcards.specimen, wildcards.block
-    )
-
-
-def base_model(wildcards):
-    """The model file that a study builds on, or nothing; another study may make it."""
-    base = PROJECT.expected(wildcards.study).study.base
-    model = base and base.model
-    return [os.path.relpath(os.path.join(PROJECT.root, model))] if model else []
-
-
-def figure_digest(wildcards):
-    """Params function: the mark of a figure."""
-    return PROJECT.expected(wildcards.study).of_figure(wildcards.figure)
-
-
-def page_digest(wildcards):
-    """Params function: the mark of a page."""
-    return PROJECT.expected(wildcards.study).of_report(wildcards.page)

@@ -21,26 +21,6 @@ def outputs_of(place, kind, job):
     return files if len(files) > 1 else {"output": files[job.writes[0]]}
 
 
-def inputs_of_figure(wildcards):
-    files = layout(wildcards.study)
-    figure = files.figure(wildcards.figure)
-    full = bool(set(figure.tables) & set(files.full))
-    tables = files.table_files((*figure.reads, *figure.also), full)
-    return {"tables": tables, **files.other_files(figure.reads)}
-
-
-def inputs_of_page(wildcards):
-    files = layout(wildcards.study)
-    full = wildcards.page == "full"
-    figures = files.figures(full)
-    return {
-        "tables": files.table_files(files.tables, full),
-        "figures": [f"{files.folder}/figures/{figure}.svg" for figure in figures],
-        "captions": [files.caption(figure) for figure in figures],
-        **files.other_files(files.told_in_report),
-    }
-
-
 def caption_of_figure(wildcards):
     return Path(layout(wildcards.study).caption(wildcards.figure)).read_text("utf-8")
 
@@ -60,18 +40,16 @@ for kind in PROJECT.kinds:
             name:
                 f"{kind}_block"
             input:
-                outdated(f"{kind}_block", block_digest()),
+                outdated(f"{kind}_block", PROJECT.mark_of_block),
                 inputs=lambda wildcards: layout(wildcards.study).job_files(
                     wildcards.table, wildcards.specimen, wildcards.block
                 ),
             output:
-                output=update(
-                    f"{place}/blocks/{{table,{one_of(made.joined)}}}/specimen={{specimen}}/block={{block}}.parquet"
-                ),
+                output=update(f"{place}/blocks/{{table,{one_of(made.joined)}}}/{OF_BLOCK}.parquet"),
             log:
-                f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+                f"{LOGS}/blocks/{{table}}/{OF_BLOCK}.log",
             params:
-                digest=block_digest(),
+                digest=PROJECT.mark_of_block,
             run:
                 run_job(JOIN, rule, wildcards, input, output, params, log)
 
@@ -81,14 +59,14 @@ for kind in PROJECT.kinds:
             name:
                 f"{kind}_table"
             input:
-                outdated(f"{kind}_table", table_digest),
+                outdated(f"{kind}_table", PROJECT.mark_of_table),
                 inputs=lambda wildcards: layout(wildcards.study).block_files(wildcards.table),
             output:
                 output=update(f"{place}/{{table,{one_of(made.files.joined)}}}.parquet"),
             log:
                 f"{LOGS}/{{table}}.log",
             params:
-                digest=table_digest,
+                digest=PROJECT.mark_of_table,
             run:
                 run_job(JOIN, rule, wildcards, input, output, params, log)
 
@@ -117,8 +95,8 @@ for kind in PROJECT.kinds:
             name:
                 f"{kind}_figure"
             input:
-                outdated(f"{kind}_figure", figure_digest),
-                unpack(inputs_of_figure),
+                outdated(f"{kind}_figure", PROJECT.mark_of_figure),
+                unpack(PROJECT.inputs_of_figure),
             output:
                 svg=report(
                     update(f"{drawn}.svg"),
@@ -129,7 +107,7 @@ for kind in PROJECT.kinds:
             log:
                 f"{LOGS}/figure_{{figure}}.log",
             params:
-                digest=figure_digest,
+                digest=PROJECT.mark_of_figure,
                 caption=caption_of_figure,
             run:
                 run_job(DRAW, rule, wildcards, input, output, params, log)
@@ -138,13 +116,13 @@ for kind in PROJECT.kinds:
         name:
             f"{kind}_report"
         input:
-            outdated(f"{kind}_report", page_digest),
-            unpack(inputs_of_page),
+            outdated(f"{kind}_report", PROJECT.mark_of_page),
+            unpack(PROJECT.inputs_of_page),
         output:
             output=update(f"{place}/{made.files.subfolder}{{page,report|full}}.html"),
         log:
             f"{LOGS}/{{page}}.log",
         params:
-            digest=page_digest,
+            digest=PROJECT.mark_of_page,
         run:
             run_job(REPORT, rule, wildcards, input, output, params, log)

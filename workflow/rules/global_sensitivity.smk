@@ -26,8 +26,7 @@ rule base_of_specimen:
     input:
         outdated("base_of_specimen", "base"),
     output:
-        base_stiffness=update(f"{SENSITIVITIES}/base/specimen={{specimen}}/base_stiffness.parquet"),
-        base_motion=update(f"{SENSITIVITIES}/base/specimen={{specimen}}/base_motion.parquet"),
+        **tables_in(f"{SENSITIVITIES}/base/specimen={{specimen}}", "base_stiffness", "base_motion"),
     log:
         f"{LOGS}/base_of_specimen/specimen={{specimen}}.log",
     params:
@@ -39,27 +38,21 @@ rule base_of_specimen:
 # Batches of samples; how many are in one is the study's samples_per_target.
 rule responses_block:
     input:
-        outdated("responses_block", block_digest("responses")),
+        outdated_block("responses_block", part="respond", job="respond"),
         design=f"{RESULTS}/design.parquet",
         base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
     output:
-        output=update(
-            f"{SENSITIVITIES}/blocks/{{table,responses}}/specimen={{specimen}}/block={{block}}.parquet"
-        ),
+        output=update(f"{SENSITIVITIES}/blocks/{{table,responses}}/{OF_BLOCK}.parquet"),
     log:
-        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+        f"{LOGS}/blocks/{{table}}/{OF_BLOCK}.log",
     params:
-        digest=block_digest("responses"),
+        digest=PROJECT.mark_of_block,
     run:
         run_job(BLOCK, rule, wildcards, input, output, params, log)
 
 
 # One file by its name, such as one that got lost.
-rule respond:
-    input:
-        outdated("respond"),
-        design=f"{RESULTS}/design.parquet",
-        base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
+use rule responses_block as respond with:
     output:
         output=update(
             f"{SENSITIVITIES}/jobs/responses/specimen={{specimen}}/batch={{batch}}.parquet"
@@ -69,34 +62,26 @@ rule respond:
     params:
         digest=digest("respond"),
         table="responses",
-    run:
-        run_job(PART, rule, wildcards, input, output, params, log)
 
 
 # Stiffness fitted anew in each sample.
 rule calibrated_block:
     input:
-        outdated("calibrated_block", block_digest("calibrated")),
+        outdated_block("calibrated_block", part="calibrate_samples", job="calibrate"),
         design=f"{RESULTS}/design.parquet",
         base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
     output:
-        output=update(
-            f"{SENSITIVITIES}/blocks/{{table,calibrated}}/specimen={{specimen}}/block={{block}}.parquet"
-        ),
+        output=update(f"{SENSITIVITIES}/blocks/{{table,calibrated}}/{OF_BLOCK}.parquet"),
     log:
-        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+        f"{LOGS}/blocks/{{table}}/{OF_BLOCK}.log",
     params:
-        digest=block_digest("calibrated"),
+        digest=PROJECT.mark_of_block,
     run:
         run_job(BLOCK, rule, wildcards, input, output, params, log)
 
 
 # One file by its name, such as one that got lost.
-rule calibrate_samples:
-    input:
-        outdated("calibrate_samples", "calibrate"),
-        design=f"{RESULTS}/design.parquet",
-        base=lambda wildcards: layout(wildcards.study).base_of(wildcards.specimen),
+use rule calibrated_block as calibrate_samples with:
     output:
         output=update(
             f"{SENSITIVITIES}/jobs/calibrated/specimen={{specimen}}/batch={{batch}}.parquet"
@@ -106,8 +91,6 @@ rule calibrate_samples:
     params:
         digest=digest("calibrate"),
         table="calibrated",
-    run:
-        run_job(PART, rule, wildcards, input, output, params, log)
 
 
 rule index_factors:
@@ -121,9 +104,12 @@ rule index_factors:
             "calibrated", wildcards.specimen
         ),
     output:
-        indices=update(f"{SENSITIVITIES}/analysis/specimen={{specimen}}/indices.parquet"),
-        convergence=update(f"{SENSITIVITIES}/analysis/specimen={{specimen}}/convergence.parquet"),
-        failed_runs=update(f"{SENSITIVITIES}/analysis/specimen={{specimen}}/failed_runs.parquet"),
+        **tables_in(
+            f"{SENSITIVITIES}/analysis/specimen={{specimen}}",
+            "indices",
+            "convergence",
+            "failed_runs",
+        ),
     log:
         f"{LOGS}/index_factors/specimen={{specimen}}.log",
     params:

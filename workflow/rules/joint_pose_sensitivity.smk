@@ -56,25 +56,20 @@ rule build_models:
 # Poses of a specimen, fitted side by side.
 rule calibrations_block:
     input:
-        outdated("calibrations_block", block_digest("calibrations")),
+        outdated_block("calibrations_block", part="calibrate", job="calibrate"),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
     output:
-        output=update(
-            f"{POSES}/blocks/{{table,calibrations}}/specimen={{specimen}}/block={{block}}.parquet"
-        ),
+        output=update(f"{POSES}/blocks/{{table,calibrations}}/{OF_BLOCK}.parquet"),
     log:
-        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+        f"{LOGS}/blocks/{{table}}/{OF_BLOCK}.log",
     params:
-        digest=block_digest("calibrations"),
+        digest=PROJECT.mark_of_block,
     run:
         run_job(BLOCK, rule, wildcards, input, output, params, log)
 
 
 # One file by its name, such as one that got lost.
-rule calibrate:
-    input:
-        outdated("calibrate"),
-        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+use rule calibrations_block as calibrate with:
     output:
         output=update(f"{POSES}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet"),
     log:
@@ -82,8 +77,6 @@ rule calibrate:
     params:
         digest=digest("calibrate"),
         table="calibrations",
-    run:
-        run_job(PART, rule, wildcards, input, output, params, log)
 
 
 rule rank_models:
@@ -103,31 +96,23 @@ rule rank_models:
 # Each pose with its own stiffness and with the best sets of all poses.
 rule simulations_block:
     input:
-        outdated("simulations_block", block_digest("simulations")),
+        outdated_block("simulations_block", part="simulate", job="simulate"),
         poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
         calibrations=lambda wildcards: layout(wildcards.study).blocks_of_calibrations(
             wildcards.specimen
         ),
     output:
-        output=update(
-            f"{POSES}/blocks/{{table,simulations}}/specimen={{specimen}}/block={{block}}.parquet"
-        ),
+        output=update(f"{POSES}/blocks/{{table,simulations}}/{OF_BLOCK}.parquet"),
     log:
-        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+        f"{LOGS}/blocks/{{table}}/{OF_BLOCK}.log",
     params:
-        digest=block_digest("simulations"),
+        digest=PROJECT.mark_of_block,
     run:
         run_job(BLOCK, rule, wildcards, input, output, params, log)
 
 
 # One file by its name, such as one that got lost.
-rule simulate:
-    input:
-        outdated("simulate"),
-        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
-        calibrations=lambda wildcards: layout(wildcards.study).blocks_of_calibrations(
-            wildcards.specimen
-        ),
+use rule simulations_block as simulate with:
     output:
         output=update(
             f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness,calibrated|best[0-9]{{2}}}}.parquet"
@@ -137,8 +122,6 @@ rule simulate:
     params:
         digest=digest("simulate"),
         table="simulations",
-    run:
-        run_job(PART, rule, wildcards, input, output, params, log)
 
 
 rule bootstrap:

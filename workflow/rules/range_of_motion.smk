@@ -33,27 +33,21 @@ rule draw_stiffness:
 # Drawn frames with drawn stiffness.
 rule moves_block:
     input:
-        outdated("moves_block", block_digest("range_of_motion")),
+        outdated_block("moves_block", part="move", job="simulate"),
         frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
         stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
     output:
-        output=update(
-            f"{MOTIONS}/blocks/{{table,range_of_motion}}/specimen={{specimen}}/block={{block}}.parquet"
-        ),
+        output=update(f"{MOTIONS}/blocks/{{table,range_of_motion}}/{OF_BLOCK}.parquet"),
     log:
-        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+        f"{LOGS}/blocks/{{table}}/{OF_BLOCK}.log",
     params:
-        digest=block_digest("range_of_motion"),
+        digest=PROJECT.mark_of_block,
     run:
         run_job(BLOCK, rule, wildcards, input, output, params, log)
 
 
 # One file by its name, such as one that got lost.
-rule move:
-    input:
-        outdated("move", "simulate"),
-        frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
-        stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
+use rule moves_block as move with:
     output:
         output=update(
             f"{MOTIONS}/jobs/specimen={{specimen}}/pose={{pose,[0-9]+}}/stiffness={{stiffness,[0-9]+}}.parquet"
@@ -63,5 +57,3 @@ rule move:
     params:
         digest=digest("simulate"),
         table="range_of_motion",
-    run:
-        run_job(PART, rule, wildcards, input, output, params, log)

@@ -24,10 +24,7 @@ rule personalise:
         outdated("personalise"),
         population=lambda wildcards: layout(wildcards.study).population_files(wildcards.model),
     output:
-        laws=update(f"{PATIENTS}/jobs/{HELD}/laws.parquet"),
-        positions=update(f"{PATIENTS}/jobs/{HELD}/positions.parquet"),
-        displacements=update(f"{PATIENTS}/jobs/{HELD}/displacements.parquet"),
-        curves=update(f"{PATIENTS}/jobs/{HELD}/curves.parquet"),
+        **tables_in(f"{PATIENTS}/jobs/{HELD}", "laws", "positions", "displacements", "curves"),
     log:
         f"{LOGS}/personalise/specimen={{specimen}}/{{model}}.log",
     params:

@@ -26,9 +26,12 @@ rule track:
             wildcards.specimen, wildcards.trial, wildcards.approach
         ),
     output:
-        tracked=update(f"{PERSON}/trial={{trial}}/approach={{approach,[a-z_0-9]+}}/tracked.parquet"),
-        fits=update(f"{PERSON}/trial={{trial}}/approach={{approach,[a-z_0-9]+}}/fits.parquet"),
-        drawn=update(f"{PERSON}/trial={{trial}}/approach={{approach,[a-z_0-9]+}}/drawn.parquet"),
+        **tables_in(
+            f"{PERSON}/trial={{trial}}/approach={{approach,[a-z_0-9]+}}",
+            "tracked",
+            "fits",
+            "drawn",
+        ),
     log:
         f"{LOGS}/track/specimen={{specimen}}/trial={{trial}}/{{approach}}.log",
     params:
@@ -41,11 +44,10 @@ rule profile_stiffness:
     input:
         outdated("profile_stiffness", "profile"),
     output:
-        profiles=update(
-            f"{PERSON}/region={{region}}/coordinate={{coordinate,[a-z_]+}}/profiles.parquet"
-        ),
-        profile_points=update(
-            f"{PERSON}/region={{region}}/coordinate={{coordinate,[a-z_]+}}/profile_points.parquet"
+        **tables_in(
+            f"{PERSON}/region={{region}}/coordinate={{coordinate,[a-z_]+}}",
+            "profiles",
+            "profile_points",
         ),
     log:
         f"{LOGS}/profile_stiffness/specimen={{specimen}}/{{region}}_{{coordinate}}.log",
@@ -73,9 +75,7 @@ rule examine_recordings:
     input:
         outdated("examine_recordings", "examine"),
     output:
-        clusters=update(f"{PERSON}/clusters.parquet"),
-        remarks=update(f"{PERSON}/remarks.parquet"),
-        sizes=update(f"{PERSON}/sizes.parquet"),
+        **tables_in(PERSON, "clusters", "remarks", "sizes"),
     log:
         f"{LOGS}/examine_recordings/specimen={{specimen}}.log",
     params:

@@ -8,15 +8,18 @@ rule hold:
     input:
         outdated("hold"),
     output:
-        tasks=update(f"{TRUNKS}/jobs/specimen={{specimen}}/tasks.parquet"),
-        levels=update(f"{TRUNKS}/jobs/specimen={{specimen}}/levels.parquet"),
-        muscles=update(f"{TRUNKS}/jobs/specimen={{specimen}}/muscles.parquet"),
-        paths=update(f"{TRUNKS}/jobs/specimen={{specimen}}/paths.parquet"),
-        iterations=update(f"{TRUNKS}/jobs/specimen={{specimen}}/iterations.parquet"),
-        upright=update(f"{TRUNKS}/jobs/specimen={{specimen}}/upright.parquet"),
-        masses=update(f"{TRUNKS}/jobs/specimen={{specimen}}/masses.parquet"),
-        scaling=update(f"{TRUNKS}/jobs/specimen={{specimen}}/scaling.parquet"),
-        remarks=update(f"{TRUNKS}/jobs/specimen={{specimen}}/remarks.parquet"),
+        **tables_in(
+            f"{TRUNKS}/jobs/specimen={{specimen}}",
+            "tasks",
+            "levels",
+            "muscles",
+            "paths",
+            "iterations",
+            "upright",
+            "masses",
+            "scaling",
+            "remarks",
+        ),
     log:
         f"{LOGS}/hold/specimen={{specimen}}.log",
     params:
@@ -42,9 +45,7 @@ rule tune:
     input:
         outdated("tune"),
     output:
-        pressures=update(f"{TRUNKS}/pressures.parquet"),
-        tuning=update(f"{TRUNKS}/tuning.parquet"),
-        agreement=update(f"{TRUNKS}/agreement.parquet"),
+        **tables_in(TRUNKS, "pressures", "tuning", "agreement"),
     log:
         f"{LOGS}/tune.log",
     priority: 1
@@ -70,25 +71,20 @@ rule draw_inputs:
 # Batches of samples of a person; how many are in one is the study's samples_per_target.
 rule samples_block:
     input:
-        outdated("samples_block", block_digest("responses")),
+        outdated_block("samples_block", part="sample_loads", job="respond"),
         design=f"{RESULTS}/design.parquet",
     output:
-        output=update(
-            f"{TRUNKS}/blocks/{{table,responses}}/specimen={{specimen}}/block={{block}}.parquet"
-        ),
+        output=update(f"{TRUNKS}/blocks/{{table,responses}}/{OF_BLOCK}.parquet"),
     log:
-        f"{LOGS}/blocks/{{table}}/specimen={{specimen}}/block={{block}}.log",
+        f"{LOGS}/blocks/{{table}}/{OF_BLOCK}.log",
     params:
-        digest=block_digest("responses"),
+        digest=PROJECT.mark_of_block,
     run:
         run_job(BLOCK, rule, wildcards, input, output, params, log)
 
 
 # One file by its name, such as one that got lost.
-rule sample_loads:
-    input:
-        outdated("sample_loads", "respond"),
-        design=f"{RESULTS}/design.parquet",
+use rule samples_block as sample_loads with:
     output:
         output=update(f"{TRUNKS}/jobs/specimen={{specimen}}/batch={{batch}}/responses.parquet"),
     log:
@@ -96,5 +92,3 @@ rule sample_loads:
     params:
         digest=digest("respond"),
         table="responses",
-    run:
-        run_job(PART, rule, wildcards, input, output, params, log)
