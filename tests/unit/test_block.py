@@ -37,7 +37,7 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Expected:
 def make(told: Expected, number: str) -> Path:
     output = Path(told.files.block_file(TABLE, "a", number))
     inputs = {"frames": "frames.parquet", "stiffness_sets": "sets.parquet"}
-    block.run(told.root, STUDY, TABLE, "a", number, str(output), **inputs)
+    block.run(told.root, STUDY, TABLE, "a", str(output), **inputs)
     return output
 
 
@@ -77,3 +77,14 @@ def test_a_file_that_fails_is_named_and_the_others_are_made(
         make(told, "001")
     assert read_mark(good) == told.of_job("simulate", place_of(good))
     assert not Path(told.files.block_file(TABLE, "a", "001")).exists()
+
+
+def test_one_file_is_made_by_its_name(told: Expected) -> None:
+    lost = Path(told.files.job_files(TABLE, "a", "003")[1])
+    given = {"frames": "frames.parquet", "stiffness_sets": "sets.parquet", "pose": "0001"}
+    block.run(told.root, STUDY, TABLE, "a", str(lost), **given)
+    alone = lost.read_bytes()
+    assert [path.name for path in lost.parent.iterdir()] == [lost.name]
+    lost.unlink()
+    make(told, "003")
+    assert lost.read_bytes() == alone
