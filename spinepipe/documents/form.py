@@ -13,7 +13,12 @@ from typing import Any, Literal
 from spinepipe.documents.yaml_text import packaged_yaml
 from spinepipe.schema import Column
 
-__all__ = ["InputColumn", "Rule", "TableForm", "read_forms"]
+__all__ = ["FILE", "WORDS", "InputColumn", "Rule", "TableForm", "read_forms"]
+
+FILE = "forms.yaml"
+
+WORDS = frozenset({"row", "titled", "meaning", "called", "otherwise", "found", "allowed", "remedy"})
+"""Fields whose texts are for people alone; a list that is ``allowed`` decides."""
 
 
 @dataclass(frozen=True)

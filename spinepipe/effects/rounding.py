@@ -1,8 +1,13 @@
-"""Corners rounded over a small width, so that a law with a corner still has a tangent there."""
+"""Corners rounded over a small width, so that a law with a corner still has a tangent there; and
+where exponential growth goes on straight.
+"""
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
+
+STRAIGHT = 5.0
+"""Exponent from which laws of two exponentials are straight: 148 times the stiffness at rest."""
 
 
 def ramp(x: Array, width: float) -> tuple[Array, Array]:

@@ -9,10 +9,8 @@ from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
 from spinepipe.effects.nonlinear_stiffening import exponential_rise
 from spinepipe.effects.registry import register
+from spinepipe.effects.rounding import STRAIGHT
 from spinepipe.units import COORDINATES, TRANSLATIONS
-
-STRAIGHT = 5.0
-"""Exponent from which the law is straight: 148 times the stiffness at rest."""
 
 # A lumbar joint: 27 N m/rad at rest, 103 in flexion and 149 in extension at 7.5 N m (see
 # `spinepipe/motion/passive.csv`); translations of some 100 N/mm that hardly stiffen.

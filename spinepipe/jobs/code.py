@@ -4,7 +4,7 @@ Imports are followed where they are written. Of a file that names the tables of 
 only the names that are imported count, and of that file the rows of these tables, without words: a
 result hangs on what its own columns are called and hold, not on what they mean to a reader. An
 effect counts where its name is written, or where all of them are asked for; a row of ``facts.csv``
-where its fact is named, without its source.
+where its fact is named, without its source; ``forms.yaml`` without its words.
 
 Snakemake does not see imported modules. What a file imports and means is worked out once and kept
 beside Snakemake's own state, known by size and time of change as Python knows its bytecode.
@@ -23,6 +23,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from spinepipe.documents.form import FILE as FORMS
+from spinepipe.documents.form import WORDS
+from spinepipe.documents.yaml_text import packaged_yaml
 from spinepipe.facts import FILE as FACTS
 from spinepipe.files import appearing, stamp
 from spinepipe.schema.rows import FILE, read_tables
@@ -65,7 +68,7 @@ def code_digest(module: str) -> str:
     lines = [f"{name} {_meaning(name)}" for name in sorted(found)]
     words = {word for name in found if _TABLE not in name for word in _piece(name).uses}
     for path in _data_files(found):
-        lines += _facts_named(path, words) if path.name == FACTS else [_bytes_digest(path)]
+        lines += _facts_named(path, words) if path.name == FACTS else [_data_digest(path)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
@@ -299,6 +302,15 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 
 @cache
-def _bytes_digest(path: Path) -> str:
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+def _data_digest(path: Path) -> str:
+    told = str(_without_words(packaged_yaml(path))).encode() if path.name == FORMS else None
+    digest = hashlib.sha256(path.read_bytes() if told is None else told).hexdigest()
     return f"{path.relative_to(_ROOT).as_posix()} {digest}"
+
+
+def _without_words(told: Any) -> Any:
+    """What forms declare, no text that they tell people; columns may have names of such fields."""
+    if isinstance(told, dict):
+        of_words = {key for key, one in told.items() if key in WORDS and isinstance(one, str)}
+        return {key: _without_words(one) for key, one in told.items() if key not in of_words}
+    return [_without_words(one) for one in told] if isinstance(told, list) else told

@@ -11,6 +11,9 @@ from spinepipe.files import Stamp, stamp
 from spinepipe.studies.read import check, read
 from spinepipe.studies.study import STUDIES, Study
 
+KEPT_SPECIMENS = 128
+"""Whose frames a worker keeps: jobs of different specimens come in any order."""
+
 AnyStudy = TypeVar("AnyStudy", bound=Study)
 
 

@@ -9,9 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
-
-STRAIGHT = 5.0
-"""Exponent from which on the law is straight: beyond that it would be e times as stiff every B."""
+from spinepipe.effects.rounding import STRAIGHT
 
 
 @dataclass(frozen=True, eq=False)

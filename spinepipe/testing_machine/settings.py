@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from spinepipe.cohort.cohort import VertebraName, joint_names
+from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
 from spinepipe.documents.yaml_text import Document
 from spinepipe.problems import Problem, did_you_mean, one_of
 from spinepipe.testing_machine.channels import (
@@ -228,6 +229,12 @@ def _names(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
             remedy = did_you_mean(channel.joint, joints, "correct the joint or vertebrae")
             key = f"motion.{number}.joint"
             yield _at(document, key, f"'{channel.joint}'", one_of(joints), remedy)
+    for number, of in enumerate(mapping.files):
+        if (fault := folder_fault(of.specimen)) is not None:
+            key = f"files.{number}.specimen"
+            yield _at(document, key, fault, ALLOWED_FOLDER, "rename the specimen")
+        if (fault := name_fault(of.test)) is not None:
+            yield _at(document, f"files.{number}.test", fault, ALLOWED, "rename the test")
     forces = any(channel.unit in FORCES for channel in mapping.loads)
     if forces and mapping.load_point_mm is None:
         allowed = "a point, as there are forces and no masses that would tell one"

@@ -77,7 +77,7 @@ def test_what_cannot_be_read_is_not_believed(kept: Path, content: str) -> None:
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: Path) -> Path:
     """A made-up package in the place of this one: `spinepipe.own` imports `spinepipe.used.it`."""
     monkeypatch.setattr(code, "_ROOT", tmp_path)
-    for known in (code._source, code._bytes_digest, code.effect_modules):
+    for known in (code._source, code._data_digest, code.effect_modules):
         monkeypatch.setattr(code, known.__name__, cache(known.__wrapped__))
     for folder in ("used", "other"):
         (tmp_path / "spinepipe" / folder).mkdir(parents=True)
@@ -102,7 +102,7 @@ def test_data_beside_imported_modules_counts(package: Path, name: str, counts: b
 
     def digest() -> str:
         forget()
-        code._bytes_digest.cache_clear()
+        code._data_digest.cache_clear()
         return code.code_digest("spinepipe.own")
 
     without = digest()
@@ -239,3 +239,49 @@ def test_of_facts_the_named_ones_count_without_their_sources(
 
     assert was in FACTS
     assert (digest(FACTS) != digest(FACTS.replace(was, becomes))) is counts
+
+
+FORM = """# Who takes part.
+persons:
+  row: person
+  columns:
+    person: {type: text, key: true, meaning: "who, by name"}
+    called: {low: 0, meaning: how often somebody called}
+    sex: {type: text, allowed: [male, female], otherwise: write it out}
+  rules:
+    - together: [called, sex]
+      found: one of two
+      allowed: both or none
+      remedy: fill it
+"""
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "counts"),
+    [
+        ("# Who", "# Those who", False),
+        ("row: person", "row: one person", False),
+        ("who, by name", "name of a person", False),
+        ("write it out", "correct it", False),
+        ("one of two", "half", False),
+        ("both or none", "two or none", False),
+        ("remedy: fill it", "remedy: delete it", False),
+        ("low: 0", "low: 1", True),
+        ("    called: {", "    heard: {", True),
+        ("male, female", "male", True),
+        ("key: true", "key: false", True),
+        ("[called, sex]", "[person, sex]", True),
+        ("persons:", "people:", True),
+    ],
+)
+def test_of_forms_columns_and_rules_count_without_words(
+    package: Path, was: str, becomes: str, counts: bool
+) -> None:
+    def digest(text: str) -> str:
+        (package / "used/forms.yaml").write_text(text, "utf-8")
+        forget()
+        code._data_digest.cache_clear()
+        return code.code_digest("spinepipe.own")
+
+    assert was in FORM
+    assert (digest(FORM) != digest(FORM.replace(was, becomes))) is counts

@@ -317,6 +317,8 @@ FILE = DOCUMENT["files"][0]
         ({"loads": [LOAD, {**LOAD, "column": "F"}]}, "add `driving:`"),
         ({"motion": [{**MOTION, "column": "Moment"}]}, "column 'Moment' twice"),
         ({"files": [{**FILE, "driving": "Momant"}]}, "did you mean 'Moment'?"),
+        ({"files": [{**FILE, "test": "../flexion"}]}, "files.0.test: found '../flexion' with '/'"),
+        ({"files": [{**FILE, "specimen": "s 1"}]}, "files.0.specimen: found 's 1' with"),
         ({"loaded": "L5"}, "loaded: found 'L5'; allowed: one of L4"),
         ({"cyles": 2}, "an unknown key"),
         ({"form": {**DOCUMENT["form"], "first_line": 2}}, "a line below the names"),

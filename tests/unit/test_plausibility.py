@@ -28,6 +28,9 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cli.program import main
+from spinepipe.frames import rotation_zxy
+from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
+from spinepipe.plausibility.warnings.postures import _stray_deg
 from spinepipe.problems import InputError
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.doubts import doubts, refusals, suspicions
@@ -95,6 +98,13 @@ def test_kinds_of_mistakes_that_came_later(name: str, tmp_path: Path) -> None:
     found = scores(name, FRESH, tmp_path)
     assert len(found) >= 25
     assert sum(one.remedy for one in found) >= 0.6 * len(found)
+
+
+def test_two_joints_are_enough_to_tell_axes_off_their_line() -> None:
+    turned = np.array([rotation_zxy(np.deg2rad(30.0), 0.0, 0.0)] * 2)
+    line = np.array([[0.0, 0.0, 0.0], [0.0, 35.0, 0.0]])
+    pose = NeutralPose("s01", ("L5", "L4", "L3"), line, turned)
+    assert _stray_deg(pose) == pytest.approx(30.0)
 
 
 def test_necks_are_not_doubted(tmp_path: Path) -> None:

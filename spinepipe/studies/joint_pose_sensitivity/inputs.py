@@ -11,15 +11,12 @@ from spinepipe.cohort.specimen import on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose, rotation_zxy
-from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.inputs import KEPT_SPECIMENS, study_of_kind
 from spinepipe.model import SpineModel
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.tables import read_frame
 from spinepipe.units import MM_PER_M, ROTATIONS
-
-_SPECIMENS = 128
-"""Whose poses are kept: jobs of different specimens come in any order."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +37,7 @@ def study_and_cohort(root: str, name: str) -> tuple[JointPoseSensitivity, Cohort
     return study_of_kind(JointPoseSensitivity, root, name)
 
 
-@lru_cache(maxsize=_SPECIMENS)
+@lru_cache(maxsize=KEPT_SPECIMENS)
 def _poses(where: Stamp) -> Poses:
     frame = read_frame(where[0])
     origins = frame[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M

@@ -15,7 +15,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import mark_of, provenance
-from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.jobs.inputs import KEPT_SPECIMENS, study_of_kind
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics.many import Stack
 from spinepipe.status import Status
@@ -31,9 +31,6 @@ TABLE = RANGE_OF_MOTION.without("specimen", "pose")
 
 Ends = list[tuple[Array, Status, str]]
 """End of each stored step: motion (J, 6) in mm and deg, NaN where there is none; how, and why."""
-
-_SPECIMENS = 128
-"""Whose frames are kept: jobs of different specimens come in any order."""
 
 
 def run(
@@ -151,7 +148,7 @@ def drawn_frames(path: str) -> DrawnFrames:
     return _frames(stamp(path))
 
 
-@lru_cache(maxsize=_SPECIMENS)
+@lru_cache(maxsize=KEPT_SPECIMENS)
 def _frames(where: Stamp) -> DrawnFrames:
     table = read_frame(where[0])
     n = table["joint"].nunique()

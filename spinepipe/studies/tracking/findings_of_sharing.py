@@ -9,10 +9,9 @@ from spinepipe.report.page.document import Results
 from spinepipe.report.words import capital, count, fixed, listed, plain
 from spinepipe.studies.tracking.findings_of_errors import FEWEST
 from spinepipe.studies.tracking.settings import CONSTRAINED, Tracking
-from spinepipe.studies.tracking.tables import DONE, TOO_FEW, TOO_SMALL, UNDEFINED
+from spinepipe.studies.tracking.tables import DONE, TOO_FEW, TOO_SMALL, UNDEFINED, WINDOW
 from spinepipe.studies.tracking.words import in_order, told
 
-WINDOW = "20-80"
 PREFERRED = ("optk_generic", "optk_from_both", "optk_calibrated")
 """Whose shares are told: of the first that there is, else of the first approach of the table."""
 

@@ -17,6 +17,9 @@ from spinepipe.studies.tracking.moved import AXIS, Moved
 LEAST_RAD = float(np.deg2rad(2.0))
 LUMBAR_JOINTS = JOINTS[LUMBAR]
 
+INSTANTS = 101
+"""One per percent of the cycle, ends included."""
+
 _TRIFLE = 1e-9
 """Of a cycle: a frame on the border of a window is in it, however its time was rounded."""
 

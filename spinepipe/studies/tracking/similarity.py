@@ -16,12 +16,9 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics.waveforms import MultipleCorrelation, multiple_correlation
 from spinepipe.studies.tracking.moved import kinds_of_trials, motions
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.shares import Shares, shares_of
+from spinepipe.studies.tracking.shares import INSTANTS, Shares, shares_of
 from spinepipe.studies.tracking.tables import SIMILARITY, WINDOWS
 from spinepipe.tables import from_rows, read_frames, write
-
-INSTANTS = 101
-"""One per percent of the cycle, ends included."""
 
 ENOUGH = 0.5
 """Share of the instants of a window at which a person has to be turned enough to count."""

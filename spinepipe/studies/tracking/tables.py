@@ -31,8 +31,11 @@ LIMIT = 3.84
 
 TOLD, NOT_TOLD, NO_STATIC = "told", "not_told", "no_static"
 
+WINDOW = "20-80"
+"""The part of a motion's cycle that figures and sentences tell of."""
+
 WINDOWS = {
-    "20-80": (0.2, 0.8),
+    WINDOW: (0.2, 0.8),
     "20-40": (0.2, 0.4),
     "40-60": (0.4, 0.6),
     "60-80": (0.6, 0.8),

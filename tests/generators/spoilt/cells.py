@@ -27,6 +27,7 @@ ANY_NAME = {
     ("films", "position"),
     ("films", "observer"),
     ("marker_set", "cluster"),
+    ("muscle_parameters", "group"),
     ("trials", "trial"),
 }
 """Names that nothing else must know."""

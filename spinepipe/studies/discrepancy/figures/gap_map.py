@@ -38,14 +38,12 @@ from spinepipe.report.style import (
     saying,
 )
 from spinepipe.report.words import AXIS, case, count, fixed, number, short, unit
-from spinepipe.studies.discrepancy.figures.load_displacement import LABELS, models_shown
+from spinepipe.studies.discrepancy.figures.load_displacement import CLEARLY, LABELS, models_shown
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.tables import Tables
 from spinepipe.units import COORDINATES
 
 MOST_PLACES, FEWEST_PLACES = 6, 3
-CLEARLY = 1.5
-"""Beyond the fewest, places are shown where the base is off by more than so many noise SD."""
 
 PLACE = ["specimen", "test", "joint", "coordinate"]
 

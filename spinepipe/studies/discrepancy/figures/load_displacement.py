@@ -30,7 +30,7 @@ from spinepipe.units import BORDER_PER_SI, COORDINATES
 
 MOST_PANELS, FEWEST_PANELS = 12, 6
 CLEARLY = 1.5
-"""Beyond the fewest, curves are shown where the base is off by more than so many noise SD."""
+"""Beyond the fewest, curves and places are shown where the base is off by so many noise SD."""
 
 BAND_SD = 2.0
 """SDs of the measured mean to each side of a point."""

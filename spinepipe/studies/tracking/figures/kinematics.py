@@ -32,13 +32,10 @@ from spinepipe.studies.tracking.figures.looks import (
 from spinepipe.studies.tracking.moved import AXIS, Moved, kinds_of_trials, motions
 from spinepipe.studies.tracking.off_truth import bones_of
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.shares import LUMBAR_JOINTS
+from spinepipe.studies.tracking.shares import INSTANTS, LUMBAR_JOINTS
 from spinepipe.studies.tracking.truth import Truth, truths
 from spinepipe.studies.tracking.words import short_of
 from spinepipe.units import DEG_PER_RAD
-
-INSTANTS = 101
-"""One per percent of the cycle, ends included."""
 
 MOST_TRIALS = 2
 NO_MOTION = "Nothing can be shown: no approach found a motion of more than one frame."

@@ -26,8 +26,8 @@ from spinepipe.studies.tracking.figures.looks import (
 )
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.shares import LUMBAR_JOINTS
+from spinepipe.studies.tracking.tables import WINDOW
 
-WINDOW = "20-80"
 MOST_TRIALS = 4
 _HEIGHT_MM, _KEY_MM = 62.0, 17.0
 _WIDE, _MARGIN = 0.62, 8.0

@@ -14,6 +14,7 @@ from spinepipe.report.marks import draw_interval
 from spinepipe.report.panels import explain_marks, head, sections
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, note, saying
 from spinepipe.report.words import count, fixed, listed
+from spinepipe.studies.trunk_loads.chosen import MOST_TASKS
 from spinepipe.studies.trunk_loads.figures.looks import task_label
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import factor
@@ -24,7 +25,6 @@ INDICES = {
     "total": (BLUE, 0.16, "with its part in interactions"),
     "first_order": (GREEN, -0.16, "by itself"),
 }
-MOST_TASKS = 6
 SHOWN_TO = 1.3
 """Indices are shares: those estimated above this are written down, not drawn."""
 
