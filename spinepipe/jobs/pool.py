@@ -59,6 +59,10 @@ class JobFailed(Exception):
     """A job raised an exception or its worker process died; the text says which and why."""
 
 
+class WorkerDied(JobFailed):
+    """Its worker process died."""
+
+
 @dataclass(frozen=True)
 class _Failure:
     """An exception on its way back from a worker, as plain text."""
@@ -103,7 +107,8 @@ def submit_and_wait(
     Raises
     ------
     JobFailed
-        With the name of the job, the cause in plain words and the log file.
+        With the name of the job, the cause in plain words and the log file; `WorkerDied` where it
+        did not end by itself.
     """
     worker = _ready()
     try:
@@ -111,7 +116,7 @@ def submit_and_wait(
         wait([worker.connection, worker.process.sentinel])
         failure, grown_kb = worker.connection.recv()
     except (EOFError, OSError):
-        _fail(job, log, _fate(worker))
+        _fail(job, log, _fate(worker), error=WorkerDied)
     if grown_kb < _MOST_GROWN_KB:
         _idle.put(worker)
     else:
@@ -255,11 +260,13 @@ def _explain(failure: _Failure, folder: str) -> str:
     return f"{remedy}, then run the same command again (finished jobs are kept)"
 
 
-def _fail(job: str, log: str, message: str, trace: str = "") -> None:
+def _fail(
+    job: str, log: str, message: str, trace: str = "", error: type[JobFailed] = JobFailed
+) -> None:
     text = f"job {job}: {message}"
     try:
         Path(log).parent.mkdir(parents=True, exist_ok=True)
         Path(log).write_text(f"{text}\n{trace}", encoding="utf-8")
     except OSError:
-        raise JobFailed(text) from None
-    raise JobFailed(f"{text}\n  log: {log}") from None
+        raise error(text) from None
+    raise error(f"{text}\n  log: {log}") from None

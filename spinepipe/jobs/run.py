@@ -11,11 +11,14 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from spinepipe.jobs.pool import JobFailed, submit_and_wait
+from spinepipe.jobs.pool import JobFailed, WorkerDied, submit_and_wait
 from spinepipe.jobs.project import Project
 from spinepipe.marks import mark_in
 from spinepipe.studies.registry import kind_of
 from spinepipe.studies.registry import place_of as function_of
+
+JOIN = "spinepipe.jobs.block:run_joined"
+"""The job that joins files which other jobs have made."""
 
 _OF_RULES = ("digest", "job", "caption")
 """Params that tell Snakemake something, and no job."""
@@ -61,13 +64,46 @@ def run_job(
                 _flat(files for _, files in input.items()) if kind_of(kind).job(job).reads else []
             )
         arguments = {"root": project.root, **others, **wildcards, **named}
-        submit_and_wait(name, function, str(log), read, **arguments)
+        try:
+            submit_and_wait(name, function, str(log), read, **arguments)
+        except WorkerDied as death:
+            if "block" not in wildcards or function == JOIN:
+                raise JobFailed(str(death)) from None
+            _one_by_one(project, name, function, wildcards, str(log), arguments)
+            submit_and_wait(name, function, str(log), read, **arguments)
         if not _carry(outputs, params.digest):
             raise JobFailed(
                 f"job {name}: settings, data or code have changed since this run was planned. Run "
                 "the same command again"
             )
     _date(outputs, inputs)
+
+
+def _one_by_one(
+    project: Project,
+    name: str,
+    function: str,
+    wildcards: Mapping[str, str],
+    log: str,
+    arguments: Mapping[str, Any],
+) -> None:
+    """Make the files of a block each in a worker that only it can kill: the others are kept.
+
+    Raises
+    ------
+    JobFailed
+        With what each of those said that failed.
+    """
+    expected = project.expected(wildcards["study"])
+    table, failed = wildcards["table"], []
+    for path in expected.files.job_files(table, wildcards["specimen"], wildcards["block"]):
+        if mark_in(path) != expected.of_part(table, path):
+            try:
+                submit_and_wait(f"{name} {path}", function, log, **{**arguments, "output": path})
+            except JobFailed as error:
+                failed.append(str(error))
+    if failed:
+        raise JobFailed("\n".join(failed))
 
 
 def _carry(paths: Sequence[str], mark: str) -> bool:

@@ -5,11 +5,13 @@ along, a killed run that loses or mixes results, a run that starts though it can
 """
 
 import os
+import re
 import shutil
+from pathlib import Path
 
 import psutil
 import pytest
-from small_project import Project
+from small_project import Project, written
 from toy import SPECIMENS
 
 from spinepipe.files import HOST
@@ -192,6 +194,44 @@ def test_of_many_damaged_files_five_are_named(toy_copy: Project) -> None:
     assert said.count("is damaged, cut off, empty") == 5
     assert f"so do {len(SPECIMENS) - 5} more files" in said
     assert toy_copy.contents() == content
+
+
+DYING = """
+
+import os as _os
+
+_run = run
+
+
+def run(*given, parts, **named):
+    here = any(one["pose"] == "0001" and one["stiffness"] == "01" for one in parts.values())
+    if here and _os.path.exists("dying"):
+        _os.kill(_os.getpid(), 9)
+    _run(*given, parts=parts, **named)
+"""
+"""Added to a job whose files are made block by block: at one of them its process dies."""
+
+
+@pytest.mark.full
+def test_a_file_that_kills_its_process_is_named_and_takes_no_other_along(
+    eight: Project, tmp_path: Path
+) -> None:
+    project = eight.copy(tmp_path / "project")
+    path = project.job("range_of_motion", "simulate")
+    path.write_text(path.read_text() + DYING)
+    before = project.files()
+    project.path("dying").touch()
+    target = "results/range_of_motion/range_of_motion.parquet"
+    ended = project.snakemake("-j2", "--keep-going", target)
+    assert ended.returncode != 0
+    for specimen in "ab":
+        dead = f"results/range_of_motion/jobs/specimen={specimen}/pose=0001/stiffness=01.parquet"
+        assert re.search(rf"job moves_block .*{dead}: .*SIGKILL", ended.stdout), ended.stdout
+    jobs = {name for name in before if name.startswith("range_of_motion/jobs/")}
+    made = written(before, project.files()) & jobs
+    assert jobs - made == {name for name in jobs if name.endswith("pose=0001/stiffness=01.parquet")}
+    project.path("dying").unlink()
+    assert jobs & project.rerun(target) == jobs - made
 
 
 CHANGED = """

@@ -17,7 +17,7 @@ OF_BLOCK = "specimen={specimen}/block={block}"
 
 # Jobs that serve every kind of study.
 BLOCK = "spinepipe.jobs.block:run"
-JOIN = "spinepipe.jobs.block:run_joined"
+JOIN = run.JOIN
 DRAW = "spinepipe.jobs.draw:run"
 REPORT = "spinepipe.jobs.report:run"
 
