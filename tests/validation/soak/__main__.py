@@ -1,4 +1,4 @@
-"""`python -m tests.validation.soak [PART ...]`: kills, targets, memory; all of them unless told.
+"""`python -m tests.validation.soak [PART ...]`: kills, sequence, targets, memory; all unless told.
 
 `python -m tests.validation.soak kills KIND ...` kills studies of these kinds alone.
 
@@ -17,7 +17,7 @@ import pandas as pd
 from small_studies import SMALL
 
 from tests.validation.kept import Kept
-from tests.validation.soak import kills, memory, targets
+from tests.validation.soak import kills, memory, sequence, targets
 from tests.validation.written import write, written
 
 HANGS_ON = (
@@ -52,6 +52,7 @@ def main() -> None:
         return
     parts: dict[str, Callable[[], None]] = {
         "kills": lambda: _kills(()),
+        "sequence": _sequence,
         "targets": _targets,
         "memory": _memory,
     }
@@ -88,6 +89,21 @@ def _kills(kinds: Sequence[str]) -> None:
     harmed = [f"{kind}: {row['verdict']}" for kind, row in rows.items() if not kills.is_sound(row)]
     if harmed:
         sys.exit("soak kills: " + "; ".join(harmed))
+
+
+def _sequence() -> None:
+    found = kept("sequence", sequence.rows)
+    _write(
+        "sequence",
+        "One small study of range of motion, nothing reset in between: settings, data or code "
+        "changed and changed back, runs killed in the middle of it, files damaged, lost and dated "
+        "in a drawn order, Snakemake's record removed. After each step but a kill the run goes to "
+        "its end, and each table is compared byte by byte with that of a fresh run of the same "
+        "settings.",
+        found,
+    )
+    if any(int(row["tables_that_differ"]) for row in found):
+        sys.exit("soak sequence: tables differ")
 
 
 def _targets() -> None:
