@@ -164,9 +164,10 @@ def _design_bytes(folder: str) -> float:
 def _join_bytes(folder: str, rows: int) -> float:
     blocks = Path(folder, f"results/{STUDY}/blocks/responses").rglob("*.parquet")
     paths = [str(path) for path in sorted(blocks)]
-    marks, output = [read_mark(path) for path in paths], f"{folder}/joined.parquet"
-    call = f"job.run('global_sensitivity', 'responses', {paths!r}, {marks!r}, {output!r})"
-    return per_row("jobs.collect", call, rows)
+    marks, output = {path: read_mark(path) for path in paths}, f"{folder}/joined.parquet"
+    shape = "kind_of('global_sensitivity').table('responses')"
+    call = f"job.join_files({shape}, {marks!r}, {output!r})"
+    return per_row("jobs.collect", f"from spinepipe.studies.registry import kind_of; {call}", rows)
 
 
 def target_runs() -> Iterator[Targets]:

@@ -17,6 +17,8 @@ from spinepipe.marks import mark_in
 from spinepipe.studies.registry import kind_of
 from spinepipe.studies.registry import place_of as function_of
 
+_MOST_NAMED = 5
+
 
 class PartsFailed(Exception):
     """Some job files of a block could not be made; the text says which and why."""
@@ -82,8 +84,10 @@ def _one_by_one(
         except Exception as error:  # whatever it is: the others are made all the same
             failed[path] = f"{type(error).__name__}: {error}"
     if failed:
-        first = next(iter(failed))
+        shown = [f"  {path}: {why}" for path, why in list(failed.items())[:_MOST_NAMED]]
+        more = len(failed) - len(shown)
+        lines = [*shown, *([f"  and {more} more"] if more else [])]
         raise PartsFailed(
-            f"{len(failed)} of {len(parts)} files were not made, the others are kept. The first: "
-            f"{first}: {failed[first]}"
+            f"{len(failed)} of {len(parts)} files were not made, the others are kept:\n"
+            + "\n".join(lines)
         )

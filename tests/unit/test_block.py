@@ -73,7 +73,7 @@ def test_a_file_that_fails_is_named_and_the_others_are_made(
         run(*given, parts=parts, **named)
 
     monkeypatch.setattr(simulate, "run", fails)
-    with pytest.raises(PartsFailed, match=f"1 of 2 files .*{bad}: ValueError: no such spine"):
+    with pytest.raises(PartsFailed, match=f"1 of 2 files .*\n  {bad}: ValueError: no such spine"):
         make(told, "001")
     assert read_mark(good) == told.of_job("simulate", place_of(good))
     assert not Path(told.files.block_file(TABLE, "a", "001")).exists()

@@ -1,8 +1,9 @@
 """A study of 24,000 jobs: one in a hundred dies, and one run in a hundred tips over.
 
-Jobs that die do so in four ways, drawn beforehand: by an exception, by SIGKILL, by ending their
-process, by a fault of memory. They are told so in the copy's own Snakefile; nothing of the product
-knows of it. A run that tips over does so by itself: its load is drawn too large.
+Those that die do so in four ways, drawn beforehand: by an exception, by SIGKILL, by ending their
+process, by a fault of memory. They are told so in the copy's own job, as long as a list lies there;
+nothing of the product knows of it. A run that tips over does so by itself: its load is drawn too
+large.
 """
 
 import re
@@ -50,17 +51,23 @@ WAYS = {
 
 ACCIDENTS = """
 
-whole_execute = execute
-ACCIDENTS = dict(line.split() for line in Path("accidents.txt").read_text().splitlines())
+import importlib as _importlib
+from pathlib import Path as _Path
+
+_run = run
 
 
-def execute(rule, function, wildcards, log, arguments):
-    if rule == "respond":
-        how = ACCIDENTS.get(f"{wildcards.specimen}/{wildcards.batch}")
-        function = f"accidents:{how}" if how else function
-    whole_execute(rule, function, wildcards, log, arguments)
+def run(*given, specimen, parts, **named):
+    if _Path("accidents.txt").exists():
+        lines = _Path("accidents.txt").read_text().splitlines()
+        happens = dict(line.split() for line in lines)
+        for place in parts.values():
+            how = happens.get(f"{specimen}/{place['batch']}")
+            if how:
+                getattr(_importlib.import_module("accidents"), how)()
+    _run(*given, specimen=specimen, parts=parts, **named)
 """
-"""Added to the Snakefile of the copy."""
+"""Added to the job of the copy."""
 
 UNVERIFIED = """
 
@@ -70,7 +77,6 @@ spinepipe.marks._digest = lambda file, marks: marks.content
 """
 """Added to it to find out what verifying costs: marks are read, and nothing else of a file."""
 
-LOG = f"results/{NAME}/logs/respond/specimen={{}}/batch={{}}.log"
 FILE = f"{NAME}/jobs/responses/specimen={{}}/batch={{}}.parquet"
 
 Row = dict[str, Any]
@@ -86,7 +92,10 @@ class Big:
 
     def accidents(self, happen: bool) -> None:
         """Let them happen, or no more."""
-        self.project.path("Snakefile").write_text(self.snakefile + ACCIDENTS * happen)
+        listed = self.project.path("accidents.txt")
+        listed.unlink(missing_ok=True)
+        if happen:
+            listed.write_text("".join(f"{place} {how}\n" for place, how in self.dying.items()))
 
     def files(self) -> set[str]:
         """Those of jobs that die."""
@@ -100,8 +109,9 @@ def big(folder: Path, samples: int = SAMPLES, seed: int = 19) -> Big:
     places = [f"{name}/{number:05d}" for name in "ab" for number in range(samples)]
     chosen = rng.choice(places, round(FAILING * len(places)), replace=False)
     dying = {str(place): list(WAYS)[k % len(WAYS)] for k, place in enumerate(chosen)}
-    project.path("accidents.txt").write_text("".join(f"{k} {v}\n" for k, v in dying.items()))
-    happens = [f"def {how}(**_):\n    {what}\n" for how, (what, _) in WAYS.items()]
+    respond = project.job("global_sensitivity", "respond")
+    respond.write_text(respond.read_text() + ACCIDENTS)
+    happens = [f"def {how}():\n    {what}\n" for how, (what, _) in WAYS.items()]
     project.path("accidents.py").write_text("\n".join(happens))
     return Big(project, dying, project.path("Snakefile").read_text())
 
@@ -145,12 +155,11 @@ def rows(folder: Path, samples: int = SAMPLES) -> Iterator[Row]:
 
 
 def _is_named(run: Cost, project: Project, place: str, how: str) -> bool:
+    """Whether a file that died is told with its cause."""
     specimen, batch = place.split("/")
-    line = f"job respond study={NAME} specimen={specimen} batch={batch}: "
-    log = project.path(LOG.format(specimen, batch))
-    words = WAYS[how][1]
-    told = re.findall(re.escape(line) + ".*", run.said)
-    return bool(told) and words in told[0] and log.exists() and words in log.read_text()
+    path = f"results/{FILE.format(specimen, batch)}"
+    told = re.findall(re.escape(path) + ": .*", run.said)
+    return any(WAYS[how][1] in line for line in told)
 
 
 def _row(what: str, jobs: int, made: Sequence[str] | set[str], named: int, run: Cost) -> Row:
