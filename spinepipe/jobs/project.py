@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
-from spinepipe.files import appearing, sweep
+from spinepipe.files import appearing, refusal, sweep
 from spinepipe.jobs.digest import versions
 from spinepipe.jobs.expected import Expected
 from spinepipe.jobs.run_lock import AtWork, lock
@@ -204,15 +204,11 @@ class Project:
             stop(error)
         except AtWork as run:
             stop(f"A run is at work in this folder: {run}. Wait until it ends, or end it.")
-        for folder in ["results", *(f"results/{name}" for name in self.at_work)]:
-            try:
-                with appearing(Path(folder, "probe")) as probe:
-                    probe.write_text("1")
-                Path(folder, "probe").unlink()
-            except OSError as error:
+        for folder in (Path("results"), *(Path("results", name) for name in self.at_work)):
+            if why := refusal(folder):
                 stop(
-                    f"results cannot be written to {Path(folder).resolve()}: {error.strerror}. "
-                    "Make room or change permissions, then run again (finished jobs are kept)."
+                    f"results cannot be written to {folder.resolve()}: {why}. Make room or change "
+                    "permissions, then run again (finished jobs are kept)."
                 )
         cohorts = {one.cohort.digest: one.cohort for one in self._expected.values()}
         for doubt in (doubt for cohort in cohorts.values() for doubt in doubts(cohort)):
