@@ -61,6 +61,7 @@ class Project:
         self.names = studies.names_by_kind(Path(root))
         self.kinds = [name for name in kind_names() if name in self.names]
         self._expected: dict[str, Expected] = {}
+        self._asked: set[str] = set()
         self._marks: dict[str, str | None] = {}
         self._lost: list[str] = []
         self._lock: TextIO | None = None
@@ -109,8 +110,8 @@ class Project:
 
     @property
     def at_work(self) -> list[str]:
-        """Names of the studies that were asked for files so far."""
-        return sorted(self._expected)
+        """Names of the studies of which rules have asked for marks: files of theirs are wanted."""
+        return sorted(self._asked)
 
     def everything(self, names: Iterable[str], full: bool = False) -> list[str]:
         """Results of these studies, with those of `full` or without, and lost job files."""
@@ -120,25 +121,29 @@ class Project:
             for file in self.files(name).results(full) + self.files(name).lost(full)
         ]
 
+    def _of(self, study: str) -> Expected:
+        self._asked.add(study)
+        return self.expected(study)
+
     def mark(self, job: str, place: Mapping[str, str]) -> str:
         """The mark of the files of a job."""
-        return self.expected(place["study"]).of_job(job, {**place})
+        return self._of(place["study"]).of_job(job, {**place})
 
     def mark_of_block(self, place: Any) -> str:
         """The mark of a block of a table."""
-        return self.expected(place.study).of_block(place.table, place.specimen, place.block)
+        return self._of(place.study).of_block(place.table, place.specimen, place.block)
 
     def mark_of_table(self, place: Any) -> str:
         """The mark of a table that is joined from others."""
-        return self.expected(place.study).of_table(place.table)
+        return self._of(place.study).of_table(place.table)
 
     def mark_of_figure(self, place: Any) -> str:
         """The mark of a figure."""
-        return self.expected(place.study).of_figure(place.figure)
+        return self._of(place.study).of_figure(place.figure)
 
     def mark_of_page(self, place: Any) -> str:
         """The mark of a page."""
-        return self.expected(place.study).of_report(place.page)
+        return self._of(place.study).of_report(place.page)
 
     def base_model(self, place: Any) -> list[str]:
         """The model file that a study builds on, or nothing; another study may make it."""
@@ -210,7 +215,8 @@ class Project:
                     f"results cannot be written to {folder.resolve()}: {why}. Make room or change "
                     "permissions, then run again (finished jobs are kept)."
                 )
-        cohorts = {one.cohort.digest: one.cohort for one in self._expected.values()}
+        asked = [self.expected(name).cohort for name in self.at_work]
+        cohorts = {cohort.digest: cohort for cohort in asked}
         for doubt in (doubt for cohort in cohorts.values() for doubt in doubts(cohort)):
             warn(doubt)
         refused = [str(one) for cohort in cohorts.values() for one in refusals(cohort)]

@@ -23,11 +23,6 @@ SEED = ("seed: 1", "seed: 2")
 LOADING = ("loading: equilibrium", "loading: settle")
 BOUND = ("bound_factor: 100", "bound_factor: 2")
 RANKING = ("best_models: 2", "best_models: 1")
-SAME = ("seed: 1", "seed: 1")
-
-
-def simulation(pose: int, stiffness: str) -> str:
-    return f"{KIND}/jobs/specimen=s01/pose={pose:04d}/stiffness={stiffness}.parquet"
 
 
 @pytest.fixture
@@ -50,10 +45,10 @@ def killed_with(project: Project, change: tuple[str, str], rule: str, count: int
 @pytest.mark.parametrize(
     "kills",
     [
-        [(SEED, "simulate", 2)],
-        [(SEED, "sample_landmarks", 1), (BOUND, "calibrate", 3), (SAME, "calibrate", 1)],
-        [(BOUND, "rank_models", 1), (RANKING, f"{KIND}_block", 2)],
-        [(LOADING, "simulate", 5), (LOADING, f"{KIND}_table", 1), (SAME, "simulate", 1)],
+        [(SEED, "simulations_block", 1)],
+        [(SEED, "sample_landmarks", 1), (BOUND, "calibrations_block", 2)],
+        [(BOUND, "calibrations_block", 1), (RANKING, "simulations_block", 1)],
+        [(LOADING, "simulations_block", 2), (LOADING, f"{KIND}_table", 1)],
     ],
     ids=lambda kills: "-".join(rule for _, rule, _ in kills),
 )
@@ -107,15 +102,14 @@ def test_what_has_another_mark_or_none_or_was_cut_off_is_computed_again(
     done: Project, recorded: bool
 ) -> None:
     """Whether Snakemake has records of them or not: the files tell."""
-    another, none = simulation(1, "best02"), simulation(2, "calibrated")
-    cut_off = simulation(3, "best01")
+    blocks = f"{KIND}/blocks/simulations/specimen=s01"
+    another, none = f"{blocks}/block=000.parquet", f"{blocks}/block=001.parquet"
+    cut_off = f"{KIND}/success.parquet"
     spoil(done.path(f"results/{another}"), metadata=True)
     spoil(done.path(f"results/{none}"), metadata=False)
     file = done.path(f"results/{cut_off}")
     file.write_bytes(file.read_bytes()[:-100])
     if not recorded:
         without_record(done)
-    blocks = f"{KIND}/blocks/simulations/specimen=s01"
     tables = {name.removeprefix("results/") for name in TABLES}
-    joined = {f"{blocks}/block=000.parquet", f"{blocks}/block=001.parquet", *tables}
-    assert done.planned(*TABLES) == {another, none, cut_off} | joined
+    assert done.planned(*TABLES) == {another, none, cut_off} | tables
