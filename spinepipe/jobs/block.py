@@ -24,12 +24,21 @@ class PartsFailed(Exception):
     """Some job files of a block could not be made; the text says which and why."""
 
 
-def run(root: str, study: str, table: str, specimen: str, output: str, **inputs: Any) -> None:
+def run(
+    root: str,
+    study: str,
+    table: str,
+    specimen: str,
+    output: str,
+    anew: bool = False,
+    **inputs: Any,
+) -> None:
     """Make what is missing of the job files of a block and join them, or make one job file.
 
     Parameters
     ----------
     output : the block or the job file; the names and values in its path are no inputs.
+    anew : whether job files that are right are made all the same.
     """
     expected = Expected(root, *study_of(root, study))
     place = place_of(output)
@@ -40,7 +49,7 @@ def run(root: str, study: str, table: str, specimen: str, output: str, **inputs:
         return
     parts = expected.files.job_files(table, specimen, place["block"])
     marks = {path: expected.of_part(table, path) for path in parts}
-    missing = [path for path, mark in marks.items() if mark_in(path) != mark]
+    missing = [path for path, mark in marks.items() if anew or mark_in(path) != mark]
     _make(expected, table, missing, given)
     join_files(kind_of(expected.study.kind).table(table), marks, output)
 

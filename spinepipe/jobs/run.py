@@ -17,8 +17,8 @@ from spinepipe.marks import mark_in
 from spinepipe.studies.registry import kind_of
 from spinepipe.studies.registry import place_of as function_of
 
-JOIN = "spinepipe.jobs.block:run_joined"
-"""The job that joins files which other jobs have made."""
+BLOCK = "spinepipe.jobs.block:run"
+"""The job that makes the files of a block."""
 
 _OF_RULES = ("digest", "job", "caption")
 """Params that tell Snakemake something, and no job."""
@@ -52,22 +52,23 @@ def run_job(
     """
     inputs, outputs = [str(path) for path in input], [str(path) for path in output]
     name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
-    forced = not project.plans or any(option in sys.argv for option in _FORCE)
-    if forced or not _carry(outputs, params.digest):
+    forced = project.plans and any(option in sys.argv for option in _FORCE)
+    if forced or not project.plans or not _carry(outputs, params.digest):
         named = {key: _plain(files) for key, files in [*input.items(), *output.items()]}
         others = {key: value for key, value in params.items() if key not in _OF_RULES}
         kind = project.expected(wildcards["study"]).study.kind
+        arguments = {"root": project.root, **others, **wildcards, **named}
         function, read = job, []
         if ":" not in job:
             function = function_of(kind, job)
-            read = (
-                _flat(files for _, files in input.items()) if kind_of(kind).job(job).reads else []
-            )
-        arguments = {"root": project.root, **others, **wildcards, **named}
+            if kind_of(kind).job(job).reads:
+                read = _flat(files for _, files in input.items())
+        elif job == BLOCK:
+            arguments["anew"] = forced
         try:
             submit_and_wait(name, function, str(log), read, **arguments)
         except WorkerDied as death:
-            if "block" not in wildcards or function == JOIN:
+            if job != BLOCK or "block" not in wildcards:
                 raise JobFailed(str(death)) from None
             _one_by_one(project, name, function, wildcards, str(log), arguments)
             submit_and_wait(name, function, str(log), read, **arguments)

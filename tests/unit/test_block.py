@@ -34,10 +34,10 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Expected:
     return Expected(str(root), *check(root, STUDY))
 
 
-def make(told: Expected, number: str) -> Path:
+def make(told: Expected, number: str, anew: bool = False) -> Path:
     output = Path(told.files.block_file(TABLE, "a", number))
     inputs = {"frames": "frames.parquet", "stiffness_sets": "sets.parquet"}
-    block.run(told.root, STUDY, TABLE, "a", str(output), **inputs)
+    block.run(told.root, STUDY, TABLE, "a", str(output), anew, **inputs)
     return output
 
 
@@ -51,6 +51,8 @@ def test_right_files_are_kept_wrong_ones_made_again(told: Expected) -> None:
     assert make(told, "000").read_bytes() == whole
     assert (parts[0].stat().st_ino, parts[1].read_bytes()) == (first, sound)
     assert read_mark(told.files.block_file(TABLE, "a", "000")) == told.of_block(TABLE, "a", "000")
+    assert make(told, "000", anew=True).read_bytes() == whole
+    assert parts[0].stat().st_ino != first
 
 
 def test_blocks_hold_each_file_once(told: Expected) -> None:

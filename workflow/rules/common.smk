@@ -16,8 +16,8 @@ LOGS = "results/{study}/logs"
 OF_BLOCK = "specimen={specimen}/block={block}"
 
 # Jobs that serve every kind of study.
-BLOCK = "spinepipe.jobs.block:run"
-JOIN = run.JOIN
+BLOCK = run.BLOCK
+JOIN = "spinepipe.jobs.block:run_joined"
 DRAW = "spinepipe.jobs.draw:run"
 REPORT = "spinepipe.jobs.report:run"
 
