@@ -5,6 +5,7 @@ whatever its age and whatever Snakemake's record says. `Project.outdated` tells 
 public door: an input that is newer than the file, where the file carries another mark.
 """
 
+import json
 import os
 import sys
 import threading
@@ -27,6 +28,9 @@ from spinepipe.studies.study_files import StudyFiles
 
 OUTDATED = ".snakemake/changed_settings_data_or_code"
 """Newer than the files that count as outdated; nothing reads what it says."""
+
+RECORD = ".snakemake/metadata"
+"""What Snakemake knows of files, a JSON file each."""
 
 RUNNING = ".snakemake/spinepipe-running"
 """The lock of the run that is at work."""
@@ -71,6 +75,9 @@ class Project:
                 f"{kept.resolve()} cannot be written, where Snakemake keeps its record. Change its "
                 "permissions or owner, or copy the project to a folder of your own."
             )
+
+        if self.plans:
+            _drop_damaged(Path(RECORD))
 
     @cached_property
     def selection(self) -> studies.Selection:
@@ -216,6 +223,7 @@ class Project:
                     "permissions, then run again (finished jobs are kept)."
                 )
         asked = [self.expected(name).cohort for name in self.at_work]
+        threading.Thread(target=_stop_timers).start()
         cohorts = {cohort.digest: cohort for cohort in asked}
         for doubt in (doubt for cohort in cohorts.values() for doubt in doubts(cohort)):
             warn(doubt)
@@ -232,10 +240,6 @@ class Project:
 
         A folder of logs that is a link is somebody's own.
         """
-        # Snakemake's limit of jobs per time starts one at each look; none may hold up the end.
-        for thread in threading.enumerate():
-            if isinstance(thread, threading.Timer):
-                thread.cancel()
         for logs in (f"results/{name}/logs" for name in self.at_work):
             for folder, _, files in (
                 os.walk(logs, topdown=False) if not os.path.islink(logs) else ()
@@ -245,3 +249,27 @@ class Project:
                         os.unlink(path)
                 if not os.listdir(folder):
                     os.rmdir(folder)
+
+
+def _drop_damaged(record: Path) -> None:
+    """Remove entries that cannot be read, which would end the run with a Python stack.
+
+    Snakemake writes them in place: one that was being written when a run was killed is cut off.
+    """
+    for path in record.rglob("*") if record.is_dir() else ():
+        if path.is_file():
+            try:
+                json.loads(path.read_bytes())
+            except ValueError:
+                path.unlink()
+
+
+def _stop_timers() -> None:
+    """Wait for the main thread, then stop what would hold up the end of the process.
+
+    Snakemake's limit of jobs per time starts a timer at each look at what is ready.
+    """
+    threading.main_thread().join()
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):
+            thread.cancel()
