@@ -25,7 +25,8 @@ rule discrepancy_search:
     log:
         f"{LOGS}/discrepancy_search.log",
     priority: 1
+    threads: 4
     params:
         digest=digest("search"),
     run:
-        run_job(rule, "search", wildcards, input, output, log)
+        run_job(rule, "search", wildcards, input, output, log, threads=threads)
