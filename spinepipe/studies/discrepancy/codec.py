@@ -83,9 +83,9 @@ class _Writer:
             written = ["frozenset", *map(self.of, sorted(value, key=repr))]
         elif kind is dict:
             written = ["dict", *([self.of(key), self.of(one)] for key, one in value.items())]
-        elif is_dataclass(kind):
-            values = (getattr(value, field.name) for field in fields(kind))
-            written = ["data", _name(kind), *map(self.of, values)]
+        elif is_dataclass(value):
+            name = _name(kind)
+            written = ["data", name, *(self.of(getattr(value, f.name)) for f in fields(kind))]
         else:
             raise TypeError(f"a {kind.__module__}.{kind.__qualname__} cannot be kept as data")
         self._known[id(value)] = len(self._known)

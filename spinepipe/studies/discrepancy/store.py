@@ -217,9 +217,13 @@ def _in_workers(calls: Mapping[str, Callable[[], object]], threads: int) -> None
 
 
 def _begin() -> None:
-    """Let a worker end with the process that started it, even when that one is killed outright."""
+    """Begin the life of a worker, which ends with its parent, even when that one is killed."""
     gc.freeze()  # what it was forked with stays: no need to look through it at each collection
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
-    assert parent is not None
-    watch = threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True)
-    watch.start()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -4,7 +4,7 @@ Each subject gets every run of the menu with its expected gain, and the best of 
 effect that imperfections hide gets what these would have to be known to instead.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 
@@ -196,12 +196,15 @@ def _checked(
     """Mean gain of each run by refits of both models; of those that both can be asked for."""
     words = [None, *every]  # without any run, and with each
     left = run.map(left_apart, [(one, place, which) for one in pair for which in words])
-    (now, *one), (also, *other) = left[: len(words)], left[len(words) :]
-    return {
-        name: 0.25 * (max(0.0, a - now) + max(0.0, b - also))
-        for name, a, b in zip(every, one, other, strict=True)
-        if None not in (now, also, a, b)
-    }
+    one, other = (dict(zip(words, left[n:], strict=False)) for n in (0, len(words)))
+    more = ((name, _more(one, name), _more(other, name)) for name in every)
+    return {name: 0.5 * (a + b) for name, a, b in more if a is not None and b is not None}
+
+
+def _more(left: Mapping[str | None, float | None], words: str) -> float | None:
+    """The gain of a run: half of what it adds to the chi2 that stays."""
+    now, then = left[None], left[words]
+    return None if now is None or then is None else 0.5 * max(0.0, then - now)
 
 
 def _how(one: Offer, checked: dict[str, float]) -> str:

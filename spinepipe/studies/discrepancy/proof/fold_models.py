@@ -97,9 +97,10 @@ class FoldModels:
             When a fit by the full simulator has no start.
         """
         base, final = placed
-        for one in placed:
-            if isinstance(one, str):
-                raise NoFold(one)
+        if isinstance(base, str):
+            raise NoFold(base)
+        if isinstance(final, str):
+            raise NoFold(final)
         by_surrogate = None if self.surrogate is None else self.surrogate.placed(part)
         scored = self._scored(fold, part)
         return Predictions(scored, base, final, by_surrogate, self._left_open(part, scored))
