@@ -93,7 +93,7 @@ def fitted(grounds: Grounds, trials: Trials, form: Form) -> Refit:
             start.append(p.off * (p.default / p.off) ** 0.3)
         else:
             start.append(p.off + 0.3 * (p.default - p.off))
-    return refit(grounds, Supposed(form, np.array(start)), trials, at_once)
+    return refit(grounds, Supposed(form, np.array(start)), trials)
 
 
 def scaled_case(test: str, factor: float) -> LoadCase:

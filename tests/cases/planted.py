@@ -8,7 +8,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from spinepipe.studies.discrepancy.kept import SUFFIX
+from spinepipe.studies.discrepancy.store import SUFFIX
 
 
 class Trap:

@@ -56,7 +56,7 @@ def parts_of(content: bytes) -> Iterator[bytes]:
         yield from _of_picture(content)
     elif content.startswith(b"\x1f\x8b"):
         yield from parts_of(gzip.decompress(content))
-    elif b"PK\3\4" in content[:200]:  # behind the mark of a piece too
+    elif content.startswith(b"PK\3\4"):
         with zipfile.ZipFile(BytesIO(content)) as file:
             for name in file.namelist():
                 yield name.encode()

@@ -16,7 +16,7 @@ from sweeps import sweep
 from spinepipe.jobs.pool import _explain, _Failure
 from spinepipe.marks import write_marked
 from spinepipe.schema import Column, Table
-from spinepipe.studies.discrepancy.kept import Kept
+from spinepipe.studies.discrepancy.store import _compute
 from spinepipe.tables import to_arrow, write
 
 TABLE = Table("small", "A table.", ("n",), (Column("n", "integer", "n"),))
@@ -45,7 +45,7 @@ def text(path: Path, size: int) -> None:
 
 
 def piece(path: Path, size: int) -> None:
-    Kept(path.parent).write(path.stem, b"x" * size)
+    _compute(path, str.ljust, ("x", size))
 
 
 WRITERS: dict[str, Callable[[Path, int], None]] = {

@@ -17,7 +17,7 @@ IMPORTED = {
 }
 """Modules that rules, plug-in and library may import: documented, an interface, or our own."""
 
-WORKFLOW = {"basedir"}
+WORKFLOW = {"basedir", "cores"}
 """What is documented of the object `workflow`."""
 
 RULES = {"output", "input", "params", "log"}

@@ -34,7 +34,7 @@ def in_zip(word: str) -> bytes:
     content = BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("a", word)
-    return b"mark\n" + content.getvalue()
+    return content.getvalue()
 
 
 def in_table(word: str, metadata: bool) -> bytes:
@@ -61,7 +61,7 @@ HIDING = {
     "b.parquet": lambda word: in_table(word, metadata=True),
     "a.png": in_picture,
     "a.gz": lambda word: gzip.compress(word.encode()),
-    "a.piece": in_zip,
+    "a.zip": in_zip,
     "a.html": lambda word: b'<img src="data:;base64,' + base64.b64encode(in_picture(word)) + b'">',
 }
 

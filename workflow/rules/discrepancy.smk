@@ -29,7 +29,10 @@ rule discrepancy_search:
     log:
         f"{LOGS}/discrepancy_search.log",
     priority: 1
+    # Half of the cores: most searches have long pieces that wait for one another.
+    threads: max(1, min(4, (workflow.cores or 1) // 2))
     params:
         digest=digest("search"),
+        threads=lambda wildcards, threads: threads,
     run:
         run_job("search", rule, wildcards, input, output, params, log)

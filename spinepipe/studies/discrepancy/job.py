@@ -116,10 +116,16 @@ def run(
     design: str,
     model_base: str,
     model_with_effects: str,
+    threads: int = 1,
 ) -> None:
-    """Write the verdict, its tables and the two model files of a study."""
+    """Write the verdict, its tables and the two model files of a study.
+
+    Parameters
+    ----------
+    threads : pieces of the search that are computed at the same time.
+    """
     settings, cohort = study_of_kind(Discrepancy, root, study)
-    store = Store(Path(verdict).parent / STORE, __name__)
+    store = Store(Path(verdict).parent / STORE, __name__, threads)
     results = searched(settings, cohort, root, store, Progress(partial(_say, study)))
     metadata = provenance(JOB, settings, cohort, None, base_marks(root, settings.base.model))
     files = {
@@ -243,7 +249,7 @@ def _beyond(ended: Investigation, run: Run) -> Beyond:
         return Beyond(None, None, final)
     stays = beyond(final, ended.rules, run)
     if stays.table is not None:
-        run(on_record, stays.grounds.fit, final.readings)
+        on_record([stays.grounds.fit], final.readings, run)
     return stays
 
 

@@ -1,203 +1,229 @@
-"""A store of the pieces of a search: each is a content-hashed task, done once and kept.
+"""The pieces of a search: each is done once and kept, and independent ones run side by side.
 
-A killed search finds what it had done; a repeated one only looks it up. Pieces are functions of
-plain data, known by a digest of code and arguments, and kept as data (see `codec` and `kept`). What
-is missing is run as a task of pydra in this process, in a scratch folder of its own that nobody
-reads afterwards. The folder of the store may be deleted at any time: it only saves time.
+A piece is a function of plain data, known by the digest of the code, its name and its arguments.
+What it returns is kept as data in ``<digest>.piece``, see `codec`; a file that does not verify
+counts as not there. Files appear whole, so nothing needs a lock: two runs at once may both compute
+a piece. Nothing is unpickled and no link is followed. The folder may be deleted at any time.
 
-Pickled bytes will not do for the digest of a value. They hang on which equal objects are one and
-the same, on the order of sets, and on the cached properties that happen to be filled; so a value
-that was read back from a store would not be known again.
+Pieces that do not wait for each other are run by pydra's workers, one for each thread of the job.
+A worker keeps a piece as soon as it is done, so a killed search loses none that was.
 """
 
+import gc
 import hashlib
 import logging
+import multiprocessing
 import os
-from collections.abc import Callable, Mapping
-from collections.abc import Set as AnySet
-from dataclasses import fields, is_dataclass
-from enum import Enum
-from functools import cache
-from pathlib import Path, PurePath
+import re
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from functools import partial
+from itertools import chain
+from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import BuiltinFunctionType, FunctionType
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, TypeVar
 
-import numpy as np
 from pydra.compose import python
 from pydra.engine.submitter import Submitter
+from pydra.workers.cf import ConcurrentFuturesWorker
 
+from spinepipe.files import appearing, sweep
 from spinepipe.jobs.code import code_digest
 from spinepipe.jobs.digest import versions
 from spinepipe.studies.discrepancy.codec import decoded, encoded
-from spinepipe.studies.discrepancy.kept import Kept
 
 _log = logging.getLogger(__name__)
 
-P = ParamSpec("P")
 R = TypeVar("R")
+Arguments = tuple[Any, ...]
+
+SUFFIX = ".piece"
+MARK = b"spinepipe piece 2\n"
+"""First bytes of a file; the number is that of the format."""
+
+_HEAD = len(MARK) + 65
+_NAME = re.compile(rf"[0-9a-f]{{64}}{SUFFIX}")
 
 
-class Run(Protocol):
-    """Runs a function on arguments and returns what it returns."""
+class Run:
+    """Runs pieces: here and now, and keeps nothing."""
 
-    def __call__(self, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """The function's result, computed now or before."""
+    def __call__(self, function: Callable[..., R], /, *arguments: Any) -> R:
+        """The function's result; what it raises is passed on."""
+        return self.map(function, [arguments])[0]
 
-
-def at_once(function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-    """Run here and now, keep nothing."""
-    return function(*args, **kwargs)
-
-
-PLAIN = (type(None), bool, int, float, complex, str, bytes, PurePath)
+    def map(self, function: Callable[..., R], arguments: Iterable[Arguments]) -> list[R]:
+        """Its results for several arguments that do not wait for each other, in their order."""
+        return [function(*one) for one in arguments]
 
 
-def content_digest(value: Any) -> bytes:
-    """sha256 over plain values, arrays, enums, functions, dataclasses and what is made of them.
-
-    Of a dataclass its fields count, not its cached properties; of a function and a class the name.
-    Mappings count in their order.
-
-    Raises
-    ------
-    TypeError
-        For anything else.
-    """
-    return _Digests().of(value)
+at_once = Run()
 
 
-class _Digests:
-    """Digests of one value and its parts; a dataclass that it holds twice is looked at once."""
+class Store(Run):
+    """Runs functions of plain data once per content of code and arguments."""
 
-    def __init__(self) -> None:
-        self._known: dict[int, bytes] = {}
-
-    def of(self, value: Any) -> bytes:
-        """The digest of a part; parts stay alive while the whole is looked at."""
-        if isinstance(value, Enum | type | FunctionType | BuiltinFunctionType):
-            return _named(value)
-        if isinstance(value, PLAIN):
-            return _joined(type(value).__name__, repr(value).encode())
-        if isinstance(value, np.ndarray | np.generic):
-            return _array(np.asarray(value))
-        if isinstance(value, tuple | list):
-            return _joined("sequence", *map(self.of, value))
-        if is_dataclass(value):
-            if id(value) not in self._known:
-                self._known[id(value)] = self._dataclass(value)
-            return self._known[id(value)]
-        if isinstance(value, Mapping):
-            return _joined("mapping", *map(self.of, value.items()))
-        if isinstance(value, AnySet):
-            return _joined("set", *sorted(map(self.of, value)))
-        raise TypeError(f"what a {type(value).__qualname__} holds cannot be told")
-
-    def _dataclass(self, value: Any) -> bytes:
-        kind: Any = type(value)
-        name, names = _declared(kind)
-        return _joined("dataclass", name, *(self.of(getattr(value, one)) for one in names))
-
-
-@cache
-def _declared(kind: type) -> tuple[bytes, tuple[str, ...]]:
-    """A dataclass' name and those of its fields."""
-    return _named(kind), tuple(field.name for field in fields(kind))
-
-
-def _joined(kind: str, *parts: bytes) -> bytes:
-    return hashlib.sha256(kind.encode() + b":" + b"".join(parts)).digest()
-
-
-def _named(value: Any) -> bytes:
-    """An enum's member, a class or a function by its full name."""
-    one = f".{value.name}" if isinstance(value, Enum) else ""
-    owner = type(value) if isinstance(value, Enum) else value
-    return _joined("name", f"{owner.__module__}.{owner.__qualname__}{one}".encode())
-
-
-def _array(array: np.ndarray) -> bytes:
-    if array.dtype.hasobject:
-        raise TypeError("what an array of objects holds cannot be told")
-    about = _joined("array", f"{array.dtype.str} {array.shape}".encode())
-    return _joined("array", about, array.tobytes())
-
-
-os.environ.setdefault("NO_ET", "1")  # pydra reports its use over the network unless told not to
-
-
-_WAITING: dict[str, Callable[[], None]] = {}
-
-
-@python.define(outputs=["done"])  # type: ignore[untyped-decorator]
-def Piece(token: str) -> str:
-    """Runs the piece of that digest; pydra learns, and pickles, nothing but the digest."""
-    from spinepipe.studies.discrepancy.store import waiting
-
-    waiting(token)()
-    return token
-
-
-def waiting(token: str) -> Callable[[], None]:
-    """What a digest stands for, in the process that is about to run it."""
-    return _WAITING[token]
-
-
-class Store:
-    """Runs functions of plain data once per content of code and arguments.
-
-    Several processes may use a folder at the same time; none waits for another.
-    """
-
-    def __init__(self, folder: str | Path, module: str) -> None:
+    def __init__(self, folder: str | Path, module: str, threads: int = 1) -> None:
         """``module`` is the job whose code, with all it imports, the results hang on.
+
+        Parameters
+        ----------
+        folder : need not exist. threads : how many pieces are computed at the same time.
 
         Raises
         ------
         NotADirectoryError
             Where something else than a folder has that name.
         """
-        self._kept = Kept(Path(folder).absolute())
-        self._made_by = f"{code_digest(module)} {sorted(versions().items())}".encode()
-        self._asked: set[str] = set()
+        self._folder, self._threads = Path(folder).absolute(), threads
+        if (self._folder.exists() or self._folder.is_symlink()) and not self._folder.is_dir():
+            raise NotADirectoryError(f"{folder} is no folder; remove it, nothing is lost by that")
+        self._made_by = f"{code_digest(module)} {sorted(versions().items())}"
+        self._asked: set[Path] = set()
 
-    def __call__(self, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """The function's result, computed now or before; what it raises is passed on.
+    def map(self, function: Callable[..., R], arguments: Iterable[Arguments]) -> list[R]:
+        """Its results; what is not kept yet is computed, by workers where it is several pieces.
 
         Raises
         ------
         TypeError
-            For arguments of which no digest can be taken, or results that cannot be kept as data.
+            For arguments or results that cannot be kept as data.
         """
-        content = content_digest((function, args, sorted(kwargs.items())))
-        token = hashlib.sha256(self._made_by + content).hexdigest()
-        self._asked.add(token)
-        kept = self._kept.read(token)
-        if kept is not None:
-            try:
-                again: R = decoded(kept)
-                return again
-            except ValueError as trouble:
-                _log.warning("a piece that somebody else wrote is replaced: %s", trouble)
-        data = _computed(token, lambda: encoded(function(*args, **kwargs)))
-        self._kept.write(token, data)
-        found: R = decoded(data)  # now too, so that a search made again goes on with the same
-        return found
+        every = list(arguments)
+        paths = self._paths(function, every)
+        self._asked.update(paths)
+        found = _kept(paths)
+        calls = {
+            path: partial(_compute, path, function, one)
+            for path, one in zip(paths, every, strict=True)
+            if path not in found
+        }
+        if self._threads > 1 and len(calls) > 1:
+            _in_workers({path.name: call for path, call in calls.items()}, self._threads)
+            found |= _kept(calls)
+        for path, call in calls.items():
+            if path not in found:  # not even by a worker: what it raises is raised here
+                found[path] = decoded(call())  # as it will be read, so that all goes on the same
+        return [found[path] for path in paths]
+
+    def _paths(self, function: Callable[..., R], every: Iterable[Arguments]) -> list[Path]:
+        """Where pieces are kept. No two have one name; which equal parts are one object may count,
+        so that at worst one is computed again.
+        """
+        about = self._made_by, function.__module__, function.__qualname__
+        known: dict[int, str] = {}  # what many pieces work on is looked at once
+        for value in chain.from_iterable(every):
+            known[id(value)] = known.get(id(value)) or _sha256(encoded(value))
+        told = [" ".join([*about, *(known[id(value)] for value in one)]) for one in every]
+        return [self._folder / f"{_sha256(one.encode())}{SUFFIX}" for one in told]
 
     def forget_the_rest(self) -> None:
         """Delete pieces that nobody asked for since the store was opened: other code or data."""
-        self._kept.sweep(self._asked)
+        if self._folder.is_symlink():
+            _log.warning("%s is a link: old pieces there are not deleted", self._folder)
+            return
+        sweep(self._folder)
+        for path in self._folder.iterdir() if self._folder.is_dir() else ():
+            if _NAME.fullmatch(path.name) and path not in self._asked and _is_file(path):
+                with suppress(OSError):
+                    path.unlink()
 
 
-def _computed(token: str, piece: Callable[[], bytes]) -> bytes:
-    """The piece, run by pydra; what pydra writes about it is gone afterwards."""
-    made: list[bytes] = []
-    _WAITING[token] = lambda: made.append(piece())
+def _kept(paths: Iterable[Path]) -> dict[Path, Any]:
+    """What was kept under these names and is as it was written."""
+    found: dict[Path, Any] = {}
+    for path in filter(_is_file, dict.fromkeys(paths)):
+        try:
+            content = path.read_bytes()
+            if content[:_HEAD] != _head(path, content[_HEAD:]):
+                raise ValueError("it is not as it was written")
+            found[path] = decoded(content[_HEAD:])
+        except (OSError, ValueError) as trouble:
+            _log.warning("%s: %s; it is computed again and replaced", path, trouble)
+    return found
+
+
+def _compute(path: Path, function: Callable[..., Any], arguments: Arguments) -> bytes:
+    """Compute a piece and keep it; its bytes.
+
+    Raises
+    ------
+    OSError
+        With the file's name, when the folder cannot be written or the disk is full.
+    """
+    data = encoded(function(*arguments))
+    try:
+        with appearing(path) as temporary:
+            temporary.write_bytes(_head(path, data) + data)
+    except (FileNotFoundError, IsADirectoryError) as trouble:  # swept by another run just now
+        _log.warning("%s is not kept: %s", path, trouble)
+    return data
+
+
+def _head(path: Path, data: bytes) -> bytes:
+    """The mark, and a digest of name and bytes."""
+    return MARK + _sha256(path.name.encode() + data).encode() + b"\n"
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _is_file(path: Path) -> bool:
+    """Whether there is a file under that very name, not behind a link."""
+    return path.is_file() and not path.is_symlink()
+
+
+os.environ.setdefault("NO_ET", "1")  # pydra reports its use over the network unless told not to
+
+CALLS: dict[str, Callable[[], object]] = {}
+"""What the workers are to do, by name; they are forked while it is filled, and inherit it."""
+
+
+@python.define(outputs=["done"])  # type: ignore[untyped-decorator]
+def Piece(name: str) -> str:
+    """Computes and keeps a piece; one that raises is left to the process that asked for it."""
+    import contextlib
+
+    from spinepipe.studies.discrepancy.store import CALLS
+
+    with contextlib.suppress(Exception):
+        CALLS[name]()
+    return name
+
+
+def _in_workers(calls: Mapping[str, Callable[[], object]], threads: int) -> None:
+    """Have pydra's workers make the calls, so many at a time.
+
+    They are forked, so they compute with the very objects, and the compiled kernels, of this
+    process. Pydra's own cache holds pickles: it lies in a folder that no other run ever reads.
+    """
+    multiprocessing.current_process().daemon = False  # a job's is one, and may have no children
+    most, fork = min(threads, len(calls)), multiprocessing.get_context("fork")
+    CALLS.update(calls)
     try:
         with TemporaryDirectory(prefix="spinepipe-", ignore_cleanup_errors=True) as scratch:
             os.environ["PYDRA_HASH_CACHE"] = str(Path(scratch, "hashes"))  # else in the home
-            with Submitter(cache_root=scratch, worker="debug") as submitter:
-                submitter(Piece(token=token))
+            worker = ConcurrentFuturesWorker(n_procs=most)
+            worker.pool = ProcessPoolExecutor(most, fork, initializer=_begin)
+            with Submitter(cache_root=scratch, worker=worker) as submitter:
+                submitter(Piece().split(name=list(calls)), raise_errors=True)
+    except Exception as trouble:  # as when a worker is killed: no reason to give up the search
+        _log.warning("a worker failed, what it left is computed without: %s", trouble)
     finally:
-        del _WAITING[token]
-    return made[0]
+        CALLS.clear()
+
+
+def _begin() -> None:
+    """Begin the life of a worker, which ends with its parent, even when that one is killed."""
+    gc.freeze()  # what it was forked with stays: no need to look through it at each collection
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -30,7 +30,7 @@ from spinepipe.marks import KEY, with_mark, write_marked
 from spinepipe.tables import write
 
 
-def run(root: str, study: str, **files: str) -> None:
+def run(root: str, study: str, threads: int, **files: str) -> None:
     """Each result from the folder ``made_up``, with the mark that it must have."""
     assert study == "probe"
     settings, cohort = study_of(root, study)

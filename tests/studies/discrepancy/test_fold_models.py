@@ -23,7 +23,6 @@ from spinepipe.studies.discrepancy.proof.folds import (
     step_fold,
 )
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.store import at_once
 
 pytestmark = pytest.mark.numeric
 
@@ -130,13 +129,11 @@ def test_a_fit_to_everything_ends_where_the_full_fit_did(two: Grounds) -> None:
     """Wherever it begins; what is held stays where it was put."""
     names, count = list(two.readings), len(two.fit.x)
     away = 0.2 * np.cos(np.arange(count))
-    x, fit = fold_models._fitted(
-        two, lin(two), everything(two), names, np.arange(count), away, at_once
-    )
+    x, fit = fold_models._fitted(two, lin(two), everything(two), names, np.arange(count), away)
     assert x == pytest.approx(np.zeros(count), abs=1e-4)
     assert fit.chi2 == pytest.approx(two.fit.chi2, rel=1e-6)
     own = np.array(two.fit.hypothesis.members["b"].numbers)
-    x, _ = fold_models._fitted(two, lin(two), everything(two), ["b"], own, away, at_once)
+    x, _ = fold_models._fitted(two, lin(two), everything(two), ["b"], own, away)
     others = np.setdiff1d(np.arange(count), own)
     assert (x[others] == away[others]).all()
     assert x[own] == pytest.approx(np.zeros(len(own)), abs=1e-4)
@@ -147,7 +144,7 @@ def test_a_fit_of_some_load_steps_reads_no_others(two: Grounds) -> None:
     (part, _) = step_fold({"a": two.readings["a"]}).parts
     own = np.array(two.fit.hypothesis.members["a"].numbers)
     nothing = np.zeros(len(two.fit.x))
-    _, fit = fold_models._fitted(two, lin(two), part, ["a"], own, nothing, at_once)
+    _, fit = fold_models._fitted(two, lin(two), part, ["a"], own, nothing)
     for predicted, training, test in zip(
         fit.predicted["a"], part.training["a"], two.readings["a"].tests, strict=True
     ):

@@ -21,6 +21,7 @@ from sweeps import sweep
 
 from spinepipe.effects import Spread
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.proof import fold_models
 from spinepipe.studies.discrepancy.proof.held_out import (
     NO_FIT,
     NOT_DETERMINED,
@@ -31,6 +32,7 @@ from spinepipe.studies.discrepancy.proof.held_out import (
     together,
 )
 from spinepipe.studies.discrepancy.search.gaps import Gap
+from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import share_of_gap
@@ -187,12 +189,14 @@ def test_a_tilt_that_the_training_shows_is_foreseen_in_the_unseen_test(refit: bo
         assert (row.base.rms < 1.3) is foreseen
 
 
-def test_a_fold_without_a_fit_says_why() -> None:
-    def refused(function: Any, /, *args: Any, **kwargs: Any) -> Any:
-        return replace(function(*args, **kwargs), residuals={}, status="no stable pose")
+def test_a_fold_without_a_fit_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*args: Any) -> Any:
+        return replace(joint_fit(*args), residuals={}, status="no stable pose")
 
     readings = read({"a": 40.0}, ("flexion", "extension"), zone=False)
-    result = held_out(found(grounds(readings), False), Asked(refit=True), refused)
+    without = found(grounds(readings), False)
+    monkeypatch.setattr(fold_models, "joint_fit", refused)
+    result = held_out(without, Asked(refit=True), at_once)
     assert [(one.status, one.message) for one in result.folds[:2]] == [
         (NO_FIT, "no stable pose")
     ] * 2

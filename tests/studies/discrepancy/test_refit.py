@@ -173,8 +173,7 @@ class Fits:
     def __init__(self, *usable: bool) -> None:
         self.usable, self.starts = list(usable), list[float]()
 
-    def __call__(self, function: Any, /, *args: Any, **kwargs: Any) -> Any:
-        supposed, *_ = args
+    def __call__(self, supposed: Any, *_: Any) -> Any:
         self.starts.append(float(supposed[-1].start[0]))
         return SimpleNamespace(usable=self.usable.pop(0), chi2=60.0)
 
@@ -193,7 +192,8 @@ def refit_with(fits: Fits, monkeypatch: pytest.MonkeyPatch, degenerate: bool = F
     before.chi2, before.poses = 100.0, None
     grounds: Any = SimpleNamespace(fit=before, setting=None, suppose=lambda supposed: supposed)
     trials = Trials("", (LEVELS, ZONE), (form,))
-    return refit(grounds, Supposed(form, np.array([32.0])), trials, fits)
+    monkeypatch.setattr(refits_of, "joint_fit", fits)
+    return refit(grounds, Supposed(form, np.array([32.0])), trials)
 
 
 @pytest.mark.parametrize("failures", [0, 1, 2])

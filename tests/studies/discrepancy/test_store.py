@@ -1,30 +1,32 @@
 """The store of a search's pieces: each is computed once, whatever ends the process in between.
 
 Catches a store that computes twice, believes what is damaged, stale or planted, runs what it reads,
-waits for a dead process, or leaves something behind.
+waits for a dead process, comes to something else in workers, or leaves something behind.
 """
 
-import io
 import os
 import pickle
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
+from hashlib import sha256
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from sweeps import sweep
 
-from spinepipe.effects import Spread
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy import store as store_module
-from spinepipe.studies.discrepancy.kept import MARK, SUFFIX, Kept
+from spinepipe.studies.discrepancy.codec import encoded
 from spinepipe.studies.discrepancy.search.readings import Repeats
-from spinepipe.studies.discrepancy.store import Store, content_digest
+from spinepipe.studies.discrepancy.store import MARK, SUFFIX, Store
 
 MODULE = "spinepipe.studies.discrepancy.job"
 
@@ -56,7 +58,7 @@ def test_the_same_content_is_computed_once(tmp_path: Path) -> None:
     for _ in range(2):  # two stores: the second finds what the first has left
         store = Store(tmp_path, MODULE)
         for _ in range(2):
-            found = store(scaled, of(1.0, 2.5), factor=3.0)
+            found = store(scaled, of(1.0, 2.5), 3.0)
             np.testing.assert_array_equal(found.mean.ravel(), [3.0, 7.5])
     assert CALLS == [3.0]
 
@@ -69,9 +71,7 @@ def test_another_argument_function_or_code_is_another_piece(
     store(scaled, of(1.0 + 1e-15))
     store(scaled, of(1.0), 2.5)
     assert CALLS == [2.0, 2.0, 2.5]
-    assert store(len, [1, 2]) == 2
-    assert store(max, [1, 2]) == 2
-    assert store(min, [1, 2]) == 1
+    assert [store(one, [1, 2]) for one in (len, max, min)] == [2, 2, 1]
     monkeypatch.setattr(store_module, "code_digest", lambda module: f"changed {module}")
     Store(tmp_path, MODULE)(scaled, of(1.0))
     assert CALLS == [2.0, 2.0, 2.5, 2.0]
@@ -112,9 +112,7 @@ def test_only_data_is_kept_and_pydra_leaves_nothing(
     (piece,) = (path for path in tmp_path.rglob("*") if path.is_file())
     assert (piece.parent.name, piece.suffix) == ("store", SUFFIX)
     assert piece.read_bytes().startswith(MARK)
-    with np.load(io.BytesIO(piece.read_bytes()[len(MARK) + 65 :]), allow_pickle=False) as file:
-        assert sorted(file.files) == ["<f8", "structure"]
-        np.testing.assert_array_equal(file["<f8"], [2.0])
+    assert piece.read_bytes()[len(MARK) + 65 :] == encoded(of(2.0))
     assert list((tmp_path / "scratch").iterdir()) == []
 
 
@@ -140,11 +138,11 @@ def test_a_search_that_was_cut_off_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
-    "a flipped bit": lambda whole: whole[:-300] + bytes([whole[-300] ^ 1]) + whole[-299:],
+    "a flipped bit": lambda whole: whole[:-30] + bytes([whole[-30] ^ 1]) + whole[-29:],
     "cut off": lambda whole: whole[: len(whole) // 2],
     "empty": lambda whole: b"",
     "garbage": lambda whole: b"\x80\x05garbage" * 100,
-    "another format": lambda whole: whole.replace(MARK, MARK.replace(b"1", b"0"), 1),
+    "another format": lambda whole: whole.replace(MARK, MARK.replace(b"2", b"1"), 1),
 }
 
 
@@ -192,55 +190,23 @@ def test_a_store_that_was_never_used_has_nothing_to_forget(tmp_path: Path) -> No
     assert not (tmp_path / "none").exists()
 
 
-def test_content_is_what_a_value_holds() -> None:
-    plain, filled = of(1.0, 2.0), of(1.0, 2.0)
+def test_content_is_what_a_value_holds(tmp_path: Path) -> None:
+    """Not the properties that it has filled; of a mapping its order, of an array its dtype."""
+    store, filled = Store(tmp_path, MODULE), of(1.0, 2.0)
     assert filled.mean.sum() == 3.0
-    one, same = "extension", "".join(["exten", "sion"])
-    pairs: list[tuple[Any, Any]] = [
-        (plain, filled),
-        ((plain, plain), (plain, filled)),
-        ([one, one], [one, same]),
-        (np.arange(6.0).reshape(2, 3).T, np.array([[0.0, 3.0], [1.0, 4.0], [2.0, 5.0]])),
-    ]
-    for first, second in pairs:
-        assert content_digest(first) == content_digest(second)
-
-
-def test_content_tells_apart() -> None:
-    values: list[Any] = [
-        None,
-        0,
-        0.0,
-        False,
-        "",
-        b"",
-        "shared",
-        Spread.SHARED,
-        (),
-        {},
-        [1, [2]],
-        [[1], 2],
-        [1, 2],
-        {"a": 1},
-        {"a": 1, "b": 2},
-        {"b": 2, "a": 1},
-        np.zeros(2),
-        np.zeros(2, int),
-        np.zeros((2, 1)),
-        np.float64(0.0),
-        of(0.0, 0.0),
-        {1, 2},
-        len,
-        max,
-        Repeats,
-        scaled,
-    ]
-    assert len({content_digest(value) for value in values}) == len(values)
+    store(scaled, of(1.0, 2.0))
+    store(scaled, filled)
+    assert CALLS == [2.0]
+    values = [None, 0, 0.0, False, "", (), [], {}, [1, [2]], [[1], 2], {"a": 1, "b": 2}]
+    values += [{"b": 2, "a": 1}, np.zeros(2), np.zeros(2, int), np.zeros((2, 1)), np.float64(0.0)]
+    for value in values:
+        store(str, value)
+    assert len(list(tmp_path.iterdir())) == 1 + len(values)
 
 
 def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
     for value in (object(), np.array([None])):
-        with pytest.raises(TypeError, match="cannot be told"):
+        with pytest.raises(TypeError, match="cannot be kept"):
             Store(tmp_path, MODULE)(len, [value])
 
 
@@ -305,11 +271,9 @@ def killed(held: Repeats) -> Repeats:
 def test_a_killed_process_leaves_nothing_that_one_waits_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Pydra's lock is left in the scratch folder of the piece, where nobody looks again."""
     search = "held = store(scaled, of(1.0), 4.0); store(killed, held); print(CALLS)"
     monkeypatch.setenv("DIES", "1")
     assert ended(started(tmp_path, search))[0] == -signal.SIGKILL
-    assert len(list((tmp_path / "TMPDIR").rglob("*.lock"))) == 1
     assert len(list((tmp_path / "store").iterdir())) == 1
     monkeypatch.delenv("DIES")
     assert ended(started(tmp_path, search)) == (0, "[9.0]", "")
@@ -347,18 +311,9 @@ class Trap:
         return os.mkdir, (str(self._folder),)
 
 
-def objects(trap: Trap) -> bytes:
-    """An npz whose structure is an array of objects, which numpy writes as a pickle."""
-    array = np.empty(1, dtype=object)
-    array[0] = trap
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=True, structure=array)
-    return buffer.getvalue()
-
-
 PLANTED: dict[str, Callable[[Trap], bytes]] = {
     "a pickle": pickle.dumps,
-    "an array of objects": objects,
+    "a pickle behind JSON": lambda trap: b'["array","|O",[1],"C",0]\n' + pickle.dumps(trap),
     "no structure": lambda trap: b"PK\5\6" + bytes(18),
 }
 
@@ -375,7 +330,7 @@ def test_what_somebody_planted_is_not_run_and_computed_again(
     (piece,) = folder.iterdir()
     content = PLANTED[what](Trap(sprung))
     if sealed:
-        Kept(folder).write(piece.stem, content)
+        piece.write_bytes(store_module._head(piece, content) + content)
     else:
         piece.write_bytes(content)
     found = Store(folder, MODULE)(scaled, of(1.0))
@@ -402,3 +357,166 @@ def test_the_trap_works(tmp_path: Path) -> None:
     """Else the tests above would show nothing."""
     pickle.loads(pickle.dumps(Trap(tmp_path / "sprung")))
     assert (tmp_path / "sprung").is_dir()
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_any_change_of_any_byte_is_seen(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    folder = tmp_path_factory.getbasetemp() / "changed"
+    Store(folder, MODULE)(scaled, of(1.0))
+    (path,) = folder.iterdir()
+    whole = path.read_bytes()
+    place = data.draw(st.integers(0, len(whole) - 1))
+    flipped = bytes([whole[place] ^ (1 << data.draw(st.integers(0, 7)))])
+    more = data.draw(st.binary(min_size=1))
+    for changed in (whole[:place] + flipped + whole[place + 1 :], whole[:place], whole + more):
+        path.write_bytes(changed)
+        assert store_module._kept([path]) == {}
+    path.write_bytes(whole)
+    assert list(store_module._kept([path])) == [path]
+    other = path.with_name(sha256(b"other").hexdigest() + SUFFIX)
+    path.rename(other)
+    assert store_module._kept([other]) == {}  # it is another's result
+    other.unlink()
+
+
+def test_only_pieces_that_nobody_wants_are_swept(tmp_path: Path) -> None:
+    store = Store(tmp_path, MODULE)
+    store(scaled, of(1.0))
+    (wanted,) = tmp_path.iterdir()
+    stays = {wanted.name, "notes.txt", "0" * 64, f"{'0' * 63}{SUFFIX}", f".{'0' * 64}{SUFFIX}"}
+    for name in stays - {wanted.name}:
+        (tmp_path / name).write_text("somebody's work")
+    (tmp_path / f"{'1' * 64}{SUFFIX}").write_bytes(b"spinepipe piece 1\nof an older version")
+    (tmp_path / f".{'1' * 64}{SUFFIX}.{2**31 - 1}").write_bytes(MARK)
+    (tmp_path / f"{'2' * 64}{SUFFIX}").mkdir()
+    (tmp_path / f"{'3' * 64}{SUFFIX}").symlink_to(wanted)
+    store.forget_the_rest()
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == stays | {f"{'2' * 64}{SUFFIX}", f"{'3' * 64}{SUFFIX}"}
+
+
+def test_what_is_no_folder_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    (tmp_path / "link").symlink_to(tmp_path / "none")
+    for name in ("file", "link"):
+        with pytest.raises(NotADirectoryError, match=f"{name} is no folder; remove it"):
+            Store(tmp_path / name, MODULE)
+
+
+def test_a_folder_in_the_place_of_a_piece_fails_no_run(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    Store(tmp_path, MODULE)(scaled, of(1.0))
+    (path,) = tmp_path.iterdir()
+    path.unlink()
+    (path / "thesis").mkdir(parents=True)
+    assert Store(tmp_path, MODULE)(scaled, of(1.0)).mean.sum() == 2.0
+    assert "is not kept: [Errno" in caplog.text
+    assert (path / "thesis").exists()
+
+
+# Workers
+
+
+def logged(log: str, number: int) -> np.ndarray:
+    """A piece that says in a file that it began, and in which process."""
+    with Path(log).open("a") as file:
+        file.write(f"{number} {os.getpid()}\n")
+    if number == int(os.environ.get("SLOW", "-1")):
+        time.sleep(600.0)
+    if number == int(os.environ.get("DIES", "-1")) and os.getpid() != PARENT:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if number == int(os.environ.get("FAILS", "-1")):
+        raise ArithmeticError(f"piece {number}")
+    return np.linalg.qr(np.sin(number + np.arange(4e4)).reshape(200, 200))[0]
+
+
+PARENT = os.getpid()
+
+
+def begun(log: Path) -> list[int]:
+    """Numbers of the pieces that began, in order of the numbers."""
+    lines = log.read_text().splitlines() if log.exists() else []
+    return sorted(int(line.split()[0]) for line in lines)
+
+
+def test_workers_come_to_the_same_bytes_and_leave_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    scratch, log, before = tmp_path / "scratch", tmp_path / "log", os.getcwd()
+    scratch.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(scratch))
+    asked = [(str(log), number) for number in (3, 1, 2, 1, 0)]
+    found = {n: Store(tmp_path / str(n), MODULE, n).map(logged, asked) for n in (1, 2, 3)}
+    for threads in (2, 3):
+        for one, other in zip(found[1], found[threads], strict=True):
+            assert one.tobytes() == other.tobytes()
+        for path in (tmp_path / "1").iterdir():
+            assert (tmp_path / str(threads) / path.name).read_bytes() == path.read_bytes()
+    assert begun(log) == sorted([0, 1, 2, 3] * 3)
+    processes = [line.split()[1] for line in log.read_text().splitlines()]
+    assert [one == str(os.getpid()) for one in processes] == [True] * 4 + [False] * 8
+    assert Store(tmp_path / "2", MODULE, 2).map(logged, [*asked, (str(log), 9)])[5].shape
+    assert log.read_text().split()[-2:] == ["9", str(os.getpid())]  # one alone is computed here
+    assert (list(scratch.iterdir()), os.getcwd(), caplog.messages) == ([], before, [])
+
+
+def test_a_daemon_has_workers_too(tmp_path: Path) -> None:
+    """As the jobs of a run are, in the pool of their processes."""
+    body = (
+        "import multiprocessing\n"
+        f"asked = [({str(tmp_path / 'log')!r}, number) for number in range(4)]\n"
+        f"store = Store({str(tmp_path / 'store')!r}, MODULE, 2)\n"
+        "process = multiprocessing.get_context('fork').Process(\n"
+        "    target=store.map, args=(logged, asked), daemon=True)\n"
+        "process.start(); process.join(); print(process.exitcode)"
+    )
+    assert ended(started(tmp_path, body)) == (0, "0", "")
+    lines = (tmp_path / "log").read_text().splitlines()
+    assert len({line.split()[1] for line in lines}) == 2
+
+
+def test_what_a_piece_raises_in_a_worker_is_raised_and_the_others_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    asked = [(str(tmp_path / "log"), number) for number in range(4)]
+    monkeypatch.setenv("FAILS", "1")
+    with pytest.raises(ArithmeticError, match="piece 1"):
+        Store(tmp_path / "store", MODULE, 2).map(logged, asked)
+    assert len(list((tmp_path / "store").iterdir())) == 3
+    assert caplog.messages == []
+
+
+def test_a_worker_that_dies_is_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    asked = [(str(tmp_path / "log"), number) for number in range(5)]
+    monkeypatch.setenv("DIES", "2")
+    found = Store(tmp_path / "store", MODULE, 2).map(logged, asked)
+    assert [one.shape for one in found] == [(200, 200)] * 5
+    assert "a worker failed, what it left is computed without" in caplog.text
+
+
+def test_a_killed_search_computes_nothing_twice_and_its_workers_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One piece never ends, so that the other worker does the rest; then the search is killed."""
+    log, store = tmp_path / "log", tmp_path / "store"
+    asked = f"[({str(log)!r}, number) for number in range(5)]"
+    monkeypatch.setenv("SLOW", "1")
+    search = started(tmp_path, f"store._threads = 2; store.map(logged, {asked})")
+    until = time.monotonic() + 300.0
+    while time.monotonic() < until and len([*store.glob(f"[!.]*{SUFFIX}")]) < 4:
+        time.sleep(0.05)
+    workers = {int(line.split()[1]) for line in log.read_text().splitlines()}
+    search.kill()
+    ended(search)
+    while time.monotonic() < until and any(Path(f"/proc/{one}/exe").exists() for one in workers):
+        time.sleep(0.05)
+    assert not any(Path(f"/proc/{one}/exe").exists() for one in workers)
+    monkeypatch.delenv("SLOW")
+    assert ended(started(tmp_path, f"store.map(logged, {asked})")) == (0, "", "")
+    assert begun(log) == [0, 1, 1, 2, 3, 4]

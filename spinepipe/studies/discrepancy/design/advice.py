@@ -4,12 +4,12 @@ Each subject gets every run of the menu with its expected gain, and the best of 
 effect that imperfections hide gets what these would have to be known to instead.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 
 from spinepipe.studies.discrepancy.design.extra_tests import Bench
-from spinepipe.studies.discrepancy.design.next_test import Offer, offers, refitted_gains
+from spinepipe.studies.discrepancy.design.next_test import Offer, left_apart, offers
 from spinepipe.studies.discrepancy.design.patterns import Fitted, generic, strengths
 from spinepipe.studies.discrepancy.design.withheld import (
     FACTORS,
@@ -86,7 +86,7 @@ def advice(
     if ended.reason is Reason.DATA_ERRORS:
         return ()
     grounds = _standing_on(found, ended)
-    rows = [row for pair in _pairs(found, ended, rules) for row in run(_of_pair, *pair, place)]
+    rows = [row for pair in _pairs(found, ended, rules) for row in _of_pair(*pair, place, run)]
     if ended.verdict in (Answer.PART, Answer.UNKNOWN):
         rows += run(_of_unnamed, grounds, rules, place)
     threshold = found.stages[0].screen.threshold
@@ -168,15 +168,15 @@ def _beside_the_rest(found: Found, name: str, rival: str) -> Refit | None:
 
 
 def _of_pair(
-    subject: str, first: Fitted, second: Fitted, missing: float, place: Bench
+    subject: str, first: Fitted, second: Fitted, missing: float, place: Bench, run: Run
 ) -> list[Advice]:
     """Runs that tell two models apart; the best are checked by refits.
 
     The others are taken to lose as much by it.
     """
-    found = offers([first, second], place)
+    found = run(offers, (first, second), place)
     likely = [one.words for one in found[:MOST_CHECKED] if (one.gain or 0.0) > LEAST_GAIN]
-    checked = _checked((first, second), place, likely)
+    checked = _checked((first, second), place, likely, run)
     linear = sum(one.gain or 0.0 for one in found if one.words in checked)
     share = min(1.0, sum(checked.values()) / linear) if linear > 0.0 else 1.0
     told = [
@@ -190,11 +190,21 @@ def _of_pair(
     return _rows(subject, told, missing)
 
 
-def _checked(pair: tuple[Fitted, Fitted], place: Bench, every: Sequence[str]) -> dict[str, float]:
+def _checked(
+    pair: tuple[Fitted, Fitted], place: Bench, every: Sequence[str], run: Run
+) -> dict[str, float]:
     """Mean gain of each run by refits of both models; of those that both can be asked for."""
-    one, other = (refitted_gains(pattern, place, every) for pattern in pair)
-    both = [words for words in every if words in one and words in other]
-    return {words: 0.5 * (one[words] + other[words]) for words in both}
+    words = [None, *every]  # without any run, and with each
+    left = run.map(left_apart, [(one, place, which) for one in pair for which in words])
+    one, other = (dict(zip(words, left[n:], strict=False)) for n in (0, len(words)))
+    more = ((name, _more(one, name), _more(other, name)) for name in every)
+    return {name: 0.5 * (a + b) for name, a, b in more if a is not None and b is not None}
+
+
+def _more(left: Mapping[str | None, float | None], words: str) -> float | None:
+    """The gain of a run: half of what it adds to the chi2 that stays."""
+    now, then = left[None], left[words]
+    return None if now is None or then is None else 0.5 * max(0.0, then - now)
 
 
 def _how(one: Offer, checked: dict[str, float]) -> str:

@@ -221,29 +221,20 @@ def _among_all(fit: JointFit, name: str, own: Array) -> Array:
     return whole
 
 
-def refitted_gains(pattern: Fitted, place: Bench, every: Sequence[str]) -> dict[str, float]:
-    """The gain of runs with the fitted model refitted, nonlinearly, to what the other predicts.
+def left_apart(pattern: Fitted, place: Bench, words: str | None) -> float | None:
+    """chi2 and priors that stay between the models, the fitted one refitted to the other.
 
-    A model of many shapes bends further than its tangent. Runs without such a fit are left out.
+    A model of many shapes bends further than its tangent.
+
+    Parameters
+    ----------
+    words : of a run that is made besides, or none. Without such a fit there is no result.
     """
-    menus = {name: _menu(place, name) for name in pattern.grounds.readings}
-    now = _refitted(pattern, place, {})
-    found = {}
-    for words in every if now is not None else ():
-        of = {name: _named(words, menu) for name, menu in menus.items()}
-        more = _refitted(pattern, place, of)
-        if more is not None and now is not None:
-            found[words] = 0.5 * max(0.0, more - now)
-    return found
-
-
-def _named(words: str, menu: Sequence[Run]) -> Run | None:
-    return next((run for run in menu if run.words == words), None)
-
-
-def _refitted(pattern: Fitted, place: Bench, added: Mapping[str, Run | None]) -> float | None:
-    """chi2 and priors that stay between the models; None where a run cannot be asked."""
     g = pattern.grounds
+    added = {
+        name: next((run for run in _menu(place, name) if run.words == words), None)
+        for name in (g.readings if words is not None else ())
+    }
     readings, whitenings = {}, {}
     for name, one in g.readings.items():
         tests = [_as_predicted(t, q) for t, q in _pairs(one, pattern.other.predicted[name])]

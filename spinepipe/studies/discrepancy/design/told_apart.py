@@ -132,7 +132,9 @@ def told_apart(
     declared : (6,) m and rad, SD of a single reading, for coordinates that were not read; or None.
     """
     joints = next(iter(grounds.fit.models.values())).n_joints
-    of = {name: run(seen_in, grounds, name, trials) for name in grounds.readings}
+    names = list(grounds.readings)
+    seen = run.map(seen_in, [(grounds, name, trials) for name in names])
+    of = dict(zip(names, seen, strict=True))
     design = Design(candidates(trials, joints, grounds.tests), of)
     found = judgements(trials, of, joints, grounds.tests, needed, seed)
     pairs = confusions(design, found, margin)

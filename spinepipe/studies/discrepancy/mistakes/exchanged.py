@@ -71,7 +71,10 @@ def exchanged(
     ----------
     grounds : of the base. trials : effects that may be missing. found : where the search ended.
     """
-    tried = [_exchange(grounds, pair, run, trials, found) for pair in _promising(grounds)]
+    pairs, every = _promising(grounds), tuple(trials)
+    as_read = _as_read(grounds, run, every, found) if pairs else 0.0
+    ways = tuple(_ways(grounds, run, found)) if pairs else ()
+    tried = run.map(_exchange, [(grounds, pair, every, as_read, ways) for pair in pairs])
     strong = [one for one in tried if one is not None and one.evidence > NEEDED]
     taken: set[str] = set()
     errors = []
@@ -111,49 +114,43 @@ def _promising(grounds: Grounds) -> list[tuple[str, str]]:
 def _exchange(
     grounds: Grounds,
     pair: tuple[str, str],
-    run: Run,
     trials: Sequence[Trials],
-    found: Found | None,
+    as_read: float,
+    ways: Sequence[tuple[Grounds, float]],
 ) -> _Exchange | None:
-    """The best of the ways; None where the base has no fit with the pair exchanged."""
+    """The best of the ways; None where the base has no fit with the pair exchanged.
+
+    Parameters
+    ----------
+    as_read : log evidence of the effects that explain what the base leaves without an exchange.
+    ways : fits with effects, see `_ways`.
+    """
     setting = _setting(grounds, pair)
     if setting is None:
         return None
-    there = _fitted(grounds, setting, pair, (), run)
+    there = _fitted(grounds, setting, pair, ())
     if there is None:
         return None
-    best = [_in_place_of_all(grounds, there, pair, run, trials, found)]
-    for others, left_out in _ways(grounds, run, found):
-        beside = _fitted(others, setting, pair, standing(others.fit), run)
+    effects = max(0.0, _look(there, trials).effects[0].log_evidence) if trials else 0.0
+    best = [_compared(grounds, there, pair, effects - as_read, effects)]
+    for others, left_out in ways:
+        beside = _fitted(others, setting, pair, standing(others.fit))
         if beside is not None:
             best.append(_compared(others, beside, pair, -left_out, 0.0))
     return max(best, key=lambda one: one.evidence)
 
 
-def _in_place_of_all(
-    grounds: Grounds,
-    there: Grounds,
-    pair: tuple[str, str],
-    run: Run,
-    trials: Sequence[Trials],
-    found: Found | None,
-) -> _Exchange:
-    """The base as read and exchanged, with the effects that would explain what is left."""
+def _as_read(grounds: Grounds, run: Run, trials: Sequence[Trials], found: Found | None) -> float:
+    """Log evidence of the effects that explain what the base leaves of the readings as they are."""
     if not trials:
-        return _compared(grounds, there, pair, 0.0, 0.0)
-    first, second = (
-        found.stages[0].screen if found and one is grounds else _look(one, trials, run)
-        for one in (grounds, there)
-    )
-    as_read = max(0.0, first.effects[0].log_evidence)
-    if found:
-        as_read = max(as_read, sum(one.log_evidence for one in found.standing))
-    effects = max(0.0, second.effects[0].log_evidence)
-    return _compared(grounds, there, pair, effects - as_read, effects)
+        return 0.0
+    first = found.stages[0].screen if found else run(_look, grounds, trials)
+    standing_ones = sum(one.log_evidence for one in found.standing) if found else 0.0
+    return max(0.0, first.effects[0].log_evidence, standing_ones)
 
 
-def _look(grounds: Grounds, trials: Sequence[Trials], run: Run) -> Screen:
-    return run(look, grounds, tuple(trials), 0, 0.5, 0, LEAST_THRESHOLD)
+def _look(grounds: Grounds, trials: Sequence[Trials]) -> Screen:
+    return look(grounds, trials, 0, 0.5, 0, LEAST_THRESHOLD)
 
 
 def _ways(grounds: Grounds, run: Run, found: Found | None) -> Iterator[tuple[Grounds, float]]:
@@ -215,13 +212,12 @@ def _fitted(
     setting: Setting,
     pair: tuple[str, str],
     supposed: Sequence[Supposed],
-    run: Run,
 ) -> Grounds | None:
     """The grounds with a pair exchanged, base and effects fitted anew; None without a fit."""
     start = grounds.start
     models = {**start.models, **_models(start.models, pair)}
     again = hypothesis(models, start.base, supposed, grounds.tests, start.bound)
-    fit: JointFit = run(joint_fit, again, setting)
+    fit = joint_fit(again, setting)
     if not fit.usable:
         return None
     plain = {**grounds.plain, pair[0]: grounds.plain[pair[1]], pair[1]: grounds.plain[pair[0]]}

@@ -33,6 +33,10 @@ SIZES = np.array([0.03, 0.1, 0.2, 0.35, 0.6, 1.0])
 """Of one prior SD."""
 
 
+Both = tuple[Placed | str, Placed | str]
+"""A part as base and model with effects have it, or why a fit has no start."""
+
+
 class NoFold(RuntimeError):
     """A fold's fit has no start; the message says why."""
 
@@ -78,7 +82,13 @@ class FoldModels:
         except NoEquilibrium as trouble:
             return None, f"no surrogate: {trouble}"
 
-    def predictions(self, fold: Fold, part: Part) -> Predictions:
+    def placed(self, parts: Sequence[Part]) -> list[Both]:
+        """Each part as base and model with effects have it, before it is said what counts."""
+        base = self._placed(self.grounds[0], self.base, parts)
+        final = self._placed(self.grounds[1], self.final, parts) if self.named else base
+        return list(zip(base, final, strict=True))
+
+    def predictions(self, fold: Fold, part: Part, placed: Both) -> Predictions:
         """A part as each model has it.
 
         Raises
@@ -86,8 +96,11 @@ class FoldModels:
         NoFold
             When a fit by the full simulator has no start.
         """
-        base = self._placed(self.grounds[0], self.base, part)
-        final = self._placed(self.grounds[1], self.final, part) if self.named else base
+        base, final = placed
+        if isinstance(base, str):
+            raise NoFold(base)
+        if isinstance(final, str):
+            raise NoFold(final)
         by_surrogate = None if self.surrogate is None else self.surrogate.placed(part)
         scored = self._scored(fold, part)
         return Predictions(scored, base, final, by_surrogate, self._left_open(part, scored))
@@ -104,10 +117,12 @@ class FoldModels:
                     total += float(np.sum((columns @ covariance[name]) * columns))
         return total
 
-    def _placed(self, grounds: Grounds, linear: LinearFolds, part: Part) -> Placed:
+    def _placed(
+        self, grounds: Grounds, linear: LinearFolds, parts: Sequence[Part]
+    ) -> Sequence[Placed | str]:
         if self.refit:
-            return refitted(grounds, linear.model, part, self.run)
-        return linear.placed(part)
+            return self.run.map(refitted, [(grounds, linear.model, part) for part in parts])
+        return [linear.placed(part) for part in parts]
 
     def _scored(self, fold: Fold, part: Part) -> Masks:
         """Readings left out; of an unseen test those that the training determines in both models.
@@ -145,23 +160,25 @@ class FoldModels:
         }
 
 
-def refitted(grounds: Grounds, linear: LinearModel, part: Part, run: Run) -> Placed:
-    """The scored specimens as fits to the training have them.
+def refitted(grounds: Grounds, linear: LinearModel, part: Part) -> Placed | str:
+    """The scored specimens as fits to the training have them, or why one has no start.
 
     Parameters
     ----------
     linear : the grounds' fit to first order; its nuisances are used.
-
-    Raises
-    ------
-    NoFold
-        When a fit has no start.
     """
+    try:
+        return _refitted(grounds, linear, part)
+    except NoFold as trouble:
+        return str(trouble)
+
+
+def _refitted(grounds: Grounds, linear: LinearModel, part: Part) -> Placed:
     hypothesis = grounds.fit.hypothesis
     count = len(hypothesis.unknowns)
     free, x = np.arange(count), np.zeros(count)
     if part.apart is None:
-        _, fit = _fitted(grounds, linear, part, list(hypothesis.members), free, x, run)
+        _, fit = _fitted(grounds, linear, part, list(hypothesis.members), free, x)
     else:
         numbers = {
             name: np.array(one.numbers, dtype=np.int64) for name, one in hypothesis.members.items()
@@ -169,8 +186,8 @@ def refitted(grounds: Grounds, linear: LinearModel, part: Part, run: Run) -> Pla
         own = own_unknowns(numbers, part.apart)
         others = [name for name in hypothesis.members if name != part.apart]
         # own values stay at the full fit: no training tells them yet, priors would switch them off
-        x, _ = _fitted(grounds, linear, part, others, np.setdiff1d(free, own), x, run)
-        _, fit = _fitted(grounds, linear, part, [part.apart], own, x, run)
+        x, _ = _fitted(grounds, linear, part, others, np.setdiff1d(free, own), x)
+        _, fit = _fitted(grounds, linear, part, [part.apart], own, x)
     nuisances = {name: _nuisances(grounds, linear, part, name, fit) for name in part.scored}
     return Placed({name: fit.predicted[name] for name in part.scored}, nuisances)
 
@@ -182,7 +199,6 @@ def _fitted(
     specimens: Sequence[str],
     free: Indices,
     x: Array,
-    run: Run,
 ) -> tuple[Array, JointFit]:
     """Moves from the full fit after a fit of the free unknowns, others as in x; and that fit."""
     start = _again(grounds.fit, linear, specimens, free, x)
@@ -193,7 +209,7 @@ def _fitted(
         readings[name] = replace(one, tests=tests)
         plain = whitening(tests, grounds.noise)
         whitenings[name] = with_nuisances(plain, linear.members[name].nuisances)
-    fit = run(joint_fit, start, Setting(readings, whitenings, grounds.noise.zeroed))
+    fit = joint_fit(start, Setting(readings, whitenings, grounds.noise.zeroed))
     if not fit.usable:
         raise NoFold(fit.status)
     ended = x.copy()

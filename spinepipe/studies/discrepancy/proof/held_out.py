@@ -7,13 +7,14 @@ which costs next to nothing.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.proof.fold_linear import Placed
-from spinepipe.studies.discrepancy.proof.fold_models import FoldModels, NoFold, Predictions
+from spinepipe.studies.discrepancy.proof.fold_models import Both, FoldModels, NoFold, Predictions
 from spinepipe.studies.discrepancy.proof.folds import (
     STEPS,
     Chosen,
@@ -202,14 +203,28 @@ def proven(
         folds += folds_by_test(readings, tests)
     if asked.specimens:
         folds += folds_by_specimen(readings)
-    rows = [_row(models, fold, number, motion) for number, fold in enumerate(folds)]
+    rows = _rows(models, folds, 0, motion)
     if asked.tests and len(readings) == 1 and not together(rows, motion).tells:
-        rows.append(_row(models, step_fold(readings), len(rows), motion))
+        rows += _rows(models, [step_fold(readings)], len(rows), motion)
     return together(rows, motion)
 
 
+def _rows(
+    models: FoldModels, folds: Sequence[Fold], first: int, motion: Mapping[str, HeldOutMotion]
+) -> list[FoldRow]:
+    placed = iter(models.placed([part for fold in folds for part in fold.parts]))
+    return [
+        _row(models, fold, number, list(islice(placed, len(fold.parts))), motion)
+        for number, fold in enumerate(folds, first)
+    ]
+
+
 def _row(
-    models: FoldModels, fold: Fold, number: int, motion: Mapping[str, HeldOutMotion]
+    models: FoldModels,
+    fold: Fold,
+    number: int,
+    placed: Sequence[Both],
+    motion: Mapping[str, HeldOutMotion],
 ) -> FoldRow:
     count = sum(
         int(test.sum())
@@ -218,7 +233,8 @@ def _row(
         for test in tests
     )
     try:
-        parts = [models.predictions(fold, part) for part in fold.parts]
+        pairs = zip(fold.parts, placed, strict=True)
+        parts = [models.predictions(fold, part, both) for part, both in pairs]
     except NoFold as trouble:
         return FoldRow(fold.name, fold.kind, 0, count, None, None, None, 0.0, NO_FIT, str(trouble))
     for part in parts:

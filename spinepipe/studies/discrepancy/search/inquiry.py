@@ -244,7 +244,7 @@ class Inquiry:
     def refit(self, grounds: Grounds, one: Supposed) -> Refit:
         """One form beside those of the grounds' fit."""
         trials = next(t for t in self.rules.trials if t.effect == one.form.name)
-        return refit(grounds, one, trials, self.run)
+        return self.run(refit, grounds, one, trials)
 
     def beside(self, current: Grounds, others: tuple[Supposed, ...]) -> Grounds | None:
         """Grounds with these of the current effects alone; None where they have no fit.

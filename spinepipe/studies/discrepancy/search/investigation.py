@@ -102,8 +102,7 @@ def investigate(ready: Prepared, run: Run, progress: Progress | None = None) -> 
     study, rules = ready.study, _rules(ready)
     grounds = base_fitted(ready, run)
     found = search(grounds, rules, run, progress)
-    for fit in (found.base.fit, found.final.fit):
-        run(on_record, fit, grounds.readings)
+    on_record([found.base.fit, found.final.fit], grounds.readings, run)
     errors = suspected_errors(grounds, ready.measured, run, rules.trials, found)
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
@@ -135,21 +134,20 @@ def _with_sure_effects(one: Investigation, asked: Asked, run: Run) -> Investigat
     if not fit.usable:
         return one
     found = one.found.with_only(kept, fit)
-    run(on_record, fit, one.grounds.readings)
+    on_record([fit], one.grounds.readings, run)
     return replace(one, found=found, proof=held_out(found, asked, run))
 
 
-def on_record(fit: JointFit, readings: Mapping[str, SpecimenReadings]) -> int:
-    """Solve all that a fit predicts by the engine of record; how many specimens agree.
+def on_record(fits: Sequence[JointFit], readings: Mapping[str, SpecimenReadings], run: Run) -> None:
+    """Solve all that fits predict by the engine of record, specimen by specimen.
 
     Raises
     ------
     Disagreement
         Where it differs by more than rounding.
     """
-    for name, model in fit.models.items():
-        recorded(model, readings[name].cases)
-    return len(fit.models)
+    models = [(name, model) for fit in fits for name, model in fit.models.items()]
+    run.map(recorded, [(model, readings[name].cases) for name, model in models])
 
 
 def _read_coordinates(study: Discrepancy, cohort: Cohort) -> tuple[str, ...]:

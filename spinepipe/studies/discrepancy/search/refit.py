@@ -76,14 +76,11 @@ def refits(
     by_name = {one.effect: one for one in trials}
     there = {one.form.variant for one in standing(grounds.fit)}
     new = [tried for tried in leading(screen) if tried.form.variant not in there]
-    found = [
-        refit(grounds, started(tried), by_name[tried.form.name], run)
-        for tried in progress.through(new, "refits")
-    ]
-    found += [
-        refit(grounds, simple, by_name[simple.form.name], run)
-        for simple in _simpler(found, screen, standing(grounds.fit))
-    ]
+    if new:
+        progress.round(f"{len(new)} forms are refitted")
+    found = run.map(refit, [(grounds, started(t), by_name[t.form.name]) for t in new])
+    simpler = list(_simpler(found, screen, standing(grounds.fit)))
+    found += run.map(refit, [(grounds, one, by_name[one.form.name]) for one in simpler])
     return preferred(found)
 
 
@@ -233,7 +230,7 @@ def _value(p: Parameter, sds: float) -> float:
     return float(np.clip(value, p.low if p.logarithmic else p.low + margin, p.high - margin))
 
 
-def refit(grounds: Grounds, one: Supposed, trials: Trials, run: Run) -> Refit:
+def refit(grounds: Grounds, one: Supposed, trials: Trials) -> Refit:
     """One more form beside those of the grounds' fit.
 
     What tips the segment over where it starts is tried again closer to off.
@@ -241,7 +238,7 @@ def refit(grounds: Grounds, one: Supposed, trials: Trials, run: Run) -> Refit:
     before = grounds.fit
     for share in STARTS:
         supposed = (*standing(before), weaker(one, share))
-        fit = run(joint_fit, grounds.suppose(supposed), grounds.setting, before.poses)
+        fit = joint_fit(grounds.suppose(supposed), grounds.setting, before.poses)
         if fit.usable:
             break
     if not fit.usable or _degenerate(fit, len(supposed) - 1):
