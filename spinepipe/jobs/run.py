@@ -68,7 +68,7 @@ def run_job(
         try:
             submit_and_wait(name, function, str(log), read, **arguments)
         except WorkerDied as death:
-            if job != BLOCK or "block" not in wildcards:
+            if job != BLOCK or "block" not in wildcards.keys():  # of a list of Snakemake's
                 raise JobFailed(str(death)) from None
             _one_by_one(project, name, function, wildcards, str(log), arguments)
             submit_and_wait(name, function, str(log), read, **arguments)
