@@ -30,7 +30,7 @@ def run_job(
     project: Project,
     job: str,
     rule: str,
-    wildcards: Mapping[str, str],
+    wildcards: Any,
     input: Any,
     output: Any,
     params: Any,
@@ -51,13 +51,14 @@ def run_job(
         With the job's name, why it failed, and where its log is.
     """
     inputs, outputs = [str(path) for path in input], [str(path) for path in output]
-    name = " ".join([rule, *(f"{key}={value}" for key, value in wildcards.items())])
+    place = dict(wildcards.items())  # Snakemake's own is a list
+    name = " ".join([rule, *(f"{key}={value}" for key, value in place.items())])
     forced = project.plans and any(option in sys.argv for option in _FORCE)
     if forced or not project.plans or not _carry(outputs, params.digest):
         named = {key: _plain(files) for key, files in [*input.items(), *output.items()]}
         others = {key: value for key, value in params.items() if key not in _OF_RULES}
-        kind = project.expected(wildcards["study"]).study.kind
-        arguments = {"root": project.root, **others, **wildcards, **named}
+        kind = project.expected(place["study"]).study.kind
+        arguments = {"root": project.root, **others, **place, **named}
         function, read = job, []
         if ":" not in job:
             function = function_of(kind, job)
@@ -68,9 +69,9 @@ def run_job(
         try:
             submit_and_wait(name, function, str(log), read, **arguments)
         except WorkerDied as death:
-            if job != BLOCK or "block" not in wildcards.keys():  # of a list of Snakemake's
+            if job != BLOCK or "block" not in place:
                 raise JobFailed(str(death)) from None
-            _one_by_one(project, name, function, wildcards, str(log), arguments)
+            _one_by_one(project, name, function, place, str(log), arguments)
             submit_and_wait(name, function, str(log), read, **arguments)
         if not _carry(outputs, params.digest):
             raise JobFailed(
@@ -84,7 +85,7 @@ def _one_by_one(
     project: Project,
     name: str,
     function: str,
-    wildcards: Mapping[str, str],
+    place: Mapping[str, str],
     log: str,
     arguments: Mapping[str, Any],
 ) -> None:
@@ -95,9 +96,9 @@ def _one_by_one(
     JobFailed
         With what each of those said that failed.
     """
-    expected = project.expected(wildcards["study"])
-    table, failed = wildcards["table"], []
-    for path in expected.files.job_files(table, wildcards["specimen"], wildcards["block"]):
+    expected = project.expected(place["study"])
+    table, failed = place["table"], []
+    for path in expected.files.job_files(table, place["specimen"], place["block"]):
         if mark_in(path) != expected.of_part(table, path):
             try:
                 submit_and_wait(f"{name} {path}", function, log, **{**arguments, "output": path})
