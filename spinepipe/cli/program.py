@@ -21,6 +21,7 @@ COMMANDS = {
     "show": "print a specimen and draw it",
     "doctor": "test whether this computer can run the studies",
     "export": "write a specimen's model as an OpenSim file",
+    "archive": "pack a computed study as a zip, for the supplement of a paper",
     "docs": "write the generated parts of the documentation",
 }
 

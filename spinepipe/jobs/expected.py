@@ -3,6 +3,7 @@
 A job writes the mark of what it read; here is told beforehand what that will be.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -80,7 +81,21 @@ class Expected:
         """The mark of a table, or of another result by its name with a dot."""
         if name in (*self.files.made_of_jobs, *self.files.by_specimen):
             return self.of_table(name)
-        return self.of_job(kind_of(self.study.kind).maker(name).name, {})
+        kind, place = kind_of(self.study.kind), {}
+        for pattern in (made for job in kind.jobs for made in job.makes if "{" in made):
+            form = re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>[^/]+)", re.escape(pattern))
+            if found := re.fullmatch(form, name):
+                name, place = pattern, found.groupdict()
+        return self.of_job(kind.maker(name).name, place)
+
+    def of_file(self, path: str) -> str:
+        """The mark of a file that a reader wants to have, one of `StudyFiles.results`."""
+        name = path.removeprefix(f"{self.files.folder}/")
+        if name.startswith("figures/"):
+            return self.of_figure(Path(name).stem)
+        if name.endswith(".html"):
+            return self.of_report(Path(name).stem)
+        return self.of_result(name.removesuffix(".parquet"))
 
     def _of_results(self, names: Sequence[str], full: bool) -> list[str]:
         return [self.of_result(name) for name in self.files.has(names, full)]

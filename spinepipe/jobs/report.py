@@ -9,6 +9,7 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import mark_of, report_digest
 from spinepipe.jobs.inputs import study_of
@@ -17,6 +18,7 @@ from spinepipe.report.page.document import Picture, Results
 from spinepipe.report.words import listed
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
+from spinepipe.studies.study import Study
 from spinepipe.tables import Tables, read_metadata
 
 
@@ -44,15 +46,22 @@ def run(
     read += [_text(path) for path in captions]
     digest = report_digest(page, settings, cohort, read)
     write_marked(document.html(settings, cohort), output, digest)
-    folder, has = Path(output).parent, files_of(settings, cohort).tables
+    folder = Path(output).parent
+    told = descriptor_of(settings, cohort, folder)
+    with appearing(folder / FILE) as temporary:
+        temporary.write_text(told, "utf-8")
+
+
+def descriptor_of(study: Study, cohort: Cohort, folder: Path) -> str:
+    """What the tables are that a study has in its folder by now, as a Data Package."""
+    has = files_of(study, cohort).tables
     shapes = [
         (shape, f"{shape.name}.parquet")
-        for shape in kind_of(settings.kind).tables
+        for shape in kind_of(study.kind).tables
         if shape.name in has and (folder / f"{shape.name}.parquet").is_file()
     ]
-    title = f"Results of the study {study} ({settings.kind}) of the cohort {cohort.name}"
-    with appearing(folder / FILE) as temporary:
-        temporary.write_text(descriptor(study, title, shapes), "utf-8")
+    title = f"Results of the study {study.study} ({study.kind}) of the cohort {cohort.name}"
+    return descriptor(study.study, title, shapes)
 
 
 def results_of(

@@ -93,7 +93,7 @@ KIND = Kind(
     checks_of_files=(BaseCheck(own_bushings=False),),
     tables=all_declared(__file__),
     # every setting says something about the search
-    jobs=(Job("search", at="job", reads_base=True, makes=(*TABLES, VERDICT)),),
+    jobs=(Job("search", at="job", reads_base=True, makes=(*TABLES, *OTHERS)),),
     makes_models="search",
     holds=True,
     exports="export:exported",

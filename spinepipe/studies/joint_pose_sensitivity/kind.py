@@ -319,6 +319,7 @@ _SAMPLED = (
         "start_model",
         ignores=ignoring("calibration", *_SOLVING, *_GROUPING, *_PARTS),
         header_alone=True,
+        makes=("model.yaml",),
     ),
     Job(
         "sample_landmarks",
