@@ -42,7 +42,7 @@ def run(
     """
     expected = Expected(root, *study_of(root, study))
     place = place_of(output)
-    given = {name: value for name, value in inputs.items() if name not in place}
+    given = {name: value for name, value in inputs.items() if name not in (*place, "block")}
     given |= {"root": root, "study": study, "specimen": specimen}
     if "block" not in place:
         _make(expected, table, [output], given)

@@ -1,18 +1,19 @@
 """How a job of a rule is run: what is there is kept, what is made is looked at.
 
 A job whose files all carry the mark that they must have has nothing to do, whatever made Snakemake
-start it: its files are dated anew. After a job its files are looked at: another mark means that
-settings, data or code have changed since the run was planned, and the job has failed.
+start it; Snakemake dates its files anew. After a job its files are looked at: another mark means
+that settings, data or code have changed since the run was planned, and the job has failed.
 """
 
 import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from spinepipe.jobs.pool import JobFailed, WorkerDied, submit_and_wait
-from spinepipe.jobs.project import Project
+from spinepipe.jobs.project import Project, warn
 from spinepipe.marks import mark_in
 from spinepipe.studies.registry import kind_of
 from spinepipe.studies.registry import place_of as function_of
@@ -78,7 +79,7 @@ def run_job(
                 f"job {name}: settings, data or code have changed since this run was planned. Run "
                 "the same command again"
             )
-    _date(outputs, inputs)
+    _date_back(inputs)
 
 
 def _one_by_one(
@@ -112,12 +113,13 @@ def _carry(paths: Sequence[str], mark: str) -> bool:
     return all(mark_in(path) == mark for path in paths)
 
 
-def _date(outputs: Sequence[str], inputs: Sequence[str]) -> None:
-    """Date files as made now, and not before what they are made of, whatever clocks say."""
-    there = (os.stat(path).st_mtime_ns for path in inputs if os.path.exists(path))
-    now = max([time.time_ns(), *there])
-    for path in outputs:
-        os.utime(path, ns=(now, now))
+def _date_back(inputs: Sequence[str]) -> None:
+    """Date as now what is dated in the future: Snakemake would end the run for it."""
+    for path in inputs:
+        with suppress(OSError):
+            if os.stat(path).st_mtime > time.time():
+                os.utime(path)
+                warn(f"{path} was dated in the future: a clock is or was wrong. It is dated back")
 
 
 def _plain(files: Any) -> Any:

@@ -83,7 +83,7 @@ def test_a_file_that_fails_is_named_and_the_others_are_made(
 
 def test_one_file_is_made_by_its_name(told: Expected) -> None:
     lost = Path(told.files.job_files(TABLE, "a", "003")[1])
-    given = {"frames": "frames.parquet", "stiffness_sets": "sets.parquet", "pose": "0001"}
+    given = {"frames": "frames.parquet", "stiffness_sets": "sets.parquet", "block": "003"}
     block.run(told.root, STUDY, TABLE, "a", str(lost), **given)
     alone = lost.read_bytes()
     assert [path.name for path in lost.parent.iterdir()] == [lost.name]

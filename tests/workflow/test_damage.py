@@ -85,6 +85,7 @@ def test_damaged_and_lost_files_are_computed_again_by_the_same_run_with_the_same
     said = done.run(*ASKED)
     for name in (RANKED, BLOCK):
         assert said.count(f"results/{name} is damaged") == 1
+    assert f"{LATE} was dated in the future" in said
     assert "Traceback" not in said
     assert not (folder / dead).exists()
     assert not sprung.exists()  # nothing that was planted has run
