@@ -7,10 +7,10 @@ from typing import Any
 import pandas as pd
 from small_project import Project, copy_project
 
-from spinepipe.jobs import collect
+from spinepipe.jobs.collect import join_files
 from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.studies.global_sensitivity import analyse, base, calibrate, design, respond
-from spinepipe.studies.global_sensitivity.kind import SensitivityFiles
+from spinepipe.studies.global_sensitivity.kind import KIND, SensitivityFiles
 from spinepipe.studies.read import check
 from spinepipe.tables import read_frame
 
@@ -101,11 +101,11 @@ def tables_of(
         for specimen, block in files.blocks(table):
             if specimen == "a":
                 parts = [path(name) for name in files.job_files(table, specimen, block)]
-                for part in parts:
-                    job(str(root), study, drawn, start, "a", place_of(part)["batch"], part)
+                places = {part: place_of(part) for part in parts}
+                job(str(root), study, drawn, "a", places, start)
                 blocks[table].append(path(files.block_file(table, specimen, block)))
-                marks = [told.of_part(table, part) for part in parts]
-                collect.run("global_sensitivity", table, parts, marks, blocks[table][-1])
+                marks = {part: told.of_part(table, part) for part in parts}
+                join_files(KIND.table(table), marks, blocks[table][-1])
     names = ("indices", "convergence", "failed_runs")
     found = {name: path(f"{files.folder}/{name}.parquet") for name in names}
     analyse.run(str(root), study, drawn, **blocks, specimen="a", **found)

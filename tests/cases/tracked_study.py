@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import pyarrow.parquet as pq
 
-from spinepipe.jobs import collect
+from spinepipe.jobs.collect import join_files
 from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.marks import read_mark
 from spinepipe.studies.read import check
@@ -69,8 +69,8 @@ class Run:
     def join(self, table: str) -> None:
         """Join the job files of a table."""
         inputs = [str(file) for _, file in self.jobs_of(table)]
-        marks = [self.expected.of_part(table, path) for path in inputs]
-        collect.run("tracking", table, inputs, marks, str(self.path_of(table)))
+        marks = {path: self.expected.of_part(table, path) for path in inputs}
+        join_files(KIND.table(table), marks, str(self.path_of(table)))
 
     def analyse(self, name: str) -> None:
         """Run a job that makes a table of tables."""

@@ -59,6 +59,7 @@ BY_NAME = {
     "comparison/papers.py": "the engine in the folder beside the package",
     "studies/doubts.py": "the doubts of a kind",
     "studies/registry.py": "folders of kinds, by a name that is one of them",
+    "jobs/block.py": "the job of a kind that makes the files of a block",
     "jobs/pool.py": "jobs, by names that the rules write",
     "jobs/report.py": "the page of a kind",
     "jobs/draw.py": "a figure that a kind declares",

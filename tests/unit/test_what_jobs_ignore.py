@@ -20,6 +20,9 @@ ASKED = ("settings", "study")
 
 OF_OTHERS = {
     ("cohort_stiffness", "pool"): {"level_stiffness", "nuisance"},  # no pooled fit has them
+    # what ranks its sets: the first two decide of the fits, whose marks it holds, the last is named
+    # in the marks of simulations with a ranked set
+    ("joint_pose_sensitivity", "simulate"): {"calibration", "stiffness", "success"},
     ("tracking", "profile"): {"intervals"},  # has its own, put in their place
 }
 """Asked for by functions that the job shares with others, and only for them."""

@@ -37,7 +37,7 @@ OF_FIT = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors", "n
 
 ASKED = (
     *(f"results/{POSES}/{name}.parquet" for name in ("simulations", "agreement")),
-    f"results/{RANKED}",
+    *(f"results/{name}" for name in (RANKED, FLIPPED, PICKLED)),
     f"results/{FIT}/stiffness.parquet",
     f"results/{MOTION}",
     "all",

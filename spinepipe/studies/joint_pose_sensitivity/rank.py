@@ -15,7 +15,7 @@ def run(root: str, study: str, calibrations: str, output: str) -> None:
     settings, cohort = study_and_cohort(root, study)
     fits = read_frame(calibrations)
     best = {
-        specimen: ranked(settings, fits[fits["specimen"] == specimen])
+        specimen: ranked(settings, fits[fits["specimen"] == specimen])[: settings.best_models]
         for specimen in cohort.specimen_names
     }
     data = with_mark(best, digest_of("rank", settings, cohort))

@@ -11,7 +11,7 @@ from spinepipe.units import STIFFNESS_COLUMNS
 
 
 def ranked(settings: JointPoseSensitivity, calibrations: pd.DataFrame) -> list[dict[str, Any]]:
-    """The best sets of the reduced dataset of a specimen, least cost first.
+    """The sets of the reduced dataset of a specimen, least cost first.
 
     Each with its name, the pose it comes from, cost, and stiffness (J or 1, 6) SI.
 
@@ -31,7 +31,7 @@ def ranked(settings: JointPoseSensitivity, calibrations: pd.DataFrame) -> list[d
             .to_numpy(float)
             .tolist(),
         }
-        for rank, pose in enumerate(costs.index[: settings.best_models], start=1)
+        for rank, pose in enumerate(costs.index, start=1)
     ]
 
 

@@ -6,9 +6,10 @@ import pytest
 from chain_cases import STUDY, Chains
 from cohort_edge_cases import A
 
-from spinepipe.jobs import collect
+from spinepipe.jobs.collect import join_files
 from spinepipe.marks import KEY
 from spinepipe.studies.cohort_stiffness import fit, literature, pool
+from spinepipe.studies.cohort_stiffness.kind import KIND
 from spinepipe.tables import metadata_of, read
 
 DIGESTS = {"code_digest", "config_digest", "data_digest", KEY}
@@ -48,9 +49,9 @@ def test_tables_that_are_joined_carry_all_digests(
 ) -> None:
     """Of the jobs one reads a specimen, another the cohort: what was read has one name in all."""
     files = [part[table] for part in parts if table in part]
-    marks = [metadata_of(read(file))[KEY] for file in files]
+    marks = {file: metadata_of(read(file))[KEY] for file in files}
     output = tmp_path / f"{table}.parquet"
-    collect.run("cohort_stiffness", table, files, marks, str(output))
+    join_files(KIND.table(table), marks, str(output))
     told = metadata_of(read(output))
     assert set(told) >= DIGESTS
     assert all(len(told[name]) == 64 for name in DIGESTS)

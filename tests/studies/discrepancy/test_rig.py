@@ -3,10 +3,8 @@
 The data are made by one line of algebra, F = k q (1 + c q^2), with all rotations blocked.
 """
 
-from collections.abc import Callable
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -29,6 +27,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
 )
 from spinepipe.studies.discrepancy.search.regions import estimated
 from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import Answer
 
 STEPS_MM = np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 1.4, 0.6])
@@ -53,10 +52,6 @@ specimen,test,joint,coordinate,state,reaction
 STUDY = Discrepancy(
     study="rig", kind="discrepancy", cohort="rig", base={"stiffness": "per_specimen"}
 )
-
-
-def plain_run(function: Callable[..., Any], *arguments: Any) -> Any:
-    return function(*arguments)
 
 
 def force(q_mm: np.ndarray, growth_per_mm2: float) -> np.ndarray:
@@ -93,7 +88,7 @@ def written(
 
 def laid(cohort: Cohort) -> tuple[Prepared, Grounds]:
     ready = prepared(STUDY, cohort, None)
-    return ready, base_fitted(ready, plain_run)
+    return ready, base_fitted(ready, at_once)
 
 
 def test_what_is_read_and_what_is_not(tmp_path: Path) -> None:
@@ -178,7 +173,7 @@ def searched(folder: Path, growth_per_mm2: float) -> Investigation:
     cohort, _ = written(folder, growth_per_mm2, FORCE_SD, "abcd")
     few = ("nonlinear_stiffening", "neutral_zone", "flexion_extension_asymmetry")
     study = STUDY.model_copy(update={"effects": few})
-    return investigate(prepared(study, cohort, None), plain_run)
+    return investigate(prepared(study, cohort, None), at_once)
 
 
 def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) -> None:

@@ -176,7 +176,7 @@ def test_samples_start_from_the_fit(tmp_path: Path) -> None:
     assert base_stiffness(found.paths[0])[3] == found.of("extension")["stiffness"]
     root, files = str(tmp_path), [str(tmp_path / f"{n}.parquet") for n in ("drawn", "runs")]
     design.run(root, "based", files[0])
-    respond.run(root, "based", files[0], [found.paths[0]], "a", "0", files[1])
+    respond.run(root, "based", files[0], "a", {files[1]: {"batch": "0"}}, [found.paths[0]])
     rows = read_frame(files[1])
     turned = rows[rows["test"] == "flexion"]["predicted_extension_deg"]
     assert turned.between(-1.15 * 3.44, -0.85 * 3.44).all()

@@ -8,6 +8,7 @@ change places between the jobs; the estimators by themselves are looked at in
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from known_indices import ishigami, morris_truth
@@ -42,18 +43,30 @@ outputs: {{motion: [extension], joint_load: []}}
 
 
 def in_place_of_a_solve(
-    root: str, study: str, design: str, base: list[str], specimen: str, batch: str, output: str
+    root: str,
+    study: str,
+    design: str,
+    specimen: str,
+    parts: dict[str, dict[str, str]],
+    base: list[str],
 ) -> None:
     """Ishigami's function of the first three factors."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     size = settings.batch_size(1)
     values = pq.read_table(design).column("value").to_numpy().reshape(settings.n_runs, -1)
-    part = values[int(batch) * size : (int(batch) + 1) * size]
+    read = [mark_of(path) for path in (design, *base)]
+    known = provenance("respond", settings, cohort, [specimen], [str(size), *read])
+    for output, place in parts.items():
+        write(_responses(values, size, int(place["batch"])), output, known)
+
+
+def _responses(values: np.ndarray, size: int, batch: int) -> pa.Table:
+    part = values[batch * size : (batch + 1) * size]
     x, y, z = part[:, :3].T
     table = RESPONSES.without("specimen")
     columns = {column.name: [0.0] * len(part) for column in table.columns}
     columns.update(
-        sample=[int(batch) * size + number for number in range(len(part))],
+        sample=[batch * size + number for number in range(len(part))],
         test=["push"] * len(part),
         step=[1] * len(part),
         joint=["V1V2"] * len(part),
@@ -61,9 +74,7 @@ def in_place_of_a_solve(
         status=["converged"] * len(part),
         message=[""] * len(part),
     )
-    read = [mark_of(path) for path in (design, *base)]
-    known = provenance("respond", settings, cohort, [specimen], [str(size), *read])
-    write(to_arrow(table, columns), output, known)
+    return to_arrow(table, columns)
 
 
 @pytest.fixture(scope="module")

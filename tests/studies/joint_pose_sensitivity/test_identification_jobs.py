@@ -262,7 +262,7 @@ class Run:
             write_rows(self.folder / f"{name}.parquet", TABLES[name], rows.to_dict("records"))
         fits, judged = self._files("calibrations", "success")
         success.success(self.root, STUDY, [fits], judged)
-        rank.run(self.root, STUDY, fits, judged, self.best)
+        rank.run(self.root, STUDY, fits, self.best)
 
     @property
     def best(self) -> str:

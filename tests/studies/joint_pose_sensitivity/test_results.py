@@ -4,18 +4,14 @@ What would be caught: simulations with another stiffness or pose than they are f
 hang on more of the ranking than the set that they take from it.
 """
 
-import json
-import shutil
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pyarrow.dataset as ds
 import pytest
 from small_project import Project
 
-from spinepipe.jobs.expected import Expected
-from spinepipe.marks import read_json, read_mark, with_mark
+from spinepipe.marks import read_json
+from spinepipe.studies.joint_pose_sensitivity.ranking import ranked
 from spinepipe.studies.read import check
 from spinepipe.units import COORDINATE_COLUMNS
 
@@ -47,21 +43,13 @@ def test_job_files_open_as_one_data_set(eight: Project) -> None:
     assert set(jobs["pose"].to_pylist()) == set(rows["pose"])
 
 
-def test_a_simulation_hangs_on_its_own_set_of_the_ranking(eight: Project, tmp_path: Path) -> None:
+def test_simulations_are_with_the_sets_of_the_ranking(eight: Project) -> None:
+    """That each specimen's own calibrations give, as `best.json` has them for people."""
     study = "joint_pose_sensitivity"
-    shutil.copytree(eight.path("config"), tmp_path / "config")
-    best = tmp_path / f"results/{study}/best.json"
-    best.parent.mkdir(parents=True)
-    shutil.copy(eight.path(f"results/{study}/best.json"), best)
-
-    def marks() -> dict[str, str]:
-        told = Expected(str(tmp_path), *check(tmp_path, study))
-        place = {"specimen": "s01", "pose": "0000"}
-        names = ("best01", "best02", "calibrated")
-        return {name: told.of_job("simulate", {**place, "stiffness": name}) for name in names}
-
-    before, ranked, mark = marks(), read_json(best), read_mark(best)
-    ranked["s01"][1]["stiffness"] = ranked["s01"][0]["stiffness"]
-    best.write_text(json.dumps(with_mark(ranked, mark), indent=1))
-    after = marks()
-    assert {name for name in before if before[name] != after[name]} == {"best02"}
+    settings, _ = check(eight.folder, study)
+    fits = table(eight, "calibrations")
+    best = read_json(eight.path(f"results/{study}/best.json"))
+    assert set(best) == {"s01"}
+    assert best["s01"] == ranked(settings, fits)[: settings.best_models]
+    names = {one["name"] for one in best["s01"]}
+    assert set(table(eight, "simulations")["stiffness"]) == {"calibrated", *names}

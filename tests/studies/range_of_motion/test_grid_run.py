@@ -61,4 +61,6 @@ def test_other_draws_of_stiffness_leave_the_frames_alone(eight: Project, tmp_pat
     planned = grid.planned()
     assert f"{STUDY}/stiffness_sets.parquet" in planned
     assert not [name for name in planned if "frames" in name]
-    assert jobs(planned) == jobs(set(grid.files()))
+    blocks = {name for name in grid.files() if "/blocks/range_of_motion/" in name}
+    assert blocks
+    assert blocks <= planned

@@ -131,8 +131,8 @@ def moved(root: Path, pose: int = 0, stiffness: int = 0, specimen: str = "a") ->
     load_steps.asked_tests.cache_clear()  # a test changes its study in no time
     sample_frames.sample_frames(str(root), STUDY, specimen, frames)
     draw_stiffness.draw_stiffness(str(root), STUDY, sets)
-    place = (specimen, f"{pose:04d}", f"{stiffness:02d}")
-    simulate.run(str(root), STUDY, frames, sets, *place, output)
+    place = {"pose": f"{pose:04d}", "stiffness": f"{stiffness:02d}"}
+    simulate.run(str(root), STUDY, frames, sets, specimen, {output: place})
     return read_frame(output)
 
 
