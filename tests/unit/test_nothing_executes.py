@@ -49,6 +49,7 @@ SUSPICIOUS = re.compile(
 """Words without which a file need not be looked at closely."""
 
 PROGRAMS = {
+    "cli/archive.py": "git, for the commit of the code",
     "cli/doctor.py": "starts this very Python, to see whether the engine crashes",
     "jobs/if_changed.py": "starts the command that it is given, which is Snakemake",
 }
