@@ -9,13 +9,14 @@ import random
 import shutil
 import signal
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from small_project import Project
 from small_studies import of_kind
 
-from tests.validation.soak.started import Cost, seen, start, timed
+from tests.validation.soak.started import Cost, start, timed
 
 STEPS = 200
 SEED = 41
@@ -59,6 +60,7 @@ class Sequence:
         way = self.draw.choice(WAYS)
         self.steps[way] += 1
         getattr(self, f"_{way}")()
+        print(f"step {number}: {way}; {len(self.differ)} tables differ so far", flush=True)
         if way == "kill":
             return
         run = timed(self.project, *TARGETS)
@@ -80,14 +82,23 @@ class Sequence:
         """Change something, then kill everything after a drawn number of further files."""
         self._change()
         until = self.draw.randint(1, 40)
-        before = seen(self.project) if self.project.path("results").is_dir() else {}
+        before = self._written()
         with start(self.project, *TARGETS) as run:
             while run.process.poll() is None:
-                now = seen(self.project) if self.project.path("results").is_dir() else {}
+                now = self._written()
                 if sum(before.get(name) != state for name, state in now.items()) >= until:
                     run.process.send_signal(signal.SIGKILL)
                     run.kill_all()
                     return
+
+    def _written(self) -> dict[str, int]:
+        """Result files by number on the disk; what goes while one looks is left out."""
+        found = {}
+        for folder, _, names in os.walk(self.project.path("results/probe")):  # bears with that
+            for path in (os.path.join(folder, name) for name in names):
+                with suppress(FileNotFoundError):
+                    found[path] = os.stat(path).st_ino
+        return found
 
     def _damage(self) -> None:
         """One bit of one file, its age kept."""
