@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from spinepipe.cli import check_results
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort, Reader
+from spinepipe.marks import mark_in
 from spinepipe.problems import InputError, Problem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
 from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.free import unmeasured
 from spinepipe.studies.read import ReadCohort
-from spinepipe.studies.registry import PACKAGE, every_form, kind_of
+from spinepipe.studies.registry import PACKAGE, every_form, files_of, kind_of
 from spinepipe.studies.study import COHORTS, Study
 
 
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     """Print one line for what is sound and all problems of what is not."""
     root: Path = options.root
     if options.results:
-        return check_results.run(root, options.names)
+        return _run_results(root, options.names)
     told: set[Problem] = set()
     warned: dict[str, tuple[Problem, ...]] = {}
     if not options.names:
@@ -56,6 +56,31 @@ def run(options: argparse.Namespace) -> int:
         number = sum(map(len, warned.values()))
         print(f"\n{count(number, 'warning')} in all, which stop no run: look at the files first.")
     return 0 if all(sound) else 1
+
+
+def _run_results(root: Path, names: list[str]) -> int:
+    """Remove result files of studies that are not as they were written, and say which.
+
+    A run asks the files that it needs; this asks all that a study declares, also job files whose
+    rows are in a table already. Files of somebody else's and links are left alone.
+    """
+    known = study_names(root)
+    if strange := [name for name in names if name not in known]:
+        raise InputError([unknown("study", name, known) for name in strange])
+    computed = [name for name in names or known if (root / "results" / name).is_dir()]
+    damaged, sound = [], 0
+    for name in computed:
+        for path in files_of(*studies.check(root, name, starting=False)).every():
+            mark = None if (root / path).is_symlink() else mark_in(root / path)
+            sound += bool(mark)
+            damaged += [path] if mark == "" else []
+    for path in damaged:
+        (root / path).unlink()
+        print(f"FAIL  {path}: damaged, cut off, empty or of an older version; removed")
+    print(f"{count(sound, 'result file')} as written, {len(damaged)} removed.")
+    if damaged:
+        print("`snakemake all` computes them again.")
+    return 1 if damaged else 0
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ TUNED = {
     "max-jobs-per-timespan": "100000/1h",
     "nolock": "true",
 }
-"""Options without which a run takes many times longer."""
+"""Options without which a run takes many times longer, waits at its end, or leaves a lock."""
 
 LARGEST_ERROR = 1e-9
 """Relative; Newton ends below 1e-9 rad of the closed form."""

@@ -102,9 +102,7 @@ class Expected:
 
     def of_figure(self, name: str) -> str:
         """The mark of a figure."""
-        figure = self.files.figure(name)
-        full = bool(set(figure.tables) & set(self.files.full))
-        read = self._of_results((*figure.reads, *figure.also), full)
+        read = [self.of_result(one) for one in self.files.read_by_figure(name)]
         return self._once(
             ("figure", name), lambda: figure_digest(name, self.study, self.cohort, read)
         )

@@ -16,14 +16,16 @@ from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
 from spinepipe.files import appearing, refusal, sweep
+from spinepipe.jobs import code
 from spinepipe.jobs.digest import versions
 from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.pool import warm_up
 from spinepipe.jobs.run_lock import AtWork, lock
 from spinepipe.marks import mark_in
 from spinepipe.problems import InputError
 from spinepipe.studies import read as studies
 from spinepipe.studies.doubts import doubts, refusals
-from spinepipe.studies.registry import kind_names
+from spinepipe.studies.registry import kind_names, modules_of_many
 from spinepipe.studies.study_files import StudyFiles
 
 OUTDATED = ".snakemake/changed_settings_data_or_code"
@@ -75,7 +77,6 @@ class Project:
                 f"{kept.resolve()} cannot be written, where Snakemake keeps its record. Change its "
                 "permissions or owner, or copy the project to a folder of your own."
             )
-
         if self.plans:
             _drop_damaged(Path(RECORD))
 
@@ -161,10 +162,8 @@ class Project:
     def inputs_of_figure(self, place: Any) -> dict[str, Any]:
         """Tables and other results that a figure is drawn from."""
         files = self.files(place.study)
-        figure = files.figure(place.figure)
-        full = bool(set(figure.tables) & set(files.full))
-        tables = files.table_files((*figure.reads, *figure.also), full)
-        return {"tables": tables, **files.other_files(figure.reads)}
+        read = tuple(files.read_by_figure(place.figure))
+        return {"tables": files.table_files(read), **files.other_files(read)}
 
     def inputs_of_page(self, place: Any) -> dict[str, Any]:
         """All that a page shows."""
@@ -179,8 +178,10 @@ class Project:
 
     def outdated(self, files: Iterable[str], mark: str) -> list[str]:
         """Nothing if the files that are there carry a mark, else an input newer than they."""
+        if not self.plans:  # what a started process is to make was decided by the one that plans
+            return []
         wrong = [path for path in files if self._mark_in(path) not in (None, mark)]
-        if not wrong or not self.plans:
+        if not wrong:
             return []
         newest = max(os.stat(path).st_mtime for path in wrong)
         now = time.time()
@@ -222,9 +223,8 @@ class Project:
                     f"results cannot be written to {folder.resolve()}: {why}. Make room or change "
                     "permissions, then run again (finished jobs are kept)."
                 )
-        asked = [self.expected(name).cohort for name in self.at_work]
-        threading.Thread(target=_stop_timers).start()
-        cohorts = {cohort.digest: cohort for cohort in asked}
+        at_work = [self.expected(name) for name in self.at_work]
+        cohorts = {one.cohort.digest: one.cohort for one in at_work}
         for doubt in (doubt for cohort in cohorts.values() for doubt in doubts(cohort)):
             warn(doubt)
         refused = [str(one) for cohort in cohorts.values() for one in refusals(cohort)]
@@ -234,16 +234,18 @@ class Project:
             warn(f"so do {len(self._lost) - _MOST_NAMED} more files below results")
         for name in self.at_work:
             sweep(f"results/{name}")
+        code.keep()  # workers then read no source file for its digest
+        warm_up(modules_of_many({one.study.kind for one in at_work}))
+        threading.Thread(target=_stop_timers).start()
 
     def end(self) -> None:
         """Remove the empty logs that Snakemake leaves for every job that went well.
 
         A folder of logs that is a link is somebody's own.
         """
-        for logs in (f"results/{name}/logs" for name in self.at_work):
-            for folder, _, files in (
-                os.walk(logs, topdown=False) if not os.path.islink(logs) else ()
-            ):
+        places = (f"results/{name}/logs" for name in self.at_work)
+        for logs in (place for place in places if not os.path.islink(place)):
+            for folder, _, files in os.walk(logs, topdown=False):
                 for path in (os.path.join(folder, file) for file in files):
                     if not os.path.getsize(path):
                         os.unlink(path)

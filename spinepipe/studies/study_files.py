@@ -143,6 +143,12 @@ class StudyFiles(ABC):
         """The file of what is said below a figure."""
         return f"spinepipe/studies/{self.study.kind}/figures/{figure}.rst"
 
+    def read_by_figure(self, name: str) -> list[str]:
+        """What a figure is drawn from: of what it names, what the study has."""
+        figure = self.figure(name)
+        full = bool(set(figure.tables) & set(self.full))
+        return self.has((*figure.reads, *figure.also), full)
+
     def has(self, names: Sequence[str], full: bool) -> list[str]:
         """Of these results those that the study has, tables first; a name with a dot is none."""
         tables = [name for name in names if name in self.tables_of(full)]
@@ -180,8 +186,15 @@ class StudyFiles(ABC):
         Snakemake does not miss a deleted file once the table made of it exists.
         """
         tables = self.tables_of(full)
-        made_of_jobs = [table for table in self.made_of_jobs if table in tables]
-        lost = [file for table in made_of_jobs for file in self.absent(table, joined=True)]
+        lost = [
+            file
+            for table in self.made_of_jobs
+            if table in tables
+            for specimen, block in self.blocks(table)
+            if self._is_joined(table, specimen, block)
+            for file in self.job_files(table, specimen, block)
+            if not os.path.exists(file)
+        ]
         return lost + [
             file
             for table in self.by_specimen
@@ -190,15 +203,16 @@ class StudyFiles(ABC):
             if not os.path.exists(file)
         ]
 
-    def absent(self, table: str, joined: bool) -> list[str]:
-        """Missing job files of a table; with `joined` of those blocks only that are in a table."""
-        return [
-            file
-            for specimen, block in self.blocks(table)
-            if not joined or self._is_joined(table, specimen, block)
-            for file in self.job_files(table, specimen, block)
-            if not os.path.exists(file)
-        ]
+    def every(self) -> list[str]:
+        """All files that the study makes: results, those of `full` too, blocks, job files."""
+        files = self.results(full=True)
+        for table in self.by_specimen:
+            files += self.block_files(table)
+        for table in self.made_of_jobs:
+            files += self.block_files(table)
+            for specimen, block in self.blocks(table):
+                files += self.job_files(table, specimen, block)
+        return files
 
     def _is_joined(self, table: str, specimen: str, block: str) -> bool:
         whole = f"{self.folder}/{table}.parquet"

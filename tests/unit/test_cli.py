@@ -13,6 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
+import grid_cases
 import numpy as np
 import pandas as pd
 import pytest
@@ -104,6 +105,26 @@ def test_check_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert code == 1
     assert "unknown study 'prob'" in err
     assert "did you mean 'probe'?" in err
+
+
+def test_check_of_results_removes_damaged_ones_and_nothing_else(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = grid_cases.project(tmp_path)
+    results = root / f"results/{grid_cases.STUDY}"
+    own, other = results / "notes.csv", root / "results/validation/table.csv"
+    damaged = results / "stiffness_sets.parquet"
+    for path in (own, other, damaged):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("a,b\n")
+    code, _, error = run(capsys, "--root", root, "check", "--results", "..")
+    assert code != 0
+    assert "unknown study '..'" in error
+    assert damaged.exists()
+    code, out, _ = run(capsys, "--root", root, "check", "--results")
+    assert code == 1
+    assert f"FAIL  results/{grid_cases.STUDY}/stiffness_sets.parquet: damaged" in out
+    assert (own.exists(), other.exists(), damaged.exists()) == (True, True, False)
 
 
 def test_check_in_the_wrong_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
