@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Any
 
 from spinepipe.jobs.pool import JobFailed, WorkerDied, submit_and_wait
-from spinepipe.jobs.project import Project, warn
+from spinepipe.jobs.project import OUTDATED, Project, warn
 from spinepipe.marks import mark_in
 from spinepipe.studies.registry import kind_of
 from spinepipe.studies.registry import place_of as function_of
@@ -64,7 +64,7 @@ def run_job(
         if ":" not in job:
             function = function_of(kind, job)
             if kind_of(kind).job(job).reads:
-                read = _flat(files for _, files in input.items())
+                read = [path for path in inputs if path != OUTDATED]
         elif job == BLOCK:
             arguments["anew"] = forced
         try:
@@ -125,8 +125,3 @@ def _date_back(inputs: Sequence[str]) -> None:
 def _plain(files: Any) -> Any:
     """Paths as plain strings: Snakemake's own carry the whole rule with them."""
     return str(files) if isinstance(files, str) else [str(path) for path in files]
-
-
-def _flat(files: Any) -> list[str]:
-    plain = [_plain(one) for one in files]
-    return [path for one in plain for path in ([one] if isinstance(one, str) else one)]

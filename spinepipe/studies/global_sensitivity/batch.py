@@ -9,6 +9,7 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
+from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.global_sensitivity.drawn import drawn_values
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
@@ -28,6 +29,20 @@ class Batch:
     count: int
     start: Start
     varied: Varied
+
+
+def made_of_batches(
+    job: str,
+    study: GlobalSensitivity,
+    cohort: Cohort,
+    specimen: str,
+    design: str,
+    base: Sequence[str],
+) -> dict[str, str]:
+    """Metadata of the files of a job, which hang on how many samples are in a batch too."""
+    size = str(study.batch_size(len(study.chosen_specimens(cohort))))
+    read = [mark_of(path) for path in (design, *base)]
+    return provenance(job, study, cohort, [specimen], [size, *read])
 
 
 def batch_of(

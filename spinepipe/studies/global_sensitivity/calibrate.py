@@ -6,12 +6,11 @@ from typing import Any
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
-from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel
 from spinepipe.statics import moved
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
+from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, made_of_batches
 from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CALIBRATED
@@ -38,24 +37,16 @@ def run(
     ----------
     base : file of the specimen's fitted stiffness, where factors start from it.
     """
-    for path, place in parts.items():
-        _run(root, study, design, base, specimen, place["batch"], path)
-
-
-def _run(
-    root: str, study: str, design: str, base: Sequence[str], specimen: str, batch: str, output: str
-) -> None:
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
-    one = batch_of(root, settings, cohort, design, base, specimen, int(batch), all_steps=True)
-    rows = [_refused(one.first + sample, why) for sample, why in one.varied.refused.items()]
-    for place, sample in enumerate(one.varied.kept.tolist()):
-        rows.append(_fitted(settings, cohort, specimen, one, place, one.first + sample))
-    rows.sort(key=lambda row: int(row["sample"]))
-    columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
-    size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
-    read = [mark_of(path) for path in (design, *base)]
-    made_by = provenance("calibrate", settings, cohort, [specimen], size + read)
-    write(to_arrow(TABLE, columns), output, made_by)
+    made_by = made_of_batches("calibrate", settings, cohort, specimen, design, base)
+    for path, place in parts.items():
+        one = batch_of(root, settings, cohort, design, base, specimen, int(place["batch"]), True)
+        rows = [_refused(one.first + sample, why) for sample, why in one.varied.refused.items()]
+        for lane, sample in enumerate(one.varied.kept.tolist()):
+            rows.append(_fitted(settings, cohort, specimen, one, lane, one.first + sample))
+        rows.sort(key=lambda row: int(row["sample"]))
+        columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
+        write(to_arrow(TABLE, columns), path, made_by)
 
 
 def _fitted(

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statics.many import ManySolved, solve_many
 from spinepipe.status import Status
 from spinepipe.studies.asked_tests import AskedTest
-from spinepipe.studies.global_sensitivity.batch import Batch, batch_of
+from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, made_of_batches
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
 from spinepipe.tables import to_arrow, write
@@ -40,32 +39,24 @@ def run(
     ----------
     base : file of the specimen's fitted stiffness, where factors start from it.
     """
-    for path, place in parts.items():
-        _run(root, study, design, base, specimen, place["batch"], path)
-
-
-def _run(
-    root: str, study: str, design: str, base: Sequence[str], specimen: str, batch: str, output: str
-) -> None:
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
+    made_by = made_of_batches("respond", settings, cohort, specimen, design, base)
     every = settings.steps == "all"
-    one = batch_of(root, settings, cohort, design, base, specimen, int(batch), every)
-    asked = tuple(zip(one.varied.cases, one.start.tests, strict=True))
-    found = [solve_many(one.varied.spines, cases, test.needed) for cases, test in asked]
-    solved = [_rows(one, *both) for both in zip(one.start.tests, found, strict=True)]
-    columns = _columns(one, cohort.joint_names, solved)
-    size = [str(settings.batch_size(len(settings.chosen_specimens(cohort))))]
-    read = [mark_of(path) for path in (design, *base)]
-    made_by = provenance("respond", settings, cohort, [specimen], size + read)
-    by_engine = np.concatenate([many.by_engine for many in found])
-    handed = {HANDED_OVER: f"{by_engine.sum() / max(len(by_engine), 1):.4f}"}
-    if by_engine.any():
-        print(
-            f"{study}: {specimen}, batch {batch}: {by_engine.sum()} of {len(by_engine)} runs left "
-            "to the engine of record",
-            file=sys.stderr,
-        )
-    write(to_arrow(TABLE, columns), output, made_by | handed)
+    for path, place in parts.items():
+        one = batch_of(root, settings, cohort, design, base, specimen, int(place["batch"]), every)
+        asked = tuple(zip(one.varied.cases, one.start.tests, strict=True))
+        found = [solve_many(one.varied.spines, cases, test.needed) for cases, test in asked]
+        solved = [_rows(one, *both) for both in zip(one.start.tests, found, strict=True)]
+        columns = _columns(one, cohort.joint_names, solved)
+        by_engine = np.concatenate([many.by_engine for many in found])
+        handed = {HANDED_OVER: f"{by_engine.sum() / max(len(by_engine), 1):.4f}"}
+        if by_engine.any():
+            print(
+                f"{study}: {specimen}, batch {place['batch']}: {by_engine.sum()} of "
+                f"{len(by_engine)} runs left to the engine of record",
+                file=sys.stderr,
+            )
+        write(to_arrow(TABLE, columns), path, made_by | handed)
 
 
 class _Rows:

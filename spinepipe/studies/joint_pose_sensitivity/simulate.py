@@ -51,22 +51,21 @@ def run(
     settings, cohort = study_and_cohort(root, study)
     inputs = specimen_inputs(root, study, specimen, cohort.digest)
     fits = pd.concat([read_frame(path) for path in calibrations])
-    calibrated = _fits(fits)
     best = {one["name"]: np.array(one["stiffness"]) for one in ranked(settings, fits)}
-    sampled = sampled_poses(poses)
+    of_pose, sampled = fits.set_index("pose"), sampled_poses(poses)
     asked: list[tuple[tuple[Pose, ...] | str, Array | str]] = []
     for place in parts.values():
         placed, no_frames = sampled.of(specimen, int(place["pose"]))
         if place["stiffness"] == "calibrated":
-            values = calibrated[int(place["pose"])]
+            values = _calibrated(of_pose.loc[[int(place["pose"])]])
         else:
             lacking = f"fewer fits in the reduced dataset than {place['stiffness']} asks for"
             values = best.get(place["stiffness"], lacking)
         asked.append((no_frames if placed is None else placed, values))
     read = [mark_of(path) for path in (poses, *calibrations)]
     made_by = {
-        of_pose: provenance("simulate", settings, cohort, [specimen], [*read, *rule])
-        for of_pose, rule in ((True, []), (False, [judging(settings)]))
+        own: provenance("simulate", settings, cohort, [specimen], [*read, *rule])
+        for own, rule in ((True, []), (False, [judging(settings)]))
     }
     ends = _solve_all(settings, cohort, inputs, asked)
     for (path, place), (frames, _), ended in zip(parts.items(), asked, ends, strict=True):
@@ -80,15 +79,11 @@ def run(
         write(to_arrow(TABLE, columns), path, made_by[place["stiffness"] == "calibrated"])
 
 
-def _fits(fits: pd.DataFrame) -> dict[int, Array | str]:
-    """Pose to the stiffness (J or 1, 6) that was calibrated, or why there is none."""
-    found: dict[int, Array | str] = {}
-    for pose in fits["pose"].unique():
-        rows = fits[fits["pose"] == pose]
-        values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)
-        whole = np.isfinite(values).all()
-        found[int(pose)] = values if whole else f"not calibrated: {rows['message'].iloc[0]}"
-    return found
+def _calibrated(rows: pd.DataFrame) -> Array | str:
+    """Stiffness (J or 1, 6) that was calibrated in a pose, or why there is none."""
+    values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)
+    whole = np.isfinite(values).all()
+    return values if whole else f"not calibrated: {rows['message'].iloc[0]}"
 
 
 def _in_frames(inputs: MeasuredSpecimen, frames: tuple[Pose, ...]) -> tuple[MeasuredCycle, ...]:
