@@ -198,7 +198,7 @@ def _serve(connection: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.freeze()  # what was imported stays: no need to look through it at each collection
     begun_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     while True:
         try:
             function, read, arguments = connection.recv()
@@ -209,11 +209,16 @@ def _serve(connection: Connection) -> None:
         connection.send((failure, largest_kb - begun_kb))
 
 
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+def end_with_parent() -> None:
+    """Let this process end when the one that started it does, even when that one is killed."""
+
+    def wait_for_it() -> None:
+        parent = multiprocessing.parent_process()
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait_for_it, daemon=True).start()
 
 
 def _answer(function: str, read: Sequence[str], arguments: dict[str, Any]) -> _Failure | None:

@@ -15,7 +15,6 @@ import logging
 import multiprocessing
 import os
 import re
-import threading
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
@@ -32,6 +31,7 @@ from pydra.workers.cf import ConcurrentFuturesWorker
 from spinepipe.files import appearing, sweep
 from spinepipe.jobs.code import code_digest
 from spinepipe.jobs.digest import versions
+from spinepipe.jobs.pool import end_with_parent
 from spinepipe.studies.discrepancy.codec import decoded, encoded
 
 _log = logging.getLogger(__name__)
@@ -217,13 +217,6 @@ def _in_workers(calls: Mapping[str, Callable[[], object]], threads: int) -> None
 
 
 def _begin() -> None:
-    """Begin the life of a worker, which ends with its parent, even when that one is killed."""
+    """Begin the life of a worker."""
     gc.freeze()  # what it was forked with stays: no need to look through it at each collection
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    end_with_parent()
