@@ -16,8 +16,8 @@ from spinepipe.motion.asked import Ask, ForceCost, Watched, watched
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.passive_elements import passive_elements
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.skeleton import Trial
-from spinepipe.motion.trajectory import Solved, solve
+from spinepipe.motion.skeleton import MarkerTrial
+from spinepipe.motion.trajectory import OptimalMotions, solve
 
 sys.path.append(str(ROOT / "tests" / "cases"))
 import moving_spine
@@ -73,7 +73,7 @@ def trials() -> tuple[Watched, Watched]:
         seen = np.ones(places.shape[:2], dtype=bool)
         kind = "flexion_extension" if axis == 3 else "lateral_bending"
         times = np.linspace(0.0, LONG_S, frames)
-        trial = Trial(kind, kind, times, places, seen, "hanging")
+        trial = MarkerTrial(kind, kind, times, places, seen, "hanging")
         found.append(watched(moving_spine.spine(), on, trial, INTERVALS))
     return found[0], found[1]
 
@@ -87,13 +87,13 @@ def _starts(seen: tuple[Watched, ...]) -> list[np.ndarray]:
     return [np.zeros((one.grid.coefficients, 18, 6)) for one in seen]
 
 
-def one() -> Solved:
+def one() -> OptimalMotions:
     """A trial with generic passive elements."""
     seen = trials()[:1]
     return solve(_ask(), seen, _starts(seen))
 
 
-def both() -> Solved:
+def both() -> OptimalMotions:
     """Both trials, sharing the passive elements of all rotations, which are fitted."""
     fitted = np.zeros((17, 6), dtype=bool)
     fitted[:, 3:] = True

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 import pandas as pd
 
 from papers.ranges import RULES, Range
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 from papers.selectors import selectors_of
 
 FOLDER = Path(__file__).parent
@@ -62,7 +62,7 @@ class Claim:
     unit: str
     printed: float | None
     range: Range
-    ours: Callable[[Run], Ours]
+    ours: Callable[[StudyRun], Ours]
     evidence: Evidence | None = Evidence.INDEPENDENT
     contradicted: str = ""
     also: tuple[Range, ...] = ()
@@ -129,10 +129,10 @@ def _ours(row: Mapping[str, str], selectors: Mapping[str, Callable[..., Ours]]) 
     """Our value; what is shown without a verdict is told in the reason alone."""
     args, missing, unit = arguments(row["selector_args"]), row["missing"], row["unit"]
 
-    def not_here(run: Run) -> NoReturn:
+    def not_here(run: StudyRun) -> NoReturn:
         raise NotComputed(missing)
 
-    def shown(run: Run) -> NoReturn:
+    def shown(run: StudyRun) -> NoReturn:
         found = selectors[row["selector"]](run, **args)
         ends = "" if found.low is None else f" ({found.low:.3g} to {found.high:.3g})"
         told = f"{f'{found.value:.3g} {unit}'.strip()}{ends}{found.note and '; '}{found.note}"
@@ -146,7 +146,7 @@ def _ours(row: Mapping[str, str], selectors: Mapping[str, Callable[..., Ours]]) 
 # --- verdicts -------------------------------------------------------------------------------------
 
 
-def judge(claim: Claim, run: Run) -> dict[str, Any]:
+def judge(claim: Claim, run: StudyRun) -> dict[str, Any]:
     """One row of the table ``against_<paper>``."""
     ours, missing = None, ""
     try:
@@ -217,7 +217,7 @@ def claims_of(paper: str) -> tuple[Claim, ...]:
     return tuple(claim_of(row, selectors) for row in rows_of(paper))
 
 
-def judged(claims: Iterable[Claim], run: Run) -> list[dict[str, Any]]:
+def judged(claims: Iterable[Claim], run: StudyRun) -> list[dict[str, Any]]:
     """Rows of the table ``against_<paper>``, in the order of the claims."""
     return [judge(claim, run) for claim in claims]
 
@@ -226,4 +226,4 @@ def compare(
     paper: str, tables: Mapping[str, pd.DataFrame], asked: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
     """All rows of a paper, in the order of its csv."""
-    return judged(claims_of(paper), Run(tables, asked))
+    return judged(claims_of(paper), StudyRun(tables, asked))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 from papers.selectors import named
 
 VOLUNTEER = "volunteer"
@@ -30,7 +30,7 @@ TRIFLE = 1e-6
 # --- a person's tasks -----------------------------------------------------------------------------
 
 
-def _numbered(run: Run, number: float, table: str = "tasks", **where: Any) -> pd.DataFrame:
+def _numbered(run: StudyRun, number: float, table: str = "tasks", **where: Any) -> pd.DataFrame:
     """Rows of the tasks of a number of Table 1, at least one."""
     rows = run.rows(table, **where)
     chosen = rows[_numbers(rows) == number]
@@ -61,7 +61,7 @@ def _settled(rows: pd.DataFrame) -> pd.DataFrame:
     return sound
 
 
-def _sideways(run: Run, degrees: float) -> "pd.Series[Any]":
+def _sideways(run: StudyRun, degrees: float) -> "pd.Series[Any]":
     """The volunteer's task 9 at an angle, to either side."""
     rows = _numbered(run, 9.0, specimen=VOLUNTEER)
     turned = pd.to_numeric(rows["trunk_right_bending_deg"]).abs()
@@ -71,7 +71,7 @@ def _sideways(run: Run, degrees: float) -> "pd.Series[Any]":
     return chosen.iloc[0]
 
 
-def _forward(run: Run, person: str) -> pd.DataFrame:
+def _forward(run: StudyRun, person: str) -> pd.DataFrame:
     """A person's sound tasks of forward flexion with empty hands, by growing `flexion_deg`.
 
     Task 7, and the upright and the full posture that it starts and ends with (tasks 1 and 5).
@@ -84,7 +84,12 @@ def _forward(run: Run, person: str) -> pd.DataFrame:
 
 
 def task(
-    run: Run, number: float, column: str, table: str = "tasks", scale: float = 1.0, **where: Any
+    run: StudyRun,
+    number: float,
+    column: str,
+    table: str = "tasks",
+    scale: float = 1.0,
+    **where: Any,
 ) -> Ours:
     """A number of the first task of a number: persons are asked the same, so any will do."""
     row = _numbered(run, number, table, **where).iloc[[0]]
@@ -92,17 +97,17 @@ def task(
     return Ours(scale * float(_whole(row, column).iloc[0]) + 0.0, note=note)  # no minus nought
 
 
-def task_says(run: Run, number: float, column: str, text: str) -> Ours:
+def task_says(run: StudyRun, number: float, column: str, text: str) -> Ours:
     """Whether tasks.csv has a text for the first task of a number."""
     return Ours(float(_numbered(run, number, "asked").iloc[0][column] == text))
 
 
-def hand_load(run: Run, number: float) -> Ours:
+def hand_load(run: StudyRun, number: float) -> Ours:
     """Load in the hands in the first task of a number, kg."""
     return task(run, number, "hand_load_kg")
 
 
-def tasks_of_number(run: Run, number: float) -> Ours:
+def tasks_of_number(run: StudyRun, number: float) -> Ours:
     """How many tasks have a number."""
     return Ours(float(_numbered(run, number)["task"].nunique()))
 
@@ -110,7 +115,7 @@ def tasks_of_number(run: Run, number: float) -> Ours:
 # --- Fig 5: pressure in the disc L4L5 -------------------------------------------------------------
 
 
-def pressure_error(run: Run, number: float, tier: str, sideways: float | None = None) -> Ours:
+def pressure_error(run: StudyRun, number: float, tier: str, sideways: float | None = None) -> Ours:
     """Computed less measured pressure of the volunteer's task, MPa, of confirmed measurements."""
     rows = _numbered(run, number, specimen=VOLUNTEER) if sideways is None else None
     name = str((_sideways(run, sideways or 0.0) if rows is None else rows.iloc[0])["task"])
@@ -125,7 +130,7 @@ def pressure_error(run: Run, number: float, tier: str, sideways: float | None = 
     return Ours(computed - measured, note=f"{told} ({status}, {row['measured_source']})")
 
 
-def agreement(run: Run, column: str, tier: str) -> Ours:
+def agreement(run: StudyRun, column: str, tier: str) -> Ours:
     """Correlation, or root mean square error, of computed and measured pressures."""
     value = run.number("agreement", column, tier=tier)
     note = f"ours: over {run.number('agreement', 'n_tasks', tier=tier):g} tasks"
@@ -139,7 +144,7 @@ def agreement(run: Run, column: str, tier: str) -> Ours:
 # --- Fig 6: global extensors in forward flexion ---------------------------------------------------
 
 
-def _course(run: Run, group: str) -> pd.DataFrame:
+def _course(run: StudyRun, group: str) -> pd.DataFrame:
     """Forces of a muscle's two sides, N, by flexion from upright to full (task 5), settled."""
     _settled(_numbered(run, 5.0, specimen=LIGHTER))
     tasks = _forward(run, LIGHTER).set_index("task")["flexion_deg"]
@@ -157,13 +162,13 @@ def _course(run: Run, group: str) -> pd.DataFrame:
     return forces.groupby(rows["task"].map(tasks)).sum().sort_index()
 
 
-def peaks_between(run: Run, group: str) -> Ours:
+def peaks_between(run: StudyRun, group: str) -> Ours:
     """Whether the active force is largest between upright and full flexion."""
     force = _course(run, group)["active"]
     return Ours(float(force.iloc[1:-1].max() > max(force.iloc[0], force.iloc[-1])))
 
 
-def left_at_full_flexion(run: Run, group: str) -> Ours:
+def left_at_full_flexion(run: StudyRun, group: str) -> Ours:
     """Active force at full flexion over its largest, percent."""
     force = _course(run, group)["active"]
     if force.max() <= 0.0:
@@ -171,7 +176,7 @@ def left_at_full_flexion(run: Run, group: str) -> Ours:
     return Ours(100.0 * float(force.iloc[-1] / force.max()))
 
 
-def largest_at_full_flexion(run: Run, group: str, force: str) -> Ours:
+def largest_at_full_flexion(run: StudyRun, group: str, force: str) -> Ours:
     """Whether a force is largest at full flexion."""
     course = _course(run, group)[force]
     return Ours(float(course.iloc[-1] > 0.0 and course.iloc[-1] >= course.max()))
@@ -189,7 +194,7 @@ class _Apart(NamedTuple):
     n_angles: int
 
 
-def _loads(run: Run, column: str, persons: tuple[str, ...]) -> pd.DataFrame:
+def _loads(run: StudyRun, column: str, persons: tuple[str, ...]) -> pd.DataFrame:
     """Loads by angles of flexion that two persons share, the heavier's first."""
     loads = []
     for person in persons:
@@ -201,7 +206,7 @@ def _loads(run: Run, column: str, persons: tuple[str, ...]) -> pd.DataFrame:
     return both
 
 
-def _apart(run: Run, column: str, persons: tuple[str, ...]) -> _Apart:
+def _apart(run: StudyRun, column: str, persons: tuple[str, ...]) -> _Apart:
     both = _loads(run, column, persons)
     loads = both.to_numpy(float)
     at = int((loads[:, 0] - loads[:, 1]).argmax())
@@ -209,7 +214,7 @@ def _apart(run: Run, column: str, persons: tuple[str, ...]) -> _Apart:
     return _Apart(float(both.index[at]), one, other, len(both))
 
 
-def persons_apart(run: Run, column: str, of: str, pair: bool = True) -> Ours:
+def persons_apart(run: StudyRun, column: str, of: str, pair: bool = True) -> Ours:
     """Loads of two persons where they differ most: `percent`, difference `n`, or the `lighter`'s.
 
     Of the heavier and the lighter of the paper's pair, or of all pairs of the four.
@@ -230,14 +235,14 @@ def persons_apart(run: Run, column: str, of: str, pair: bool = True) -> Ours:
     return Ours(100.0 * difference / found.other_n, note=note)
 
 
-def heavier_bears_more(run: Run, column: str) -> Ours:
+def heavier_bears_more(run: StudyRun, column: str) -> Ours:
     """Share of angles at which the heavier of the pair bears more, percent."""
     loads = _loads(run, column, (HEAVIER, LIGHTER)).to_numpy(float)
     share = 100.0 * float((loads[:, 0] > loads[:, 1]).mean())
     return Ours(share, note=f"ours: {len(loads)} angles")
 
 
-def grows_with_flexion(run: Run, column: str) -> Ours:
+def grows_with_flexion(run: StudyRun, column: str) -> Ours:
     """Whether the pair differs more at the largest angle than upright."""
     loads = _loads(run, column, (HEAVIER, LIGHTER)).to_numpy(float)
     size = np.abs(loads[:, 0] - loads[:, 1])
@@ -247,7 +252,7 @@ def grows_with_flexion(run: Run, column: str) -> Ours:
 # --- upright, and forces within their bounds ------------------------------------------------------
 
 
-def _upright(run: Run, person: str) -> "pd.Series[float]":
+def _upright(run: StudyRun, person: str) -> "pd.Series[float]":
     rows = run.rows("upright", specimen=person)
     found = pd.to_numeric(rows["upright_deg"]).astype(float).set_axis(rows["body"])
     lacking = [body for body in BODIES if body not in found.index or pd.isna(found[body])]
@@ -256,29 +261,29 @@ def _upright(run: Run, person: str) -> "pd.Series[float]":
     return found[BODIES]
 
 
-def upright(run: Run, person: str, body: str) -> Ours:
+def upright(run: StudyRun, person: str, body: str) -> Ours:
     """Rotation of a body, deg."""
     return Ours(float(_upright(run, person)[body]))
 
 
-def ordered_upright(run: Run, person: str) -> Ours:
+def ordered_upright(run: StudyRun, person: str) -> Ours:
     """Whether bodies are turned the more backwards the lower they lie."""
     return Ours(float((np.diff(_upright(run, person)) > 0.0).all()))
 
 
-def spread_upright(run: Run) -> Ours:
+def spread_upright(run: StudyRun) -> Ours:
     """Largest difference among four persons, deg."""
     apart = np.ptp([_upright(run, person) for person in PERSONS], axis=0)
     return Ours(float(apart.max()), note=f"ours: at {BODIES[int(apart.argmax())]}")
 
 
-def turned_from_start(run: Run) -> Ours:
+def turned_from_start(run: StudyRun) -> Ours:
     """Largest rotation of a body from the start of Eq 2, deg."""
     rows = run.rows("upright")
     return Ours(float((rows["upright_deg"] - rows["start_deg"]).abs().max()))
 
 
-def moments_over_start(run: Run) -> Ours:
+def moments_over_start(run: StudyRun) -> Ours:
     """Sum of moments upright over that at the start of Eq 2, the worst of all persons."""
     columns = ["moment_before_nm", "moment_after_nm"]
     rows = run.rows("upright").dropna(subset=columns)
@@ -288,7 +293,7 @@ def moments_over_start(run: Run) -> Ours:
     return Ours(float((sums["moment_after_nm"] / sums["moment_before_nm"]).max()))
 
 
-def largest_slack(run: Run) -> Ours:
+def largest_slack(run: StudyRun) -> Ours:
     """Largest moment that no muscle holds in tasks 1 to 9, N m."""
     rows = run.rows("tasks")
     rows = rows[_numbers(rows).between(1.0, 9.0)]
@@ -299,7 +304,7 @@ def largest_slack(run: Run) -> Ours:
     return Ours(float(slack.max()), note=f"ours: task {worst['task']} of {worst['specimen']}")
 
 
-def out_of_bounds(run: Run) -> Ours:
+def out_of_bounds(run: StudyRun) -> Ours:
     """Fascicles that pull less than passively, or actively beyond the largest stress."""
     stress = run.rows("tasks").set_index(["specimen", "task"])["largest_stress_mpa"]
     rows = run.rows("muscles").dropna(subset=["force_n", "passive_n"])

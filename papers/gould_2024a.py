@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from papers.ranges import IQR_PER_SD, spearman_interval, spearman_threshold, wilson_percent
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 from papers.selectors import named, tested
 
 JOINTS = ("L1L2", "L2L3", "L3L4")
@@ -54,7 +54,7 @@ SAME = 1e-4
 # --- cells of the summary -------------------------------------------------------------------------
 
 
-def _value(run: Run, column: str, **where: Any) -> float:
+def _value(run: StudyRun, column: str, **where: Any) -> float:
     return run.number("summary", column, **where)
 
 
@@ -65,7 +65,7 @@ def _each(where: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield where | dict(zip(several, values, strict=True))
 
 
-def summary(run: Run, column: str, **where: Any) -> Ours:
+def summary(run: StudyRun, column: str, **where: Any) -> Ours:
     """A column of one row, a median with its quartiles; of several rows the largest."""
     value = max(_value(run, column, **one) for one in _each(where))
     if column != "median" or len(list(_each(where))) > 1:
@@ -78,7 +78,7 @@ def summary(run: Run, column: str, **where: Any) -> Ours:
     return Ours(value, low, high)
 
 
-def percent_of_median(run: Run, column: str, **where: Any) -> Ours:
+def percent_of_median(run: StudyRun, column: str, **where: Any) -> Ours:
     """A spread as a percentage of its median."""
     middle = _value(run, "median", **where)
     if middle == 0.0:
@@ -86,7 +86,7 @@ def percent_of_median(run: Run, column: str, **where: Any) -> Ours:
     return Ours(100.0 * _value(run, column, **where) / middle)
 
 
-def ratio(run: Run, column: str, what: str, **where: Any) -> Ours:
+def ratio(run: StudyRun, column: str, what: str, **where: Any) -> Ours:
     """The first of two rows in the second; the filter with two values tells them apart."""
     first, second = (_value(run, column, **one) for one in _each(where))
     if second == 0.0:
@@ -94,7 +94,7 @@ def ratio(run: Run, column: str, what: str, **where: Any) -> Ours:
     return Ours(first / second)
 
 
-def percent_ratio(run: Run, column: str, what: str, **where: Any) -> Ours:
+def percent_ratio(run: StudyRun, column: str, what: str, **where: Any) -> Ours:
     """The same of spreads in percent of their medians."""
     first, second = (percent_of_median(run, column, **one).value for one in _each(where))
     if second == 0.0:
@@ -102,7 +102,7 @@ def percent_ratio(run: Run, column: str, what: str, **where: Any) -> Ours:
     return Ours(first / second)
 
 
-def largest_shift(run: Run, column: str, **where: Any) -> Ours:
+def largest_shift(run: StudyRun, column: str, **where: Any) -> Ours:
     """Largest size of a difference between reduced and complete dataset."""
     shifts = (
         _value(run, column, **one, dataset="reduced") - _value(run, column, **one, dataset="all")
@@ -111,13 +111,13 @@ def largest_shift(run: Run, column: str, **where: Any) -> Ours:
     return Ours(max(map(abs, shifts)))
 
 
-def drop(run: Run, column: str, **where: Any) -> Ours:
+def drop(run: StudyRun, column: str, **where: Any) -> Ours:
     """Complete less reduced dataset."""
     reduced, complete = (_value(run, column, **where, dataset=one) for one in ("reduced", "all"))
     return Ours(-(reduced - complete))
 
 
-def share_lower(run: Run) -> Ours:
+def share_lower(run: StudyRun) -> Ours:
     """Medians and ranges of error of both bootstraps that are lower quasi-static, percent."""
     lower = []
     parts = ("damping_bootstrap", "start_bootstrap")
@@ -136,7 +136,7 @@ def _stiffness_where(part: str, dataset: str, coordinate: str) -> dict[str, str]
     return where | {"quantity": "stiffness", "joint": "*", "coordinate": coordinate}
 
 
-def stiffness_range(run: Run, part: str, dataset: str, coordinate: str) -> Ours:
+def stiffness_range(run: StudyRun, part: str, dataset: str, coordinate: str) -> Ours:
     """Range of fitted stiffness, with how many fits end close to the median."""
     where = _stiffness_where(part, dataset, coordinate)
     middle = _value(run, "median", **where)
@@ -148,7 +148,7 @@ def stiffness_range(run: Run, part: str, dataset: str, coordinate: str) -> Ours:
     return Ours(_value(run, "range", **where), note=note)
 
 
-def start_over_damping(run: Run, coordinate: str) -> Ours:
+def start_over_damping(run: StudyRun, coordinate: str) -> Ours:
     """Range of stiffness over start values in that over sets of damping."""
     both = [_stiffness_where(part, "all", coordinate) for part in ("start", "damping")]
     start, damping = (_value(run, "range", **where) for where in both)
@@ -171,7 +171,7 @@ class _Spreads(NamedTuple):
     high: np.ndarray
 
 
-def _spreads(run: Run, **where: Any) -> _Spreads:
+def _spreads(run: StudyRun, **where: Any) -> _Spreads:
     rows = [run.rows("spread_over_landmark_sd", **one) for one in _each(where)]
     known = pd.concat(rows).dropna(subset=["iqr"])
     if known.empty:
@@ -186,7 +186,7 @@ def _at(x: float, xs: np.ndarray, ys: np.ndarray) -> float:
 
 
 def frame_spread(
-    run: Run, printed: float, dataset: str, quantity: str, joint: Any, coordinate: Any
+    run: StudyRun, printed: float, dataset: str, quantity: str, joint: Any, coordinate: Any
 ) -> Ours:
     """Largest interquartile range of cells of joint frames, with the landmark SD of the printed."""
     cells = {"quantity": quantity, "joint": joint, "coordinate": coordinate}
@@ -194,7 +194,7 @@ def frame_spread(
     return replace(summary(run, "iqr", **poses, **cells), note=_needed_sd(run, printed, **cells))
 
 
-def _needed_sd(run: Run, printed: float, **cells: Any) -> str:
+def _needed_sd(run: StudyRun, printed: float, **cells: Any) -> str:
     """``ours: a landmark SD of 2.2 mm (2.0 to 2.5) per axis ...``; nothing without the table."""
     try:
         found = _spreads(run, **cells)
@@ -210,7 +210,7 @@ def _needed_sd(run: Run, printed: float, **cells: Any) -> str:
     return f"{gives}{_own_sd(run)}{then}"
 
 
-def _own_sd(run: Run) -> str:
+def _own_sd(run: StudyRun) -> str:
     """The study's own SD, where all landmarks have one."""
     try:
         own = np.unique(run.rows("landmarks")["sd_mm"].to_numpy(float))
@@ -219,7 +219,7 @@ def _own_sd(run: Run) -> str:
     return f", the study's is {own[0]:g} mm" if len(own) == 1 else ""
 
 
-def _origins_then(run: Run, sd: float) -> str:
+def _origins_then(run: StudyRun, sd: float) -> str:
     """How far origins would scatter with the SD that an orientation asks for."""
     try:
         found = _spreads(run, quantity="origin", joint=JOINTS, coordinate=TRANSLATIONS)
@@ -229,7 +229,7 @@ def _origins_then(run: Run, sd: float) -> str:
     return f"; origins then scatter by up to {then}, printed are {LARGEST_ORIGIN_IQR_MM:g} at most"
 
 
-def _lowered(run: Run, printed: float) -> tuple[float, float]:
+def _lowered(run: StudyRun, printed: float) -> tuple[float, float]:
     """How much lower the load must act for a flexion stiffness, mm, and the cost there over ours.
 
     Straight between the load points of the grid, as far forward as the study puts the load.
@@ -251,7 +251,7 @@ def _lowered(run: Run, printed: float) -> tuple[float, float]:
     return -shift, float(np.interp(shift, shifts, costs)) / stated
 
 
-def lower_load(run: Run, printed: float) -> Ours:
+def lower_load(run: StudyRun, printed: float) -> Ours:
     """How much lower the load must act for a printed flexion stiffness, mm."""
     lower, cost = _lowered(run, printed)
     worth = "" if cost > 1.0 else ": motion does not speak against it"
@@ -259,7 +259,7 @@ def lower_load(run: Run, printed: float) -> Ours:
     return Ours(lower, note=note)
 
 
-def flexion_stiffness(run: Run, printed: float, **where: Any) -> Ours:
+def flexion_stiffness(run: StudyRun, printed: float, **where: Any) -> Ours:
     """Median of the summary, with where the load would have to act for the printed one."""
     found = summary(run, "median", **where)
     try:
@@ -276,7 +276,7 @@ def flexion_stiffness(run: Run, printed: float, **where: Any) -> Ours:
 # --- the best model -------------------------------------------------------------------------------
 
 
-def _best(run: Run) -> "pd.Series[Any]":
+def _best(run: StudyRun) -> "pd.Series[Any]":
     """Row of the reduced fit of least cost."""
     kept = run.rows("success", reduced=True)["pose"]
     fits = run.rows("calibrations")
@@ -286,7 +286,7 @@ def _best(run: Run) -> "pd.Series[Any]":
     return fits.iloc[int(fits["cost"].to_numpy().argmin())]
 
 
-def _motion(run: Run, joints: tuple[str, ...], column: str) -> "pd.Series[float]":
+def _motion(run: StudyRun, joints: tuple[str, ...], column: str) -> "pd.Series[float]":
     """Largest size of a column over readings, per joint, in the best model."""
     rows = run.rows("simulations", pose=int(_best(run)["pose"]), stiffness="calibrated")
     rows = rows[rows["joint"].isin(joints)]
@@ -296,7 +296,7 @@ def _motion(run: Run, joints: tuple[str, ...], column: str) -> "pd.Series[float]
     return sizes
 
 
-def best_stiffness(run: Run, coordinate: str) -> Ours:
+def best_stiffness(run: StudyRun, coordinate: str) -> Ours:
     """A stiffness of the best model."""
     best = _best(run)
     if best["joint"] != "*":
@@ -304,13 +304,13 @@ def best_stiffness(run: Run, coordinate: str) -> Ours:
     return Ours(float(best[STIFFNESS[coordinate]]), note=f"pose {int(best['pose'])}")
 
 
-def best_error(run: Run, coordinate: str, joint: str = "") -> Ours:
+def best_error(run: StudyRun, coordinate: str, joint: str = "") -> Ours:
     """Error of the best model at a joint, or the larger of two."""
     joints = (joint,) if joint else MEASURED_JOINTS
     return Ours(float(_motion(run, joints, f"error_{MOTION[coordinate]}").max()))
 
 
-def best_error_percent(run: Run, coordinate: str) -> Ours:
+def best_error_percent(run: StudyRun, coordinate: str) -> Ours:
     """The larger share of the measured motion."""
     errors, sizes = (
         _motion(run, MEASURED_JOINTS, f"{what}_{MOTION[coordinate]}")
@@ -322,7 +322,7 @@ def best_error_percent(run: Run, coordinate: str) -> Ours:
     return Ours(float(shares.max()))
 
 
-def carried_force(run: Run, joint: str) -> Ours:
+def carried_force(run: StudyRun, joint: str) -> Ours:
     """Stiffness times superior motion of a joint in the best model, N."""
     stiffness = best_stiffness(run, "superior")
     motion = float(_motion(run, (joint,), "predicted_superior_mm").max())
@@ -344,20 +344,20 @@ def _rate(count: int, of: int) -> Ours:
     return Ours(100.0 * count / of, low, high, f"ours: {count} of {of}")
 
 
-def successful(run: Run, part: str, loading: str) -> Ours:
+def successful(run: StudyRun, part: str, loading: str) -> Ours:
     """Solved and moved away from the start, outliers included, as the paper counts, percent."""
     row = run.row("counts", part=part, loading=loading)
     failed = int(row[f"near_start_{run.asked['failed_when']}"])
     return _rate(int(row["solved"]) - failed, int(row["fits"]))
 
 
-def kept(run: Run) -> Ours:
+def kept(run: StudyRun) -> Ours:
     """Poses in the reduced dataset, percent."""
     row = run.row("counts", part="poses", loading="equilibrium")
     return _rate(int(row["reduced"]), int(row["fits"]))
 
 
-def successful_by(run: Run, method: str) -> Ours:
+def successful_by(run: StudyRun, method: str) -> Ours:
     """The same of one way of fitting."""
     row = run.row("success_by_method", method=method)
     return _rate(int(row["successful"]), int(row["fits"]))
@@ -366,7 +366,7 @@ def successful_by(run: Run, method: str) -> Ours:
 # --- tests of significance ------------------------------------------------------------------------
 
 
-def rho(run: Run, family: str, response: str, factor: str) -> Ours:
+def rho(run: StudyRun, family: str, response: str, factor: str) -> Ours:
     """A rank correlation, with its own interval."""
     where = {"family": family, "response": response, "factor": factor}
     row = tested(run, "spearman", **where).iloc[0]
@@ -376,7 +376,7 @@ def rho(run: Run, family: str, response: str, factor: str) -> Ours:
     return Ours(found, low, high, f"ours: n = {n}, p = {row['p']:.2g} uncorrected")
 
 
-def depends_on_motion(run: Run, joint: str, coordinate: str) -> Ours:
+def depends_on_motion(run: StudyRun, joint: str, coordinate: str) -> Ours:
     """Whether an error correlates with the measured motion, which each frame sees otherwise."""
     where = {"joint": joint, "response": f"{coordinate}_error"}
     row = tested(run, "spearman", family="error against motion", **where).iloc[0]
@@ -385,7 +385,7 @@ def depends_on_motion(run: Run, joint: str, coordinate: str) -> Ours:
     return Ours(float(abs(found) > THRESHOLD), note=note)
 
 
-def significant_pairs(run: Run, family: str, of: str) -> Ours:
+def significant_pairs(run: StudyRun, family: str, of: str) -> Ours:
     """Pairs of stiffness or error and joint pose beyond the paper's threshold."""
     rows = tested(run, "spearman", family=family)
     rows = rows[rows["response"].isin([f"{name}_{of}" for name in FITTED])]
@@ -397,7 +397,7 @@ def significant_pairs(run: Run, family: str, of: str) -> Ours:
     return Ours(beyond, note=f"{note} with n = {int(rows['n'].max())}")
 
 
-def not_normal(run: Run, responses: Any) -> Ours:
+def not_normal(run: StudyRun, responses: Any) -> Ours:
     """Distributions that are not normal (chi-squared)."""
     rows = tested(run, "chi", family="normality")
     rows = rows[rows["response"].isin(responses)]
@@ -407,7 +407,7 @@ def not_normal(run: Run, responses: Any) -> Ours:
     return Ours(float(rejected), note=f"ours: {rejected} of {len(rows)} tested, uncorrected")
 
 
-def _two_factor(run: Run, kind: str, factor: str, joint: str, error: str) -> pd.DataFrame:
+def _two_factor(run: StudyRun, kind: str, factor: str, joint: str, error: str) -> pd.DataFrame:
     """Tests of one cell of Table 6 that have a result."""
     test, against = {"orientation": ("kendall", "pose"), "stiffness": ("spearman", "stiffness")}[
         kind
@@ -416,7 +416,7 @@ def _two_factor(run: Run, kind: str, factor: str, joint: str, error: str) -> pd.
     return tested(run, test, family=family, factor=f"{factor}_{kind}")
 
 
-def any_significant(run: Run, kind: str, factor: str, joint: str, error: str) -> Ours:
+def any_significant(run: StudyRun, kind: str, factor: str, joint: str, error: str) -> Ours:
     """Whether any test of a cell is significant after Bonferroni."""
     rows = _two_factor(run, kind, factor, joint, error)
     count = int((rows["p_bonferroni"] < P_BELOW).sum())
@@ -424,7 +424,7 @@ def any_significant(run: Run, kind: str, factor: str, joint: str, error: str) ->
     return Ours(float(count > 0), note=note)
 
 
-def coefficient(run: Run, kind: str, factor: str, joint: str, error: str) -> Ours:
+def coefficient(run: StudyRun, kind: str, factor: str, joint: str, error: str) -> Ours:
     """Median coefficient of the significant tests of a cell."""
     rows = _two_factor(run, kind, factor, joint, error)
     found = rows.loc[rows["p_bonferroni"] < P_BELOW, "effect"]
@@ -436,13 +436,13 @@ def coefficient(run: Run, kind: str, factor: str, joint: str, error: str) -> Our
     return Ours(float(found.median()), float(found.min()), float(found.max()), note)
 
 
-def number_significant(run: Run, joint: str) -> Ours:
+def number_significant(run: StudyRun, joint: str) -> Ours:
     """Stiffness sets in which the anterior error goes with the extension of the frames."""
     rows = _two_factor(run, "orientation", "extension", joint, "anterior")
     return Ours(float((rows["p_bonferroni"] < P_BELOW).sum()), note=f"ours: of {len(rows)}")
 
 
-def largest_share(run: Run, factor: str) -> Ours:
+def largest_share(run: StudyRun, factor: str) -> Ours:
     """Poses in which a stiffness correlates with an error, the largest of six cells, percent."""
     cells = []
     for joint, error in product(MEASURED_JOINTS, FITTED):
@@ -451,7 +451,7 @@ def largest_share(run: Run, factor: str) -> Ours:
     return Ours(max(cells), min(cells), max(cells), "ours: smallest to largest of six cells")
 
 
-def friedman(run: Run, factor: str) -> Ours:
+def friedman(run: StudyRun, factor: str) -> Ours:
     """Largest p of tests of errors between levels of a factor."""
     rows = tested(run, "friedman", family="friedman", factor=factor)
     corrected = float(rows["p_bonferroni"].max())
@@ -459,7 +459,7 @@ def friedman(run: Run, factor: str) -> Ours:
     return Ours(float(rows["p"].max()), note=note)
 
 
-def pose_in_tree(run: Run, joint: str, coordinate: str) -> Ours:
+def pose_in_tree(run: StudyRun, joint: str, coordinate: str) -> Ours:
     """Share of the joint pose in the regression tree of an error."""
     rows = run.rows("importance", joint=joint, coordinate=coordinate)
     known = rows.dropna(subset=["importance"])
@@ -471,7 +471,7 @@ def pose_in_tree(run: Run, joint: str, coordinate: str) -> Ours:
     return Ours(pose / total, note=f"ours: {int(first['leaves'])} leaves, r2 {first['r2']:.2f}")
 
 
-def pose_in_variance(run: Run, joint: str, coordinate: str) -> Ours:
+def pose_in_variance(run: StudyRun, joint: str, coordinate: str) -> Ours:
     """Variance of an error due to the joint pose, of that due to pose or stiffness alone."""
     pose, stiffness = (
         run.number("variance_shares", "share", factor=one, joint=joint, coordinate=coordinate)
@@ -486,7 +486,7 @@ def pose_in_variance(run: Run, joint: str, coordinate: str) -> Ours:
 # --- how precise landmarks must be ----------------------------------------------------------------
 
 
-def required_sd(run: Run) -> Ours:
+def required_sd(run: StudyRun) -> Ours:
     """Largest landmark SD per axis that keeps the limits, mm; an end of the sampled ones else."""
     row = run.row("required_precision", stiffness="calibrated", motion="both")
     if pd.notna(row["sd_mm"]):
@@ -503,7 +503,7 @@ def required_sd(run: Run) -> Ours:
     return Ours(float(sampled.min()), note=f"ours is an upper end: {message}")
 
 
-def share_below(run: Run, motion: str, limit: float) -> Ours:
+def share_below(run: StudyRun, motion: str, limit: float) -> Ours:
     """Poses with errors below a limit at the sampled SD nearest to the paper's, percent."""
     rows = run.rows("landmark_precision", stiffness="calibrated", motion=motion)
     row = rows.iloc[int((rows["sd_mm"] - PER_AXIS_MM).abs().to_numpy().argmin())]
@@ -513,7 +513,7 @@ def share_below(run: Run, motion: str, limit: float) -> Ours:
     return Ours(share, low, high, f"ours: SD {row['sd_mm']:g} mm, {int(row['n'])} poses")
 
 
-def midpoint_iqr(run: Run) -> Ours:
+def midpoint_iqr(run: StudyRun) -> Ours:
     """IQR of a joint origin midway between two endplate centres, mm."""
     landmarks = run.rows("landmarks")
     centres = landmarks[landmarks["landmark"].str.contains("endplate")]["sd_mm"].unique()

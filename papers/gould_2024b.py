@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 from papers.selectors import named, tested
 
 MODELS = ("per_specimen", "level_ratio")
@@ -46,17 +46,17 @@ def _of_stage(model: str, stage: str, test: str) -> dict[str, str]:
 # --- Table 4: mean absolute errors ----------------------------------------------------------------
 
 
-def _mae(run: Run, column: str, model: str, stage: str, test: str) -> float:
+def _mae(run: StudyRun, column: str, model: str, stage: str, test: str) -> float:
     return run.number("mae", column, **_of_stage(model, stage, test), test=test, steps="peak")
 
 
-def _points(run: Run, model: str, test: str) -> float:
+def _points(run: StudyRun, model: str, test: str) -> float:
     """Fall of the percentage from literature to fitted."""
     before, after = (_mae(run, "mae_percent", model, s, test) for s in ("literature", "fitted"))
     return before - after
 
 
-def mae(run: Run, model: str, stage: str, test: str, of: str) -> Ours:
+def mae(run: StudyRun, model: str, stage: str, test: str, of: str) -> Ours:
     """Median over specimens with its quartiles, `iqr`, or `percent` of the largest motion."""
     if of == "percent":
         return Ours(_mae(run, "mae_percent", model, stage, test))
@@ -66,12 +66,12 @@ def mae(run: Run, model: str, stage: str, test: str, of: str) -> Ours:
     return Ours(_mae(run, "mae", model, stage, test), low, high)
 
 
-def mae_drop(run: Run, model: str, test: str) -> Ours:
+def mae_drop(run: StudyRun, model: str, test: str) -> Ours:
     """Fall of the percentage from literature to fitted."""
     return Ours(_points(run, model, test))
 
 
-def mae_ratio(run: Run, test: str, models: Any, stages: Any) -> Ours:
+def mae_ratio(run: StudyRun, test: str, models: Any, stages: Any) -> Ours:
     """The first error in the second."""
     first, second = (_mae(run, "mae", *of, test) for of in zip(models, stages, strict=True))
     if second == 0.0:
@@ -79,7 +79,7 @@ def mae_ratio(run: Run, test: str, models: Any, stages: Any) -> Ours:
     return Ours(first / second)
 
 
-def level_ratio_gains_more(run: Run, test: str) -> Ours:
+def level_ratio_gains_more(run: StudyRun, test: str) -> Ours:
     """Whether fitting lowers the percentage of level_ratio more than that of per_specimen."""
     uniform, levels = (_points(run, model, test) for model in MODELS)
     return Ours(float(levels > uniform), note=f"ours: {levels:.0f} and {uniform:.0f} points")
@@ -88,7 +88,7 @@ def level_ratio_gains_more(run: Run, test: str) -> Ours:
 # --- errors at the largest load -------------------------------------------------------------------
 
 
-def _errors(run: Run, model: str, stage: str, test: str, coordinate: str = "") -> pd.DataFrame:
+def _errors(run: StudyRun, model: str, stage: str, test: str, coordinate: str = "") -> pd.DataFrame:
     """One row per specimen and joint."""
     where = {"test": test, "coordinate": coordinate or LOADED[test]}
     seen = run.rows("errors", **_of_stage(model, stage, test), **where)
@@ -107,7 +107,7 @@ def _rms(seen: pd.DataFrame, by: str) -> "pd.Series[float]":
     return seen["peak_error"].pow(2).groupby(seen[by]).mean().pow(0.5)
 
 
-def _whole_rms(run: Run, model: str, stage: str, test: str, coordinate: str) -> float:
+def _whole_rms(run: StudyRun, model: str, stage: str, test: str, coordinate: str) -> float:
     seen = _errors(run, model, stage, test, coordinate)
     return float(np.sqrt(np.mean(seen["peak_error"].to_numpy(dtype=float) ** 2)))
 
@@ -117,7 +117,7 @@ def _largest_motion(seen: pd.DataFrame) -> float:
     return float(seen["measured_peak"].abs().groupby(seen["specimen"]).mean().max())
 
 
-def fitted_below(run: Run, model: str, other: str) -> Ours:
+def fitted_below(run: StudyRun, model: str, other: str) -> Ours:
     """Share of loads and rotations whose fitted error is below that of another stage, percent."""
     cells = list(product(LOADED, COORDINATES))
     higher = [
@@ -129,7 +129,7 @@ def fitted_below(run: Run, model: str, other: str) -> Ours:
     return Ours(share, note=f"ours: not {', '.join(higher)}" if higher else "")
 
 
-def gains_most_when_loaded(run: Run, model: str, test: str) -> Ours:
+def gains_most_when_loaded(run: StudyRun, model: str, test: str) -> Ours:
     """Whether fitting lowers the error of the loaded coordinate most."""
     gains = {
         name: _whole_rms(run, model, "literature", test, name)
@@ -139,7 +139,7 @@ def gains_most_when_loaded(run: Run, model: str, test: str) -> Ours:
     return _largest_is_loaded(gains, test, "deg", 2)
 
 
-def highest_when_loaded(run: Run, model: str, test: str) -> Ours:
+def highest_when_loaded(run: StudyRun, model: str, test: str) -> Ours:
     """Whether the fitted error of the loaded coordinate is the highest."""
     sizes = {name: _whole_rms(run, model, "fitted", test, name) for name in COORDINATES}
     return _largest_is_loaded(sizes, test, "deg", 2)
@@ -151,7 +151,7 @@ def _largest_is_loaded(sizes: dict[str, float], test: str, unit: str, digits: in
     return Ours(float(largest == LOADED[test]), note=f"ours: {told} {unit}")
 
 
-def larger_at_each_level(run: Run, test: str) -> Ours:
+def larger_at_each_level(run: StudyRun, test: str) -> Ours:
     """Share of levels where the fitted error of level_ratio is the larger, percent."""
     uniform, levels = (_rms(_errors(run, model, "fitted", test), "joint") for model in MODELS)
     larger = (levels > uniform).reindex(levels.index)
@@ -159,7 +159,7 @@ def larger_at_each_level(run: Run, test: str) -> Ours:
     return Ours(100.0 * float(larger.mean()), note=f"ours: not at {lower}" if lower else "")
 
 
-def largest_error_of_levels(run: Run, test: str) -> Ours:
+def largest_error_of_levels(run: StudyRun, test: str) -> Ours:
     """Whether the largest fitted error of level_ratio is the larger."""
     uniform, levels = (
         float(_errors(run, model, "fitted", test)["peak_error"].abs().max()) for model in MODELS
@@ -167,7 +167,7 @@ def largest_error_of_levels(run: Run, test: str) -> Ours:
     return Ours(float(levels > uniform), note=f"ours: {levels:.2g} and {uniform:.2g} deg")
 
 
-def rms_difference(run: Run, by: str) -> Ours:
+def rms_difference(run: StudyRun, by: str) -> Ours:
     """Largest difference of fitted errors between specimens or joints, percent of motion."""
     found = {}
     for test in LOADED:
@@ -178,13 +178,13 @@ def rms_difference(run: Run, by: str) -> Ours:
     return Ours(found[worst], note=f"ours: under {WORDS[worst]}")
 
 
-def extreme_error(run: Run, model: str, which: str) -> Ours:
+def extreme_error(run: StudyRun, model: str, which: str) -> Ours:
     """Largest or smallest fitted error of a level under any load, deg."""
     sizes = pd.concat([_errors(run, model, "fitted", test)["peak_error"].abs() for test in LOADED])
     return Ours(float(sizes.max() if which == "largest" else sizes.min()))
 
 
-def over_predicted(run: Run, test: str, stage: str, by: str = "") -> Ours:
+def over_predicted(run: StudyRun, test: str, stage: str, by: str = "") -> Ours:
     """Share of joints, or of levels on average, whose motion is predicted too large, percent."""
     seen = _errors(run, MODELS[0], stage, test)
     excess = _predicted(seen) - seen["measured_peak"].abs()
@@ -193,27 +193,27 @@ def over_predicted(run: Run, test: str, stage: str, by: str = "") -> Ours:
     return Ours(100.0 * count / len(excess), note=f"ours: {count} of {len(excess)}")
 
 
-def published_rotation(run: Run, model: str, test: str, joints: Any) -> Ours:
+def published_rotation(run: StudyRun, model: str, test: str, joints: Any) -> Ours:
     """Mean predicted motion of joints with published stiffness, deg."""
     seen = _errors(run, model, "literature", test)
     sizes = _predicted(seen[seen["joint"].isin(joints if isinstance(joints, tuple) else (joints,))])
     return Ours(float(sizes.mean()), float(sizes.min()), float(sizes.max()))
 
 
-def levels_over_uniform(run: Run, test: str) -> Ours:
+def levels_over_uniform(run: StudyRun, test: str) -> Ours:
     """That of level_ratio in that of per_specimen, L1L2 to L5S1."""
     uniform, levels = (published_rotation(run, m, test, LOWER_FIVE).value for m in MODELS)
     return Ours(levels / uniform)
 
 
-def measured_motion(run: Run, test: str) -> Ours:
+def measured_motion(run: StudyRun, test: str) -> Ours:
     """Median over specimens of the mean measured motion of L1L2 to L5S1, deg."""
     seen = _errors(run, MODELS[0], "literature", test)
     own = seen[seen["joint"].isin(LOWER_FIVE)].groupby("specimen")["measured_peak"].mean().abs()
     return Ours(float(own.median()), float(own.min()), float(own.max()))
 
 
-def largest_motion(run: Run, test: str) -> Ours:
+def largest_motion(run: StudyRun, test: str) -> Ours:
     """Largest over specimens of the mean measured motion, deg."""
     return Ours(_largest_motion(_errors(run, MODELS[0], "literature", test)))
 
@@ -221,7 +221,7 @@ def largest_motion(run: Run, test: str) -> Ours:
 # --- fitted stiffness -----------------------------------------------------------------------------
 
 
-def _stiffness(run: Run, model: str, test: str, coordinate: str = "") -> pd.DataFrame:
+def _stiffness(run: StudyRun, model: str, test: str, coordinate: str = "") -> pd.DataFrame:
     """One row per specimen and joint; at least one."""
     where = {**_of_stage(model, "fitted", test), "coordinate": coordinate or LOADED[test]}
     rows = run.rows("stiffness", **where).dropna(subset=["stiffness"])
@@ -230,12 +230,12 @@ def _stiffness(run: Run, model: str, test: str, coordinate: str = "") -> pd.Data
     return rows
 
 
-def _of_specimens(run: Run, test: str, coordinate: str) -> "pd.Series[float]":
+def _of_specimens(run: StudyRun, test: str, coordinate: str) -> "pd.Series[float]":
     rows = _stiffness(run, MODELS[0], test, coordinate)
     return rows.groupby("specimen")["stiffness"].first()
 
 
-def over_specimens(run: Run, test: str, coordinate: str, of: str) -> Ours:
+def over_specimens(run: StudyRun, test: str, coordinate: str, of: str) -> Ours:
     """Smallest, median, largest or range over specimens of per_specimen's stiffness."""
     values = _of_specimens(run, test, coordinate)
     low, high = float(values.min()), float(values.max())
@@ -247,20 +247,20 @@ def over_specimens(run: Run, test: str, coordinate: str, of: str) -> Ours:
     return Ours({"smallest": low, "largest": high, "range": high - low}[of], note=told)
 
 
-def largest_range_when_loaded(run: Run, test: str) -> Ours:
+def largest_range_when_loaded(run: StudyRun, test: str) -> Ours:
     """Whether the stiffness of the loaded coordinate has the largest range."""
     ranges = {name: over_specimens(run, test, name, "range").value for name in COORDINATES}
     return _largest_is_loaded(ranges, test, "N m/rad", 3)
 
 
-def not_converged(run: Run, test: str) -> Ours:
+def not_converged(run: StudyRun, test: str) -> Ours:
     """Specimens whose fit of per_specimen did not converge."""
     rows = run.rows("fits", representation=MODELS[0], fitted_to=test)
     ended = rows["status"].str.startswith("converged")
     return Ours(float((~ended).sum()), note=f"ours: of {len(rows)}")
 
 
-def converged_in_both(run: Run, test: str) -> Ours:
+def converged_in_both(run: StudyRun, test: str) -> Ours:
     """Specimens whose fits of both models converged."""
     ended = []
     for model in MODELS:
@@ -269,7 +269,7 @@ def converged_in_both(run: Run, test: str) -> Ours:
     return Ours(float(len(set.intersection(*ended))))
 
 
-def unchanged(run: Run, test: str, start: Any) -> Ours:
+def unchanged(run: StudyRun, test: str, start: Any) -> Ours:
     """Specimens whose fit of per_specimen ended at the start values, N m/rad."""
     frame = pd.DataFrame({name: _of_specimens(run, test, name) for name in COORDINATES})
     near = ((frame / pd.Series(start, COORDINATES) - 1.0).abs() < SAME_AS_START).all(axis=1)
@@ -278,7 +278,7 @@ def unchanged(run: Run, test: str, start: Any) -> Ours:
     return Ours(float(near.sum()), note=f"ours: of {len(frame)}")
 
 
-def spread_larger(run: Run, test: str, larger: str, of: str, joint: str = "") -> Ours:
+def spread_larger(run: StudyRun, test: str, larger: str, of: str, joint: str = "") -> Ours:
     """Whether a model's stiffness has the larger range or IQR, at a level or over all."""
     low, high = {"range": (0.0, 1.0), "IQR": (0.25, 0.75)}[of]
     spreads = []
@@ -292,7 +292,7 @@ def spread_larger(run: Run, test: str, larger: str, of: str, joint: str = "") ->
     return Ours(float(spreads[0] > spreads[1]), note=told)
 
 
-def levels_stiffer(run: Run) -> Ours:
+def levels_stiffer(run: StudyRun) -> Ours:
     """Share of loads and levels whose median stiffness is larger of level_ratio, percent."""
     higher: list[bool] = []
     for test in LOADED:
@@ -306,7 +306,7 @@ def levels_stiffer(run: Run) -> Ours:
 # --- tests of significance ------------------------------------------------------------------------
 
 
-def groups_differ(run: Run, test: str, model: str, group: str, stage: str) -> Ours:
+def groups_differ(run: StudyRun, test: str, model: str, group: str, stage: str) -> Ours:
     """Table 5: whether errors differ between specimens or levels (Kruskal-Wallis)."""
     representation = LITERATURE[model] if stage == "literature" else model
     where = {"family": f"between_{group}s/{representation}/{stage}", "stratum": test}
@@ -320,7 +320,7 @@ def groups_differ(run: Run, test: str, model: str, group: str, stage: str) -> Ou
     return Ours(float(p < P_BELOW), note=told)
 
 
-def _beside(run: Run, test: str, what: str, **where: str) -> str:
+def _beside(run: StudyRun, test: str, what: str, **where: str) -> str:
     """The p of another test, where there is one."""
     try:
         return f"; {float(tested(run, test, **where)['p'].iloc[0]):.2g} of {what}"
@@ -328,7 +328,7 @@ def _beside(run: Run, test: str, what: str, **where: str) -> str:
         return ""
 
 
-def specimens_differ(run: Run, comparison: str, model: str, test: str) -> Ours:
+def specimens_differ(run: StudyRun, comparison: str, model: str, test: str) -> Ours:
     """Table 6: specimens whose errors differ between two stages (signed rank), percent."""
     where = {"stratum": test, "response": "rotation_error"}
     rows = tested(run, "wilcoxon", family=f"signed_rank/{comparison}/{model}/{test}", **where)
@@ -337,7 +337,7 @@ def specimens_differ(run: Run, comparison: str, model: str, test: str) -> Ours:
     return Ours(100.0 * float(significant.mean()), note=told)
 
 
-def models_differ(run: Run, test: str, motion: str, of: str = "decision") -> Ours:
+def models_differ(run: StudyRun, test: str, motion: str, of: str = "decision") -> Ours:
     """Table 7: whether errors of the two models differ (Kruskal-Wallis), or the `h` of it."""
     family = f"per_specimen_against_level_ratio/{test}"
     where = {"family": family, "response": f"{motion}_rmse", "stratum": "fitted"}

@@ -11,7 +11,7 @@ angle of each patient's main curve as it is on the erect film.
 import numpy as np
 import pandas as pd
 
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 from papers.selectors import named
 
 MODELS = ("tangent", "linear_regions")
@@ -19,7 +19,7 @@ BELOW = ("below_0.2", "0.2_to_0.8")
 """Ranges of a rotation that end at 0.8 of the published end, or below."""
 
 
-def least_error_at(run: Run, table: str, column: str, **where: str) -> Ours:
+def least_error_at(run: StudyRun, table: str, column: str, **where: str) -> Ours:
     """The enlargement of the smallest error, mean over patients."""
     rows = run.rows(table, varied="enlargement", **where)
     known = rows.drop_duplicates([name for name in ("specimen", "value") if name in rows])
@@ -30,7 +30,7 @@ def least_error_at(run: Run, table: str, column: str, **where: str) -> Ours:
     return Ours(float(by_value.index[int(np.argmin(by_value))]), note=f"ours: {told} deg")
 
 
-def below_the_end(run: Run) -> Ours:
+def below_the_end(run: StudyRun) -> Ours:
     """Share of rotations on held-out films below 0.8 of the published end, percent."""
     rows = run.rows("by_range", films="held_out", model="tangent")
     counts = rows.groupby("range")["n"].sum()
@@ -40,7 +40,7 @@ def below_the_end(run: Run) -> Ours:
     return Ours(100.0 * float(counts.reindex(BELOW).sum()) / float(counts["all"]), note=note)
 
 
-def error(run: Run, column: str, unit: str, **where: str) -> Ours:
+def error(run: StudyRun, column: str, unit: str, **where: str) -> Ours:
     """An error of table `accuracy`, beside mean less and plus SD of the patients' own errors."""
     value = run.number("accuracy", column, **where)
     row = run.row("accuracy", **where)
@@ -52,7 +52,7 @@ def error(run: Run, column: str, unit: str, **where: str) -> Ours:
     return Ours(value, low, high, told)
 
 
-def _against_the_bend(run: Run, films: str, model: str) -> "pd.Series[float]":
+def _against_the_bend(run: StudyRun, films: str, model: str) -> "pd.Series[float]":
     """Errors without sign of rotations of segments that turn against a bend, deg."""
     rows = run.rows("displacements", model=model, opposite=True)
     rows = rows[rows["fitted"].astype(bool) == (films == "fitted")]
@@ -62,7 +62,7 @@ def _against_the_bend(run: Run, films: str, model: str) -> "pd.Series[float]":
     return sizes
 
 
-def error_against_the_bend(run: Run, films: str, model: str, of: str) -> Ours:
+def error_against_the_bend(run: StudyRun, films: str, model: str, of: str) -> Ours:
     """Mean or SD of those errors."""
     sizes = _against_the_bend(run, films, model)
     mean, sd = float(sizes.mean()), float(sizes.std(ddof=0))
@@ -80,24 +80,24 @@ def _less(tangent: float, linear: float) -> float:
     return 100.0 * (1.0 - tangent / linear)
 
 
-def _reduction(run: Run, measure: str, column: str, films: str) -> float:
+def _reduction(run: StudyRun, measure: str, column: str, films: str) -> float:
     where = {"films": films, "measure": measure}
     return _less(*(run.number("accuracy", column, **where, model=model) for model in MODELS))
 
 
-def reduction(run: Run, measure: str, column: str, films: str) -> Ours:
+def reduction(run: StudyRun, measure: str, column: str, films: str) -> Ours:
     """Of an error of table `accuracy`."""
     return Ours(_reduction(run, measure, column, films))
 
 
-def reduction_of_both(run: Run, measure: str) -> Ours:
+def reduction_of_both(run: StudyRun, measure: str) -> Ours:
     """The mean of the reductions on fitted and on held-out films."""
     both = [_reduction(run, measure, "mean_of_patients", one) for one in ("fitted", "held_out")]
     told = f"ours: {both[0]:.0f} % on fitted, {both[1]:.0f} % on held-out films"
     return Ours(0.5 * sum(both), min(both), max(both), told)
 
 
-def reduction_in_range(run: Run, films: str, range: str) -> Ours:
+def reduction_in_range(run: StudyRun, films: str, range: str) -> Ours:
     """Of rotations by their share of the published end, with and against the bend together."""
     sizes = []
     for model in MODELS:
@@ -112,7 +112,7 @@ def reduction_in_range(run: Run, films: str, range: str) -> Ours:
     return Ours(_less(*sizes), note=f"ours: {int(rows['n'].sum())} rotations")
 
 
-def reduction_against_the_bend(run: Run, films: str) -> Ours:
+def reduction_against_the_bend(run: StudyRun, films: str) -> Ours:
     """Of the mean error of segments that turn against a bend."""
     return Ours(_less(*(float(_against_the_bend(run, films, one).mean()) for one in MODELS)))
 

@@ -23,7 +23,7 @@ class Ours:
 
 
 @dataclass(frozen=True)
-class Run:
+class StudyRun:
     """What a run found.
 
     Attributes

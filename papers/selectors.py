@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 
 Selector = Callable[..., Ours]
 
@@ -21,12 +21,14 @@ def named(*selectors: Selector) -> dict[str, Selector]:
     return {one.__name__: one for one in selectors}
 
 
-def number(run: Run, value: float, low: float | None = None, high: float | None = None) -> Ours:
+def number(
+    run: StudyRun, value: float, low: float | None = None, high: float | None = None
+) -> Ours:
     """A value that the paper's other numbers give, whatever the run."""
     return Ours(value, low, high)
 
 
-def setting(run: Run, name: str) -> Ours:
+def setting(run: StudyRun, name: str) -> Ours:
     """A setting of the study, or a number that the product has of its own."""
     if run.asked.get(name) is None:
         raise NotComputed(f"this study states no {name.replace('_', ' ')}")
@@ -34,7 +36,7 @@ def setting(run: Run, name: str) -> Ours:
 
 
 def cell(
-    run: Run,
+    run: StudyRun,
     table: str,
     column: str,
     low: str = "",
@@ -49,18 +51,24 @@ def cell(
     return Ours(scale * value, ends[0], ends[1])
 
 
-def equals(run: Run, table: str, column: str, text: Any, **where: Any) -> Ours:
+def equals(run: StudyRun, table: str, column: str, text: Any, **where: Any) -> Ours:
     """Whether a cell has a text."""
     return Ours(float(run.row(table, **where)[column] == text))
 
 
-def distinct(run: Run, table: str, column: str, **where: Any) -> Ours:
+def distinct(run: StudyRun, table: str, column: str, **where: Any) -> Ours:
     """How many values a column has."""
     return Ours(float(run.rows(table, **where)[column].nunique()))
 
 
 def reduced(
-    run: Run, table: str, column: str, by: str, ends: bool = False, scale: float = 1.0, **where: Any
+    run: StudyRun,
+    table: str,
+    column: str,
+    by: str,
+    ends: bool = False,
+    scale: float = 1.0,
+    **where: Any,
 ) -> Ours:
     """Mean, median, largest ... of a column's numbers; its ends, the least and the largest."""
     values = filled(run.rows(table, **where), column)
@@ -68,7 +76,7 @@ def reduced(
     return Ours(scale * float(values.agg(by)), low, high)
 
 
-def tested(run: Run, test: str, **where: Any) -> pd.DataFrame:
+def tested(run: StudyRun, test: str, **where: Any) -> pd.DataFrame:
     """Tests that have a result and whose name begins like this, in any case; at least one."""
     rows = run.rows("statistics", **where)
     rows = rows[rows["test"].str.lower().str.startswith(test)]

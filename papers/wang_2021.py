@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 from papers.selectors import filled, named
 
 CONSTRAINED = "ik_constrained_"
@@ -36,7 +36,7 @@ SIDE = ["joint", "coordinate", "side"]
 LOW_MOMENT_NM = 0.1
 
 
-def of_kind(run: Run, table: str, kind: str, **where: Any) -> pd.DataFrame:
+def of_kind(run: StudyRun, table: str, kind: str, **where: Any) -> pd.DataFrame:
     """Rows of motions of a kind, at least one."""
     rows = run.rows(table, **where)
     trials = run.rows("trials", kind=kind)[["specimen", "trial"]].drop_duplicates()
@@ -52,7 +52,7 @@ def several(names: Any) -> tuple[str, ...]:
     return names if isinstance(names, tuple) else (names,)
 
 
-def first_of(run: Run, table: str, names: Any, column: str = "approach") -> str:
+def first_of(run: StudyRun, table: str, names: Any, column: str = "approach") -> str:
     """The first approach, or calibration, of which a table has rows: it stands for the paper's."""
     there = set(run.rows(table)[column])
     for name in several(names):
@@ -64,7 +64,7 @@ def first_of(run: Run, table: str, names: Any, column: str = "approach") -> str:
 # --- errors against X-rays in stance --------------------------------------------------------------
 
 
-def error_in_stance(run: Run, measure: str, approaches: Any, best: bool = True) -> Ours:
+def error_in_stance(run: StudyRun, measure: str, approaches: Any, best: bool = True) -> Ours:
     """Our error of what stands for an approach, the best or the worst of several, and whose it is.
 
     Means over persons and stances. Where the run has none of the paper's sets of ratios, others
@@ -96,14 +96,19 @@ def _ratios(name: str) -> str:
     )
 
 
-def range_of_errors(run: Run, measure: str, approaches: Any) -> Ours:
+def range_of_errors(run: StudyRun, measure: str, approaches: Any) -> Ours:
     """The worst approach less the best."""
     low, high = (error_in_stance(run, measure, approaches, best).value for best in (True, False))
     return Ours(high - low)
 
 
 def smaller_error(
-    run: Run, measure: str, one: Any, other: Any, one_best: bool = True, other_best: bool = True
+    run: StudyRun,
+    measure: str,
+    one: Any,
+    other: Any,
+    one_best: bool = True,
+    other_best: bool = True,
 ) -> Ours:
     """Whether an approach has a smaller error than another, where persons tell it."""
     unit = measure.rpartition("_")[2]
@@ -143,7 +148,14 @@ def _told(holds: bool, apart: "pd.Series[float]", told: str, unit: str) -> Ours:
 
 
 def _of_approach(
-    run: Run, table: str, column: str, kinds: Any, approaches: Any, by: str, how: str, **where: Any
+    run: StudyRun,
+    table: str,
+    column: str,
+    kinds: Any,
+    approaches: Any,
+    by: str,
+    how: str,
+    **where: Any,
 ) -> tuple["pd.Series[float]", str]:
     """A column of the first approach that is there, by person or joint; and which it is."""
     approach = first_of(run, table, approaches)
@@ -157,7 +169,7 @@ def _of_approach(
 
 
 def motion(
-    run: Run,
+    run: StudyRun,
     table: str,
     column: str,
     kinds: Any,
@@ -172,7 +184,7 @@ def motion(
     return Ours(float(found.agg(value)), float(found.min()), float(found.max()), note)
 
 
-def likeness(run: Run, kind: str, approaches: Any) -> Ours:
+def likeness(run: StudyRun, kind: str, approaches: Any) -> Ours:
     """How alike persons share a motion among joints."""
     found, approach = _of_approach(
         run, "similarity", "cmc", kind, approaches, "", "mean", window="20-80"
@@ -180,7 +192,7 @@ def likeness(run: Run, kind: str, approaches: Any) -> Ours:
     return Ours(float(found.mean()), note=approach)
 
 
-def seconds(run: Run, approaches: Any) -> Ours:
+def seconds(run: StudyRun, approaches: Any) -> Ours:
     """Processor time of a motion, and how much faster than the paper's fastest."""
     kinds = ("flexion_extension", "lateral_bending")
     found = motion(run, "fits", "cpu_s", kinds, approaches)
@@ -189,7 +201,7 @@ def seconds(run: Run, approaches: Any) -> Ours:
     return Ours(found.value, found.low, found.high, found.note + faster)
 
 
-def along_the_spine(run: Run, low: float, high: float, approaches: Any) -> Ours:
+def along_the_spine(run: StudyRun, low: float, high: float, approaches: Any) -> Ours:
     """How far a lumbar vertebra slides, of the joint farthest outside a window with two ends."""
     found, approach = _of_approach(
         *(run, "ranges", "range", "flexion_extension", approaches, "joint", "mean"),
@@ -208,7 +220,7 @@ def _farthest(values: Any, low: float, high: float) -> float:
 
 
 def differs(
-    run: Run,
+    run: StudyRun,
     table: str,
     column: str,
     kinds: Any,
@@ -228,7 +240,7 @@ def differs(
     return _told(bool(sign * apart.mean() > 0.0), apart, told, unit)
 
 
-def largest_of_third_set(run: Run) -> Ours:
+def largest_of_third_set(run: StudyRun) -> Ours:
     """Largest rotation of a joint with the third set of ratios, taken as Shojaei 2017."""
     rows = run.rows("ranges", unit="deg")
     rows = rows[rows["approach"] == SETS[-1]]
@@ -238,7 +250,7 @@ def largest_of_third_set(run: Run) -> Ours:
     return Ours(float(largest["range"]), note=f"{largest['approach']}, {largest['joint']}")
 
 
-def shares(run: Run, kind: str, approaches: Any, pattern: str) -> Ours:
+def shares(run: StudyRun, kind: str, approaches: Any, pattern: str) -> Ours:
     """Whether a pattern holds of lumbar joints' mean shares: `largest_L2L3`, or `down`."""
     approach = first_of(run, "sharing", approaches)
     rows = of_kind(run, "sharing", kind, approach=approach, window="20-80")
@@ -267,7 +279,7 @@ def shares(run: Run, kind: str, approaches: Any, pattern: str) -> Ours:
 # --- passive elements -----------------------------------------------------------------------------
 
 
-def _beside_generic(run: Run, laws: Any) -> pd.DataFrame:
+def _beside_generic(run: StudyRun, laws: Any) -> pd.DataFrame:
     """Sides that were loaded, with columns of the generic ones ending in `_generic`."""
     law = first_of(run, "stiffness", laws, "law")
     rows = run.rows("stiffness", law=law)
@@ -279,7 +291,7 @@ def _beside_generic(run: Run, laws: Any) -> pd.DataFrame:
     return both
 
 
-def multiplier(run: Run, laws: Any, low: float, high: float) -> Ours:
+def multiplier(run: StudyRun, laws: Any, low: float, high: float) -> Ours:
     """Parameter A or B over the generic one, the one farthest outside a window."""
     rows = _beside_generic(run, laws)
     found = np.concatenate([rows[name] / rows[f"{name}_generic"] for name in ("a", "b")])
@@ -288,7 +300,7 @@ def multiplier(run: Run, laws: Any, low: float, high: float) -> Ours:
     return Ours(value, float(found.min()), float(found.max()), note)
 
 
-def mostly_softer(run: Run, laws: Any) -> Ours:
+def mostly_softer(run: StudyRun, laws: Any) -> Ours:
     """Whether most sides are less stiff at a low moment than generic ones, k = B (F + A)."""
     rows = _beside_generic(run, laws)
     a, b = rows["a_generic"], rows["b_generic"]
@@ -300,7 +312,7 @@ def mostly_softer(run: Run, laws: Any) -> Ours:
     return _most(ratio < 1.0, ratio, f"; {below:.0%} below the lower end of generic ones")
 
 
-def mostly_stiffer(run: Run, laws: Any) -> Ours:
+def mostly_stiffer(run: StudyRun, laws: Any) -> Ours:
     """Whether most sides are stiffer at a high moment than generic ones."""
     ratio = _beside_generic(run, laws)["ratio_to_generic"].to_numpy(float)
     return _most(ratio > 1.0, ratio, "")
@@ -316,7 +328,7 @@ def _most(holds: Any, ratio: Any, further: str) -> Ours:
     return Ours(float(share > 0.5), note=note)
 
 
-def low_moment(run: Run) -> Ours:
+def low_moment(run: StudyRun) -> Ours:
     """Passive moment at which the low stiffness is read, k / B - A, N m."""
     rows = run.rows("stiffness").dropna(subset=["at_low_moment"])
     rows = rows[rows["b"] > 0.0]
@@ -329,29 +341,29 @@ def low_moment(run: Run) -> Ours:
 # --- cohort ---------------------------------------------------------------------------------------
 
 
-def all_motions(run: Run) -> Ours:
+def all_motions(run: StudyRun) -> Ours:
     """Whether each person stands, bends forwards and back, and sideways."""
     kinds = run.rows("trials").groupby("specimen")["kind"].agg(set)
     wanted = {"stance", "flexion_extension", "lateral_bending"}
     return Ours(float(all(wanted <= own for own in kinds)))
 
 
-def markers(run: Run, vertebra: str) -> Ours:
+def markers(run: StudyRun, vertebra: str) -> Ours:
     """Markers of the first person on a vertebra; none is no fault."""
     return Ours(float((_first(run)["vertebra"] == vertebra).sum()))
 
 
-def marked_vertebrae(run: Run) -> Ours:
+def marked_vertebrae(run: StudyRun) -> Ours:
     """Vertebrae of the first person that have a marker."""
     return Ours(float(len(set(_first(run)["vertebra"].dropna()) - {"S1"})))
 
 
-def _first(run: Run) -> pd.DataFrame:
+def _first(run: StudyRun) -> pd.DataFrame:
     rows = run.rows("marker_set")
     return rows[rows["specimen"] == rows["specimen"].iloc[0]]
 
 
-def moving(run: Run, approaches: Any) -> Ours:
+def moving(run: StudyRun, approaches: Any) -> Ours:
     """Coordinates of a joint that move."""
     rows = run.rows("ranges", approach=first_of(run, "ranges", approaches))
     return Ours(float(rows[rows["range"] > 0.0]["coordinate"].nunique()))

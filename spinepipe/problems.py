@@ -8,7 +8,15 @@ from difflib import get_close_matches
 from heapq import nsmallest
 from itertools import accumulate
 
-__all__ = ["InputError", "Problem", "Spelling", "closest", "did_you_mean", "first_of", "one_of"]
+__all__ = [
+    "InputError",
+    "InputProblem",
+    "Spelling",
+    "closest",
+    "did_you_mean",
+    "first_of",
+    "one_of",
+]
 
 LONGEST_FOUND = 160
 """Longer findings are cut: a message is read on a terminal."""
@@ -20,7 +28,7 @@ MOST_LISTED = 60
 
 
 @dataclass(frozen=True)
-class Problem:
+class InputProblem:
     """One thing in one input file that must be changed by hand.
 
     Attributes
@@ -94,9 +102,9 @@ class InputError(Exception):
         that are alike are told in one, see `gathered`.
     """
 
-    problems: tuple[Problem, ...]
+    problems: tuple[InputProblem, ...]
 
-    def __init__(self, problems: Iterable[Problem]) -> None:
+    def __init__(self, problems: Iterable[InputProblem]) -> None:
         self.problems = gathered(dict.fromkeys(problems))
         super().__init__(self.problems)
 
@@ -111,9 +119,9 @@ MOST_MADE = 2000
 """Faults that one check of one input tells apart; a file with more is none of this kind."""
 
 
-def first_of(found: Iterable[Problem]) -> Iterator[Problem]:
+def first_of(found: Iterable[InputProblem]) -> Iterator[InputProblem]:
     """The first `MOST_MADE` problems, the last of them told as one of more."""
-    before: Problem | None = None
+    before: InputProblem | None = None
     for number, problem in enumerate(found):
         if before is not None:
             yield before
@@ -138,7 +146,7 @@ MOST_CHARACTERS = 50_000
 """Of all problems of one input together."""
 
 
-def gathered(problems: Iterable[Problem]) -> tuple[Problem, ...]:
+def gathered(problems: Iterable[InputProblem]) -> tuple[InputProblem, ...]:
     """Problems with a bound on their number: what is alike is counted, with its lines.
 
     Messages stay as long as a person reads, however many rows a file has.
@@ -150,7 +158,7 @@ def gathered(problems: Iterable[Problem]) -> tuple[Problem, ...]:
     return tuple(_short_enough(found))
 
 
-def _short_enough(problems: list[Problem]) -> list[Problem]:
+def _short_enough(problems: list[InputProblem]) -> list[InputProblem]:
     """As many as fit into `MOST_CHARACTERS`, the last with the number of the others."""
     ends = accumulate(len(str(problem)) for problem in problems)
     fit = max(sum(end <= MOST_CHARACTERS for end in ends), 1)
@@ -161,19 +169,19 @@ def _short_enough(problems: list[Problem]) -> list[Problem]:
     return [*problems[: fit - 1], replace(last, others=last.others + rest, rows=())]
 
 
-def _but_for_the_row(problem: Problem) -> Hashable:
+def _but_for_the_row(problem: InputProblem) -> Hashable:
     return problem.file, problem.column, problem.found, problem.allowed, problem.remedy
 
 
 def _told_in_one(
-    problems: list[Problem], alike: Callable[[Problem], Hashable], most: int, kept: int
-) -> list[Problem]:
+    problems: list[InputProblem], alike: Callable[[InputProblem], Hashable], most: int, kept: int
+) -> list[InputProblem]:
     """Of more than ``most`` problems that are alike the first ``kept``, the last with the rest."""
     keys = list(map(alike, problems))
-    groups: dict[Hashable, list[Problem]] = defaultdict(list)
+    groups: dict[Hashable, list[InputProblem]] = defaultdict(list)
     for key, problem in zip(keys, problems, strict=True):
         groups[key].append(problem)
-    told: list[Problem] = []
+    told: list[InputProblem] = []
     met: Counter[Hashable] = Counter()
     for key, problem in zip(keys, problems, strict=True):
         met[key] += 1
@@ -184,7 +192,7 @@ def _told_in_one(
     return told
 
 
-def _with_rest(problem: Problem, rest: list[Problem]) -> Problem:
+def _with_rest(problem: InputProblem, rest: list[InputProblem]) -> InputProblem:
     rows = [row for one in rest for row in ((one.row,) if one.row else ()) + one.rows]
     others = sum(1 + one.others for one in rest)
     return replace(problem, others=problem.others + others, rows=(*problem.rows, *rows))
@@ -193,7 +201,7 @@ def _with_rest(problem: Problem, rest: list[Problem]) -> Problem:
 _NAME_OR_NUMBER = re.compile(r"'[^']*'|[0-9][0-9.e+-]*")
 
 
-def _likeness(problem: Problem) -> Hashable:
+def _likeness(problem: InputProblem) -> Hashable:
     """What problems have in common that differ in names and numbers alone."""
     found = _NAME_OR_NUMBER.sub("#", _cut(problem.found))
     keyed = problem.file.endswith(".csv")

@@ -27,7 +27,7 @@ def joined(*notes: str) -> str:
     return "; ".join(note for note in notes if note)
 
 
-class Ended(StrEnum):
+class PrescribedStatus(StrEnum):
     """Outcome of holding a spine in a place (`spinepipe.statics.prescribed`)."""
 
     CONVERGED = "converged"

@@ -28,7 +28,7 @@ def once(point: Point) -> Point:
 
 
 @dataclass(frozen=True)
-class Settled:
+class DescentTolerances:
     """When a descent has arrived, and when it is given up.
 
     Attributes
@@ -64,7 +64,7 @@ def descend(
     bounds: tuple[Array, Array],
     scale: Array,
     size: int,
-    settled: Settled,
+    settled: DescentTolerances,
 ) -> Descent:
     """Least squares from a start that has an equilibrium.
 
@@ -114,7 +114,11 @@ PROMISE = 1e-3
 
 
 def descend_along(
-    point: Point, start: Array, bounds: tuple[Array, Array], scale: Array, settled: Settled
+    point: Point,
+    start: Array,
+    bounds: tuple[Array, Array],
+    scale: Array,
+    settled: DescentTolerances,
 ) -> Descent:
     """The same where optima lie on bounds: each step is a damped linear fit inside the bounds.
 

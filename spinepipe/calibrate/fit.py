@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend, descend_along
+from spinepipe.calibrate.descent import OFF_THE_PATH, DescentTolerances, descend, descend_along
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, among, lead
-from spinepipe.calibrate.profile import Profile, Reach, profiles
+from spinepipe.calibrate.profile import Profile, RegionEnds, profiles
 from spinepipe.calibrate.solvers import by_record
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
@@ -40,7 +40,7 @@ AT_BOUND = 1e-6
 
 ROUNDING = 1e-12
 
-SETTLED = Settled(cost=1e-11, step=1e-7, slope=1e-14, evaluations=200)
+SETTLED = DescentTolerances(cost=1e-11, step=1e-7, slope=1e-14, evaluations=200)
 """When a fit at rest has arrived."""
 
 LAST_SETTLING_STEP = 1e-3
@@ -118,7 +118,7 @@ class Fit:
         closed = self.profile is not None and self.profile.closed[unknown]
         return bool(closed and self.uncertainty.identifiable[unknown])
 
-    def reach(self, unknown: int, value: float) -> Reach | None:
+    def reach(self, unknown: int, value: float) -> RegionEnds | None:
         """Region of a value that a logarithmic unknown moves; none where none was looked for.
 
         Parameters
@@ -131,7 +131,7 @@ class Fit:
         ends = value * np.exp(np.array([found.low[unknown], found.high[unknown]]) - self.x[unknown])
         below, above = bool(found.open_below[unknown]), bool(found.open_above[unknown])
         low, high = None if below else float(ends[0]), None if above else float(ends[1])
-        return Reach(low, high, below, above)
+        return RegionEnds(low, high, below, above)
 
 
 def fit(
@@ -371,7 +371,7 @@ def _stationary(problem: Problem, evaluation: Evaluation, at_bound: Array) -> bo
     return bool(level[at_bound == 0].all())
 
 
-def _settled(problem: Problem) -> Settled:
+def _settled(problem: Problem) -> DescentTolerances:
     return SETTLED if problem.course is None else replace(SETTLED, step=LAST_SETTLING_STEP)
 
 

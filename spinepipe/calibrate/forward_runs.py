@@ -244,7 +244,7 @@ def fit_by_cost(runs: ForwardCost, relative_step: float, raw_units: bool) -> For
     if not all(parameter.logarithmic for parameter in problem.free):
         raise ValueError("forward runs fit stiffness, not parameters that may be negative")
     start = np.array([_first_value(problem, index) for index in range(len(problem.free))])
-    search = _Search(runs, start if raw_units else np.ones_like(start), relative_step)
+    search = _OptimiserRun(runs, start if raw_units else np.ones_like(start), relative_step)
     if runs.cost(np.zeros_like(start)) >= LOST:
         message = "the forward run with the start's stiffness is lost"
         return _ended(search, start, False, Status.UNSTABLE, message, None)
@@ -255,7 +255,7 @@ def fit_by_cost(runs: ForwardCost, relative_step: float, raw_units: bool) -> For
 
 
 def _ended(
-    search: "_Search",
+    search: "_OptimiserRun",
     start: Array,
     claims: bool,
     status: Status,
@@ -275,7 +275,7 @@ def _first_value(problem: Problem, index: int) -> float:
     )
 
 
-class _Search:
+class _OptimiserRun:
     """The optimiser on unknowns that are ``unit`` (m,) at the start."""
 
     def __init__(self, runs: ForwardCost, unit: Array, relative_step: float) -> None:

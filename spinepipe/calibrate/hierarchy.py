@@ -50,7 +50,7 @@ class Spreads:
 
 
 @dataclass(frozen=True)
-class Posterior:
+class HierarchicalPosterior:
     """What prior and readings say together.
 
     Attributes
@@ -177,13 +177,13 @@ class Hierarchy:
         precision = np.eye(len(pull)) + len(x) * by_mean.T @ by_mean
         return float(np.sum(away**2) - pull @ np.linalg.solve(precision, pull))
 
-    def posterior(self) -> Posterior:
+    def posterior(self) -> HierarchicalPosterior:
         """Unknowns of every specimen, of the cohort and of a newcomer."""
         d = self._of.shape[1]
         unseen = self._by_direction(self._unseen)
         kept = self.own @ unseen
         covariance = kept @ self.own + kept @ self.common_covariance @ kept.transpose(0, 2, 1)
-        return Posterior(
+        return HierarchicalPosterior(
             x=self.common + self._score @ self.own,
             covariance=0.5 * (covariance + covariance.transpose(0, 2, 1)),
             mean=MEAN_SD * self._effects[:d],
@@ -222,7 +222,7 @@ STEEP = 1e-2
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SpreadEstimate:
     """Spreads, and why they are not the mode that was asked for; empty where they are."""
 
     spreads: Spreads
@@ -231,7 +231,7 @@ class Estimate:
 
 def estimated(
     readings: LinearReadings, dof: Indices, scatter: float | None, start: Spreads | None = None
-) -> Estimate:
+) -> SpreadEstimate:
     """Spreads at the mode of marginal likelihood and prior; what cannot be told apart is dropped.
 
     Levels are told from the rest by two specimens, specimens by two levels. With less than that
@@ -271,7 +271,7 @@ def estimated(
     # a line search that rounding ends is no trouble at the top
     lost = not found.success and bool(np.abs(uphill).max() > STEEP)
     trouble = f"the search for the most likely spreads ended early ({found.message})"
-    return Estimate(_unpacked(found.x, told, scatter), trouble if lost else "")
+    return SpreadEstimate(_unpacked(found.x, told, scatter), trouble if lost else "")
 
 
 def tellable(readings: LinearReadings, dof: Indices) -> NDArray[np.bool_]:

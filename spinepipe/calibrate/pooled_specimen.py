@@ -63,7 +63,7 @@ class PooledSpecimen:
     poses: tuple[Array, ...]
 
 
-class Member:
+class PoolMember:
     """A specimen's problem, where it stands and what it sees there.
 
     One without readings or without a stable pose tells nothing of the cohort. Its unknowns are

@@ -13,7 +13,7 @@ import numpy as np
 
 from spinepipe.calibrate.fit import values
 from spinepipe.calibrate.hierarchy import Hierarchy, between, change, condensed, estimated
-from spinepipe.calibrate.pooled_specimen import COST_TIE, SMALLEST_SHARE, Member, PooledSpecimen
+from spinepipe.calibrate.pooled_specimen import COST_TIE, SMALLEST_SHARE, PooledSpecimen, PoolMember
 from spinepipe.calibrate.problem import Evaluation, Problem
 from spinepipe.calibrate.uncertainty import declared_deviation, refuse_correlated
 from spinepipe.effects.contract import Array, Indices
@@ -108,7 +108,7 @@ def pool(
     _check(problems, noise)
     dof, scale = _degrees_of_freedom(problems[0]), problems[0].scale
     starts = starts or [np.zeros(len(dof))] * len(problems)
-    members = [Member(p, x, noise) for p, x in zip(problems, starts, strict=True)]
+    members = [PoolMember(p, x, noise) for p, x in zip(problems, starts, strict=True)]
     hierarchy, iterations, unsettled = _travel(members, dof, None if noise is None else 1.0)
     found = hierarchy.posterior()
     told = zip(found.x, found.covariance, found.effective_parameters.tolist(), strict=True)
@@ -163,7 +163,7 @@ def _degrees_of_freedom(problem: Problem) -> Indices:
 
 
 def _travel(
-    members: Sequence[Member], dof: Indices, scatter: float | None
+    members: Sequence[PoolMember], dof: Indices, scatter: float | None
 ) -> tuple[Hierarchy, int, str]:
     """The hierarchy where no specimen moves any more, after how many rounds, and what ails it."""
     hierarchy, rounds, settled, trouble = None, 0, False, ""
@@ -184,7 +184,7 @@ def _travel(
     return hierarchy, rounds, trouble or ("" if settled else UNSETTLED)
 
 
-def _move(members: Sequence[Member], hierarchy: Hierarchy) -> None:
+def _move(members: Sequence[PoolMember], hierarchy: Hierarchy) -> None:
     """One step of all together that lowers their cost, or else of each by itself."""
     found = hierarchy.posterior()
     deviations = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
@@ -204,7 +204,9 @@ def _move(members: Sequence[Member], hierarchy: Hierarchy) -> None:
         member.move_alone(hierarchy)
 
 
-def _cost(places: Sequence[tuple[Member, Array, Evaluation | None]], hierarchy: Hierarchy) -> float:
+def _cost(
+    places: Sequence[tuple[PoolMember, Array, Evaluation | None]], hierarchy: Hierarchy
+) -> float:
     """Squared residuals of all specimens at their points, and distance from the prior."""
     if not places:
         return 0.0

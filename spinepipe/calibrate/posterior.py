@@ -71,7 +71,7 @@ def normal_of(low: Array, high: Array, x: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Noise:
+class ResidualNoise:
     """Of the weighted residuals: independent and normal.
 
     Attributes
@@ -89,7 +89,7 @@ class Noise:
         return 0.5 * float(every.sum()), 1.0 / variance
 
 
-def noise_of(evaluator: Evaluator, sd: Array, scatter: float) -> Noise:
+def noise_of(evaluator: Evaluator, sd: Array, scatter: float) -> ResidualNoise:
     """The declared error ``sd`` (6,) m and rad of one reading, and the scatter of the residuals.
 
     Raises
@@ -100,7 +100,7 @@ def noise_of(evaluator: Evaluator, sd: Array, scatter: float) -> Noise:
     variance = evaluator.problem.weights * (BORDER_PER_SI * sd) ** 2 + scatter**2
     if np.any(variance[evaluator.coordinate] <= 0.0):
         raise ValueError("neither an error of readings nor a scatter of residuals is known")
-    return Noise(variance, evaluator.coordinate)
+    return ResidualNoise(variance, evaluator.coordinate)
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class Point:
 class Target:
     """The density that data and prior make; points of several searches are solved together."""
 
-    def __init__(self, evaluator: Evaluator, unknowns: Unknowns, noise: Noise) -> None:
+    def __init__(self, evaluator: Evaluator, unknowns: Unknowns, noise: ResidualNoise) -> None:
         """``evaluator`` : of the problem whose unknowns ``unknowns`` tell."""
         self.evaluator, self.unknowns, self.noise = evaluator, unknowns, noise
         self.evaluations = 0

@@ -19,8 +19,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.solvers import AtRest, Seen, Settling, held_against
-from spinepipe.effects import Kind
+from spinepipe.calibrate.solvers import AtRest, CaseResiduals, Settling, held_against
+from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
 from spinepipe.statics import (
@@ -183,7 +183,7 @@ class Evaluator:
         """The same at x (m,) of several searches, each with its number."""
         return side_by_side([(number, self, x) for number, x in points])
 
-    def _evaluation(self, x: Array, seen: Seen | str) -> Evaluation:
+    def _evaluation(self, x: Array, seen: CaseResiduals | str) -> Evaluation:
         if isinstance(seen, str):
             return Evaluation(None, None, (), self.coordinate, self.sharing, seen)
         residual = self._residuals(x, seen.readings)
@@ -301,11 +301,11 @@ def needed(problem: Problem) -> tuple[MeasuredCase, ...]:
 def _steps_needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
     """The case without the steps that neither carry a reading nor lead to those that do."""
     kinds = {scoped.effect.kind for scoped in problem.model.effects}
-    if measured.zeroed or Kind.PATH in kinds:
+    if measured.zeroed or EffectKind.PATH in kinds:
         return measured
     read = np.flatnonzero(np.any(_used(measured, problem.weights), axis=(1, 2))).tolist()
     if problem.course is None:  # steps that settle begin from rest, each for itself
-        pressed = bool(np.any(problem.model.gravity)) or Kind.LOAD in kinds
+        pressed = bool(np.any(problem.model.gravity)) or EffectKind.LOAD in kinds
         read = measured.case.leading_to(read, pressed)
     steps = tuple(measured.case.steps[place] for place in read)
     return replace(

@@ -22,8 +22,8 @@ from scipy.stats import norm, t
 
 from spinepipe.calibrate.descent import (
     LEAST_DAMPING,
+    DescentTolerances,
     Point,
-    Settled,
     damped_step,
     descend,
     descend_along,
@@ -39,7 +39,7 @@ LEVEL = 0.95
 
 NORMAL_95 = float(norm.ppf(0.975))
 
-ENOUGH = Settled(cost=1e-6, step=1e-5, slope=1e-14, evaluations=30)
+ENOUGH = DescentTolerances(cost=1e-6, step=1e-5, slope=1e-14, evaluations=30)
 """When the others have been fitted well enough for the rise to be known to a hundredth or so."""
 
 MOST_FITS = 8
@@ -90,7 +90,7 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Reach:
+class RegionEnds:
     """How far one value may be from where a fit has it: its ends, none where they are open."""
 
     low: float | None
@@ -128,7 +128,7 @@ class Best:
     upper: Array
     scale: Array
     bent: NDArray[np.bool_]
-    enough: Settled = ENOUGH
+    enough: DescentTolerances = ENOUGH
     along_bounds: bool = False
     ahead: float = 1.0
 

@@ -77,7 +77,7 @@ logging.getLogger("mici").setLevel(logging.ERROR)  # it warns of each trajectory
 
 
 @dataclass(frozen=True)
-class Chains:
+class MarkovChains:
     """Draws of C chains.
 
     Attributes
@@ -111,7 +111,9 @@ class Convergence:
         return "; ".join([*told, "take more draws"]) if told else ""
 
 
-def sample(target: Target, mode: Mode, chains: int, warm_up: int, draws: int, seed: int) -> Chains:
+def sample(
+    target: Target, mode: Mode, chains: int, warm_up: int, draws: int, seed: int
+) -> MarkovChains:
     """Draws around a mode that has been found.
 
     Parameters
@@ -126,7 +128,7 @@ def sample(target: Target, mode: Mode, chains: int, warm_up: int, draws: int, se
     ended = in_lockstep(runs, target.together)
     z = np.stack([one for one, _ in ended])
     accepted = float(np.mean([share for _, share in ended]))
-    return Chains(z, accepted, target.evaluations - before)
+    return MarkovChains(z, accepted, target.evaluations - before)
 
 
 @dataclass(frozen=True)

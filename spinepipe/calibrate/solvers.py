@@ -17,7 +17,7 @@ from spinepipe.world import Chain
 
 
 @dataclass(frozen=True)
-class Seen:
+class CaseResiduals:
     """What is seen of every case at one point.
 
     Attributes
@@ -80,7 +80,7 @@ class AtRest:
 
     def solve(
         self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel] = ()
-    ) -> list[Seen | str]:
+    ) -> list[CaseResiduals | str]:
         """What is seen with the unknowns at x (m,), or why there is nothing.
 
         Parameters
@@ -96,7 +96,7 @@ class AtRest:
         dq = poses_by(stack, q, unknowns)
         seen, by_x = readings(stack, q), readings_by(stack, q, dq, unknowns)
         ends, each = stack.first[1 : len(self._cases)], len(q) // len(points)
-        result: list[Seen | str] = []
+        result: list[CaseResiduals | str] = []
         for at, (number, x) in enumerate(points):
             own = slice(each * at, each * (at + 1))
             bad = np.flatnonzero(np.isnan(found.q[own, 0, 0]))
@@ -106,7 +106,7 @@ class AtRest:
             self._last[number] = (x.copy(), q[own], dq[own])
             poses = q[own].reshape(each, -1)
             parts = (tuple(np.split(one, ends)) for one in (poses, seen[own], by_x[own]))
-            result.append(Seen(*parts))
+            result.append(CaseResiduals(*parts))
         return result
 
     def _guesses(
@@ -191,7 +191,7 @@ class Settling:
 
     def solve(
         self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel] = ()
-    ) -> list[Seen | str]:
+    ) -> list[CaseResiduals | str]:
         """What is seen with the unknowns at x (m,), or why there is nothing.
 
         Parameters
@@ -211,7 +211,7 @@ class Settling:
         leads[:] = leads[:, :1]  # those that tell the derivatives take the steps of the point's own
         ends = settle(stack, self._course, leads.ravel())
         every = ends.q.reshape(len(points), each, count, -1, 6)
-        result: list[Seen | str] = []
+        result: list[CaseResiduals | str] = []
         for base, model, (_, x), lanes, q in zip(bases, models, points, leads, every, strict=True):
             trouble = min(
                 set(range(lanes[0, 0], lanes[0, 0] + each * count)) & set(ends.trouble),
@@ -221,13 +221,13 @@ class Settling:
             result.append(self._seen(base, model, q) if trouble is None else ends.trouble[trouble])
         return result
 
-    def _seen(self, base: SpineModel, model: SpineModel, every: Array) -> Seen:
+    def _seen(self, base: SpineModel, model: SpineModel, every: Array) -> CaseResiduals:
         """What is seen of a model, from its ends (1 + m, cases, J, 6) and the changed ones."""
         dq = np.moveaxis((every[1:] - every[0]) / STEP, 0, -1)
         there = self._stacks.of([model], [base])
         seen, by_x = readings(there, every[0]), readings_by(there, every[0], dq, [self._free])
         poses = every[0].reshape(len(self._cases), -1)
-        return Seen(*(tuple(one[at] for at in self._lanes) for one in (poses, seen, by_x)))
+        return CaseResiduals(*(tuple(one[at] for at in self._lanes) for one in (poses, seen, by_x)))
 
     def record(self, x: Array, model: SpineModel | None = None) -> tuple[Array, ...] | str:
         """The poses (T, n) of every case by the engine of record, over the steps of `solve`."""

@@ -22,7 +22,7 @@ from spinepipe.jobs.report import descriptor_of
 from spinepipe.jobs.run_lock import AtWork, lock
 from spinepipe.marks import mark_in
 from spinepipe.muscles.myo_sim import origin_of_myo_sim
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.page.document import origin
 from spinepipe.report.words import count
 from spinepipe.schema.datapackage import FILE
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
     output = (options.output or Path(f"{name}.zip")).resolve()
     if output.suffix != ".zip":
         at = "command line", None, "-o"
-        raise InputError([Problem(*at, output.name, "FILE.zip", "rename it")])
+        raise InputError([InputProblem(*at, output.name, "FILE.zip", "rename it")])
     if name not in study_names(root):
         raise InputError([unknown("study", name, study_names(root))])
     expected = Expected(str(root), *studies.check(root, name, starting=False))
@@ -128,7 +128,7 @@ def _no_run_at_work(root: Path) -> Iterator[None]:
     except AtWork as run:
         found, allowed = f"a run at work: {run}", "results that no run changes"
         place = str(RUNNING), None, None
-        raise InputError([Problem(*place, found, allowed, "wait until it ends")]) from None
+        raise InputError([InputProblem(*place, found, allowed, "wait until it ends")]) from None
     with held:
         yield
 
@@ -152,7 +152,7 @@ def _refuse_others(expected: Expected, results: Sequence[str], run_by: str) -> N
     allowed = "what the study makes as it is now"
     if wrong:
         raise InputError(
-            Problem(paths[0], None, None, found, allowed, remedy, others=len(paths) - 1)
+            InputProblem(paths[0], None, None, found, allowed, remedy, others=len(paths) - 1)
             for found, paths in wrong.items()
         )
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort, Reader
 from spinepipe.marks import mark_in
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
 from spinepipe.studies.doubts import doubts, refusals
@@ -43,8 +43,8 @@ def run(options: argparse.Namespace) -> int:
     root: Path = options.root
     if options.results:
         return _run_results(root, options.names)
-    told: set[Problem] = set()
-    warned: dict[str, tuple[Problem, ...]] = {}
+    told: set[InputProblem] = set()
+    warned: dict[str, tuple[InputProblem, ...]] = {}
     if not options.names:
         warned["config/studies"] = tuple(studies.strays(root))
         for warning in warned["config/studies"]:
@@ -84,15 +84,15 @@ def _run_results(root: Path, names: list[str]) -> int:
 
 
 @dataclass(frozen=True)
-class Seen:
+class CheckedInput:
     """What is sound: in words, its own warnings, and the cohort whose data may be doubted."""
 
     words: str
-    warnings: tuple[Problem, ...] = ()
+    warnings: tuple[InputProblem, ...] = ()
     cohort: Cohort | None = None
 
 
-Look = Callable[[], Seen]
+Look = Callable[[], CheckedInput]
 """Looks at one thing, or raises."""
 
 Task = tuple[str, Look]
@@ -106,10 +106,10 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
         allowed = "a folder with config/studies and config/cohorts"
         remedy = "go there or pass --root"
         raise InputError(
-            [Problem(str(root), None, None, "no studies, no cohorts", allowed, remedy)]
+            [InputProblem(str(root), None, None, "no studies, no cohorts", allowed, remedy)]
         )
     if not names:
-        tasks: list[Task] = [("config/config.yaml", lambda: Seen(_selection(root)))]
+        tasks: list[Task] = [("config/config.yaml", lambda: CheckedInput(_selection(root)))]
         tasks += [_study_task(root, name, read) for name in known_studies]
         return tasks + [_cohort_task(root, name, read) for name in known_cohorts]
     tasks = []
@@ -124,12 +124,12 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
 
 
 def _study_task(root: Path, name: str, read: ReadCohort) -> Task:
-    def look() -> Seen:
+    def look() -> CheckedInput:
         study, cohort = _checked(root, name, read)
         words, warnings = _told_by_kind(study, cohort, root)
         told = f"{study.kind} on cohort {cohort.name}"
         warnings = warnings or unmeasured(root, study, cohort)
-        return Seen("; ".join(filter(None, (told, words))), warnings, cohort)
+        return CheckedInput("; ".join(filter(None, (told, words))), warnings, cohort)
 
     return f"study {name}", look
 
@@ -147,20 +147,20 @@ def _checked(root: Path, name: str, read: ReadCohort) -> tuple[Study, Cohort]:
 
 
 def _cohort_task(root: Path, name: str, read: ReadCohort) -> Task:
-    def look() -> Seen:
+    def look() -> CheckedInput:
         cohort = read(root / COHORTS / name, every_form())
-        return Seen(_described(cohort), cohort=cohort)
+        return CheckedInput(_described(cohort), cohort=cohort)
 
     return f"cohort {name}", look
 
 
-def _told_by_kind(study: Study, cohort: Cohort, root: Path) -> tuple[str, tuple[Problem, ...]]:
+def _told_by_kind(study: Study, cohort: Cohort, root: Path) -> tuple[str, tuple[InputProblem, ...]]:
     """What the kind of a sound study says of it, and warns of."""
     place = kind_of(study.kind).told_by_check
     if place is None:
         return "", ()
     module, _, function = place.partition(":")
-    told: tuple[str, tuple[Problem, ...]] = getattr(
+    told: tuple[str, tuple[InputProblem, ...]] = getattr(
         import_module(f"{PACKAGE}.{study.kind}.{module}"), function
     )(study, cohort, root)
     return told
@@ -187,7 +187,7 @@ def _described(cohort: Cohort) -> str:
 
 
 def _tell(
-    title: str, look: Look, told: set[Problem], warned: dict[str, tuple[Problem, ...]]
+    title: str, look: Look, told: set[InputProblem], warned: dict[str, tuple[InputProblem, ...]]
 ) -> bool:
     """Print how one thing is; what was told before is not told again.
 

@@ -17,7 +17,7 @@ from spinepipe.motion.asked import SHAPE, Ask, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import postures
 from spinepipe.motion.skeleton import BODIES as TRACKED
-from spinepipe.motion.skeleton import MarkerSet, Masses, Skeleton, Trial
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial, Masses, Skeleton
 from spinepipe.motion.trajectory import solve
 from spinepipe.muscles import pose
 from spinepipe.muscles.diaphragm import AREA_M2
@@ -82,7 +82,9 @@ def track_a_spine_that_stands() -> None:
     markers = MarkerSet(empty, np.arange(bodies), np.zeros((bodies, 3)), np.ones(bodies), empty)
     q = np.zeros((2, *SHAPE))
     places = marker_places(Skeleton(steps, masses), markers, q)
-    trial = Trial("", "", np.arange(2.0), places, np.ones(places.shape[:2], dtype=bool), "hanging")
+    trial = MarkerTrial(
+        "", "", np.arange(2.0), places, np.ones(places.shape[:2], dtype=bool), "hanging"
+    )
     seen = watched(Skeleton(steps, masses), markers, trial, 1)
     postures(Ask(loads=False), seen)
     solve(Ask(force_cost="level_difference"), [seen], [seen.grid.through(q)])
@@ -94,7 +96,7 @@ def hold_a_trunk_upright() -> None:
     axial = np.array([AXIAL_N_PER_M[level] for level in LEVELS])
     shear = np.full((len(LEVELS), 2), 1e6)
     laws = JointLaws(CURVES["mixed"], np.ones((len(LEVELS), 3)), axial, shear, True)
-    chain, lines = pose.Chain.of(trunk, 0.004), Lines.of(trunk, Standoff())
+    chain, lines = pose.JointCentres.of(trunk, 0.004), Lines.of(trunk, Standoff())
     person = Person(
         *(REFERENCE, chain, lines, laws, PassiveMuscle(), masses_of(trunk, REFERENCE)),
         *(AREA_M2, unknown, *np.ones((2, len(trunk.muscles)))),

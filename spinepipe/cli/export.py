@@ -6,7 +6,7 @@ from pathlib import Path
 
 from spinepipe.cli.find import specimen_of, study_names, unknown
 from spinepipe.files import appearing
-from spinepipe.problems import InputError, Problem, one_of
+from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.studies import read as studies
 from spinepipe.studies.kind import Wanted
 from spinepipe.studies.registry import PACKAGE, every_kind, kind_of
@@ -66,5 +66,5 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _problem(column: str, found: str, allowed: str, remedy: str) -> Problem:
-    return Problem("command line", None, column, found, allowed, remedy)
+def _problem(column: str, found: str, allowed: str, remedy: str) -> InputProblem:
+    return InputProblem("command line", None, column, found, allowed, remedy)

@@ -6,7 +6,7 @@ from pathlib import Path
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.documents.strays import files_in, folders_in
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS, STUDIES, Study
@@ -39,10 +39,12 @@ def study_or_cohort(name: str, root: Path) -> tuple[Study | None, Cohort]:
     raise InputError([unknown("name", name, [*study_names(root), *cohort_names(root)])])
 
 
-def unknown(what: str, name: str, known: Sequence[str]) -> Problem:
+def unknown(what: str, name: str, known: Sequence[str]) -> InputProblem:
     """A name on the command line that nothing has."""
     remedy = did_you_mean(name, known, "correct the name, or the folder with --root")
-    return Problem("command line", None, None, f"unknown {what} '{name}'", one_of(known), remedy)
+    return InputProblem(
+        "command line", None, None, f"unknown {what} '{name}'", one_of(known), remedy
+    )
 
 
 def specimen_of(cohort: Cohort, name: str | None) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from spinepipe.cli.find import specimen_of, study_or_cohort
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.specimen import draw_specimen, view_of
 from spinepipe.report.specimen_text import describe
 from spinepipe.report.style import save, style
@@ -34,7 +34,9 @@ def run(options: argparse.Namespace) -> int:
     output = options.output or options.root / "results" / "show" / f"{chosen}.png"
     if output.suffix not in PICTURES:
         allowed = ", ".join(PICTURES)
-        problem = Problem("command line", None, "-o", output.name, allowed, "rename the picture")
+        problem = InputProblem(
+            "command line", None, "-o", output.name, allowed, "rename the picture"
+        )
         raise InputError([problem])
     study, cohort = study_or_cohort(options.name, options.root)
     specimen = specimen_of(cohort, options.specimen)

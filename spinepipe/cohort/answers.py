@@ -36,7 +36,7 @@ a force must move the joint by more than its rotation does over so much, at usua
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class LoadResponse:
     """How one coordinate of one joint moves with the load that drives it in one test.
 
     Attributes
@@ -86,7 +86,7 @@ def joint_loads(frames: tuple[Pose, ...], case: LoadCase) -> Array:
 
 def answers_of_test(
     specimen: str, test: str, loads: Array, motion: Array, zeroed: bool
-) -> Iterator[Answer]:
+) -> Iterator[LoadResponse]:
     """All driven coordinates that were read under loads that changed.
 
     Parameters
@@ -102,7 +102,7 @@ def answers_of_test(
         if not zeroed and len(load):
             load, read = load - load.mean(), read - read.mean()
         if load @ load > 0.0:
-            yield Answer(specimen, test, int(joint), COORDINATES[number], load, read)
+            yield LoadResponse(specimen, test, int(joint), COORDINATES[number], load, read)
 
 
 def _driven(power: Array) -> NDArray[np.bool_]:

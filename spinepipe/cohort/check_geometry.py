@@ -15,7 +15,7 @@ from spinepipe.cohort.exchanged_landmarks import Suspect, suspect
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.frames import joint_pose
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 from spinepipe.units import MM_PER_M
 
 SMALLEST_MM = 0.1
@@ -29,13 +29,13 @@ XYZ = ("x_mm", "y_mm", "z_mm")
 UPPER_FACE, LOWER_FACE = "inferior_endplate_centre", "superior_endplate_centre"
 
 
-def check_geometry(draft: Draft) -> Iterator[Problem]:
+def check_geometry(draft: Draft) -> Iterator[InputProblem]:
     """Joints without a pose, landmarks that define no frame, and points that lie nowhere sane."""
     if {"landmarks", "joints"} <= draft.absent:
         if not any(form.places for stem, form in draft.forms.items() if stem not in draft.absent):
             found = "neither landmarks.csv nor joints.csv"
             allowed = "landmarks.csv, joints.csv or both"
-            yield Problem(draft.name, None, None, found, allowed, "add one")
+            yield InputProblem(draft.name, None, None, found, allowed, "add one")
         return
     if not draft.vertebrae:
         return
@@ -46,7 +46,7 @@ def check_geometry(draft: Draft) -> Iterator[Problem]:
         yield from landmark_problems(draft, given)
 
 
-def landmark_problems(draft: Draft, given: set[tuple[str, str]]) -> Iterator[Problem]:
+def landmark_problems(draft: Draft, given: set[tuple[str, str]]) -> Iterator[InputProblem]:
     """Problems of the joint frames that only landmarks can give.
 
     Parameters
@@ -66,7 +66,9 @@ def landmark_problems(draft: Draft, given: set[tuple[str, str]]) -> Iterator[Pro
             if "landmarks" in draft.absent:
                 found = f"no row of joint {joint} of specimen '{specimen}'"
                 allowed = "a row for each joint of each specimen, or landmarks.csv"
-                yield Problem(draft.file("joints"), None, "joint", found, allowed, "add the row")
+                yield InputProblem(
+                    draft.file("joints"), None, "joint", found, allowed, "add the row"
+                )
             else:
                 sides = (points.get((specimen, lower), {}), points.get((specimen, upper), {}))
                 line = lines.get((specimen, upper)) or lines.get((specimen, lower))
@@ -94,7 +96,7 @@ def _joint_problems(
     lower: Mapping[str, Array],
     upper: Mapping[str, Array],
     behind: Suspect | None,
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     if any(np.isnan(point).any() for side in (lower, upper) for point in side.values()):
         return  # a bad cell, reported there
     for side, face, which in ((upper, UPPER_FACE, "upper"), (lower, LOWER_FACE, "lower")):
@@ -115,7 +117,7 @@ def _frame_problems(
     lower: Mapping[str, Array],
     upper: Mapping[str, Array],
     behind: Suspect | None,
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     try:
         pose = joint_pose(_metres(lower), _metres(upper))
     except ValueError as error:
@@ -127,14 +129,14 @@ def _frame_problems(
         remedy = "look for left and right, or superior and inferior, exchanged"
         if behind is not None:
             place, remedy = (*place[:2], behind.column), behind.words
-        yield Problem(*place, found, allowed, remedy)
+        yield InputProblem(*place, found, allowed, remedy)
 
 
 def _metres(points: Mapping[str, Array]) -> dict[str, Array]:
     return {name: point / MM_PER_M for name, point in points.items()}
 
 
-def _no_pose(place: Place, joint: str, reason: str, behind: Suspect | None = None) -> Problem:
+def _no_pose(place: Place, joint: str, reason: str, behind: Suspect | None = None) -> InputProblem:
     allowed = (
         f"{UPPER_FACE} above, {LOWER_FACE} below, and one of the two vertebrae with both endplate "
         "centres and both pedicle bases, or a row in joints.csv"
@@ -144,10 +146,10 @@ def _no_pose(place: Place, joint: str, reason: str, behind: Suspect | None = Non
     remedy = "add or correct the landmarks: one may be misplaced"
     if behind is not None:
         column, remedy = behind.column, behind.words
-    return Problem(*place[:2], column, found, allowed, remedy)
+    return InputProblem(*place[:2], column, found, allowed, remedy)
 
 
-def _origin_spacing(draft: Draft) -> Iterator[Problem]:
+def _origin_spacing(draft: Draft) -> Iterator[InputProblem]:
     rows = draft.rows("joints", "specimen", "joint", *XYZ)
     origins = {(cells[0], cells[1]): (line, np.array(cells[2:])) for line, cells in rows}
     names = draft.joint_names
@@ -180,7 +182,7 @@ LARGEST_GYRATION_M = 1.0
 """No part of a trunk has its mass further than this from its centre."""
 
 
-def check_bodies(draft: Draft) -> Iterator[Problem]:
+def check_bodies(draft: Draft) -> Iterator[InputProblem]:
     """Problems of ``bodies.csv`` beyond its cells and names."""
     yield from _inertias(draft)
     yield from _exchanged(draft)
@@ -188,7 +190,7 @@ def check_bodies(draft: Draft) -> Iterator[Problem]:
     yield from _spacing(draft)
 
 
-def _exchanged(draft: Draft) -> Iterator[Problem]:
+def _exchanged(draft: Draft) -> Iterator[InputProblem]:
     """Masses that are none beside centres of mass that are masses."""
     rows = list(draft.rows("bodies", "mass_kg", "com_x_mm"))
     bad = [line for line, (mass, _) in rows if isnan(mass)]
@@ -196,10 +198,10 @@ def _exchanged(draft: Draft) -> Iterator[Problem]:
         found = "masses that are none, and com_x_mm that could be masses"
         remedy = "suspected: mass_kg and com_x_mm exchanged; exchange them back"
         place = (draft.file("bodies"), bad[0], "mass_kg")
-        yield Problem(*place, found, "mass_kg in kg and com_x_mm in mm", remedy)
+        yield InputProblem(*place, found, "mass_kg in kg and com_x_mm in mm", remedy)
 
 
-def _inertias(draft: Draft) -> Iterator[Problem]:
+def _inertias(draft: Draft) -> Iterator[InputProblem]:
     """Inertias that no body has; all of a file are looked at together."""
     rows = list(draft.rows("bodies", "mass_kg", *INERTIA))
     six = np.array([cells[1:] for _, cells in rows]).reshape(len(rows), len(INERTIA))
@@ -212,7 +214,7 @@ def _inertias(draft: Draft) -> Iterator[Problem]:
         yield from _moment_problems(file, line, mass, moments[index])
 
 
-def _moment_problems(file: str, line: int, mass: float, of_body: Array) -> Iterator[Problem]:
+def _moment_problems(file: str, line: int, mass: float, of_body: Array) -> Iterator[InputProblem]:
     """What is wrong with principal moments of inertia, kg m2, smallest first."""
     moments: list[float] = of_body.tolist()
     slack = ROUNDING * max(map(abs, moments))
@@ -224,7 +226,7 @@ def _moment_problems(file: str, line: int, mass: float, of_body: Array) -> Itera
     if allowed is not None:
         found = f"principal moments {', '.join(f'{m:.4g}' for m in moments)} kg m2"
         remedy = "check signs, units (kg m2) and that the inertia is about the centre of mass"
-        yield Problem(file, line, INERTIA[0], found, allowed, remedy)
+        yield InputProblem(file, line, INERTIA[0], found, allowed, remedy)
     if moments[2] > mass * LARGEST_GYRATION_M**2:
         gyration = sqrt(moments[2] / mass)
         found = f"a radius of gyration of {gyration:.3g} m"
@@ -232,17 +234,19 @@ def _moment_problems(file: str, line: int, mass: float, of_body: Array) -> Itera
         remedy = "give kg m2, not kg mm2 or kg cm2"
         if LIKELY_GYRATION_M[0] <= gyration / sqrt(KG_PER_T) <= LIKELY_GYRATION_M[1]:
             remedy = f"suspected: mass_kg in t and not kg, multiply it by 1000; or {remedy}"
-        yield Problem(file, line, INERTIA[0], found, allowed, remedy)
+        yield InputProblem(file, line, INERTIA[0], found, allowed, remedy)
 
 
-def _missing(draft: Draft) -> Iterator[Problem]:
+def _missing(draft: Draft) -> Iterator[InputProblem]:
     """Bodies that gravity needs and the file lacks."""
     file = draft.file("bodies")
     if not draft.gravity:
         return
     if "bodies" in draft.absent:
         remedy = "add bodies.csv, or set gravity: false in cohort.yaml"
-        yield Problem(file, None, None, "no such file", "bodies.csv when gravity is true", remedy)
+        yield InputProblem(
+            file, None, None, "no such file", "bodies.csv when gravity is true", remedy
+        )
     elif "bodies" in draft.tables:
         known = {cells for _, cells in draft.rows("bodies", "specimen", "vertebra")}
         for specimen in draft.specimens:
@@ -250,10 +254,10 @@ def _missing(draft: Draft) -> Iterator[Problem]:
                 if (specimen, vertebra) not in known:
                     found = f"no body of specimen '{specimen}', vertebra '{vertebra}'"
                     allowed = "a body for every moving vertebra when gravity is true"
-                    yield Problem(file, None, None, found, allowed, "add the row")
+                    yield InputProblem(file, None, None, found, allowed, "add the row")
 
 
-def _spacing(draft: Draft) -> Iterator[Problem]:
+def _spacing(draft: Draft) -> Iterator[InputProblem]:
     columns = ("specimen", "vertebra", "com_x_mm", "com_y_mm", "com_z_mm")
     rows = draft.rows("bodies", *columns)
     centres = {(cells[0], cells[1]): (line, np.array(cells[2:])) for line, cells in rows}
@@ -273,7 +277,7 @@ METRES_MM = (3.0, 150.0)
 
 def spacing_problem(
     place: Place, apart: Array, columns: Sequence[str], what: str
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     """The problem of two neighbouring points, if their distance says the unit is wrong.
 
     Parameters
@@ -291,4 +295,4 @@ def spacing_problem(
             remedy = f"suspected: lengths in m and not mm; multiply {', '.join(columns)} by 1000"
         found = f"{what} {distance:.3g} mm apart"
         allowed = f"{SMALLEST_MM:g} mm to {LARGEST_MM:g} mm"
-        yield Problem(*place[:2], column, found, allowed, remedy)
+        yield InputProblem(*place[:2], column, found, allowed, remedy)

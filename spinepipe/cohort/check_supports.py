@@ -6,12 +6,12 @@ from math import isnan
 
 from spinepipe.cohort.draft import Draft
 from spinepipe.cohort.supports import MEASURED, PRESCRIBED, Rig
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem, first_of
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem, first_of
 from spinepipe.units import COORDINATE_COLUMNS, TRANSLATIONS
 
 
-def check_supports(draft: Draft, document: Document | None) -> Iterator[Problem]:
+def check_supports(draft: Draft, document: YamlDocument | None) -> Iterator[InputProblem]:
     """Problems of ``supports.csv`` beyond its cells and keys; ``document`` is ``cohort.yaml``."""
     if "supports" not in draft.tables:
         return
@@ -23,7 +23,7 @@ def check_supports(draft: Draft, document: Document | None) -> Iterator[Problem]
         yield from first_of(found)
 
 
-def _places(draft: Draft) -> Iterator[Problem]:
+def _places(draft: Draft) -> Iterator[InputProblem]:
     """Each row is of a joint and a coordinate; a vertebra by itself cannot be held yet."""
     columns = ("joint", "coordinate", "vertebra", "direction")
     for line, cells in draft.rows("supports", *columns):
@@ -33,15 +33,15 @@ def _places(draft: Draft) -> Iterator[Problem]:
             found = "a vertebra held in a direction of ground, which is not yet supported"
             allowed = "a joint and a coordinate"
             remedy = "say it of the joints, or leave the row out if the rig does not matter"
-            yield Problem(*place, "vertebra", found, allowed, remedy)
+            yield InputProblem(*place, "vertebra", found, allowed, remedy)
             continue
         for name in ("joint", "coordinate"):
             if not there[name]:
                 allowed = "a joint and a coordinate in every row"
-                yield Problem(*place, name, "an empty cell", allowed, f"name the {name}")
+                yield InputProblem(*place, name, "an empty cell", allowed, f"name the {name}")
 
 
-def _without_values(draft: Draft) -> Iterator[Problem]:
+def _without_values(draft: Draft) -> Iterator[InputProblem]:
     """A prescribed coordinate needs a reading at every step; said once per test and coordinate."""
     if "motion" not in draft.tables and "motion" not in draft.absent:
         return
@@ -64,7 +64,7 @@ def _without_values(draft: Draft) -> Iterator[Problem]:
             )
             allowed = "a value at every step of a test in which supports.csv prescribes it"
             remedy = "add the value to motion.csv, or set the state to held or free"
-            yield Problem(draft.file("supports"), None, "state", found, allowed, remedy)
+            yield InputProblem(draft.file("supports"), None, "state", found, allowed, remedy)
 
 
 def _measured(draft: Draft) -> set[tuple[object, ...]]:
@@ -81,7 +81,7 @@ def _measured(draft: Draft) -> set[tuple[object, ...]]:
     return found
 
 
-def _without_sd(draft: Draft, document: Document | None) -> Iterator[Problem]:
+def _without_sd(draft: Draft, document: YamlDocument | None) -> Iterator[InputProblem]:
     """A load that was measured counts by its SD."""
     sd = document.data.get("measurement_sd") if document else None
     known = sd if isinstance(sd, dict) else {}
@@ -93,4 +93,4 @@ def _without_sd(draft: Draft, document: Document | None) -> Iterator[Problem]:
             place = (draft.file("supports"), line, "reaction")
             allowed = f"a measured reaction with measurement_sd.{key} in cohort.yaml"
             remedy = f"add `{key}:` there, the SD of the rig's load, or set the reaction to unknown"
-            yield Problem(*place, f"'{MEASURED}', but no SD of it", allowed, remedy)
+            yield InputProblem(*place, f"'{MEASURED}', but no SD of it", allowed, remedy)

@@ -10,17 +10,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import isnan
 
-from spinepipe.cohort.draft import AppliedLoad, Draft
+from spinepipe.cohort.draft import Draft, LoadRow
 from spinepipe.documents.names import COHORT_NAME
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.model import MOST_JOINTS
-from spinepipe.problems import Problem, Spelling
+from spinepipe.problems import InputProblem, Spelling
 
 REGIONS = "SLTC"
 """Sacral, lumbar, thoracic, cervical: caudal to cranial."""
 
 
-def check_header(document: Document, folder: str) -> Iterator[Problem]:
+def check_header(document: YamlDocument, folder: str) -> Iterator[InputProblem]:
     """Problems of ``cohort.yaml`` which its schema cannot see."""
     name = document.data.get("cohort")
     if isinstance(name, str) and name != folder:
@@ -28,14 +28,14 @@ def check_header(document: Document, folder: str) -> Iterator[Problem]:
         remedy = "rename the folder or change the key"
         if not COHORT_NAME.fullmatch(folder):
             remedy = "rename the folder: names of cohorts are of a-z, 0-9 and _"
-        yield Problem(*place, f"'{name}'", f"the folder's name, '{folder}'", remedy)
+        yield InputProblem(*place, f"'{name}'", f"the folder's name, '{folder}'", remedy)
     vertebrae = document.data.get("vertebrae")
     if isinstance(vertebrae, list):
         names = [name for name in vertebrae if isinstance(name, str)]
         yield from _chain_problems(document, names, len(vertebrae))
 
 
-def usable_vertebrae(document: Document) -> tuple[str, ...]:
+def usable_vertebrae(document: YamlDocument) -> tuple[str, ...]:
     """The vertebrae when they are a sound chain; none otherwise, so that one fault stays one."""
     names = document.data.get("vertebrae")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
@@ -43,23 +43,25 @@ def usable_vertebrae(document: Document) -> tuple[str, ...]:
     return () if any(_chain_problems(document, names, len(names))) else tuple(names)
 
 
-def _chain_problems(document: Document, names: list[str], count: int) -> Iterator[Problem]:
+def _chain_problems(document: YamlDocument, names: list[str], count: int) -> Iterator[InputProblem]:
     place = (document.file, document.line_of("vertebrae"), "vertebrae")
     if count < 2:
         found = f"{count} vertebra{'' if count == 1 else 'e'}"
-        yield Problem(*place, found, "at least 2", "list every vertebra, caudal to cranial")
+        yield InputProblem(*place, found, "at least 2", "list every vertebra, caudal to cranial")
     if count - 1 > MOST_JOINTS:
         allowed = f"at most {MOST_JOINTS}"
-        yield Problem(*place, f"{count - 1} joints", allowed, "leave vertebrae out at an end")
+        yield InputProblem(*place, f"{count - 1} joints", allowed, "leave vertebrae out at an end")
         return
     for name, times in Counter(names).items():
         if times > 1:
-            yield Problem(*place, f"'{name}' twice", "each vertebra once", "delete one")
+            yield InputProblem(*place, f"'{name}' twice", "each vertebra once", "delete one")
     for lower, upper in pairwise(names):
         low, high = _height(lower), _height(upper)
         if low is not None and high is not None and low > high:
             found = f"'{lower}' before '{upper}'"
-            yield Problem(*place, found, "caudal to cranial, as in [L4, L3]", "turn the list round")
+            yield InputProblem(
+                *place, found, "caudal to cranial, as in [L4, L3]", "turn the list round"
+            )
 
 
 def _height(name: str) -> tuple[int, int] | None:
@@ -72,7 +74,7 @@ POINT = ("px_mm", "py_mm", "pz_mm")
 FORCE = ("fx_n", "fy_n", "fz_n")
 
 
-def check_loads(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
+def check_loads(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProblem]:
     """Problems of ``loads.csv`` beyond its cells and names."""
     yield from _repeated_loads(draft, applied)
     for stem in ("loads", "preload"):
@@ -83,7 +85,7 @@ def check_loads(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Proble
     yield from _followers(draft)
 
 
-def _repeated_loads(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
+def _repeated_loads(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProblem]:
     seen: dict[tuple[object, ...], int] = {}
     reported = set()
     for load in applied:
@@ -96,28 +98,28 @@ def _repeated_loads(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Pr
             found = f"again {load.specimen}, {load.test}, {load.step}, {load.vertebra}"
             allowed = "one row per specimen x test x cycle x step x vertebra (* and empty mean all)"
             remedy = f"add the loads up in one row (the other is line {first})"
-            yield Problem(draft.file("loads"), load.line, None, found, allowed, remedy)
+            yield InputProblem(draft.file("loads"), load.line, None, found, allowed, remedy)
 
 
-def _preload(draft: Draft) -> Iterator[Problem]:
+def _preload(draft: Draft) -> Iterator[InputProblem]:
     """A preload that is a force belongs to a point of a vertebra."""
     for line, cells in draft.rows("preload", *POINT, *FORCE):
         if _pulls_without_a_point(cells):
             place = (draft.file("preload"), line, "px_mm")
             remedy = "fill px_mm, py_mm, pz_mm"
-            yield Problem(*place, "a force without a point", "a force with a point", remedy)
+            yield InputProblem(*place, "a force without a point", "a force with a point", remedy)
 
 
-def _on_the_fixed_vertebra(draft: Draft, stem: str) -> Iterator[Problem]:
+def _on_the_fixed_vertebra(draft: Draft, stem: str) -> Iterator[InputProblem]:
     for line, (vertebra,) in draft.rows(stem, "vertebra"):
         if draft.vertebrae and vertebra == draft.vertebrae[0]:
             place = (draft.file(stem), line, "vertebra")
             found = f"a load on '{vertebra}', which is fixed to ground"
             allowed = "one of " + ", ".join(draft.vertebrae[1:])
-            yield Problem(*place, found, allowed, "load a moving vertebra or delete the row")
+            yield InputProblem(*place, found, allowed, "load a moving vertebra or delete the row")
 
 
-def _without_a_point(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
+def _without_a_point(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProblem]:
     """A force without a point acts at the centre of mass, which must then be known."""
     rows = draft.rows("loads", *POINT, *FORCE)
     pointless = {line for line, cells in rows if _pulls_without_a_point(cells)}
@@ -131,7 +133,7 @@ def _without_a_point(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[P
             place = (draft.file("loads"), load.line, "px_mm")
             found = "a force without a point, on a vertebra without a body"
             allowed = f"a point, or a row for {load.specimen}, {load.vertebra} in bodies.csv"
-            yield Problem(*place, found, allowed, "fill px_mm, py_mm, pz_mm")
+            yield InputProblem(*place, found, allowed, "fill px_mm, py_mm, pz_mm")
 
 
 def _pulls_without_a_point(cells: tuple[float, ...]) -> bool:
@@ -139,7 +141,7 @@ def _pulls_without_a_point(cells: tuple[float, ...]) -> bool:
     return all(map(isnan, point)) and any(f != 0.0 and not isnan(f) for f in force)
 
 
-def _times(draft: Draft) -> Iterator[Problem]:
+def _times(draft: Draft) -> Iterator[InputProblem]:
     tests: dict[tuple[object, ...], list[tuple[float, float, int]]] = defaultdict(list)
     columns = ("specimen", "test", "cycle", "step", "time_s")
     for line, (specimen, test, cycle, step, time) in draft.rows("loads", *columns):
@@ -150,21 +152,23 @@ def _times(draft: Draft) -> Iterator[Problem]:
             yield from _times_of_one_test(draft.file("loads"), sorted(rows))
 
 
-def _times_of_one_test(file: str, rows: list[tuple[float, float, int]]) -> Iterator[Problem]:
+def _times_of_one_test(file: str, rows: list[tuple[float, float, int]]) -> Iterator[InputProblem]:
     for _, time, line in rows:
         if isnan(time):
             allowed = "a time in every row of a test, or in none"
-            yield Problem(file, line, "time_s", "no time", allowed, "fill the cell")
+            yield InputProblem(file, line, "time_s", "no time", allowed, "fill the cell")
     timed = [row for row in rows if not isnan(row[1])]
     for (step, time, _), (later_step, later, line) in pairwise(timed):
         found = f"{later:g} s at step {later_step:g} after {time:g} s at step {step:g}"
         if step == later_step and later != time:
-            yield Problem(file, line, "time_s", found, "one time per step", "correct the time")
+            yield InputProblem(file, line, "time_s", found, "one time per step", "correct the time")
         if step < later_step and later <= time:
-            yield Problem(file, line, "time_s", found, "times that increase", "correct the time")
+            yield InputProblem(
+                file, line, "time_s", found, "times that increase", "correct the time"
+            )
 
 
-def _followers(draft: Draft) -> Iterator[Problem]:
+def _followers(draft: Draft) -> Iterator[InputProblem]:
     """A test has one follower load, told in each of its rows."""
     file, told = draft.file("loads"), defaultdict[tuple[object, object], dict[str, int]](dict)
     for line, (specimen, test, force) in draft.rows("loads", "specimen", "test", "follower_n"):
@@ -177,17 +181,19 @@ def _followers(draft: Draft) -> Iterator[Problem]:
             found = f"{word} after {first} in test '{test}'"
             allowed = "one tension in all rows of a test (of a specimen, or of * and it)"
             remedy = "fill it in everywhere; a test under another tension has a name of its own"
-            yield Problem(file, line, "follower_n", found, allowed, remedy)
+            yield InputProblem(file, line, "follower_n", found, allowed, remedy)
 
 
-def check_motion(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
+def check_motion(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProblem]:
     """Motion without loads; said once per test, cycle or step of a specimen."""
     if "motion" in draft.absent or not ("loads" in draft.tables or "loads" in draft.absent):
         return
     file = draft.file("motion")
     if "loads" in draft.absent:
         remedy = "add loads.csv, or take motion.csv out"
-        yield Problem(file, None, None, "motion without loads", "motion with loads.csv", remedy)
+        yield InputProblem(
+            file, None, None, "motion without loads", "motion with loads.csv", remedy
+        )
         return
     known = _prefixes(applied)
     tests = Spelling(sorted({load.test for load in applied}), "add the load or delete the motion")
@@ -205,7 +211,7 @@ def check_motion(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Probl
             yield _problem(file, line, missing, tests)
 
 
-def _prefixes(applied: Sequence[AppliedLoad]) -> set[tuple[object, ...]]:
+def _prefixes(applied: Sequence[LoadRow]) -> set[tuple[object, ...]]:
     """(specimen, test), with cycle, and with cycle and step, of every load."""
     known: set[tuple[object, ...]] = set()
     for load in applied:
@@ -214,17 +220,17 @@ def _prefixes(applied: Sequence[AppliedLoad]) -> set[tuple[object, ...]]:
     return known
 
 
-def _problem(file: str, line: int, key: tuple[object, ...], tests: Spelling) -> Problem:
+def _problem(file: str, line: int, key: tuple[object, ...], tests: Spelling) -> InputProblem:
     column = ("test", "cycle", "step")[len(key) - 2]
     found = f"{column} '{key[-1]}' of specimen '{key[0]}', which has no load"
     allowed = "a specimen, test, cycle and step of loads.csv"
     remedy = "add the load or delete the motion"
     if column == "test" and key[1] not in tests.known:
         remedy = tests.remedy(str(key[1]))
-    return Problem(file, line, column, found, allowed, remedy)
+    return InputProblem(file, line, column, found, allowed, remedy)
 
 
-def check_steps(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Problem]:
+def check_steps(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProblem]:
     """Gaps in ``loads.csv`` and, joint by joint, in ``motion.csv``."""
     loads = (((a.specimen, a.test, a.cycle), a.step, a.line) for a in applied)
     remedy = "add the row, with zeros where nothing acts"
@@ -245,7 +251,7 @@ def check_steps(draft: Draft, applied: Sequence[AppliedLoad]) -> Iterator[Proble
 
 def _gaps(
     file: str, rows: Iterable[tuple[tuple[object, ...], int | None, int]], remedy: str
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     series: dict[tuple[object, ...], list[tuple[int, int]]] = defaultdict(list)
     unclear = set()  # a bad cell hides one step, and is reported there
     for key, step, line in rows:
@@ -260,5 +266,5 @@ def _gaps(
                 last = f"after step {before}" if before >= 0 else "first"
                 found = f"step {step} {last} in test '{key[1]}'"
                 allowed = "steps 0, 1, 2, … without a gap"
-                yield Problem(file, line, "step", found, allowed, remedy)
+                yield InputProblem(file, line, "step", found, allowed, remedy)
             before = step

@@ -44,7 +44,7 @@ class Draft:
         return () if table is None else tuple(dict.fromkeys(table["specimen"].dropna()))
 
     @cached_property
-    def applied(self) -> tuple["AppliedLoad", ...]:
+    def applied(self) -> tuple["LoadRow", ...]:
         """Every load on every specimen in every cycle, as `applied_loads` gives them."""
         return tuple(applied_loads(self))
 
@@ -79,7 +79,7 @@ class Draft:
 
 
 @dataclass(frozen=True)
-class AppliedLoad:
+class LoadRow:
     """One row of ``loads.csv`` as it acts on one specimen in one cycle.
 
     Attributes
@@ -96,7 +96,7 @@ class AppliedLoad:
     vertebra: str
 
 
-def applied_loads(draft: Draft) -> Iterator[AppliedLoad]:
+def applied_loads(draft: Draft) -> Iterator[LoadRow]:
     """Every load on every specimen in every cycle; rows without a name are left out."""
     cycles = _known_cycles(draft)
     everyone = draft.specimens or ("*",)
@@ -107,7 +107,7 @@ def applied_loads(draft: Draft) -> Iterator[AppliedLoad]:
         known_step = None if isnan(step) else int(step)
         for name in everyone if specimen == "*" else (specimen,):
             for number in cycles[test] if isnan(cycle) else (int(cycle),):
-                yield AppliedLoad(line, name, test, number, known_step, vertebra)
+                yield LoadRow(line, name, test, number, known_step, vertebra)
 
 
 def number_of_applied_loads(draft: Draft) -> int:

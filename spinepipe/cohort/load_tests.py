@@ -77,7 +77,7 @@ def coupled_range(case: LoadCase) -> float:
 
 
 @dataclass(frozen=True)
-class Direction:
+class TurnDirection:
     """Where a virtual test turns the most cranial vertebra.
 
     Attributes
@@ -90,13 +90,13 @@ class Direction:
     axis: tuple[float, float, float]
 
 
-VIRTUAL_TESTS: Mapping[str, Direction] = {
-    "flexion": Direction("extension", (0.0, 0.0, -1.0)),
-    "extension": Direction("extension", (0.0, 0.0, 1.0)),
-    "right_bending": Direction("right_bending", (1.0, 0.0, 0.0)),
-    "left_bending": Direction("right_bending", (-1.0, 0.0, 0.0)),
-    "left_rotation": Direction("left_rotation", (0.0, 1.0, 0.0)),
-    "right_rotation": Direction("left_rotation", (0.0, -1.0, 0.0)),
+VIRTUAL_TESTS: Mapping[str, TurnDirection] = {
+    "flexion": TurnDirection("extension", (0.0, 0.0, -1.0)),
+    "extension": TurnDirection("extension", (0.0, 0.0, 1.0)),
+    "right_bending": TurnDirection("right_bending", (1.0, 0.0, 0.0)),
+    "left_bending": TurnDirection("right_bending", (-1.0, 0.0, 0.0)),
+    "left_rotation": TurnDirection("left_rotation", (0.0, 1.0, 0.0)),
+    "right_rotation": TurnDirection("left_rotation", (0.0, -1.0, 0.0)),
 }
 """Virtual tests by name."""
 

@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from spinepipe.documents.strays import is_hidden
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 
 LIKE = 0.8
 """Least likeness of two names without their endings: joint and joints have 0.91."""
@@ -28,7 +28,7 @@ ENDINGS = {
 """Endings that programs give the files."""
 
 
-def misnamed(folder: Path, name: str, absent: Sequence[str]) -> Iterator[Problem]:
+def misnamed(folder: Path, name: str, absent: Sequence[str]) -> Iterator[InputProblem]:
     """Files that are most likely the absent ones.
 
     Parameters
@@ -43,7 +43,7 @@ def misnamed(folder: Path, name: str, absent: Sequence[str]) -> Iterator[Problem
         if meant is not None:
             place = (f"{name}/{path.name}", None, None)
             remedy = f"did you mean '{meant}'? Rename it; or give it a name that is not so similar"
-            yield Problem(*place, "a file that is not read", f"the name {meant}", remedy)
+            yield InputProblem(*place, "a file that is not read", f"the name {meant}", remedy)
 
 
 def _is_like(name: str, file: str) -> bool:

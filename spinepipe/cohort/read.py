@@ -28,8 +28,8 @@ from spinepipe.documents.form import TableForm
 from spinepipe.documents.inside import outside
 from spinepipe.documents.rules import TableCheck
 from spinepipe.documents.settings import validate
-from spinepipe.documents.yaml_text import Document, read_yaml
-from spinepipe.problems import InputError, Problem, first_of
+from spinepipe.documents.yaml_text import YamlDocument, read_yaml
+from spinepipe.problems import InputError, InputProblem, first_of
 
 __all__ = ["Reader", "read"]
 
@@ -72,7 +72,9 @@ class Reader:
         folder = Path(folder)
         if not folder.is_dir():
             found, allowed = "no such folder", "a folder with cohort.yaml and specimens.csv"
-            raise InputError([Problem(str(folder), None, None, found, allowed, "check the name")])
+            raise InputError(
+                [InputProblem(str(folder), None, None, found, allowed, "check the name")]
+            )
         forms = TABLES | {form.stem: form for form in further}
         there = tuple(form for form in forms.values() if _is_there(folder / form.file))
         place = folder.resolve()
@@ -92,7 +94,7 @@ class _Outcome:
     """What reading came to: a cohort, or problems."""
 
     cohort: Cohort | None
-    problems: Sequence[Problem]
+    problems: Sequence[InputProblem]
 
 
 @contextmanager
@@ -138,7 +140,7 @@ def _outcome(folder: Path, name: str, forms: Mapping[str, TableForm]) -> _Outcom
 
 def _read_header(
     folder: Path, name: str
-) -> tuple[Document | None, CohortHeader | None, list[Problem]]:
+) -> tuple[YamlDocument | None, CohortHeader | None, list[InputProblem]]:
     file = f"{name}/{COHORT_YAML}"
     if not _is_there(folder / COHORT_YAML):
         return None, None, [_missing(file), *misnamed(folder, name, [COHORT_YAML])]
@@ -158,7 +160,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _read_tables(
-    folder: Path, name: str, forms: Mapping[str, TableForm], problems: list[Problem]
+    folder: Path, name: str, forms: Mapping[str, TableForm], problems: list[InputProblem]
 ) -> tuple[dict[str, pd.DataFrame], frozenset[str]]:
     """Tables by stem and the stems without a file; what is wrong is added to ``problems``."""
     tables: dict[str, pd.DataFrame] = {}
@@ -180,20 +182,20 @@ def _read_tables(
     return tables, frozenset(absent)
 
 
-def _within_bounds(draft: Draft, problems: list[Problem]) -> Draft:
+def _within_bounds(draft: Draft, problems: list[InputProblem]) -> Draft:
     """The draft without tables that mean more than can be looked at, which is added to problems."""
     number = len(draft.specimens)
     if number > MOST_SPECIMENS:
         allowed, remedy = f"at most {MOST_SPECIMENS}", "split the cohort"
         place = (draft.file("specimens"), None, None)
-        problems.append(Problem(*place, f"{number} specimens", allowed, remedy))
+        problems.append(InputProblem(*place, f"{number} specimens", allowed, remedy))
         return _without(draft, "specimens", "loads")
     number = number_of_applied_loads(draft)
     if number > MOST_APPLIED:
         found = f"{number} loads, with * as every specimen and an empty cycle as every cycle"
         place = (draft.file("loads"), None, None)
         remedy = "look for wrong numbers in the columns cycle, or split the cohort"
-        problems.append(Problem(*place, found, f"at most {MOST_APPLIED}", remedy))
+        problems.append(InputProblem(*place, found, f"at most {MOST_APPLIED}", remedy))
         return _without(draft, "loads")
     return draft
 
@@ -202,7 +204,7 @@ def _without(draft: Draft, *stems: str) -> Draft:
     return replace(draft, tables={s: t for s, t in draft.tables.items() if s not in stems})
 
 
-def _broken_rules(draft: Draft, problems: Sequence[Problem]) -> Iterator[Problem]:
+def _broken_rules(draft: Draft, problems: Sequence[InputProblem]) -> Iterator[InputProblem]:
     """What the tables do not keep of their forms, where their cells could be read."""
     for stem, table in draft.tables.items():
         file = draft.file(stem)
@@ -211,7 +213,7 @@ def _broken_rules(draft: Draft, problems: Sequence[Problem]) -> Iterator[Problem
         yield from first_of(check.problems())
 
 
-def _checks(draft: Draft) -> Iterator[Problem]:
+def _checks(draft: Draft) -> Iterator[InputProblem]:
     for found in (
         check_geometry(draft),
         check_bodies(draft),
@@ -222,8 +224,8 @@ def _checks(draft: Draft) -> Iterator[Problem]:
         yield from first_of(found)
 
 
-def _missing(file: str) -> Problem:
-    return Problem(file, None, None, "no such file", "a file of this name", "add it")
+def _missing(file: str) -> InputProblem:
+    return InputProblem(file, None, None, "no such file", "a file of this name", "add it")
 
 
 def _cohort(

@@ -10,15 +10,15 @@ from collections.abc import Iterator, Sequence
 import pandas as pd
 
 from spinepipe.cohort.draft import Draft
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem, Spelling
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS
 
 KEY = "zeroed_at_step_0"
 _PLACE = ["specimen", "test", "cycle", "joint"]
 
 
-def check_zeroing(draft: Draft, document: Document | None) -> Iterator[Problem]:
+def check_zeroing(draft: Draft, document: YamlDocument | None) -> Iterator[InputProblem]:
     """Tests that are named but unknown, and those that cannot be zeroed beside the named ones."""
     named = document.data.get(KEY) if document else None
     motion = draft.tables.get("motion")
@@ -30,14 +30,14 @@ def check_zeroing(draft: Draft, document: Document | None) -> Iterator[Problem]:
         if isinstance(name, str) and name not in known:
             place = (document.file, document.line_of(KEY), KEY)
             allowed = f"a test of motion.csv: {tests.allowed}"
-            yield Problem(*place, f"'{name}'", allowed, tests.remedy(name))
+            yield InputProblem(*place, f"'{name}'", allowed, tests.remedy(name))
     if not known.intersection(name for name in named if isinstance(name, str)):
         return
     for line, column in _without_start(motion, named):
         found = "a reading, but none at step 0 of its cycle"
         allowed = f"one at step 0 in each test that {KEY} does not name, as it names some"
         remedy = f"add it, or name the test in {KEY} if its readings count from step 0"
-        yield Problem(draft.file("motion"), line, column, found, allowed, remedy)
+        yield InputProblem(draft.file("motion"), line, column, found, allowed, remedy)
 
 
 def _without_start(motion: pd.DataFrame, named: Sequence[str]) -> Iterator[tuple[int, str]]:

@@ -22,7 +22,7 @@ from spinepipe.documents.text import (
     has_long_word,
     read_text,
 )
-from spinepipe.problems import Problem, Spelling, first_of
+from spinepipe.problems import InputProblem, Spelling, first_of
 
 MOST_ROWS = 150_000
 
@@ -36,7 +36,7 @@ MOST_CELLS = 4_000_000
 
 
 @dataclass(frozen=True)
-class Rows:
+class CsvRows:
     """Cells of one CSV file, not yet understood.
 
     Attributes
@@ -60,7 +60,9 @@ class Rows:
         return pd.Index(self.lines)
 
 
-def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | None, list[Problem]]:
+def read_table(
+    path: Path, form: TableForm, file: str
+) -> tuple[pd.DataFrame | None, list[InputProblem]]:
     """Read and convert one CSV file.
 
     Parameters
@@ -92,7 +94,7 @@ def read_table(path: Path, form: TableForm, file: str) -> tuple[pd.DataFrame | N
     return pd.DataFrame(data), problems
 
 
-def _column_problems(rows: Rows, form: TableForm) -> Iterator[Problem]:
+def _column_problems(rows: CsvRows, form: TableForm) -> Iterator[InputProblem]:
     known = Spelling(form.names, "delete the column or correct its name")
     absent = [name for name in form.names if name not in rows.header]
     for name in rows.header:
@@ -100,16 +102,18 @@ def _column_problems(rows: Rows, form: TableForm) -> Iterator[Problem]:
             continue
         if not form.carries:
             remedy = known.remedy(name)
-            yield Problem(rows.file, 1, name, "an unknown column", known.allowed, remedy)
+            yield InputProblem(rows.file, 1, name, "an unknown column", known.allowed, remedy)
         elif (meant := _meant(name, absent)) is not None:
             allowed = f"the name {meant}, or one that is not so similar"
             remedy = f"did you mean '{meant}'?"
-            yield Problem(rows.file, 1, name, "a column that is not read", allowed, remedy)
+            yield InputProblem(rows.file, 1, name, "a column that is not read", allowed, remedy)
         elif name and (fault := name_fault(name)) is not None:
-            yield Problem(rows.file, 1, None, fault, f"columns of {ALLOWED}", "rename the column")
+            yield InputProblem(
+                rows.file, 1, None, fault, f"columns of {ALLOWED}", "rename the column"
+            )
     for column in form.columns:
         if not column.nullable and column.name not in rows.header:
-            yield Problem(
+            yield InputProblem(
                 rows.file, 1, column.name, "no such column", column.meaning, "add the column"
             )
 
@@ -130,11 +134,11 @@ def _meant(name: str, absent: Sequence[str]) -> str | None:
 
 
 def _converted(
-    cells: list[str], column: InputColumn, rows: Rows, problems: list[Problem]
+    cells: list[str], column: InputColumn, rows: CsvRows, problems: list[InputProblem]
 ) -> "pd.Series":
     if not column.nullable:
         problems += first_of(
-            Problem(rows.file, line, column.name, "an empty cell", column.meaning, "fill it")
+            InputProblem(rows.file, line, column.name, "an empty cell", column.meaning, "fill it")
             for line, cell in zip(rows.lines, cells, strict=True)
             if not cell and line not in rows.ragged
         )
@@ -143,7 +147,7 @@ def _converted(
     numbers = _numbers(cells)
     wrong = [index for index in np.flatnonzero(_is_wrong(numbers, column)).tolist() if cells[index]]
     problems += first_of(
-        Problem(
+        InputProblem(
             *(rows.file, rows.lines[index], column.name, f"'{cells[index]}'"),
             *_number_fault(cells[index], float(numbers[index]), column),
         )
@@ -210,7 +214,7 @@ def _number_fault(cell: str, number: float, column: InputColumn) -> tuple[str, s
     return f"{column.meaning}: {column.range_text}", _remedy(number, column)
 
 
-def read_rows(path: Path, file: str) -> tuple[Rows | None, list[Problem]]:
+def read_rows(path: Path, file: str) -> tuple[CsvRows | None, list[InputProblem]]:
     """Rows of a comma-separated UTF-8 file, None when it is no such table.
 
     Wholly blank lines are skipped: they carry nothing.
@@ -228,12 +232,14 @@ def read_rows(path: Path, file: str) -> tuple[Rows | None, list[Problem]]:
     rows, problems = _squared(file, header, records[1:])
     if not rows.lines:
         problems.append(
-            Problem(file, 1, None, "a header and no rows", "at least one row", "fill or delete it")
+            InputProblem(
+                file, 1, None, "a header and no rows", "at least one row", "fill or delete it"
+            )
         )
     return rows, problems
 
 
-def _size_problems(text: str, file: str) -> Iterator[Problem]:
+def _size_problems(text: str, file: str) -> Iterator[InputProblem]:
     """More lines or cells than are read, said before they are."""
     for what, sign, most in (
         ("rows", "\n", MOST_ROWS),
@@ -243,7 +249,9 @@ def _size_problems(text: str, file: str) -> Iterator[Problem]:
         number = text.count(sign)
         if number > most:
             remedy = "split the cohort, or leave steps out"
-            yield Problem(file, None, None, f"{number} {what}", f"at most {most} {what}", remedy)
+            yield InputProblem(
+                file, None, None, f"{number} {what}", f"at most {most} {what}", remedy
+            )
             return
 
 
@@ -251,7 +259,7 @@ Records = list[tuple[int, list[str]]]
 """Line and cells of each row, the header too."""
 
 
-def _records(text: str, file: str) -> tuple[Records, list[Problem]]:
+def _records(text: str, file: str) -> tuple[Records, list[InputProblem]]:
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     records: Records = []
     line = 1
@@ -265,12 +273,14 @@ def _records(text: str, file: str) -> tuple[Records, list[Problem]]:
     return records, [] if records else [_not_csv(file, 1, "blank lines alone")]
 
 
-def _not_csv(file: str, line: int, reason: str) -> Problem:
+def _not_csv(file: str, line: int, reason: str) -> InputProblem:
     allowed = "comma-separated cells, double quotes only in pairs around a cell"
-    return Problem(file, line, None, f"no CSV ({reason})", allowed, "look for a stray quote mark")
+    return InputProblem(
+        file, line, None, f"no CSV ({reason})", allowed, "look for a stray quote mark"
+    )
 
 
-def _long_cells(file: str, records: Records) -> Iterator[Problem]:
+def _long_cells(file: str, records: Records) -> Iterator[InputProblem]:
     """Cells that no table has; they are not looked into."""
     header = records[0][1]
     for line, cells in records:
@@ -281,7 +291,7 @@ def _long_cells(file: str, records: Records) -> Iterator[Problem]:
                     found = f"a cell of {len(cell)} characters, '{cell[:20]}…'"
                     allowed = f"at most {LONGEST_CELL}, or {LONGEST_REMARK} with blanks in it"
                     remedy = "shorten it, or look for a quote mark"
-                    yield Problem(file, line, column, found, allowed, remedy)
+                    yield InputProblem(file, line, column, found, allowed, remedy)
 
 
 def _is_too_long(cell: str) -> bool:
@@ -289,45 +299,49 @@ def _is_too_long(cell: str) -> bool:
     return len(cell) > LONGEST_REMARK or has_long_word(cell)
 
 
-def _header_problems(file: str, header: list[str]) -> list[Problem]:
+def _header_problems(file: str, header: list[str]) -> list[InputProblem]:
     if len(header) > MOST_COLUMNS:
         found, allowed = f"{len(header)} columns", f"at most {MOST_COLUMNS}"
-        return [Problem(file, 1, None, found, allowed, "one header row, one thing per row")]
+        return [InputProblem(file, 1, None, found, allowed, "one header row, one thing per row")]
     separators = [mark for mark in (";", "\t") if len(header) == 1 and mark in header[0]]
     if separators:
         found = f"cells separated by {'semicolons' if separators[0] == ';' else 'tabs'}"
         remedy = "save the file as CSV with commas, and decimal points in numbers"
-        return [Problem(file, 1, None, found, "cells separated by commas", remedy)]
+        return [InputProblem(file, 1, None, found, "cells separated by commas", remedy)]
     repeated = sorted({name for name in header if header.count(name) > 1 and name})
     problems = [
-        Problem(file, 1, name, "the same column name twice", "each name once", "delete one")
+        InputProblem(file, 1, name, "the same column name twice", "each name once", "delete one")
         for name in repeated
     ]
     if "" in header:
         allowed = "a name over every column"
         remedy = "name the column or delete it"
-        problems.append(Problem(file, 1, None, "a column without a name", allowed, remedy))
+        problems.append(InputProblem(file, 1, None, "a column without a name", allowed, remedy))
     return problems
 
 
 def _squared(
     file: str, header: list[str], records: list[tuple[int, list[str]]]
-) -> tuple[Rows, list[Problem]]:
+) -> tuple[CsvRows, list[InputProblem]]:
     width = len(header)
     problems, ragged, cells = [], set(), []
     for line, row in records:
         if row == header:
             place = (file, line, None)
-            problems.append(Problem(*place, "the header again", "rows of cells", "delete the line"))
+            problems.append(
+                InputProblem(*place, "the header again", "rows of cells", "delete the line")
+            )
         if len(row) != width:
             problems.append(_ragged(file, line, len(row), width))
             ragged.add(line)
         cells.append((row + [""] * width)[:width])
-    rows = Rows(file, header, [line for line, _ in records], cells, frozenset(ragged))
+    rows = CsvRows(file, header, [line for line, _ in records], cells, frozenset(ragged))
     return rows, list(first_of(problems))
 
 
-def _ragged(file: str, line: int, found: int, width: int) -> Problem:
+def _ragged(file: str, line: int, found: int, width: int) -> InputProblem:
     cause = "a decimal comma splits a number into two cells" if found > width else "fill the row up"
     remedy = f"count the commas ({cause})"
-    return Problem(file, line, None, f"{found} cells", f"{width} cells, as in the header", remedy)
+    return InputProblem(
+        file, line, None, f"{found} cells", f"{width} cells, as in the header", remedy
+    )

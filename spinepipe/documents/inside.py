@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 
 ALLOWED_FILE = "a file in this folder, or a link to one in it"
 
@@ -18,7 +18,7 @@ def leads_out(path: Path, folder: Path) -> bool:
 
 def outside(
     path: Path, folder: Path, place: tuple[str, int | None, str | None], name: str
-) -> Problem | None:
+) -> InputProblem | None:
     """A problem where a file of a folder leads out of it; None where it does not.
 
     Parameters
@@ -29,4 +29,4 @@ def outside(
         return None
     found = f"'{name}', which leads out of the folder to {os.path.realpath(path)}"
     remedy = "copy the file into the folder; the folder as a whole may be a link"
-    return Problem(*place, found, ALLOWED_FILE, remedy)
+    return InputProblem(*place, found, ALLOWED_FILE, remedy)

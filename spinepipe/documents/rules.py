@@ -19,7 +19,7 @@ from spinepipe.documents.names import (
     look_alike,
     name_fault,
 )
-from spinepipe.problems import MOST_LISTED, Problem, Spelling
+from spinepipe.problems import MOST_LISTED, InputProblem, Spelling
 
 HEADER = 1
 """Line of the names of columns."""
@@ -65,13 +65,13 @@ class TableCheck:
 
     def problem(
         self, line: int | None, column: str | None, found: str, allowed: str, remedy: str
-    ) -> Problem:
+    ) -> InputProblem:
         """A fault of a row, with the words by which rows of this table are told."""
         if self.form.titled and line is not None:
             found = self.form.titled.format(**self.table.loc[line]) + found
-        return Problem(self.file, line, column, found, allowed, remedy)
+        return InputProblem(self.file, line, column, found, allowed, remedy)
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[InputProblem]:
         """All that is wrong."""
         for column in self.form.columns:
             cells = self.table[column.name].dropna()
@@ -87,7 +87,7 @@ class TableCheck:
             for rule in self.form.rules:
                 yield from self._broken(rule)
 
-    def _unknown(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[Problem]:
+    def _unknown(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[InputProblem]:
         """Names that do not stand where they should."""
         listed = self.known(column.references)
         if listed is None or not (listed.names or column.wildcard):
@@ -104,9 +104,11 @@ class TableCheck:
         for line, name in cells[~cells.isin(names)].items():
             found = f"unknown {called} {look_alike(name) or _quoted(name)}"
             remedy = listed.instead.get(name) or spelling.remedy(name)
-            yield Problem(self.file, _line(line), column.name, found, allowed, remedy)
+            yield InputProblem(self.file, _line(line), column.name, found, allowed, remedy)
 
-    def _unknown_of_each(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[Problem]:
+    def _unknown_of_each(
+        self, column: InputColumn, cells: "pd.Series[str]"
+    ) -> Iterator[InputProblem]:
         """The same where names are those of a specimen, say, and not of another."""
         stem, _, name = column.references.partition(".")
         listed = self.tables[stem]
@@ -121,9 +123,9 @@ class TableCheck:
                 spelling = spellings[owner]
                 found = f"no {column.called or column.name} '{cell}' of '{owner}'"
                 place = (self.file, _line(line), column.name)
-                yield Problem(*place, found, spelling.allowed, spelling.remedy(cell))
+                yield InputProblem(*place, found, spelling.allowed, spelling.remedy(cell))
 
-    def _not_allowed(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[Problem]:
+    def _not_allowed(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[InputProblem]:
         """Words that are none of those that a column may hold."""
         spelling = Spelling(column.allowed, column.otherwise or "correct it")
         lower = all(word == word.lower() for word in column.allowed)
@@ -132,7 +134,7 @@ class TableCheck:
             remedy = spelling.remedy(word.lower() if lower else word)
             yield self.problem(_line(line), column.name, found, spelling.allowed, remedy)
 
-    def _unfit(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[Problem]:
+    def _unfit(self, column: InputColumn, cells: "pd.Series[str]") -> Iterator[InputProblem]:
         """Names that nothing can be called by."""
         is_folder = column.names == "folder"
         fault_of, allowed = (folder_fault, ALLOWED_FOLDER) if is_folder else (name_fault, ALLOWED)
@@ -140,9 +142,11 @@ class TableCheck:
         faults = {name: fault_of(name) for name in cells.unique() if is_folder or name != EVERYONE}
         for line, name in cells[cells.map(faults).notna()].items():
             remedy = f"rename {what} in every file"
-            yield Problem(self.file, _line(line), column.name, faults[name] or "", allowed, remedy)
+            yield InputProblem(
+                self.file, _line(line), column.name, faults[name] or "", allowed, remedy
+            )
 
-    def _repeated(self) -> Iterator[Problem]:
+    def _repeated(self) -> Iterator[InputProblem]:
         """Rows with the keys of another; a row that lacks one is told elsewhere, or may be."""
         keys = self.form.keys
         standing = {one.name: one.empty_is for one in self.form.columns if one.empty_is is not None}
@@ -154,9 +158,9 @@ class TableCheck:
                 found = "again " + ", ".join(map(_shown, row))
                 allowed = f"one row per {' x '.join(keys)}"
                 remedy = f"delete one (the other is line {first[row]})"
-                yield Problem(self.file, _line(line), None, found, allowed, remedy)
+                yield InputProblem(self.file, _line(line), None, found, allowed, remedy)
 
-    def _broken(self, rule: Rule) -> Iterator[Problem]:
+    def _broken(self, rule: Rule) -> Iterator[InputProblem]:
         if rule.at_least or rule.at_most:
             yield from self._miscounted(rule)
             return
@@ -181,7 +185,7 @@ class TableCheck:
             if not any((line, name) in self.refused for name in columns):
                 yield _line(line), [name for name in columns if not filled.loc[line, name]]
 
-    def _miscounted(self, rule: Rule) -> Iterator[Problem]:
+    def _miscounted(self, rule: Rule) -> Iterator[InputProblem]:
         """Groups of too few or too many rows that count; an unknown word may be the one meant."""
         counts = pd.Series(True, index=self.table.index)
         for name, words in (rule.where or {}).items():
@@ -205,7 +209,7 @@ class TableCheck:
             found = rule.found.format(**{rule.per: group, "count": count})
             for line in faulty:
                 column = rule.at or rule.per
-                yield Problem(self.file, line, column, found, rule.allowed, rule.remedy)
+                yield InputProblem(self.file, line, column, found, rule.allowed, rule.remedy)
 
 
 def _line(index: object) -> int:

@@ -7,8 +7,8 @@ from pydantic import BaseModel, Tag, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem, did_you_mean, one_of
 
 MOST_TOLD = 100
 """Faults of one file that are told one by one."""
@@ -16,7 +16,7 @@ MOST_TOLD = 100
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def validate(model: type[Model], document: Document) -> tuple[Model | None, list[Problem]]:
+def validate(model: type[Model], document: YamlDocument) -> tuple[Model | None, list[InputProblem]]:
     """The document as an instance of the model, None when it does not fit; and the problems."""
     try:
         return model.model_validate(document.data), []
@@ -25,7 +25,9 @@ def validate(model: type[Model], document: Document) -> tuple[Model | None, list
         problems = [_problem(model, document, detail) for detail in details[:MOST_TOLD]]
         if len(details) > MOST_TOLD:
             found = f"{len(details) - MOST_TOLD} faults more"
-            problems.append(Problem(document.file, None, None, found, "none", "mend these first"))
+            problems.append(
+                InputProblem(document.file, None, None, found, "none", "mend these first")
+            )
         return None, problems
 
 
@@ -38,7 +40,7 @@ def _distinct(details: list[ErrorDetails]) -> Iterator[ErrorDetails]:
             yield detail
 
 
-def _problem(model: type[BaseModel], document: Document, detail: ErrorDetails) -> Problem:
+def _problem(model: type[BaseModel], document: YamlDocument, detail: ErrorDetails) -> InputProblem:
     owner, field, loc = _field_at(model, detail["loc"])
     key = ".".join(map(str, loc))
     place = (document.file, document.line_of(key), key or None)
@@ -47,19 +49,19 @@ def _problem(model: type[BaseModel], document: Document, detail: ErrorDetails) -
     if detail["type"] == "extra_forbidden":
         names = list(owner.model_fields)
         remedy = did_you_mean(str(loc[-1]), names, "delete it or correct its name")
-        return Problem(*place, "an unknown key", one_of(names), remedy)
+        return InputProblem(*place, "an unknown key", one_of(names), remedy)
     meaning = field.description if field is not None and field.description else ""
     if detail["type"] == "missing":
-        return Problem(*place, "nothing: the key is missing", meaning, f"add `{loc[-1]}:`")
+        return InputProblem(*place, "nothing: the key is missing", meaning, f"add `{loc[-1]}:`")
     allowed = _allowed(detail)
     expected = detail.get("ctx", {}).get("expected", "")
     remedy = f"correct it ({meaning})" if meaning else "correct it"
     if detail["type"] == "literal_error":
         remedy = did_you_mean(str(detail["input"]), _quoted(expected), remedy)
-    return Problem(*place, _shown(detail["input"]), allowed, remedy)
+    return InputProblem(*place, _shown(detail["input"]), allowed, remedy)
 
 
-def _no_such_form(document: Document, key: str, detail: ErrorDetails) -> Problem:
+def _no_such_form(document: YamlDocument, key: str, detail: ErrorDetails) -> InputProblem:
     """An item that does not say which of several forms it has, or one that there is not."""
     context = detail.get("ctx", {})
     (name,) = _quoted(context["discriminator"])
@@ -67,10 +69,10 @@ def _no_such_form(document: Document, key: str, detail: ErrorDetails) -> Problem
     place = (document.file, document.line_of(key), key)
     if detail["type"] == "union_tag_not_found":
         found, allowed = "nothing: the key is missing", "a form, which decides on the other keys"
-        return Problem(*place, found, allowed, f"add `{name}:`")
+        return InputProblem(*place, found, allowed, f"add `{name}:`")
     tags = _quoted(context["expected_tags"])
     remedy = did_you_mean(context["tag"], tags, "it decides which other keys are allowed")
-    return Problem(*place, repr(context["tag"]), one_of(tags), remedy)
+    return InputProblem(*place, repr(context["tag"]), one_of(tags), remedy)
 
 
 def _field_at(

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from stat import S_ISREG
 
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 
 MOST_YAML_BYTES = 1_000_000
 
@@ -43,7 +43,7 @@ def has_long_word(text: str) -> bool:
     return longest_word(text) > LONGEST_CELL
 
 
-def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[Problem]]:
+def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[InputProblem]]:
     """Text of a UTF-8 file; a byte-order mark is allowed.
 
     Parameters
@@ -60,7 +60,9 @@ def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[Problem
     if problems:
         return "", problems
     if not data.strip():
-        return "", [Problem(file, None, None, "an empty file", "a file with content", "fill it")]
+        return "", [
+            InputProblem(file, None, None, "an empty file", "a file with content", "fill it")
+        ]
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -73,7 +75,7 @@ def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[Problem
     return text, []
 
 
-def read_bytes(path: Path, file: str, most_bytes: int) -> tuple[bytes, list[Problem]]:
+def read_bytes(path: Path, file: str, most_bytes: int) -> tuple[bytes, list[InputProblem]]:
     """What is in a file, empty when there is a problem, and the problems, as `read_text`."""
     try:
         status = path.stat()
@@ -86,29 +88,35 @@ def read_bytes(path: Path, file: str, most_bytes: int) -> tuple[bytes, list[Prob
         return b"", [_unreadable(file, error)]
 
 
-def _no_file(file: str) -> Problem:
+def _no_file(file: str) -> InputProblem:
     found = "a folder or device"
-    return Problem(file, None, None, found, "a file", "rename it, or put the file in its place")
+    return InputProblem(
+        file, None, None, found, "a file", "rename it, or put the file in its place"
+    )
 
 
-def _unreadable(file: str, error: OSError) -> Problem:
+def _unreadable(file: str, error: OSError) -> InputProblem:
     """A file that the system does not let us read."""
     reason = (error.strerror or type(error).__name__).lower()
     remedy = "look at what it is and who may read it"
-    return Problem(file, None, None, f"what cannot be read ({reason})", "a readable file", remedy)
+    return InputProblem(
+        file, None, None, f"what cannot be read ({reason})", "a readable file", remedy
+    )
 
 
-def _too_large(file: str, size: int, most: int) -> Problem:
+def _too_large(file: str, size: int, most: int) -> InputProblem:
     found, allowed = f"{size / 1e6:.1f} MB", f"at most {most / 1e6:g} MB"
-    return Problem(file, None, None, found, allowed, "take out what does not belong, or split it")
+    return InputProblem(
+        file, None, None, found, allowed, "take out what does not belong, or split it"
+    )
 
 
-def _not_utf8(file: str, line: int) -> Problem:
+def _not_utf8(file: str, line: int) -> InputProblem:
     found = "bytes that are not UTF-8 text"
-    return Problem(file, line, None, found, "UTF-8", "save the file again with encoding UTF-8")
+    return InputProblem(file, line, None, found, "UTF-8", "save the file again with encoding UTF-8")
 
 
-def _invisible(file: str, line: int, character: str) -> Problem:
+def _invisible(file: str, line: int, character: str) -> InputProblem:
     found = f"the control character U+{ord(character):04X}"
     allowed = "characters that can be seen, blanks, tabs and line ends"
-    return Problem(file, line, None, found, allowed, "delete it; retype the line if it hides")
+    return InputProblem(file, line, None, found, allowed, "delete it; retype the line if it hides")

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from spinepipe.documents.text import LONGEST_CELL, MOST_YAML_BYTES, longest_word, read_text
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 
 DEEPEST = 20
 """Levels of lists and keys within each other."""
@@ -26,7 +26,7 @@ LONGEST_VALUE = 10_000
 
 
 @dataclass(frozen=True)
-class Document:
+class YamlDocument:
     """One YAML file whose top level is a list of keys.
 
     Attributes
@@ -47,7 +47,7 @@ class Document:
         return self.lines.get(key)
 
 
-def read_yaml(path: Path, file: str) -> tuple[Document | None, list[Problem]]:
+def read_yaml(path: Path, file: str) -> tuple[YamlDocument | None, list[InputProblem]]:
     """Read a YAML file of keys and values, None when it is none.
 
     Parameters
@@ -99,7 +99,7 @@ def packaged_yaml(path: Path) -> dict[str, Any]:
     return found
 
 
-def _document(text: str, file: str) -> tuple[Document | None, list[Problem]]:
+def _document(text: str, file: str) -> tuple[YamlDocument | None, list[InputProblem]]:
     """Keys and values of a text within bounds."""
     loader = _Loader(text)
     try:
@@ -111,12 +111,12 @@ def _document(text: str, file: str) -> tuple[Document | None, list[Problem]]:
             return None, problems
         lines: dict[str, int] = {}
         problems = list(_walk(node, "", file, lines))
-        return Document(file, loader.construct_document(node), lines), problems
+        return YamlDocument(file, loader.construct_document(node), lines), problems
     finally:
         loader.dispose()
 
 
-def _beyond_bounds(text: str, file: str) -> Iterator[Problem]:
+def _beyond_bounds(text: str, file: str) -> Iterator[InputProblem]:
     """The first thing in a file that is beyond what is read."""
     depth, values = 0, 0
     for event in yaml.parse(text, Loader=_PARSER):
@@ -136,7 +136,7 @@ def _beyond_bounds(text: str, file: str) -> Iterator[Problem]:
             found, allowed = "more keys and values than are read", f"at most {MOST_VALUES}"
             fault = found, allowed, "take out what does not belong, or split it"
         if fault is not None:
-            yield Problem(file, _line(event), None, *fault)
+            yield InputProblem(file, _line(event), None, *fault)
             return
 
 
@@ -170,7 +170,7 @@ def _length_fault(text: str) -> tuple[str, str, str] | None:
     return None
 
 
-def _no_names(node: yaml.Node, file: str) -> Iterator[Problem]:
+def _no_names(node: yaml.Node, file: str) -> Iterator[InputProblem]:
     """Keys below a node that are no names."""
     if isinstance(node, yaml.SequenceNode):
         for item in node.value:
@@ -179,11 +179,11 @@ def _no_names(node: yaml.Node, file: str) -> Iterator[Problem]:
         for key, value in node.value:
             fault = _key_fault(key)
             if fault is not None:
-                yield Problem(file, key.start_mark.line + 1, None, *fault)
+                yield InputProblem(file, key.start_mark.line + 1, None, *fault)
             yield from _no_names(value, file)
 
 
-def _walk(node: yaml.Node, path: str, file: str, lines: dict[str, int]) -> Iterator[Problem]:
+def _walk(node: yaml.Node, path: str, file: str, lines: dict[str, int]) -> Iterator[InputProblem]:
     """Note the line of every key below a node, and report repeated keys."""
     prefix = f"{path}." if path else ""
     if isinstance(node, yaml.SequenceNode):
@@ -196,7 +196,7 @@ def _walk(node: yaml.Node, path: str, file: str, lines: dict[str, int]) -> Itera
             key, line = f"{prefix}{key_node.value}", key_node.start_mark.line + 1
             if key in seen:
                 remedy = f"delete one (the other is in line {lines[key]})"
-                yield Problem(file, line, key, "the same key twice", "each key once", remedy)
+                yield InputProblem(file, line, key, "the same key twice", "each key once", remedy)
             seen.add(key)
             lines.setdefault(key, line)
             yield from _walk(value, key, file, lines)
@@ -213,12 +213,12 @@ def _key_fault(node: yaml.Node) -> tuple[str, str, str] | None:
     return None
 
 
-def _no_keys(file: str) -> Problem:
+def _no_keys(file: str) -> InputProblem:
     allowed = "lines of the form `key: value`"
-    return Problem(file, None, None, "no keys", allowed, "see the format's documentation")
+    return InputProblem(file, None, None, "no keys", allowed, "see the format's documentation")
 
 
-def _no_yaml(file: str, error: Exception) -> Problem:
+def _no_yaml(file: str, error: Exception) -> InputProblem:
     mark = getattr(error, "problem_mark", None)
     reason = getattr(error, "problem", None) or str(error)
     about = getattr(error, "context", None) or ""
@@ -226,4 +226,4 @@ def _no_yaml(file: str, error: Exception) -> Problem:
         mark = getattr(error, "context_mark", None) or mark  # what is not closed: where it opens
     line = mark.line + 1 if mark is not None else None
     remedy = "check indentation, colons, brackets and quotes there"
-    return Problem(file, line, None, f"no YAML ({reason})", "YAML", remedy)
+    return InputProblem(file, line, None, f"no YAML ({reason})", "YAML", remedy)

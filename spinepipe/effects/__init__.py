@@ -7,10 +7,10 @@ from spinepipe.effects.contract import (
     Advance,
     AppliedLoad,
     Effect,
+    EffectKind,
     GeometryEffect,
     JointLaw,
     JointResponse,
-    Kind,
     LoadEffect,
     MeasurementBeside,
     MeasurementEffect,
@@ -22,16 +22,16 @@ from spinepipe.effects.contract import (
     PlacementByParameter,
     Wrench,
 )
-from spinepipe.effects.registry import Spread, Trial, create, register, registered
+from spinepipe.effects.registry import PlaceSpread, TriedValues, create, register, registered
 
 __all__ = [
     "Advance",
     "AppliedLoad",
     "Effect",
+    "EffectKind",
     "GeometryEffect",
     "JointLaw",
     "JointResponse",
-    "Kind",
     "LoadEffect",
     "MeasurementBeside",
     "MeasurementEffect",
@@ -39,10 +39,10 @@ __all__ = [
     "Observation",
     "Parameter",
     "PathLaw",
+    "PlaceSpread",
     "Placement",
     "PlacementByParameter",
-    "Spread",
-    "Trial",
+    "TriedValues",
     "Wrench",
     "create",
     "register",

@@ -7,7 +7,7 @@ import numpy as np
 
 from spinepipe.effects.contract import (
     Array,
-    Kind,
+    EffectKind,
     Parameter,
     Placement,
     PlacementByParameter,
@@ -26,7 +26,7 @@ class AxesTilt:
     """
 
     name: ClassVar[str] = "axes_tilt"
-    kind: ClassVar[Kind] = Kind.GEOMETRY
+    kind: ClassVar[EffectKind] = EffectKind.GEOMETRY
     per_joint: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = tilt_parameters(float(np.deg2rad(3.0)))
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.contract import Array, EffectKind, JointResponse, Parameter
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 # Typical size and bound by the number of translations in the pair. Rotations: a fifth of the
@@ -28,10 +28,10 @@ class BendingRotationCoupling:
 
     pair: tuple[str, str] = ("right_bending", "left_rotation")
     name: ClassVar[str] = "bending_rotation_coupling"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     straight_over: ClassVar[float] = np.inf
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"pair": pair} for pair in combinations(COORDINATES, 2)),
         spreads=PER_JOINT,
         told_by="motion measured in both coordinates while one of them is loaded",

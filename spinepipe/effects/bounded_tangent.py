@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
+from spinepipe.effects.contract import Array, EffectKind, JointResponse, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.facts import number
 from spinepipe.units import COORDINATES, ROTATIONS
@@ -28,7 +28,7 @@ class BoundedTangent:
 
     coordinate: str = "right_bending"
     name: ClassVar[str] = "bounded_tangent"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

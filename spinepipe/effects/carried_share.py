@@ -21,7 +21,7 @@ ALL = "all"
 
 
 @dataclass(frozen=True)
-class Share:
+class CarriedFraction:
     """A share of the carried load on C coordinates and its derivatives.
 
     Attributes
@@ -47,7 +47,7 @@ class CarriedShare(ABC):
         return columns_of(self.coordinate)
 
     @abstractmethod
-    def share(self, q: Array, parameters: Array) -> Share:
+    def share(self, q: Array, parameters: Array) -> CarriedFraction:
         """Share at the scaled coordinates q (J, C)."""
 
     def respond(self, q: Array, parameters: Array, carried: Array) -> JointResponse:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-class Kind(StrEnum):
+class EffectKind(StrEnum):
     """What an effect acts on."""
 
     JOINT_LAW = "joint law"
@@ -159,7 +159,7 @@ class Observation:
 
 
 @dataclass(frozen=True)
-class Beside:
+class MeasurementContext:
     """What readings of joints may hang on besides their own motion.
 
     Attributes
@@ -232,7 +232,7 @@ class Effect(Protocol):
     @property
     def name(self) -> str: ...
     @property
-    def kind(self) -> Kind: ...
+    def kind(self) -> EffectKind: ...
     @property
     def per_joint(self) -> bool: ...
     @property
@@ -350,8 +350,10 @@ class MeasurementEffect(Effect, Protocol):
 class MeasurementBeside(Effect, Protocol):
     """Instruments that follow the neighbouring joints, or drift while a test goes on."""
 
-    def observe_beside(self, q: Array, parameters: Array, beside: Beside) -> Observation:
+    def observe_beside(
+        self, q: Array, parameters: Array, beside: MeasurementContext
+    ) -> Observation:
         """Reported coordinates (J, 6) for true ones, and what stands beside them."""
 
-    def by_parameter_beside(self, q: Array, parameters: Array, beside: Beside) -> Array:
+    def by_parameter_beside(self, q: Array, parameters: Array, beside: MeasurementContext) -> Array:
         """(J, 6, P) derivative of the reported coordinates by the parameters."""

@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Advance, Array, JointResponse, Kind, Parameter
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.contract import Advance, Array, EffectKind, JointResponse, Parameter
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.units import COORDINATES
 
 ELEMENTS = 5
@@ -78,11 +78,11 @@ class Creep:
     coordinate: str = "extension"
     load: str = "held"
     name: ClassVar[str] = "creep"
-    kind: ClassVar[Kind] = Kind.PATH
+    kind: ClassVar[EffectKind] = EffectKind.PATH
     per_joint: ClassVar[bool] = True
     n_states: ClassVar[int] = ELEMENTS + 1
     parameters: ClassVar[tuple[Parameter, ...]] = (_FRACTION, _TIME, _SPREAD)
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c} for c in COORDINATES),
         spreads=PER_JOINT,
         told_by="recorded times, and a load that is held over several readings",
@@ -98,9 +98,9 @@ class Creep:
 
     def _step(
         self, parameters: Array, state: Array, seconds: float | Array, carried: Array
-    ) -> "_Step":
+    ) -> "_CreepStep":
         here, ramped = carried[:, self._at], self.load == "ramped"
-        return _Step(parameters, state, np.asarray(seconds, dtype=float), here, ramped)
+        return _CreepStep(parameters, state, np.asarray(seconds, dtype=float), here, ramped)
 
     def respond_on_path(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
@@ -148,7 +148,7 @@ class Creep:
         return Advance(after, np.zeros_like(by_carried), by_parameter, by_state, by_carried)
 
 
-class _Step:
+class _CreepStep:
     """z (J, N) and M (J,) at the end of a step, and their derivatives.
 
     ``z = kept z0 + before M0 + now M`` with kept = exp(-x), x = seconds / time_i; held: before = 0.

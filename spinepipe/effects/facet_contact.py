@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.contract import Array, EffectKind, JointResponse, Parameter
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.effects.rounding import ramp
 from spinepipe.facts import numbers
 from spinepipe.units import COORDINATES, TRANSLATIONS
@@ -39,9 +39,9 @@ class FacetContact:
     coordinate: str = "extension"
     side: str = "positive"
     name: ClassVar[str] = "facet_contact"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c, "side": s} for c in COORDINATES for s in SIDES),
         spreads=PER_JOINT,
         told_by="several load steps beyond the gap and within it, in both directions",

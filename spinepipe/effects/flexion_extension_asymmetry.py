@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from spinepipe.effects.carried_share import CarriedShare, Share, require
-from spinepipe.effects.contract import Array, Kind, Parameter
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.carried_share import CarriedFraction, CarriedShare, require
+from spinepipe.effects.contract import Array, EffectKind, Parameter
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.effects.rounding import sign
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
@@ -26,9 +26,9 @@ class FlexionExtensionAsymmetry(CarriedShare):
 
     coordinate: str = "extension"
     name: ClassVar[str] = "flexion_extension_asymmetry"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c} for c in COORDINATES),
         spreads=PER_JOINT,
         told_by="the same load in both directions",
@@ -43,8 +43,8 @@ class FlexionExtensionAsymmetry(CarriedShare):
         meaning = f"stiffness gained for positive and lost for negative {self.coordinate}"
         return (Parameter("asymmetry", "1", -0.9, 0.9, 0.2, 0.2, False, meaning, off=0.0),)
 
-    def share(self, q: Array, parameters: Array) -> Share:
+    def share(self, q: Array, parameters: Array) -> CarriedFraction:
         """``asymmetry * tanh(q / width)``."""
         width = ROUNDED_M if self.coordinate in TRANSLATIONS else ROUNDED_RAD
         side, slope = sign(q, width)
-        return Share(parameters * side, parameters * slope, side[:, :, None])
+        return CarriedFraction(parameters * side, parameters * slope, side[:, :, None])

@@ -9,15 +9,15 @@ import numpy as np
 from spinepipe.effects.contract import (
     AppliedLoad,
     Array,
+    EffectKind,
     Indices,
     JointResponse,
-    Kind,
     Motion,
     Neutral,
     Parameter,
     Wrench,
 )
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.effects.turning import turning
 from spinepipe.effects.vertebra_points import centres, upper_ends
 
@@ -58,7 +58,7 @@ class FollowerLoad:
 
     guides: str = "joints"
     name: ClassVar[str] = "follower_load"
-    kind: ClassVar[Kind] = Kind.LOAD
+    kind: ClassVar[EffectKind] = EffectKind.LOAD
     per_joint: ClassVar[bool] = False
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
@@ -83,9 +83,9 @@ class FollowerLoad:
             meaning="how far before its guides the cable runs; behind them below 0",
         ),
     )
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=({"guides": "joints"}, {"guides": "centres"}),
-        spreads=(Spread.SHARED, Spread.BY_SPECIMEN),
+        spreads=(PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN),
         told_by="measured translations: a compression through the joints' centres turns nothing",
     )
 

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import TRIED, Advance, Array, JointResponse, Kind, Parameter
+from spinepipe.effects.contract import TRIED, Advance, Array, EffectKind, JointResponse, Parameter
 from spinepipe.effects.friction import Stepped, dahl, jenkins
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.facts import several
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
@@ -54,9 +54,9 @@ class Hysteresis:
     coordinate: str = "extension"
     law: str = "dahl"
     name: ClassVar[str] = "hysteresis"
-    kind: ClassVar[Kind] = Kind.PATH
+    kind: ClassVar[EffectKind] = EffectKind.PATH
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple(
             {"coordinate": c, **law} for law in ({}, {"law": "jenkins"}) for c in COORDINATES
         ),
@@ -156,13 +156,15 @@ class Hysteresis:
     def _at(self) -> int:
         return COORDINATES.index(self.coordinate)
 
-    def _step(self, q: Array, parameters: Array, state: Array) -> "_Step":
+    def _step(self, q: Array, parameters: Array, state: Array) -> "_SliderStep":
         """How the elements follow a step to q (J, 6)."""
         deviates = _DEVIATES[self.law]
         spread = parameters[:, 2:] if self.law == "jenkins" else 0.0
         yields = parameters[:, 1:2] * np.exp(spread * deviates)
         x = (q[:, self._at, None] - state[:, :1]) / yields
-        return _Step(_STEPS[self.law](state[:, 1:], x), x, yields, parameters[:, 1:2], deviates)
+        return _SliderStep(
+            _STEPS[self.law](state[:, 1:], x), x, yields, parameters[:, 1:2], deviates
+        )
 
 
 _SPREAD = Parameter(
@@ -188,7 +190,7 @@ class _Mean:
 
 
 @dataclass(frozen=True)
-class _Step:
+class _SliderStep:
     """Elements (J, N) after a step; x is how far they were moved over their yields."""
 
     own: Stepped

@@ -7,12 +7,12 @@ import numpy as np
 
 from spinepipe.effects.contract import (
     Array,
-    Kind,
+    EffectKind,
     Parameter,
     Placement,
     PlacementByParameter,
 )
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.effects.turning import turning
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M
 
@@ -49,14 +49,14 @@ class JointCentreMigration:
     """
 
     name: ClassVar[str] = "joint_centre_migration"
-    kind: ClassVar[Kind] = Kind.GEOMETRY
+    kind: ClassVar[EffectKind] = EffectKind.GEOMETRY
     per_joint: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(map(_rate, DIRECTIONS))
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=({},),
         spreads=(
-            *(Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN),
-            *(Spread.EACH, Spread.ONE_JOINT, Spread.ONE),
+            *(PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN),
+            *(PlaceSpread.EACH, PlaceSpread.ONE_JOINT, PlaceSpread.ONE),
         ),
         told_by="translations measured at several angles of flexion and extension, "
         "or forces beside the moments",

@@ -7,12 +7,12 @@ import numpy as np
 
 from spinepipe.effects.contract import (
     Array,
-    Kind,
+    EffectKind,
     Parameter,
     Placement,
     PlacementByParameter,
 )
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.effects.turning import turning
 from spinepipe.units import TRANSLATIONS
 
@@ -43,14 +43,14 @@ class JointCentreOffset:
     """
 
     name: ClassVar[str] = "joint_centre_offset"
-    kind: ClassVar[Kind] = Kind.GEOMETRY
+    kind: ClassVar[EffectKind] = EffectKind.GEOMETRY
     per_joint: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(map(_offset, TRANSLATIONS))
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=({},),
         spreads=(
-            *(Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN),
-            *(Spread.EACH, Spread.ONE_JOINT, Spread.ONE),
+            *(PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN),
+            *(PlaceSpread.EACH, PlaceSpread.ONE_JOINT, PlaceSpread.ONE),
         ),
         told_by="measured translations, or forces beside the moments: "
         "rotations under pure moments do not depend on the centre",

@@ -8,12 +8,12 @@ import numpy as np
 from spinepipe.effects.carried_share import (
     ALL,
     ALL_ROTATIONS,
+    CarriedFraction,
     CarriedShare,
-    Share,
     require,
 )
-from spinepipe.effects.contract import Array, Kind, Parameter
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.contract import Array, EffectKind, Parameter
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.units import COORDINATES
 
 
@@ -28,12 +28,12 @@ class LevelDependence(CarriedShare):
 
     coordinate: str = "extension"
     name: ClassVar[str] = "level_dependence"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     straight_over: ClassVar[float] = np.inf
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c} for c in (*COORDINATES, ALL_ROTATIONS, ALL)),
-        spreads=(Spread.BY_JOINT,),
+        spreads=(PlaceSpread.BY_JOINT,),
         told_by="motion of every level, with a base that gives all levels the same stiffness",
     )
 
@@ -46,7 +46,7 @@ class LevelDependence(CarriedShare):
         meaning = f"stiffness of this level in {self.coordinate} over the model's"
         return (Parameter("ratio", "1", 0.01, 100.0, 1.3, 0.5, True, meaning, off=1.0),)
 
-    def share(self, q: Array, parameters: Array) -> Share:
+    def share(self, q: Array, parameters: Array) -> CarriedFraction:
         """``ratio - 1``, wherever the joint is."""
         value = np.broadcast_to(parameters - 1.0, q.shape)
-        return Share(value, np.zeros_like(q), np.ones((*q.shape, 1)))
+        return CarriedFraction(value, np.zeros_like(q), np.ones((*q.shape, 1)))

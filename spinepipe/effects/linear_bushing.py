@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
+from spinepipe.effects.contract import Array, EffectKind, JointResponse, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
@@ -46,7 +46,7 @@ class LinearBushing:
     """
 
     name: ClassVar[str] = "linear_bushing"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     straight_over: ClassVar[float] = np.inf
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
+from spinepipe.effects.contract import Array, EffectKind, Indices, Neutral, Parameter
 from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
 from spinepipe.effects.registry import register
 
@@ -17,7 +17,7 @@ class LoadGain(DeadLoad):
     """
 
     name: ClassVar[str] = "load_gain"
-    kind: ClassVar[Kind] = Kind.LOAD
+    kind: ClassVar[EffectKind] = EffectKind.LOAD
     per_joint: ClassVar[bool] = False
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(

@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
+from spinepipe.effects.contract import Array, EffectKind, Indices, Neutral, Parameter
 from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 
 TYPICAL_RAD = float(np.deg2rad(3.0))
 LARGEST_RAD = 0.5
@@ -57,11 +57,11 @@ class LoadMisalignment(DeadLoad):
     turns: str = "moments"
 
     name: ClassVar[str] = "load_misalignment"
-    kind: ClassVar[Kind] = Kind.LOAD
+    kind: ClassVar[EffectKind] = EffectKind.LOAD
     per_joint: ClassVar[bool] = False
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=({"turns": "moments"}, {"turns": "wrench"}),
-        spreads=(Spread.SHARED, Spread.BY_SPECIMEN, Spread.BY_TEST),
+        spreads=(PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN, PlaceSpread.BY_TEST),
         told_by="motion in several coordinates, with loads about or along more than one axis "
         "so that tilted joint frames do not explain it",
     )

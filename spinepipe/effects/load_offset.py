@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
+from spinepipe.effects.contract import Array, EffectKind, Indices, Neutral, Parameter
 from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.effects.vertebra_points import centres
 from spinepipe.units import TRANSLATIONS
 
@@ -65,11 +65,11 @@ class LoadOffset(DeadLoad):
     applies: str = MOMENT
 
     name: ClassVar[str] = "load_offset"
-    kind: ClassVar[Kind] = Kind.LOAD
+    kind: ClassVar[EffectKind] = EffectKind.LOAD
     per_joint: ClassVar[bool] = False
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=({}, {"applies": FORCE}, *({"coordinate": c} for c in TRANSLATIONS)),
-        spreads=(Spread.SHARED, Spread.BY_SPECIMEN, Spread.BY_TEST),
+        spreads=(PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN, PlaceSpread.BY_TEST),
         told_by="readings not zeroed at the unloaded step; if zeroed, a joint that is not linear, "
         "or loads large enough to turn the vertebrae in the moment",
     )

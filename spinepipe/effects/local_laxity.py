@@ -8,12 +8,12 @@ import numpy as np
 from spinepipe.effects.carried_share import (
     ALL,
     ALL_ROTATIONS,
+    CarriedFraction,
     CarriedShare,
-    Share,
     require,
 )
-from spinepipe.effects.contract import Array, Kind, Parameter
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.contract import Array, EffectKind, Parameter
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.units import COORDINATES
 
 
@@ -28,12 +28,12 @@ class LocalLaxity(CarriedShare):
 
     coordinate: str = "extension"
     name: ClassVar[str] = "local_laxity"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     straight_over: ClassVar[float] = np.inf
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c} for c in (*COORDINATES, ALL_ROTATIONS, ALL)),
-        spreads=(Spread.ONE,),
+        spreads=(PlaceSpread.ONE,),
         told_by="motion of every level of several specimens, with a base that shares stiffness",
     )
 
@@ -46,7 +46,7 @@ class LocalLaxity(CarriedShare):
         meaning = f"part of the stiffness in {self.coordinate} that is lost"
         return (Parameter("fraction", "1", 0.0, 0.95, 0.3, 0.3, False, meaning, off=0.0),)
 
-    def share(self, q: Array, parameters: Array) -> Share:
+    def share(self, q: Array, parameters: Array) -> CarriedFraction:
         """``-fraction``, wherever the joint is."""
         value = np.broadcast_to(-parameters, q.shape)
-        return Share(value, np.zeros_like(q), -np.ones((*q.shape, 1)))
+        return CarriedFraction(value, np.zeros_like(q), -np.ones((*q.shape, 1)))

@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from spinepipe.effects.contract import Array, Kind, Observation, Parameter
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.contract import Array, EffectKind, Observation, Parameter
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.effects.tilting import tilt_parameters, tilted, tilted_by_tilt
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
@@ -53,11 +53,11 @@ class MarkerBias:
     form: str = "offset"
 
     name: ClassVar[str] = "marker_bias"
-    kind: ClassVar[Kind] = Kind.MEASUREMENT
+    kind: ClassVar[EffectKind] = EffectKind.MEASUREMENT
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=({"form": "offset"}, {"form": "tilt"}),
-        spreads=(Spread.EACH, Spread.BY_JOINT, Spread.ONE_JOINT, Spread.ONE),
+        spreads=(PlaceSpread.EACH, PlaceSpread.BY_JOINT, PlaceSpread.ONE_JOINT, PlaceSpread.ONE),
         told_by="offset: readings not zeroed at the unloaded step; "
         "tilt: motion about several axes, each of which shows in the others",
     )

@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, Beside, Kind, Observation, Parameter
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.contract import Array, EffectKind, MeasurementContext, Observation, Parameter
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 _DRIFT = {True: (1e-2, 3e-4), False: (0.2, float(np.deg2rad(0.3)))}
@@ -28,9 +28,9 @@ class NeutralPoseDrift:
     coordinate: str = "extension"
 
     name: ClassVar[str] = "neutral_pose_drift"
-    kind: ClassVar[Kind] = Kind.MEASUREMENT
+    kind: ClassVar[EffectKind] = EffectKind.MEASUREMENT
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c} for c in COORDINATES),
         spreads=PER_JOINT,
         told_by="tests that come back to loads they have had before, best to none at their end",
@@ -61,13 +61,15 @@ class NeutralPoseDrift:
             Parameter("pace", "1", 0.05, 20.0, 1.0, 1.5, True, pace, family=True),
         )
 
-    def observe_beside(self, q: Array, parameters: Array, beside: Beside) -> Observation:
+    def observe_beside(
+        self, q: Array, parameters: Array, beside: MeasurementContext
+    ) -> Observation:
         """Reported coordinates; the true ones are in them as they are."""
         seen = q.copy()
         seen[:, self._at] += parameters[:, 0] * _course(beside.passed, parameters[:, 1])[0]
         return Observation(seen, np.tile(np.eye(6), (len(q), 1, 1)))
 
-    def by_parameter_beside(self, q: Array, parameters: Array, beside: Beside) -> Array:
+    def by_parameter_beside(self, q: Array, parameters: Array, beside: MeasurementContext) -> Array:
         """(J, 6, 2)."""
         course, by_pace = _course(beside.passed, parameters[:, 1])
         found = np.zeros((len(q), 6, 2))

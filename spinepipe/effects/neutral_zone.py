@@ -5,10 +5,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from spinepipe.effects.carried_share import CarriedShare, Share, require
-from spinepipe.effects.contract import Array, Kind, Parameter
+from spinepipe.effects.carried_share import CarriedFraction, CarriedShare, require
+from spinepipe.effects.contract import Array, EffectKind, Parameter
 from spinepipe.effects.knee import chord, inside
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.facts import numbers
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
@@ -47,9 +47,9 @@ class NeutralZone(CarriedShare):
     coordinate: str = "extension"
     zone: str = "centred"
     name: ClassVar[str] = "neutral_zone"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple(
             {"coordinate": c, **zone} for zone in ({}, {"zone": "off_centre"}) for c in COORDINATES
         ),
@@ -97,7 +97,7 @@ class NeutralZone(CarriedShare):
             high = WIDEST * width
         return Parameter("width", unit, low, high, width, 0.7, True, meaning, tried=tried)
 
-    def share(self, q: Array, parameters: Array) -> Share:
+    def share(self, q: Array, parameters: Array) -> CarriedFraction:
         """``(ratio - 1) g``; derivatives by ratio, width, sharpness and offset."""
         ratio, width, n = parameters[:, :1], parameters[:, 1:2], parameters[:, 2:3]
         softer, u = ratio - 1.0, q / width
@@ -107,4 +107,4 @@ class NeutralZone(CarriedShare):
         else:
             g, by_u, by_n, by_offset = chord(u, n, parameters[:, 3:4])
             columns = [g, -softer * by_u * u / width, softer * by_n, softer * by_offset]
-        return Share(softer * g, softer * by_u / width, np.stack(columns, axis=2))
+        return CarriedFraction(softer * g, softer * by_u / width, np.stack(columns, axis=2))

@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from spinepipe.effects.carried_share import CarriedShare, Share, require
-from spinepipe.effects.contract import Array, Kind, Parameter
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.carried_share import CarriedFraction, CarriedShare, require
+from spinepipe.effects.contract import Array, EffectKind, Parameter
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.effects.rounding import magnitude, ramp
 from spinepipe.facts import several
 from spinepipe.units import COORDINATES, TRANSLATIONS
@@ -77,9 +77,9 @@ class NonlinearStiffening(CarriedShare):
     coordinate: str = "extension"
     shape: str = "exponential"
     name: ClassVar[str] = "nonlinear_stiffening"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c, "shape": s} for c in COORDINATES for s in SHAPES),
         spreads=PER_JOINT,
         told_by="several load steps up to a large motion, in both directions",
@@ -113,13 +113,13 @@ class NonlinearStiffening(CarriedShare):
             at, low = (float(np.deg2rad(deg)) for deg in _BREAK[self.coordinate])
         return gain, Parameter("break_at", unit, low, most, at, 0.4, True, where, tried=tried)
 
-    def share(self, q: Array, parameters: Array) -> Share:
+    def share(self, q: Array, parameters: Array) -> CarriedFraction:
         """``factor(strength * size(q)) - 1`` with size |q| or q^2; of the bilinear, its own."""
         if self.shape == "bilinear":
             return _beyond(q, parameters[:, :1], parameters[:, 1:])
         size, by_q = self._size(q)
         value, slope = _SHARES[self.shape](parameters * size)
-        return Share(value, slope * parameters * by_q, (slope * size)[:, :, None])
+        return CarriedFraction(value, slope * parameters * by_q, (slope * size)[:, :, None])
 
     def _size(self, q: Array) -> tuple[Array, Array]:
         if self.shape != "exponential":
@@ -158,14 +158,14 @@ def _cubic(v: Array) -> tuple[Array, Array]:
     return v, np.ones_like(v)
 
 
-def _beyond(q: Array, gain: Array, at: Array) -> Share:
+def _beyond(q: Array, gain: Array, at: Array) -> CarriedFraction:
     """``gain (|q| - break) / |q|`` beyond the break, by gain and break."""
     u = np.abs(q) / at
     over, slope = ramp(u - 1.0, ROUNDED)
     safe = np.maximum(u, 1.0 - ROUNDED)  # nothing is over nearer to zero
     value, by_u = over / safe, (slope - over / safe) / safe
     columns = [value, -gain * by_u * u / at]
-    return Share(gain * value, gain * by_u * np.sign(q) / at, np.stack(columns, axis=2))
+    return CarriedFraction(gain * value, gain * by_u * np.sign(q) / at, np.stack(columns, axis=2))
 
 
 _SHARES: dict[str, Callable[[Array], tuple[Array, Array]]] = {

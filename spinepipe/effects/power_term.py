@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
+from spinepipe.effects.contract import Array, EffectKind, JointResponse, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.facts import several
 from spinepipe.units import COORDINATES, TRANSLATIONS
@@ -31,7 +31,7 @@ class PowerTerm:
     of: tuple[str, ...] = ("extension", "extension")
     signed: bool = False
     name: ClassVar[str] = "power_term"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import ALL_ROTATIONS, columns_of, require
-from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
-from spinepipe.effects.registry import PER_JOINT, Trial, register
+from spinepipe.effects.contract import Array, EffectKind, JointResponse, Parameter
+from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.units import COORDINATES
 
 _SUPERIOR = COORDINATES.index("superior")
@@ -31,9 +31,9 @@ class PreloadStiffening:
 
     coordinate: str = "extension"
     name: ClassVar[str] = "preload_stiffening"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c} for c in STIFFENED),
         spreads=PER_JOINT,
         told_by="the same moments under two different compressive preloads",

@@ -52,7 +52,7 @@ def create(name: str, options: Mapping[str, Any] | None = None) -> Effect:
     return effect
 
 
-class Spread(StrEnum):
+class PlaceSpread(StrEnum):
     """How the values of an effect may differ between the places it acts at."""
 
     SHARED = "shared"
@@ -65,18 +65,18 @@ class Spread(StrEnum):
 
 
 PER_JOINT = (
-    Spread.SHARED,
-    Spread.BY_JOINT,
-    Spread.BY_SPECIMEN,
-    Spread.EACH,
-    Spread.ONE_JOINT,
-    Spread.ONE,
+    PlaceSpread.SHARED,
+    PlaceSpread.BY_JOINT,
+    PlaceSpread.BY_SPECIMEN,
+    PlaceSpread.EACH,
+    PlaceSpread.ONE_JOINT,
+    PlaceSpread.ONE,
 )
 """All ways in which an effect of single joints may differ."""
 
 
 @dataclass(frozen=True)
-class Trial:
+class TriedValues:
     """What is tried of an effect.
 
     Attributes
@@ -87,5 +87,5 @@ class Trial:
     """
 
     variants: tuple[Mapping[str, Any], ...]
-    spreads: tuple[Spread, ...]
+    spreads: tuple[PlaceSpread, ...]
     told_by: str

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from spinepipe.effects.contract import (
     Array,
-    Kind,
+    EffectKind,
     Parameter,
     Placement,
     PlacementByParameter,
@@ -31,7 +31,7 @@ class RotationOrder:
     """
 
     name: ClassVar[str] = "rotation_order"
-    kind: ClassVar[Kind] = Kind.GEOMETRY
+    kind: ClassVar[EffectKind] = EffectKind.GEOMETRY
     per_joint: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(

@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from spinepipe.effects.contract import Array, Indices, Kind, Neutral, Parameter
+from spinepipe.effects.contract import Array, EffectKind, Indices, Neutral, Parameter
 from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.effects.vertebra_points import centres
 from spinepipe.units import STANDARD_GRAVITY
 
@@ -26,7 +26,7 @@ class SegmentWeight(DeadLoad):
     where: str = "each"
 
     name: ClassVar[str] = "segment_weight"
-    kind: ClassVar[Kind] = Kind.LOAD
+    kind: ClassVar[EffectKind] = EffectKind.LOAD
     per_joint: ClassVar[bool] = False
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
@@ -41,9 +41,9 @@ class SegmentWeight(DeadLoad):
             off=0.0,
         ),
     )
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=({"where": "each"}, {"where": "top"}),
-        spreads=(Spread.SHARED, Spread.BY_SPECIMEN),
+        spreads=(PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN),
         told_by="postures or motions large enough that the weight's arm changes, "
         "or an unloaded reading against the weightless pose",
     )

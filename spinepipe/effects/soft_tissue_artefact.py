@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, Beside, Kind, Observation, Parameter
-from spinepipe.effects.registry import Spread, Trial, register
+from spinepipe.effects.contract import Array, EffectKind, MeasurementContext, Observation, Parameter
+from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 NEIGHBOURS = ("above", "below")
@@ -33,11 +33,11 @@ class SoftTissueArtefact:
     neighbour: str = "above"
 
     name: ClassVar[str] = "soft_tissue_artefact"
-    kind: ClassVar[Kind] = Kind.MEASUREMENT
+    kind: ClassVar[EffectKind] = EffectKind.MEASUREMENT
     per_joint: ClassVar[bool] = True
-    trial: ClassVar[Trial] = Trial(
+    trial: ClassVar[TriedValues] = TriedValues(
         variants=tuple({"coordinate": c, "neighbour": n} for c in COORDINATES for n in NEIGHBOURS),
-        spreads=(Spread.SHARED, Spread.BY_SPECIMEN),
+        spreads=(PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN),
         told_by="several joints read over several load steps up to a large motion",
     )
 
@@ -57,7 +57,9 @@ class SoftTissueArtefact:
             Parameter("reach", "m" if moves else "rad", low, high, usual, 0.7, True, reach),
         )
 
-    def observe_beside(self, q: Array, parameters: Array, beside: Beside) -> Observation:
+    def observe_beside(
+        self, q: Array, parameters: Array, beside: MeasurementContext
+    ) -> Observation:
         """Reported coordinates, by the joint's own and the neighbour's."""
         share, u, root = self._slip(parameters, beside)
         seen, by_other = q.copy(), np.zeros((len(q), 6, 6))
@@ -68,7 +70,7 @@ class SoftTissueArtefact:
             return Observation(seen, own, by_above=by_other)
         return Observation(seen, own, by_below=by_other)
 
-    def by_parameter_beside(self, q: Array, parameters: Array, beside: Beside) -> Array:
+    def by_parameter_beside(self, q: Array, parameters: Array, beside: MeasurementContext) -> Array:
         """(J, 6, 2)."""
         share, u, root = self._slip(parameters, beside)
         found = np.zeros((len(q), 6, 2))
@@ -80,7 +82,7 @@ class SoftTissueArtefact:
     def _at(self) -> int:
         return COORDINATES.index(self.coordinate)
 
-    def _slip(self, parameters: Array, beside: Beside) -> tuple[Array, Array, Array]:
+    def _slip(self, parameters: Array, beside: MeasurementContext) -> tuple[Array, Array, Array]:
         """(J,) share, motion of the neighbour, and the root that it is divided by."""
         u = (beside.above if self.neighbour == "above" else beside.below)[:, self._at]
         return parameters[:, 0], u, np.sqrt(1.0 + (u / parameters[:, 1]) ** 2)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
+from spinepipe.effects.contract import Array, EffectKind, JointResponse, Parameter
 from spinepipe.effects.registry import register
 from spinepipe.effects.rounding import ramp
 from spinepipe.facts import several
@@ -53,7 +53,7 @@ class TabulatedLaw:
     over: str = ITSELF
     reach: float = 0.0
     name: ClassVar[str] = "tabulated_law"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

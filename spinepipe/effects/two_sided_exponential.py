@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.carried_share import require
-from spinepipe.effects.contract import Array, JointResponse, Kind, Parameter
+from spinepipe.effects.contract import Array, EffectKind, JointResponse, Parameter
 from spinepipe.effects.nonlinear_stiffening import exponential_rise
 from spinepipe.effects.registry import register
 from spinepipe.effects.rounding import STRAIGHT
@@ -31,7 +31,7 @@ class TwoSidedExponential:
 
     coordinate: str = "extension"
     name: ClassVar[str] = "two_sided_exponential"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -68,7 +68,7 @@ class Zone(StrEnum):
 
 
 @dataclass(frozen=True)
-class NeutralZone:
+class FittedNeutralZone:
     """Where a joint resists least.
 
     Attributes
@@ -83,7 +83,7 @@ class NeutralZone:
 
 
 @dataclass(frozen=True)
-class Curve:
+class SigmoidCurve:
     """A fitted curve, in units of the largest load and of the range of rotation.
 
     Attributes
@@ -106,7 +106,7 @@ class Curve:
 
 def neutral_zone(
     load: Array, rotation: Array, sd: float | None
-) -> tuple[NeutralZone | None, Zone, str]:
+) -> tuple[FittedNeutralZone | None, Zone, str]:
     """The neutral zone of a curve of N points, or why there is none, in a word and in words.
 
     Parameters
@@ -138,7 +138,7 @@ def neutral_zone(
     return _measured(curve, places), Zone.FOUND, ""
 
 
-def _describes(curve: Curve, points: int, sd: float) -> bool:
+def _describes(curve: SigmoidCurve, points: int, sd: float) -> bool:
     """Whether noise explains what a curve leaves: where it does not, its bends are not the joint's.
 
     A zone narrower than the steps of load bends faster than any sigmoid that they allow.
@@ -153,7 +153,7 @@ def _distinct(load: Array) -> int:
     return 1 + int(np.count_nonzero(steps > 0.01 * np.ptp(load)))
 
 
-def fitted(load: Array, rotation: Array, sd: float | None) -> Curve | None:
+def fitted(load: Array, rotation: Array, sd: float | None) -> SigmoidCurve | None:
     """The sum of as few sigmoids as the points ask for; None where a straight line does as well.
 
     Parameters
@@ -180,7 +180,7 @@ def fitted(load: Array, rotation: Array, sd: float | None) -> Curve | None:
         return None
     gain = _gain(theta, x) / rotation_unit
     ends = float(load.min()), float(load.max())
-    return Curve(theta, gain, load_unit, rotation_unit, ends, squares * rotation_unit**2)
+    return SigmoidCurve(theta, gain, load_unit, rotation_unit, ends, squares * rotation_unit**2)
 
 
 def _better(
@@ -258,7 +258,7 @@ def _gain(theta: Array, x: Array) -> Array:
     return gain
 
 
-def _zone(curve: Curve) -> Array | None:
+def _zone(curve: SigmoidCurve) -> Array | None:
     """(2,) where the second derivative is largest and least, both inside the ends, in this order.
 
     None where there is no such pair: the curve is not S-shaped between the ends.
@@ -281,7 +281,7 @@ def _zone(curve: Curve) -> Array | None:
     return np.array([brentq(slope, x[one - 1], x[one + 1]) for one in at])
 
 
-def _measured(curve: Curve, places: Array) -> NeutralZone:
+def _measured(curve: SigmoidCurve, places: Array) -> FittedNeutralZone:
     """Size and compliance with their weights, to first order."""
     ahead, behind = (_value(curve.theta, places + step, 3) for step in (_STEP, -_STEP))
     fourth = (ahead - behind) / (2.0 * _STEP)
@@ -300,7 +300,7 @@ def _measured(curve: Curve, places: Array) -> NeutralZone:
     of_size, of_compliance = np.transpose(slopes) @ curve.gain
     size, compliance = both(curve.theta)
     low, high = curve.load_unit * places
-    return NeutralZone(
+    return FittedNeutralZone(
         Measure(float(size), of_size),
         Measure(float(compliance), of_compliance),
         (float(low), float(high)),

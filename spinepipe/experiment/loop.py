@@ -54,7 +54,7 @@ class Measure:
 
 
 @dataclass(frozen=True)
-class Spread:
+class RotationErrors:
     """What is uncertain of rotations, as combinations of independent errors of SD 1.
 
     Attributes
@@ -75,16 +75,16 @@ class Spread:
             return None
         return self.reach * float(np.linalg.norm(measure.weights @ self.root))
 
-    def at(self, places: NDArray[np.bool_]) -> "Spread":
+    def at(self, places: NDArray[np.bool_]) -> "RotationErrors":
         """That of some of the rotations (T,)."""
-        return Spread(self.root[places], self.free[places], self.reach)
+        return RotationErrors(self.root[places], self.free[places], self.reach)
 
 
 NORMAL_REACH = float(stats.norm.ppf(0.975))
 """SDs to the ends of a 95 % interval where the SD is known."""
 
 
-def reading_noise(parts: Sequence[int], sd: float, zeroed: bool) -> Spread:
+def reading_noise(parts: Sequence[int], sd: float, zeroed: bool) -> RotationErrors:
     """Independent noise of readings, of which the first of each part may have been subtracted.
 
     Parameters
@@ -97,7 +97,7 @@ def reading_noise(parts: Sequence[int], sd: float, zeroed: bool) -> Spread:
         for many in parts:
             root[first : first + many, first] -= sd
             first += many
-    return Spread(root, np.zeros((len(root), 0)), NORMAL_REACH)
+    return RotationErrors(root, np.zeros((len(root), 0)), NORMAL_REACH)
 
 
 @dataclass(frozen=True)

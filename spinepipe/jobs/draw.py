@@ -6,7 +6,7 @@ from spinepipe.jobs.digest import figure_digest, mark_of
 from spinepipe.jobs.inputs import study_of
 from spinepipe.report.style import save, style
 from spinepipe.studies.registry import PACKAGE, kind_of
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 
 def run(
@@ -18,6 +18,6 @@ def run(
     draw = getattr(import_module(f"{PACKAGE}.{settings.kind}.{module}"), function)
     read = [mark_of(path) for path in [*tables, *others.values()]]
     with style():
-        drawn = draw(settings, cohort, Tables.read(tables, others))
+        drawn = draw(settings, cohort, StudyTables.read(tables, others))
         for path in (svg, png):
             save(drawn, path, figure_digest(figure, settings, cohort, read))

@@ -14,12 +14,12 @@ from spinepipe.files import appearing
 from spinepipe.jobs.digest import mark_of, report_digest
 from spinepipe.jobs.inputs import study_of
 from spinepipe.marks import write_marked
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.words import listed
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
-from spinepipe.tables import Tables, read_metadata
+from spinepipe.tables import StudyTables, read_metadata
 
 
 def run(
@@ -71,12 +71,12 @@ def results_of(
     figures: list[str],
     captions: list[str],
     others: dict[str, str],
-) -> Results:
+) -> ResultTables:
     """Rows of the tables named in ``read``, where all tables come from, and pictures."""
     words = {Path(path).stem: _text(path) for path in captions}
     drawn = {Path(path).stem: _text(path) for path in figures}
-    return Results(
-        tables=Tables.read([path for path in tables if Path(path).stem in read], others),
+    return ResultTables(
+        tables=StudyTables.read([path for path in tables if Path(path).stem in read], others),
         metadata={Path(path).stem: read_metadata(path) for path in tables},
         pictures={
             name: Picture.of(name, titles[name], svg, " ".join(words[name].split()))

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from spinepipe.statistics import Outcome, corrected, family_size
+from spinepipe.statistics import StatisticalTest, corrected, family_size
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Tested:
     response: str
     factor: str
     stratum: str
-    outcome: Outcome
+    outcome: StatisticalTest
     specimen: str = "*"
 
 

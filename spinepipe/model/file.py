@@ -14,12 +14,12 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from spinepipe.documents.names import ALLOWED, distinct, name_fault
 from spinepipe.documents.settings import validate
 from spinepipe.documents.text import NUMBER
-from spinepipe.documents.yaml_text import Document, read_yaml
+from spinepipe.documents.yaml_text import YamlDocument, read_yaml
 from spinepipe.effects import Effect, create
 from spinepipe.effects.contract import Array
 from spinepipe.marks import write_marked
 from spinepipe.model.spine import ScopedEffect
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 _FORM = ConfigDict(extra="forbid", frozen=True)
 
@@ -111,7 +111,7 @@ def read_model(path: str | Path) -> ModelFile:
         raise InputError([*problems, *faults])
     if (fault := name_fault(model.model)) is not None:
         place = (name, document.line_of("model"), "model")
-        problems.append(Problem(*place, fault, ALLOWED, "rename the model"))
+        problems.append(InputProblem(*place, fault, ALLOWED, "rename the model"))
     problems += [
         p for number, entry in enumerate(model.effects) for p in _check(document, number, entry)
     ]
@@ -120,14 +120,14 @@ def read_model(path: str | Path) -> ModelFile:
     return model
 
 
-def _check(document: Document, number: int, entry: EffectEntry) -> list[Problem]:
+def _check(document: YamlDocument, number: int, entry: EffectEntry) -> list[InputProblem]:
     """Unknown effects, options and parameters, and values out of bounds."""
     place = f"effects.{number}"
     file, line = document.file, document.line_of(place)
     try:
         effect = create(entry.effect, entry.options)
     except (TypeError, ValueError, ArithmeticError, LookupError) as error:
-        return [Problem(file, line, place, entry.effect, str(error), "correct it")]
+        return [InputProblem(file, line, place, entry.effect, str(error), "correct it")]
     declared = {parameter.name: parameter for parameter in effect.parameters}
     problems = []
     for index, row in enumerate(entry.values):
@@ -136,11 +136,11 @@ def _check(document: Document, number: int, entry: EffectEntry) -> list[Problem]
             line = document.line_of(f"{place}.values.{index}.{name}")
             if name not in declared:
                 allowed = ", ".join(declared)
-                problems.append(Problem(file, line, where, name, allowed, "rename it"))
+                problems.append(InputProblem(file, line, where, name, allowed, "rename it"))
             elif not _within(value, declared[name].low, declared[name].high):
                 p = declared[name]
                 allowed = f"{p.low:.3g} to {p.high:.3g} {p.unit}"
-                problems.append(Problem(file, line, where, repr(value), allowed, "correct it"))
+                problems.append(InputProblem(file, line, where, repr(value), allowed, "correct it"))
     return problems
 
 
@@ -183,19 +183,21 @@ def effects_for(
     return tuple(scoped)
 
 
-def _strangers(number: int, entry: EffectEntry, joints: Sequence[str]) -> list[Problem]:
+def _strangers(number: int, entry: EffectEntry, joints: Sequence[str]) -> list[InputProblem]:
     """Joints that the specimen does not have or that the effect cannot tell apart."""
     file, allowed = "model file", f"*, {', '.join(joints)}"
     named = [("scope.joints", joint) for joint in entry.scope.joints]
     named += [("values.joint", row.joint) for row in entry.values]
     problems = [
-        Problem(file, None, f"effects.{number}.{place}", joint, allowed, "correct the joint")
+        InputProblem(file, None, f"effects.{number}.{place}", joint, allowed, "correct the joint")
         for place, joint in named
         if joint != "*" and joint not in joints
     ]
     if not create(entry.effect, entry.options).per_joint:
         problems += [
-            Problem(file, None, f"effects.{number}.values.joint", row.joint, "*", "one set for all")
+            InputProblem(
+                file, None, f"effects.{number}.values.joint", row.joint, "*", "one set for all"
+            )
             for row in entry.values
             if row.joint != "*"
         ]

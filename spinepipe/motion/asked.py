@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.passive import PassiveLaw
-from spinepipe.motion.skeleton import BODIES, JOINTS, MarkerSet, Skeleton, Trial
-from spinepipe.motion.spline import Grid
+from spinepipe.motion.skeleton import BODIES, JOINTS, MarkerSet, MarkerTrial, Skeleton
+from spinepipe.motion.spline import KnotGrid
 from spinepipe.units import ROTATIONS, TRANSLATIONS
 
 ForceCost = Literal["squared", "minus_gravity", "level_difference"]
@@ -22,7 +22,7 @@ SHAPE = (len(BODIES), len(TRANSLATIONS) + len(ROTATIONS))
 
 
 @dataclass(frozen=True)
-class Sizes:
+class ResidualScales:
     """By what each kind of error is divided before it is squared: what counts as much as what.
 
     Attributes
@@ -102,7 +102,7 @@ class Ask:
     fitted: NDArray[np.bool_] = field(
         default_factory=lambda: np.zeros((len(JOINTS), SHAPE[1]), dtype=bool)
     )
-    sizes: Sizes = field(default_factory=Sizes)
+    sizes: ResidualScales = field(default_factory=ResidualScales)
 
     @property
     def parameters(self) -> int:
@@ -123,7 +123,7 @@ class Watched:
 
     skeleton: Skeleton
     markers: MarkerSet
-    grid: Grid
+    grid: KnotGrid
     places: Array
     weight: Array
     shares: Array | None = None
@@ -134,14 +134,14 @@ class Watched:
         return replace(self, places=self.places[nodes], weight=self.weight[nodes], shares=shares)
 
 
-def watched(skeleton: Skeleton, markers: MarkerSet, trial: Trial, intervals: int) -> Watched:
+def watched(skeleton: Skeleton, markers: MarkerSet, trial: MarkerTrial, intervals: int) -> Watched:
     """A trial at nodes from its first frame to its last, between the frames that saw a marker.
 
     A marker counts at a node if a frame saw it within half a step; of one frame there is one node.
     """
     times = trial.time_s
     first, span = float(times[0]), float(times[-1] - times[0])
-    grid = Grid.over(first, first + span, intervals) if span > 0.0 else Grid(first, 1.0, 0)
+    grid = KnotGrid.over(first, first + span, intervals) if span > 0.0 else KnotGrid(first, 1.0, 0)
     places = np.zeros((grid.intervals + 1, len(markers), 3))
     weight = np.zeros(places.shape[:2])
     for k, share in enumerate(markers.weight):

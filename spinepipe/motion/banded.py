@@ -54,13 +54,13 @@ class Band:
 
 
 @dataclass(frozen=True, eq=False)
-class Factor:
+class BandFactor:
     """A damped band, factored: (C, 3, n, n), below each diagonal block the two under it."""
 
     blocks: Array
 
     @classmethod
-    def of(cls, band: Band, grown: Array) -> "Factor":
+    def of(cls, band: Band, grown: Array) -> "BandFactor":
         """Block Cholesky, the diagonal larger by `grown` (C, n).
 
         Raises
@@ -110,7 +110,7 @@ class Factor:
 
 
 def bordered_step(
-    bands: Sequence[Band], factors: Sequence[Factor], square: Array, slope: Array
+    bands: Sequence[Band], factors: Sequence[BandFactor], square: Array, slope: Array
 ) -> tuple[list[Array], Array]:
     """Newton step of each trial's coefficients (C, n), and of the P parameters they share.
 

@@ -19,7 +19,7 @@ from spinepipe.anatomy.segments import CENTRE, GYRATION, MASS_PERCENT, length_m
 from spinepipe.effects.contract import Array
 from spinepipe.facts import several
 from spinepipe.frames import Pose
-from spinepipe.motion.rigid import Part, joined, seen_from
+from spinepipe.motion.rigid import RigidPart, joined, seen_from
 from spinepipe.motion.skeleton import BODIES, JOINTS, Masses, Skeleton, body_poses
 from spinepipe.muscles.masses import ARM
 from spinepipe.muscles.subject import REFERENCE, Subject
@@ -63,7 +63,7 @@ def hung(skeleton: Skeleton, arms: Arms, subject: Subject) -> Masses:
     given = skeleton.masses
     t1 = _neutral(skeleton)
     carried = carried_parts(arms, subject, t1.origin)
-    own = Part("T1", float(given.kg[T1]), given.com[T1], given.about_com[T1])
+    own = RigidPart("T1", float(given.kg[T1]), given.com[T1], given.about_com[T1])
     whole = joined("T1", [own, *(seen_from(part, t1.rotation, t1.origin) for part in carried)])
     kg, com, about = given.kg.copy(), given.com.copy(), given.about_com.copy()
     kg[T1], com[T1], about[T1] = whole.kg, whole.com, whole.about_com
@@ -77,7 +77,7 @@ def _neutral(skeleton: Skeleton) -> Pose:
     return Pose(turns[T1], places[T1])
 
 
-def carried_parts(arms: Arms, subject: Subject, t1: Array) -> tuple[Part, ...]:
+def carried_parts(arms: Arms, subject: Subject, t1: Array) -> tuple[RigidPart, ...]:
     """Head and neck, and the segments of both arms, ground axes, the joint T1T2 at t1 (3,) m."""
     tall = subject.height_m / REFERENCE.height_m
     head = t1 + tall * HEAD_M
@@ -87,15 +87,17 @@ def carried_parts(arms: Arms, subject: Subject, t1: Array) -> tuple[Part, ...]:
     return (_head(subject, head), *right, *left)
 
 
-def _head(subject: Subject, at: Array) -> Part:
+def _head(subject: Subject, at: Array) -> RigidPart:
     head = f"head {subject.sex}"
     kg = MASS_PERCENT[head] / 100.0 * subject.mass_kg
     length = length_m("head", subject.sex, subject.height_m)
     forwards, sideways, along = length * np.array(GYRATION[head])
-    return Part("head", kg, at, kg * np.diag([forwards**2, along**2, sideways**2]))
+    return RigidPart("head", kg, at, kg * np.diag([forwards**2, along**2, sideways**2]))
 
 
-def _arm(arms: Arms, subject: Subject, shoulder: Array, head: Array, t1: Array) -> Iterator[Part]:
+def _arm(
+    arms: Arms, subject: Subject, shoulder: Array, head: Array, t1: Array
+) -> Iterator[RigidPart]:
     """Segments of the right arm."""
     upper, fore, hand = ARM
     lengths = [length_m(segment, subject.sex, subject.height_m) for segment in ARM]
@@ -118,7 +120,9 @@ def _arm(arms: Arms, subject: Subject, shoulder: Array, head: Array, t1: Array) 
         yield _segment(segment, subject, start, along, length)
 
 
-def _segment(segment: str, subject: Subject, start: Array, along: Array, length: float) -> Part:
+def _segment(
+    segment: str, subject: Subject, start: Array, along: Array, length: float
+) -> RigidPart:
     """A segment from its upper end along a direction (3,); round, as its axes are not known.
 
     De Leva's two radii across the segment differ by 1 to 18 %; their mean square is taken.
@@ -130,7 +134,7 @@ def _segment(segment: str, subject: Subject, start: Array, along: Array, length:
     axis = np.outer(along, along)
     about = kg * length**2 * (across * (np.eye(3) - axis) + lengthwise**2 * axis)
     at = start + CENTRE[named] * length * along
-    return Part(f"right_{segment}", kg, at, about)
+    return RigidPart(f"right_{segment}", kg, at, about)
 
 
 def elbow_between(
@@ -157,9 +161,9 @@ def elbow_between(
     return shoulder + share * along + np.sqrt(upper**2 - share**2) * out
 
 
-def _mirrored(part: Part, t1: Array) -> Part:
+def _mirrored(part: RigidPart, t1: Array) -> RigidPart:
     """The left arm's segment, through the plane of symmetry at T1."""
     flip = np.diag([1.0, 1.0, -1.0])
     at = t1 + flip @ (part.com - t1)
     name = part.name.replace("right", "left")
-    return Part(name, part.kg, at, flip @ part.about_com @ flip)
+    return RigidPart(name, part.kg, at, flip @ part.about_com @ flip)

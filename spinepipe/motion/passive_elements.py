@@ -34,7 +34,7 @@ from spinepipe.motion.joint_tables import (
     with_status,
 )
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.units import COORDINATES, ROTATIONS
 
 FILE = "passive.csv"
@@ -107,16 +107,16 @@ def passive_elements(own: pd.DataFrame | None = None, file: str = FILE) -> Passi
     return PassiveElements(**values, **words)
 
 
-def _steep(own: pd.DataFrame, file: str) -> Iterator[Problem]:
+def _steep(own: pd.DataFrame, file: str) -> Iterator[InputProblem]:
     """Rates of rotations that are those of another unit."""
     steep = own["coordinate"].isin(ROTATIONS) & (own["b"] > LARGEST_B_PER_DEG)
     for line, rate in own["b"][steep].items():
         allowed = f"at most {LARGEST_B_PER_DEG:g} per degree"
         remedy = "rates per radian are divided by 57.3"
-        yield Problem(file, int(str(line)), "b", f"{rate:g}", allowed, remedy)
+        yield InputProblem(file, int(str(line)), "b", f"{rate:g}", allowed, remedy)
 
 
-def _slopes(own: pd.DataFrame, values: dict[str, Array], file: str) -> Iterator[Problem]:
+def _slopes(own: pd.DataFrame, values: dict[str, Array], file: str) -> Iterator[InputProblem]:
     """Joints whose two sides begin with different stiffness: a kink no solver likes."""
     slope = values["a"] * values["b"]
     apart = np.abs(np.diff(slope, axis=-1)[..., 0]) > SLOPES_DIFFER * slope.max(axis=-1)
@@ -124,7 +124,7 @@ def _slopes(own: pd.DataFrame, values: dict[str, Array], file: str) -> Iterator[
     for line, joint, coordinate in places:
         if apart[joint, coordinate]:
             positive, negative = slope[joint, coordinate] / per_si(np.array(coordinate))
-            yield Problem(
+            yield InputProblem(
                 file,
                 int(line),
                 "a",

@@ -15,7 +15,7 @@ from spinepipe.motion.articulated import damped_steps
 from spinepipe.motion.asked import SHAPE, Ask, Watched
 from spinepipe.motion.points import COUNT, joints_of, marker_places
 from spinepipe.motion.skeleton import PELVIS
-from spinepipe.motion.terms import Loads, Markers, beyond
+from spinepipe.motion.terms import Markers, MuscleDemand, beyond
 
 MOST_STEPS = 400
 SHORTEST = 1e-7
@@ -143,7 +143,7 @@ def _cost(ask: Ask, watched: Watched, q: Array) -> Array:
     found += np.sum(beyond(ask, q)[0] ** 2, axis=(1, 2))
     if ask.loads:
         rest = np.zeros_like(q)
-        off = Loads.of(watched, ask).residuals(ask.passive, (q, rest, rest))
+        off = MuscleDemand.of(watched, ask).residuals(ask.passive, (q, rest, rest))
         return np.asarray(found + np.sum(off**2, axis=1))
     if ask.passive is not None:
         found += np.sum(_stretched(ask, q)[0] ** 2, axis=1)
@@ -193,7 +193,7 @@ def _normal(ask: Ask, watched: Watched, q: Array, whole: Array) -> tuple[Array, 
     down = pulled @ whole + (off[:, None] @ slope)[:, 0]
     if ask.loads:
         rest = np.zeros_like(q)
-        at_rest = Loads.of(watched, ask).by_node(ask.passive, (q, rest, rest), _AT_REST)
+        at_rest = MuscleDemand.of(watched, ask).by_node(ask.passive, (q, rest, rest), _AT_REST)
         for k, node in enumerate(at_rest):
             weighed = node.weighed[0] @ whole
             square[k] += weighed.T @ (node.each[0] @ whole)

@@ -22,7 +22,7 @@ from spinepipe.motion.joint_tables import (
     with_status,
 )
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.units import COORDINATES, ROTATIONS
 
 FILE = "ratios.csv"
@@ -97,11 +97,11 @@ def _set(name: str, rows: pd.DataFrame) -> RatioSet:
     return RatioSet(name, source, status, shares)
 
 
-def _faults(rows: pd.DataFrame, file: str) -> Iterator[Problem]:
+def _faults(rows: pd.DataFrame, file: str) -> Iterator[InputProblem]:
     """Shares of a rotation that are not all of it."""
     for (name, coordinate), part in rows.groupby(["set", "coordinate"], sort=False):
         total = float(part["ratio"].sum())
         if abs(total - 1.0) > SUM_DIFFERS:
             found = f"ratios of {coordinate} in {name} sum to {total:.4g}"
             line = int(str(part.index[0]))
-            yield Problem(file, line, "ratio", found, "a sum of 1", "divide each by their sum")
+            yield InputProblem(file, line, "ratio", found, "a sum of 1", "divide each by their sum")

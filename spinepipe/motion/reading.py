@@ -18,7 +18,7 @@ from spinepipe.motion.reading_c3d import read_c3d
 from spinepipe.motion.reading_csv import read_csv
 from spinepipe.motion.reading_trc import read_trc
 from spinepipe.motion.recorded import Recorded
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 DEFAULT_AXES = "x y z"
 """Axes of a file that are those of ground: forwards, up, to the right."""
@@ -42,7 +42,7 @@ class NoFrameError(InputError):
         lie between two frames.
     """
 
-    def __init__(self, problem: Problem, late: bool) -> None:
+    def __init__(self, problem: InputProblem, late: bool) -> None:
         super().__init__([problem])
         self.late = late
 
@@ -99,16 +99,16 @@ def read_motion(
     if reader is None or not path.is_file():
         found = "no such file" if reader else f"a file '{path.suffix}'"
         allowed = f"a file of motion: {', '.join(READERS)}"
-        raise InputError([Problem(name, None, None, found, allowed, "correct the name")])
+        raise InputError([InputProblem(name, None, None, found, allowed, "correct the name")])
     if (size := path.stat().st_size) > MOST_CSV_BYTES:
         found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_CSV_BYTES / 1e6:g} MB"
-        raise InputError([Problem(name, None, None, found, allowed, "crop it")])
+        raise InputError([InputProblem(name, None, None, found, allowed, "crop it")])
     raw = reader(path, name)
     kept = _kept(raw.time_s, start_s, end_s)
     if not kept.any():
         found = f"no frame from {_told(start_s)} to {_told(end_s)}"
         allowed = f"times from {raw.time_s[0]:g} to {raw.time_s[-1]:g} s"
-        problem = Problem(name, None, None, found, allowed, "correct start_s and end_s")
+        problem = InputProblem(name, None, None, found, allowed, "correct start_s and end_s")
         raise NoFrameError(problem, late=start_s is not None and start_s > raw.time_s[-1])
     names, renamed = _names(raw.names, name)
     return Recorded(
@@ -146,7 +146,7 @@ def _names(names: tuple[str, ...], file: str) -> tuple[tuple[str, ...], tuple[st
     if again:
         found = f"{', '.join(again)} more than once"
         raise InputError(
-            [Problem(file, None, None, found, "each marker once", "rename one of them")]
+            [InputProblem(file, None, None, found, "each marker once", "rename one of them")]
         )
     short = [name.rpartition(":")[2].strip() for name in names]
     counts = Counter(short)

@@ -8,7 +8,7 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.motion.c3d_form import BLOCK, FormError, Parts, reals, taken_apart, words
 from spinepipe.motion.recorded import Recorded, recorded, unit_of
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 SLOWEST, FASTEST = 1.0, 100_000.0
 """Frames a second."""
@@ -37,7 +37,7 @@ def read_c3d(path: Path, file: str) -> Recorded:
     try:
         parts = taken_apart(path.read_bytes())
     except FormError as error:
-        raise InputError([Problem(file, None, None, str(error), "a .c3d", AGAIN)]) from error
+        raise InputError([InputProblem(file, None, None, str(error), "a .c3d", AGAIN)]) from error
     problems = list(_contradictions(parts, file))
     if problems:
         raise InputError(problems)
@@ -75,12 +75,12 @@ def _labels(parts: Parts) -> list[str]:
     return [name for key in MORE_LABELS for name in _texts(parts, key)]
 
 
-def _contradictions(parts: Parts, file: str) -> Iterator[Problem]:
+def _contradictions(parts: Parts, file: str) -> Iterator[InputProblem]:
     """What the file tells that cannot be, or that its other half tells otherwise."""
     header, rate, scale = parts.header, _rate(parts), _scale(parts)
 
-    def problem(place: str, found: str, allowed: str) -> Problem:
-        return Problem(file, None, place, found, allowed, AGAIN)
+    def problem(place: str, found: str, allowed: str) -> InputProblem:
+        return InputProblem(file, None, place, found, allowed, AGAIN)
 
     if not SLOWEST <= rate <= FASTEST:
         allowed = f"{SLOWEST:g} to {FASTEST:g} frames a second"

@@ -14,7 +14,7 @@ import numpy as np
 
 from spinepipe.documents.text import NUMBER
 from spinepipe.motion.recorded import M_PER, Recorded, quickly, recorded, text_of
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 TIME = "time_s"
 COLUMN = re.compile(rf"(?P<marker>.+)_(?P<axis>[xyz])_(?P<unit>{'|'.join(M_PER)})")
@@ -98,4 +98,4 @@ def _numbers(file: str, line: int, header: list[str], cells: list[str]) -> list[
 def _fault(
     file: str, line: int, column: str | None, found: str, allowed: str, remedy: str
 ) -> InputError:
-    return InputError([Problem(file, line, column, found, allowed, remedy)])
+    return InputError([InputProblem(file, line, column, found, allowed, remedy)])

@@ -14,7 +14,7 @@ import numpy as np
 from spinepipe.documents.text import NUMBER
 from spinepipe.effects.contract import Array
 from spinepipe.motion.recorded import Recorded, quickly, recorded, text_of, unit_of
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 VALUES_LINE, NAMES_LINE, AXES_LINE = 3, 4, 5
 """Lines of the header, where an editor shows them."""
@@ -44,7 +44,7 @@ class _Sheet:
 
     def fault(self, line: int, column: str | None, found: str, allowed: str, do: str) -> InputError:
         """What is wrong in a line."""
-        return InputError([Problem(self.file, line, column, found, allowed, do)])
+        return InputError([InputProblem(self.file, line, column, found, allowed, do)])
 
 
 def read_trc(path: Path, file: str) -> Recorded:
@@ -62,7 +62,7 @@ def read_trc(path: Path, file: str) -> Recorded:
     lines = text_of(path, file).splitlines()
     if len(lines) <= AXES_LINE or not lines[0].startswith("PathFileType"):
         found, allowed = "no header of a .trc", "PathFileType and four more lines, then frames"
-        raise InputError([Problem(file, 1, None, found, allowed, "export the motion again")])
+        raise InputError([InputProblem(file, 1, None, found, allowed, "export the motion again")])
     sheet = _Sheet(file, lines, "\t" in lines[NAMES_LINE - 1])
     told = _header(sheet)
     names = _names(sheet, told)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spinepipe.documents.text import INVISIBLE
 from spinepipe.effects.contract import Array
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 M_PER = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Units in which motion is written."""
@@ -66,11 +66,11 @@ def text_of(path: Path, file: str) -> str:
     if hidden is not None:
         found = f"the control character U+{ord(hidden[0]):04X}"
         line = text[: hidden.start()].count("\n") + 1
-        raise InputError([Problem(file, line, None, found, "text", "export the motion again")])
+        raise InputError([InputProblem(file, line, None, found, "text", "export the motion again")])
     number = max(map(text.count, "\t, "))
     if number > MOST_CELLS:
         allowed, remedy = f"at most {MOST_CELLS} cells", "crop it, or leave markers or frames out"
-        raise InputError([Problem(file, None, None, f"{number} cells", allowed, remedy)])
+        raise InputError([InputProblem(file, None, None, f"{number} cells", allowed, remedy)])
     return text
 
 
@@ -95,5 +95,5 @@ def unit_of(file: str, row: int | None, column: str, text: str) -> float:
     known = text.strip().lower()
     if known not in M_PER:
         allowed = ", ".join(M_PER)
-        raise InputError([Problem(file, row, column, repr(text), allowed, "correct the unit")])
+        raise InputError([InputProblem(file, row, column, repr(text), allowed, "correct the unit")])
     return M_PER[known]

@@ -9,7 +9,7 @@ from spinepipe.effects.contract import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RigidPart:
     """A rigid part.
 
     Attributes
@@ -24,12 +24,12 @@ class Part:
     about_com: Array
 
 
-def joined(name: str, parts: Sequence[Part]) -> Part:
+def joined(name: str, parts: Sequence[RigidPart]) -> RigidPart:
     """All parts as one, by parallel axes."""
     kg = sum(part.kg for part in parts)
     com = sum((part.kg * part.com for part in parts), np.zeros(3)) / kg
     about = [part.about_com + part.kg * steiner(part.com - com) for part in parts]
-    return Part(name, kg, com, np.sum(about, axis=0))
+    return RigidPart(name, kg, com, np.sum(about, axis=0))
 
 
 def steiner(away: Array) -> Array:
@@ -39,7 +39,7 @@ def steiner(away: Array) -> Array:
     return found
 
 
-def seen_from(part: Part, rotation: Array, origin: Array) -> Part:
+def seen_from(part: RigidPart, rotation: Array, origin: Array) -> RigidPart:
     """The part in a frame that has this rotation (3, 3) and origin (3,) m in the present axes."""
     com, about = rotation.T @ (part.com - origin), rotation.T @ part.about_com @ rotation
-    return Part(part.name, part.kg, com, about)
+    return RigidPart(part.name, part.kg, com, about)

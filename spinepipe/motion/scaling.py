@@ -22,9 +22,9 @@ from spinepipe.motion.skeleton import (
     BODIES,
     JOINTS,
     MarkerSet,
+    MarkerTrial,
     Masses,
     Skeleton,
-    Trial,
     body_poses,
 )
 from spinepipe.units import COORDINATES, MM_PER_M
@@ -42,7 +42,7 @@ UNTOLD = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class ScalingFit:
     """How large the subject is beside the generic skeleton, and how well that fits.
 
     Attributes
@@ -70,9 +70,9 @@ def segment_of(body: int) -> int:
 def fitted(
     skeleton: Skeleton,
     markers: MarkerSet,
-    static: Trial,
+    static: MarkerTrial,
     pairs: Sequence[tuple[str, str]] | None = None,
-) -> Fit:
+) -> ScalingFit:
     """The factors that fit the subject's static trial.
 
     Parameters
@@ -113,7 +113,7 @@ def fitted(
     left = np.abs(solved.fun) * MM_PER_M
     worst = int(np.argmax(left))
     first, second = chosen[worst]
-    return Fit(
+    return ScalingFit(
         solved.x,
         len(chosen),
         float(np.sqrt(np.mean(left**2))),
@@ -142,7 +142,7 @@ def _require_plausible(factors: Array) -> None:
 
 
 def _measured(
-    markers: MarkerSet, static: Trial, pairs: Sequence[tuple[str, str]] | None
+    markers: MarkerSet, static: MarkerTrial, pairs: Sequence[tuple[str, str]] | None
 ) -> tuple[NDArray[np.int64], Array]:
     """Pairs of markers (N, 2) and their mean distances (N,) m over frames with both in sight."""
     asked = combinations(range(len(markers)), 2) if pairs is None else _named(markers, pairs)

@@ -124,7 +124,7 @@ class MarkerSet:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class MarkerTrial:
     """A motion of markers, in ground axes (x forwards, y up, z right).
 
     Attributes

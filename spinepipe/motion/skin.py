@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.asked import SHAPE, Sizes, Watched
+from spinepipe.motion.asked import SHAPE, ResidualScales, Watched
 from spinepipe.motion.skeleton import PELVIS, body_poses
 
 WHOLE_BEND_RAD = float(np.deg2rad(60.0))
@@ -28,7 +28,7 @@ ON_PELVIS = 0.3
 _UP = 1
 
 
-def with_sliding_skin(watched: Watched, q: Array, sizes: Sizes) -> Watched:
+def with_sliding_skin(watched: Watched, q: Array, sizes: ResidualScales) -> Watched:
     """The trial, its markers weighed as skin slides in postures near the true ones.
 
     Parameters
@@ -54,7 +54,7 @@ def bends(watched: Watched, turns: Array) -> Array:
     return found
 
 
-def shares(watched: Watched, way: Array, sizes: Sizes) -> Array:
+def shares(watched: Watched, way: Array, sizes: ResidualScales) -> Array:
     """(F, 3 K, 3 K) that make errors of markers independent, of size `sizes.marker_m`.
 
     Parameters

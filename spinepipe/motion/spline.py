@@ -16,7 +16,7 @@ _DEGREE = 3
 
 
 @dataclass(frozen=True)
-class Grid:
+class KnotGrid:
     """Nodes of a motion, equally far apart.
 
     Attributes
@@ -29,7 +29,7 @@ class Grid:
     intervals: int
 
     @classmethod
-    def over(cls, start_s: float, end_s: float, intervals: int) -> "Grid":
+    def over(cls, start_s: float, end_s: float, intervals: int) -> "KnotGrid":
         """Nodes from one time to another."""
         return cls(start_s, (end_s - start_s) / intervals, intervals)
 

@@ -54,7 +54,7 @@ class LoadSlopes(NamedTuple):
     Attributes
     ----------
     each : (n, 102, 108) slopes by its coefficients. weighed : the same, each load with those that
-        it is held against (`Loads.metric` times it), so that `weighed.T @ each` is a curvature.
+        it is held against (`MuscleDemand.metric` times it), so that `weighed.T @ each` is a curvature.
     active : (102,) what muscles do. by_size, by_shape : (102,) slopes of each load by the
         logarithms of A and of B of its own passive element.
     """
@@ -67,7 +67,7 @@ class LoadSlopes(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Loads:
+class MuscleDemand:
     """What muscles have to do at the joints, over its size; (F, 102).
 
     `squared`: all that is not done by passive elements. `minus_gravity`: as if bodies had mass and
@@ -80,7 +80,7 @@ class Loads:
     ask: Ask
 
     @classmethod
-    def of(cls, watched: Watched, ask: Ask) -> "Loads":
+    def of(cls, watched: Watched, ask: Ask) -> "MuscleDemand":
         """Of the bodies of a trial."""
         return cls(bodies_of(watched.skeleton, ask.force_cost != "minus_gravity"), ask)
 

@@ -18,11 +18,11 @@ from scipy.linalg.blas import dgemm
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.asked import Ask, Watched
-from spinepipe.motion.banded import REACH, Band, Factor, bordered_step
+from spinepipe.motion.banded import REACH, Band, BandFactor, bordered_step
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.points import COUNT
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.motion.terms import Loads, Markers, beyond
+from spinepipe.motion.terms import Markers, MuscleDemand, beyond
 from spinepipe.status import Status
 
 MOST_STEPS = 200
@@ -59,7 +59,7 @@ class Costs:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class OptimalMotions:
     """Motions that cost least.
 
     Attributes
@@ -78,16 +78,16 @@ class Solved:
 
 
 @dataclass(frozen=True, eq=False)
-class _State:
+class _Iterate:
     coefficients: tuple[Array, ...]
     parameters: Array
 
-    def moved(self, steps: Sequence[Array], shared: Array) -> "_State":
+    def moved(self, steps: Sequence[Array], shared: Array) -> "_Iterate":
         places = (
             one + step.reshape(one.shape)
             for one, step in zip(self.coefficients, steps, strict=True)
         )
-        return _State(tuple(places), self.parameters + shared)
+        return _Iterate(tuple(places), self.parameters + shared)
 
 
 def law_of(ask: Ask, parameters: Array) -> PassiveLaw | None:
@@ -107,7 +107,7 @@ def solve(
     parameters: Array | None = None,
     held: Array | None = None,
     say: Callable[[str], None] = lambda _: None,
-) -> Solved:
+) -> OptimalMotions:
     """From coefficients (N + 3, 18, 6) of each trial.
 
     Parameters
@@ -116,8 +116,8 @@ def solve(
     """
     problem = Trajectory(ask, tuple(trials), held)
     shared = np.zeros(ask.parameters) if parameters is None else parameters
-    state = _State(tuple(np.where(ask.free, one, 0.0) for one in starts), shared)
-    found = _Search(state, problem.costs(state), _FIRST_DAMPING)
+    state = _Iterate(tuple(np.where(ask.free, one, 0.0) for one in starts), shared)
+    found = _MotionSearch(state, problem.costs(state), _FIRST_DAMPING)
     steps, begun = 0, np.inf
     while steps < MOST_STEPS and not found.ended:
         steps += 1
@@ -127,9 +127,9 @@ def solve(
             # begun again at its answer it has to stay: Gauss and Newton's longer steps lead out of
             # hollows in which second derivatives hold it
             begun = found.costs.total
-            found = _Search(found.state, found.costs, _FIRST_DAMPING)
+            found = _MotionSearch(found.state, found.costs, _FIRST_DAMPING)
     done = found.ended == _FOUND
-    return Solved(
+    return OptimalMotions(
         Status.CONVERGED if done else Status.NOT_CONVERGED,
         "" if done else found.ended or f"still falling after {steps} steps",
         found.state.coefficients,
@@ -158,7 +158,7 @@ class _Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class _MotionSearch:
     """Where a search is, and how it goes on.
 
     Attributes
@@ -167,14 +167,14 @@ class _Search:
         empty if it does.
     """
 
-    state: _State
+    state: _Iterate
     costs: Costs
     damping: float
     newton: bool = False
     ended: str = ""
 
 
-def _stepped(problem: "Trajectory", now: _Search) -> _Search:
+def _stepped(problem: "Trajectory", now: _MotionSearch) -> _MotionSearch:
     """One step downhill, damped as much as it takes; or the end.
 
     Or no step, where Gauss and Newton's equations have led uphill or end, and second derivatives
@@ -203,14 +203,14 @@ def _stepped(problem: "Trajectory", now: _Search) -> _Search:
         newton = now.newton or (not exact and ratio < POOR)
         if ratio > 0.0:
             eased = max(_MOST_EASED, 1.0 - (2.0 * ratio - 1.0) ** 3)
-            return _Search(there, found, max(eased * damping, _LEAST_DAMPING), newton)
+            return _MotionSearch(there, found, max(eased * damping, _LEAST_DAMPING), newton)
         if newton and not now.newton:
             return replace(now, newton=True)
         damping, growth = damping * growth, 2.0 * growth
     return replace(now, ended=lost)
 
 
-def _least(problem: "Trajectory", now: _Search, asked: _Asked) -> _Search | None:
+def _least(problem: "Trajectory", now: _MotionSearch, asked: _Asked) -> _MotionSearch | None:
     """The end of a search, if an undamped step is predicted to gain nearly nothing.
 
     It is taken if it gains at all. Equations that are not definite are those of no least cost.
@@ -236,7 +236,7 @@ class Trajectory:
     trials: tuple[Watched, ...]
     held: Array | None = None
 
-    def costs(self, state: _State) -> Costs:
+    def costs(self, state: _Iterate) -> Costs:
         """Of a state."""
         law, sums = law_of(self.ask, state.parameters), np.zeros(4)
         for trial, coefficients in zip(self.trials, state.coefficients, strict=True):
@@ -248,7 +248,7 @@ class Trajectory:
     def _of_trial(self, trial: Watched, coefficients: Array, law: PassiveLaw | None) -> Array:
         motion = trial.grid.at_nodes(coefficients)
         parts = [Markers(trial, self.ask).residuals(motion[0])]
-        loads = Loads.of(trial, self.ask)
+        loads = MuscleDemand.of(trial, self.ask)
         parts.append(loads.residuals(law, motion) if self.ask.loads else np.zeros(1))
         smooth = motion[2] / self.ask.sizes.of_accelerations
         parts.append(smooth if self.ask.smooth else np.zeros(1))
@@ -265,7 +265,7 @@ class Trajectory:
         half = self.ask.parameters // 2
         return np.repeat([self.ask.sizes.size, self.ask.sizes.shape], half)
 
-    def normal(self, state: _State, newton: bool = False) -> _Asked:
+    def normal(self, state: _Iterate, newton: bool = False) -> _Asked:
         """Equations of a step about a state; newton : with second derivatives."""
         law, count = law_of(self.ask, state.parameters), self.ask.parameters
         square = np.diag(1.0 / self._prior**2) if count else np.zeros((0, 0))
@@ -305,7 +305,7 @@ class Trajectory:
         square, slope = np.zeros((shared, shared)), np.zeros(shared)
         if not self.ask.loads:
             return band, square, slope, np.zeros((0, 0))
-        loads, fitted = Loads.of(trial, self.ask), np.flatnonzero(self.ask.fitted)
+        loads, fitted = MuscleDemand.of(trial, self.ask), np.flatnonzero(self.ask.fitted)
         own, left = [], []
         for k, node in enumerate(loads.by_node(law, motion, weights)):
             each, weighed = node.each, node.weighed
@@ -341,7 +341,7 @@ class Trajectory:
     ) -> None:
         """Adds loads that are left, times second derivatives of passive elements."""
         free, curve, nodes = self._free, trial.grid.weights[0], len(active)
-        pull = self._worth(trial) * Loads.of(trial, self.ask).pulls(active)
+        pull = self._worth(trial) * MuscleDemand.of(trial, self.ask).pulls(active)
         q = trial.grid.at_nodes(coefficients)[0][:, 1:]
         force, stiffness, by_shape, bends, by_both, by_shapes = (
             one.reshape(nodes, -1) * pull for one in (*law.with_slopes(q), *law.curvatures(q))
@@ -401,7 +401,7 @@ class Trajectory:
         """
         # every diagonal gets a little besides: what nothing asks about stays where it is
         factors = [
-            Factor.of(band, damping * scale + 1e-9 * float(scale.max()))
+            BandFactor.of(band, damping * scale + 1e-9 * float(scale.max()))
             for band, scale in zip(asked.bands, asked.scales, strict=True)
         ]
         square = asked.square + damping * np.diag(asked.scale)

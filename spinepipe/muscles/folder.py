@@ -63,7 +63,7 @@ _GROUPS = {
 
 
 @dataclass(frozen=True)
-class Tables:
+class SpecimenTables:
     """Rows of one specimen, columns as in the forms of `trunk_loads`.
 
     Attributes
@@ -80,7 +80,7 @@ class Tables:
     frames: pd.DataFrame | None = None
 
 
-def source_of_folder(name: str, tables: Tables, stress_pa: float | None = None) -> Source:
+def source_of_folder(name: str, tables: SpecimenTables, stress_pa: float | None = None) -> Source:
     """The trunk of one specimen and the remarks on it.
 
     Parameters
@@ -126,7 +126,7 @@ def _pose(row: "pd.Series") -> Pose:
 
 
 def _fascicles(
-    tables: Tables, l5s1: Array, stress_pa: float | None
+    tables: SpecimenTables, l5s1: Array, stress_pa: float | None
 ) -> tuple[list[Fascicle], tuple[str, ...]]:
     """Those that are of use, and a sentence for each reason why others are not."""
     bodies = _Bodies.of(tables.frames)

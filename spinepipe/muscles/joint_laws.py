@@ -28,7 +28,7 @@ PRELOADS_N, PRELOAD_FACTORS = zip(*several(__name__, "stiffening_by_preload").va
 
 
 @dataclass(frozen=True)
-class Curve:
+class MomentCurve:
     """Moment that resists a rotation, through measured points on either side of nought.
 
     Attributes
@@ -70,32 +70,32 @@ class Curve:
         return found
 
 
-def _both_sides(back: str, fore: str) -> Curve:
+def _both_sides(back: str, fore: str) -> MomentCurve:
     """From points of two sides, as `heuer flexion` names them in `facts.csv`."""
     known = several(__name__, "moment_curve")
     points = (
         (*(-value for value in reversed(known[f"{back} {of}"])), 0.0, *known[f"{fore} {of}"])
         for of in ("deg", "nm")
     )
-    return Curve(*points)
+    return MomentCurve(*points)
 
 
-def _of(source: str, back: str = "flexion") -> tuple[Curve, Curve, Curve]:
+def _of(source: str, back: str = "flexion") -> tuple[MomentCurve, MomentCurve, MomentCurve]:
     """About x, y and z; `back` is extension where a source has one curve for both of its sides."""
     sides = (("right_bending",) * 2, ("left_rotation",) * 2, (back, "extension"))
     x, y, z = (_both_sides(f"{source} {one}", f"{source} {other}") for one, other in sides)
     return x, y, z
 
 
-def _linear(nm_per_rad: float) -> Curve:
+def _linear(nm_per_rad: float) -> MomentCurve:
     nm = 10.0 * nm_per_rad / DEG_PER_RAD
-    return Curve((-10.0, 0.0, 10.0), (-nm, 0.0, nm))
+    return MomentCurve((-10.0, 0.0, 10.0), (-nm, 0.0, nm))
 
 
 _GOULD = published("gould_2024b")["uniform_stiffness"]
 _SCHMIDT, _HEUER = _of("schmidt"), _of("heuer")
 
-CURVES: Mapping[str, tuple[Curve, Curve, Curve]] = {
+CURVES: Mapping[str, tuple[MomentCurve, MomentCurve, MomentCurve]] = {
     "segment_gould": (  # linear, whole segments
         _linear(_GOULD["right_bending_nm_per_rad"]),
         _linear(_GOULD["left_rotation_nm_per_rad"]),
@@ -126,7 +126,7 @@ class JointLaws:
     stiffens : whether compression stiffens the curves.
     """
 
-    curves: tuple[Curve, Curve, Curve]
+    curves: tuple[MomentCurve, MomentCurve, MomentCurve]
     angular: Array
     axial: Array
     shear: Array

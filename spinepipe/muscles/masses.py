@@ -54,7 +54,7 @@ class Load:
 
 
 @dataclass(frozen=True)
-class Share:
+class MassShare:
     """A part of the body: its share of body mass in per cent, and whether the trunk carries it."""
 
     part: str
@@ -109,7 +109,7 @@ def _position(name: str) -> float:
     return next(k + 0.5 for k, pair in enumerate(pairwise(SLICES)) if "".join(pair) == name)
 
 
-def shares(subject: Subject) -> tuple[Share, ...]:
+def shares(subject: Subject) -> tuple[MassShare, ...]:
     """Where 100 % of the body is; what the trunk does not carry is what is left."""
     sex = subject.sex
     arms = ((f"both {s.replace('_', ' ')}s", 2.0 * MASS_PERCENT[f"{s} {sex}"]) for s in ARM)
@@ -120,8 +120,8 @@ def shares(subject: Subject) -> tuple[Share, ...]:
     )
     left = 100.0 - sum(percent for _, percent in carried)
     return (
-        *(Share(part, percent, True) for part, percent in carried),
-        Share("pelvis and legs (what is left)", left, False),
+        *(MassShare(part, percent, True) for part, percent in carried),
+        MassShare("pelvis and legs (what is left)", left, False),
     )
 
 

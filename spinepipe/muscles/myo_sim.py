@@ -112,7 +112,7 @@ class NoSource(Exception):
 
 
 @dataclass(frozen=True)
-class Origin:
+class SourceFiles:
     """Which files a trunk came from.
 
     Attributes
@@ -126,14 +126,14 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class _Place:
+class _SourcePose:
     """Where something of the source lies: on which body, and its pose in the sacrum."""
 
     body: str
     pose: Pose
 
 
-def origin_of_myo_sim() -> Origin:
+def origin_of_myo_sim() -> SourceFiles:
     """Name, version and digest of the installed files.
 
     Raises
@@ -144,7 +144,7 @@ def origin_of_myo_sim() -> Origin:
     digest = sha256()
     for name, text in _texts().items():
         digest.update(name.encode() + b"\0" + sha256(text).digest())
-    return Origin(PACKAGE, VERSION, digest.hexdigest())
+    return SourceFiles(PACKAGE, VERSION, digest.hexdigest())
 
 
 def trunk_of_myo_sim() -> Trunk:
@@ -187,9 +187,9 @@ def _texts() -> dict[str, bytes]:
     return {name: path.read_bytes() for name, path in paths.items()}
 
 
-def _places_of(roots: Mapping[str, ET.Element]) -> dict[Key, _Place]:
+def _places_of(roots: Mapping[str, ET.Element]) -> dict[Key, _SourcePose]:
     """Everything named in the spine, the head and the right arm, seen from the sacrum."""
-    found: dict[Key, _Place] = {}
+    found: dict[Key, _SourcePose] = {}
     sacrum = roots["chain"].find("body")
     if sacrum is None:
         raise NoSource(f"{_FILES['chain']} of {PACKAGE} holds no body")
@@ -199,12 +199,12 @@ def _places_of(roots: Mapping[str, ET.Element]) -> dict[Key, _Place]:
     return found
 
 
-def _collect(element: ET.Element, body: str, at: Pose, found: dict[Key, _Place]) -> None:
+def _collect(element: ET.Element, body: str, at: Pose, found: dict[Key, _SourcePose]) -> None:
     for child in element:
         if child.tag not in ("body", "site", "geom"):
             continue
         name, pose = child.get("name", ""), at @ _pose(child)
-        found[child.tag, name] = _Place(name if child.tag == "body" else body, pose)
+        found[child.tag, name] = _SourcePose(name if child.tag == "body" else body, pose)
         if child.tag == "body":
             _collect(child, name, pose, found)
 
@@ -228,7 +228,7 @@ def _numbers(element: ET.Element, name: str) -> Array:
 class _Placed:
     """Places in ground, whose origin is the centre of L5S1."""
 
-    places: Mapping[Key, _Place]
+    places: Mapping[Key, _SourcePose]
     l5s1: Array
 
     def point(self, tag: str, name: str) -> Array:

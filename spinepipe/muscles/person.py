@@ -11,7 +11,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.muscles.joint_laws import JointLaws
 from spinepipe.muscles.passive_muscle import PassiveMuscle, fibres_of
 from spinepipe.muscles.paths import Lines
-from spinepipe.muscles.pose import Chain, posed, rotations_of
+from spinepipe.muscles.pose import JointCentres, posed, rotations_of
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import LEVELS, Mass
 from spinepipe.units import STANDARD_GRAVITY
@@ -33,7 +33,7 @@ class Person:
     """
 
     subject: Subject
-    chain: Chain
+    chain: JointCentres
     lines: Lines
     laws: JointLaws
     passive: PassiveMuscle

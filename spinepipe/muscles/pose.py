@@ -14,7 +14,7 @@ _SMALL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class JointCentres:
     """Centres about which a trunk's joints turn, in the source's pose.
 
     Attributes
@@ -27,7 +27,7 @@ class Chain:
     discs: Array
 
     @classmethod
-    def of(cls, trunk: Trunk, behind_m: float) -> "Chain":
+    def of(cls, trunk: Trunk, behind_m: float) -> "JointCentres":
         """Joints that lie so far behind the centres of their discs."""
         discs = np.array([rotation_zxy(tilt, 0.0, 0.0) for tilt in trunk.disc_tilt])
         return cls(trunk.joints - behind_m * discs[:, :, 0], discs)
@@ -98,7 +98,7 @@ def _carried(
     return found
 
 
-def rotations_of(chain: Chain, angles: Array) -> Array:
+def rotations_of(chain: JointCentres, angles: Array) -> Array:
     """(8, 3, 3) of angles (8, 3) rad: extension, right bending, left rotation of every body.
 
     The pelvis is turned about Z, X', Y''. From body to body the difference of the angles is turned
@@ -113,7 +113,7 @@ def rotations_of(chain: Chain, angles: Array) -> Array:
     return np.array(found)
 
 
-def posed(chain: Chain, rotations: Array, translations: Array) -> BodyPoses:
+def posed(chain: JointCentres, rotations: Array, translations: Array) -> BodyPoses:
     """The bodies with given rotations.
 
     Parameters

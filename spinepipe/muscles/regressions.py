@@ -24,7 +24,7 @@ from spinepipe.documents.form import read_forms
 from spinepipe.documents.rules import Listed, TableCheck
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import SLICES
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 Quantity = Literal["ap_distance", "ml_distance", "pcsa", "rib_cage_area"]
 Form = Literal["linear", "exponential", "power"]
@@ -153,7 +153,7 @@ def read_regressions(path: Path, file: str) -> Regressions:
     for line, muscle, level in zip(thorax.index, thorax["muscle"], thorax["level"], strict=True):
         if (muscle, level) != (ALL, ALL):
             place, found = (file, int(line), "muscle"), f"{muscle}, {level}"
-            problems.append(Problem(*place, found, "*, * for rib_cage_area", "it has one row"))
+            problems.append(InputProblem(*place, found, "*, * for rib_cage_area", "it has one row"))
     if problems:
         raise InputError(problems)
     return Regressions(file, tuple(_row(cells) for cells in table.to_dict("records")))

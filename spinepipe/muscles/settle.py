@@ -50,7 +50,7 @@ class How:
 
 
 @dataclass(frozen=True)
-class Round:
+class SolverRound:
     """One round: change over size (None in the first), N m out of balance, compression of L4L5."""
 
     change: float | None
@@ -59,7 +59,7 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class SolvedTask:
     """A task, held.
 
     Attributes
@@ -84,7 +84,7 @@ class Held:
     pushes: Array
     joint_moments: Array
     stiffening: Array
-    rounds: tuple[Round, ...] = field(default=())
+    rounds: tuple[SolverRound, ...] = field(default=())
 
     @property
     def compression(self) -> Array:
@@ -128,7 +128,7 @@ class Turned:
         return cls(poses, person.laws.moments(poses.turned, np.zeros(len(LEVELS))))
 
 
-def held(person: Person, task: Task, how: How = How(), tone: float | None = None) -> Held:
+def held(person: Person, task: Task, how: How = How(), tone: float | None = None) -> SolvedTask:
     """Muscle forces of a task.
 
     Parameters
@@ -152,7 +152,7 @@ def held(person: Person, task: Task, how: How = How(), tone: float | None = None
     return first
 
 
-def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> Held:
+def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> SolvedTask:
     """The task with given muscle forces (M,) N, where the spine has moved to under them."""
     turned = Turned.of(person, task)
     pushes, how = np.zeros((len(LEVELS), 3)), How()
@@ -162,12 +162,12 @@ def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> Hel
     return now
 
 
-def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> Held:
+def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> SolvedTask:
     """Rounds from a spine pressed by `start` (7,) N."""
     turned = Turned.of(person, task)
     pushes = np.zeros((len(LEVELS), 3))
     pushes[:, 1] = -start
-    rounds: list[Round] = []
+    rounds: list[SolverRound] = []
     trail: list[Array] = []
     step, last, found = 1.0, np.zeros_like(pushes), None
     while True:
@@ -177,7 +177,9 @@ def _rounds(person: Person, task: Task, how: How, tone: float, start: Array) -> 
         change = _change(now.found.forces, before) if trail else None
         residual = _residual(now, before, how)
         trail.append(now.found.forces)
-        rounds.append(Round(change, residual if change is not None else 0.0, now.compression[L4L5]))
+        rounds.append(
+            SolverRound(change, residual if change is not None else 0.0, now.compression[L4L5])
+        )
         settled = change is not None and change < how.change and residual < how.residual_nm
         if settled or not how.feedback or len(rounds) >= how.most:
             done = settled or not how.feedback
@@ -197,7 +199,7 @@ def _step(step: float, off: Array, last: Array) -> float:
     return min(max(wanted, _SHORTEST), _LONGEST)
 
 
-def _residual(now: Held, before: Array, how: How) -> float:
+def _residual(now: SolvedTask, before: Array, how: How) -> float:
     """N m by which the forces of the round before miss what this one asks of them.
 
     Beyond strength they are held against those of this round, which miss it, too.
@@ -209,7 +211,7 @@ def _residual(now: Held, before: Array, how: How) -> float:
 
 
 def _ended(
-    now: Held, how: How, rounds: list[Round], trail: list[Array], settled: bool
+    now: SolvedTask, how: How, rounds: list[SolverRound], trail: list[Array], settled: bool
 ) -> tuple[Balanced, str]:
     if not settled:
         last = rounds[-1]
@@ -239,7 +241,7 @@ def _at(
     pushes: Array,
     given: Array | None = None,
     nearby: Forces | None = None,
-) -> Held:
+) -> SolvedTask:
     """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
     moves = how.feedback and how.translates
     translations = person.laws.translations(pushes) if moves else np.zeros_like(pushes)
@@ -271,7 +273,7 @@ def _at(
         found = Forces(given, demand.required - demand.arms @ given, True)
     on_joints = weights + np.einsum("mki,m->ki", drawn, found.forces)
     told = np.einsum("kji,kj->ki", poses.discs, on_joints)
-    return Held(
+    return SolvedTask(
         Balanced.CONVERGED,
         "",
         poses,

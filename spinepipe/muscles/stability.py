@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import Held
+from spinepipe.muscles.settle import SolvedTask
 from spinepipe.muscles.trunk import LEVELS
 
 LENGTH_M = 0.05
@@ -40,7 +40,7 @@ class _Lines:
     pull: Array
 
 
-def smallest_eigenvalue(person: Person, held: Held, gain: float) -> float:
+def smallest_eigenvalue(person: Person, held: SolvedTask, gain: float) -> float:
     """N m/rad; below nought the posture falls over.
 
     Parameters
@@ -52,7 +52,7 @@ def smallest_eigenvalue(person: Person, held: Held, gain: float) -> float:
     return float(eigh(0.5 * (matrix + matrix.T))[0][0])
 
 
-def stiffness(person: Person, held: Held, gain: float) -> Array:
+def stiffness(person: Person, held: SolvedTask, gain: float) -> Array:
     """(42, 42) N m/rad, N/rad and N/m: turns (3) and moves (3) in ground axes, joint by joint."""
     muscles, pulls = person.lines.trunk.muscles, held.pulls
     forces = held.found.forces
@@ -70,7 +70,7 @@ def stiffness(person: Person, held: Held, gain: float) -> Array:
     return found
 
 
-def _joints(person: Person, held: Held) -> Array:
+def _joints(person: Person, held: SolvedTask) -> Array:
     """Stiffness of the joints, block by block."""
     found = np.zeros((_N, _N))
     turning = person.laws.slopes(held.poses.turned, held.compression)
@@ -84,7 +84,7 @@ def _joints(person: Person, held: Held) -> Array:
     return found
 
 
-def _tensors(held: Held, lines: _Lines) -> tuple[Array, Array]:
+def _tensors(held: SolvedTask, lines: _Lines) -> tuple[Array, Array]:
     """Of all forces above each joint: (7, 3, 3) sum of arm times force, N m, and (7, 3) sum, N."""
     loads = held.applied
     points = np.vstack([loads.at, lines.at[:, 0], lines.at[:, 1]])
@@ -125,7 +125,7 @@ def _changing_arms(tensors: Array, weights: Array) -> Array:
     return found
 
 
-def _lines(held: Held) -> _Lines:
+def _lines(held: SolvedTask) -> _Lines:
     pulls, forces = held.pulls, held.found.forces
     first, second = pulls.on[:, :-1], pulls.on[:, 1:]
     there = np.arange(1, pulls.on.shape[1]) < pulls.traced[:, None]

@@ -5,13 +5,13 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.forces import most_along
 from spinepipe.muscles.person import above
-from spinepipe.muscles.settle import Held
+from spinepipe.muscles.settle import SolvedTask
 from spinepipe.muscles.trunk import LEVELS
 
 _EXTENSION = 2
 
 
-def load_factor(held: Held) -> float | None:
+def load_factor(held: SolvedTask) -> float | None:
     """How many times the loads could be as large before no forces hold them; None: not even none.
 
     Weight, hands, exertion and pressure grow alike; posture and joints stay as they are.
@@ -22,7 +22,7 @@ def load_factor(held: Held) -> float | None:
     return most_along(held.demand, -turning.ravel(), -joints.ravel())
 
 
-def capacity_left(held: Held) -> Array | None:
+def capacity_left(held: SolvedTask) -> Array | None:
     """(7,) N m, flexion moment that could be added at each level alone; None beyond strength."""
     if not held.found.enough:
         return None

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import Held, How, held
+from spinepipe.muscles.settle import How, SolvedTask, held
 from spinepipe.muscles.stability import smallest_eigenvalue
 from spinepipe.muscles.task import Task
 from spinepipe.status import Balanced
@@ -24,7 +24,7 @@ class Toned:
     eigenvalue : N m/rad, below nought where the posture falls over.
     """
 
-    held: Held
+    held: SolvedTask
     tone: float
     eigenvalue: float
 

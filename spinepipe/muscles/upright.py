@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.masses import arm_masses
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.pose import Chain
+from spinepipe.muscles.pose import JointCentres
 from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES
 from spinepipe.units import STANDARD_GRAVITY
 
@@ -109,7 +109,7 @@ def _hanging(person: Person) -> tuple[Array, NDArray[np.int64], Array]:
     )
 
 
-def _legs(chain: Chain) -> Array:
+def _legs(chain: JointCentres) -> Array:
     """(7, 2) m, from the point that a body's pose is told of to the joint above it."""
     found: Array = (chain.centres - chain.origins[:-1])[:, :2]
     return found

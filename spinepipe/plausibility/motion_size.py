@@ -7,7 +7,7 @@ stiffness that was measured before: a joint that is fused or cut, or a unit.
 from collections.abc import Sequence
 from math import exp, log
 
-from spinepipe.plausibility.score import Hypothesis, suspect, usual
+from spinepipe.plausibility.score import MistakeHypothesis, suspect, usual
 from spinepipe.units import TRANSLATIONS
 
 
@@ -36,7 +36,7 @@ def unit_of(slopes: Sequence[float], coordinate: str) -> str:
 
 def unit_like(
     ratio: float, coordinate: str, quantity: str = "motion_over_expected"
-) -> Hypothesis | None:
+) -> MistakeHypothesis | None:
     """The mistaken unit that makes so large a motion of a coordinate; None if none does."""
     return suspect("translation" if coordinate in TRANSLATIONS else "rotation", ratio, quantity)
 

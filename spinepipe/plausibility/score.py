@@ -29,7 +29,7 @@ undone where it was not made, it takes them away as a rule."""
 
 
 @dataclass(frozen=True)
-class Range:
+class UsualRange:
     """A row of `ranges.csv`; without a limit it is infinite."""
 
     low: float
@@ -69,7 +69,7 @@ class Range:
 
 @final
 @dataclass(frozen=True)
-class Hypothesis:
+class MistakeHypothesis:
     """A row of `hypotheses.csv`.
 
     Attributes
@@ -109,21 +109,23 @@ def _number(text: str) -> float:
 
 
 @cache
-def _ranges() -> dict[str, Range]:
+def _ranges() -> dict[str, UsualRange]:
     found = {}
     for row in table(PACKAGE, "ranges"):
         low = _number(row["low"] or "-inf")
         high = _number(row["high"] or "inf")
         usual = (row["usual_low"], low), (row["usual_high"], high)
-        found[row["quantity"]] = Range(low, high, *(_number(t) if t else end for t, end in usual))
+        found[row["quantity"]] = UsualRange(
+            low, high, *(_number(t) if t else end for t, end in usual)
+        )
     return found
 
 
 @cache
-def hypotheses(what: str) -> tuple[Hypothesis, ...]:
+def hypotheses(what: str) -> tuple[MistakeHypothesis, ...]:
     """Mistakes that are known of a quantity, in the order of the table."""
     return tuple(
-        Hypothesis(
+        MistakeHypothesis(
             _number(row["factor"]), row["table"], row["words"], row["remedy"], float(row["prior"])
         )
         for row in table(PACKAGE, "hypotheses")
@@ -131,7 +133,7 @@ def hypotheses(what: str) -> tuple[Hypothesis, ...]:
     )
 
 
-def usual(quantity: str) -> Range:
+def usual(quantity: str) -> UsualRange:
     """The row of a quantity."""
     return _ranges()[quantity]
 
@@ -141,7 +143,7 @@ def has_range(quantity: str) -> bool:
     return quantity in _ranges()
 
 
-def suspect(what: str, value: float, quantity: str) -> Hypothesis | None:
+def suspect(what: str, value: float, quantity: str) -> MistakeHypothesis | None:
     """The mistake that most likely explains a value; None where none makes it a usual one.
 
     Posterior odds: the prior of each times the likelihood of the value with the mistake undone.

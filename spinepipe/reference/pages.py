@@ -24,9 +24,9 @@ from pydantic import BaseModel
 from spinepipe.cohort.cohort import CohortHeader
 from spinepipe.cohort.columns import TABLES
 from spinepipe.documents.form import TableForm
-from spinepipe.effects import Effect, Parameter, Trial, create, registered
+from spinepipe.effects import Effect, Parameter, TriedValues, create, registered
 from spinepipe.model.file import ModelFile
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.reference.licences import licences
 from spinepipe.studies.read import Selection
 from spinepipe.studies.registry import every_form, every_kind
@@ -77,7 +77,7 @@ def refreshed(text: str, page: str) -> str:
         For a marker that names nothing known, or one without an end.
     """
     if text.count("<!-- generated: ") != len(_PART.findall(text)):
-        problem = Problem(page, None, None, "a marker without an end", END, "add it")
+        problem = InputProblem(page, None, None, "a marker without an end", END, "add it")
         raise InputError([problem])
     return _PART.sub(lambda found: _part(found[1], page), text)
 
@@ -86,7 +86,7 @@ def _part(name: str, page: str) -> str:
     known = generators()
     if name not in known:
         remedy = did_you_mean(name, known, "correct the marker")
-        raise InputError([Problem(page, None, None, f"'{name}'", one_of(known), remedy)])
+        raise InputError([InputProblem(page, None, None, f"'{name}'", one_of(known), remedy)])
     return f"<!-- generated: {name} -->\n\n{known[name]()}\n\n{END}"
 
 
@@ -267,7 +267,7 @@ def _about(cls: type) -> str:
 def _effect(name: str, cls: type) -> str:
     effect = create(name)
     scope = "for each joint" if effect.per_joint else "once for the whole model"
-    trial: Trial | None = getattr(cls, "trial", None)
+    trial: TriedValues | None = getattr(cls, "trial", None)
     parts = [
         f"### {code(name)}",
         f"Kind: {effect.kind}; parameters {scope}.",
@@ -285,7 +285,7 @@ def _law(cls: type) -> str:
     return "\n\n".join(part for part in words if not part.startswith("Options:"))
 
 
-def _options(cls: type, trial: Trial | None) -> str:
+def _options(cls: type, trial: TriedValues | None) -> str:
     """Each option with its default and what a search tries."""
     told = []
     for field in fields(cls):
@@ -295,7 +295,7 @@ def _options(cls: type, trial: Trial | None) -> str:
     return f"Options: {'; '.join(told)}." if told else ""
 
 
-def _tried(trial: Trial | None, option: Field[Any]) -> list[Any]:
+def _tried(trial: TriedValues | None, option: Field[Any]) -> list[Any]:
     """The values of an option among the variants, each once; its default where none is named."""
     variants = trial.variants if trial else ()
     if not any(option.name in one for one in variants):
@@ -308,7 +308,7 @@ def _typed(value: Any) -> str:
     return code(f"[{', '.join(value)}]" if isinstance(value, tuple) else str(value))
 
 
-def _parameters(name: str, effect: Effect, trial: Trial | None) -> str:
+def _parameters(name: str, effect: Effect, trial: TriedValues | None) -> str:
     """Parameters with the default options, then those that other options have instead."""
     own = effect.parameters
     if not own:
@@ -326,7 +326,9 @@ def _parameters(name: str, effect: Effect, trial: Trial | None) -> str:
     return listed
 
 
-def _other_options(name: str, trial: Trial | None) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
+def _other_options(
+    name: str, trial: TriedValues | None
+) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
     """Parameters with one option at a time away from its default, among those that are tried."""
     effect_class = registered()[name]
     for field in fields(effect_class):
@@ -355,7 +357,7 @@ def _number(value: float) -> str:
     return "no limit" if abs(value) == inf else f"{value:.6g}"
 
 
-def _search(trial: Trial | None) -> str:
+def _search(trial: TriedValues | None) -> str:
     """How its values may differ in a search, and what test shows it."""
     if trial is None:
         return "A search for missing effects does not try it."

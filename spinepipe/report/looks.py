@@ -12,7 +12,7 @@ Dashes = str | tuple[int, tuple[float, ...]]
 
 
 @dataclass(frozen=True)
-class Look:
+class LineStyle:
     """Colour, line and mark of one of several, told apart without colour too."""
 
     color: str

@@ -35,7 +35,7 @@ MOST_ACROSS = 3
 
 
 @dataclass(frozen=True)
-class Rows:
+class PanelRows:
     """Rows of a panel from the bottom up; ``note`` says what was pooled, or nothing."""
 
     labels: tuple[str, ...]
@@ -52,7 +52,7 @@ class Rows:
         return len(self) <= MOST_ROWS_WITH_NUMBERS
 
 
-def rows_of(frame: pd.DataFrame, specimens: Sequence[str], joints: Sequence[str]) -> Rows:
+def rows_of(frame: pd.DataFrame, specimens: Sequence[str], joints: Sequence[str]) -> PanelRows:
     """Split rows with columns ``specimen`` and ``joint``; combinations without rows are left out.
 
     Parameters
@@ -68,7 +68,7 @@ def rows_of(frame: pd.DataFrame, specimens: Sequence[str], joints: Sequence[str]
     kept = [(key, part) for key, part in found if len(part)]
     labels = tuple(_label(joint, specimen, len(specimens)) for (joint, specimen), _ in kept)
     note = f"{len(specimens)} specimens pooled" if pooled else ""
-    return Rows(labels, tuple(part for _, part in kept), note)
+    return PanelRows(labels, tuple(part for _, part in kept), note)
 
 
 def _part(frame: pd.DataFrame, joint: str, specimen: str) -> pd.DataFrame:
@@ -86,13 +86,13 @@ def _label(joint: str, specimen: str, n_specimens: int) -> str:
     return f"{specimen}  {joint}"
 
 
-def row_height(rows: Rows, with_numbers_mm: float) -> float:
+def row_height(rows: PanelRows, with_numbers_mm: float) -> float:
     """Height of a row, mm."""
     return with_numbers_mm if rows.with_numbers else _CROWDED_MM
 
 
 def grid(
-    n: int, rows: Rows, row_mm: float, most_across: int = MOST_ACROSS
+    n: int, rows: PanelRows, row_mm: float, most_across: int = MOST_ACROSS
 ) -> tuple[list[Axes], Figure]:
     """``n`` panels of the same rows, so many side by side at most, and their figure."""
     across = across_of(n, most_across)
@@ -102,7 +102,7 @@ def grid(
     return side_by_side(figure, n, across), figure
 
 
-def label_rows(axis: Axes, rows: Rows, below: float, above: float) -> None:
+def label_rows(axis: Axes, rows: PanelRows, below: float, above: float) -> None:
     """Names of the rows on the left panels; room for what is drawn below and above each row."""
     axis.set_ylim(-below, len(rows) - 1 + above)
     axis.set_yticks(range(len(rows)), rows.labels)

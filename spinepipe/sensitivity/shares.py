@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.special import expit, logit
 
-from spinepipe.statistics import Ended
+from spinepipe.statistics import ComputationStatus
 from spinepipe.statistics.outcome import Array
 
 CONFIDENCE = 0.95
@@ -58,7 +58,7 @@ FEWEST = 3
 
 
 @dataclass(frozen=True)
-class Share:
+class VarianceShare:
     """A share of the variance, 0 to 1, with its 95 % confidence interval."""
 
     estimate: float
@@ -67,7 +67,7 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Shares:
+class VarianceShares:
     """Variance of a grid divided among rows, columns and their interaction.
 
     Attributes
@@ -82,13 +82,13 @@ class Shares:
 
     n_rows: int
     n_columns: int
-    status: Ended
+    status: ComputationStatus
     message: str = ""
-    row: Share | None = None
-    column: Share | None = None
-    interaction: Share | None = None
-    total_row: Share | None = None
-    total_column: Share | None = None
+    row: VarianceShare | None = None
+    column: VarianceShare | None = None
+    interaction: VarianceShare | None = None
+    total_row: VarianceShare | None = None
+    total_column: VarianceShare | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class MeanSquares:
     interaction: Array
 
 
-def variance_shares(grid: ArrayLike, hypercubes: bool = False) -> Shares:
+def variance_shares(grid: ArrayLike, hypercubes: bool = False) -> VarianceShares:
     """Shares of rows (joint poses) and columns (stiffness sets) in the variance of a full grid.
 
     Parameters
@@ -138,12 +138,12 @@ def variance_shares(grid: ArrayLike, hypercubes: bool = False) -> Shares:
         raise ValueError("shares need a full grid (rows, columns) of finite numbers")
     if min(values.shape) < FEWEST:
         message = f"grid of {values.shape[0]} x {values.shape[1]}; at least 3 x 3 are needed"
-        return _without(values, Ended.TOO_FEW, message)
+        return _without(values, ComputationStatus.TOO_FEW, message)
     if (values == values[0, 0]).all():
-        return _without(values, Ended.CONSTANT, "all values are the same")
+        return _without(values, ComputationStatus.CONSTANT, "all values are the same")
     if _constant_but_for_one_row(values) or _constant_but_for_one_row(values.T):
         message = "but for one row or column all values are the same"
-        return _without(values, Ended.CONSTANT, message)
+        return _without(values, ComputationStatus.CONSTANT, message)
     return _shares_of_table(values, hypercubes)
 
 
@@ -153,12 +153,12 @@ def _constant_but_for_one_row(values: Array) -> bool:
     return any(np.count_nonzero((values != other).any(axis=1)) <= 1 for other in others)
 
 
-def _without(values: Array, status: Ended, message: str) -> Shares:
+def _without(values: Array, status: ComputationStatus, message: str) -> VarianceShares:
     rows, columns = values.shape
-    return Shares(rows, columns, status, message)
+    return VarianceShares(rows, columns, status, message)
 
 
-def _shares_of_table(values: Array, hypercubes: bool) -> Shares:
+def _shares_of_table(values: Array, hypercubes: bool) -> VarianceShares:
     rows, columns = values.shape
     # a scale of 1 keeps the squares of tiny and of huge values
     values = (values - values.mean()) / np.abs(values - values.mean()).max()
@@ -175,8 +175,8 @@ def _shares_of_table(values: Array, hypercubes: bool) -> Shares:
     low, high = share_intervals(raw, by_row, by_column)
     # an estimate set to 0 changes the others a little
     low, high = np.minimum(low, estimates), np.maximum(high, estimates)
-    found = [Share(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
-    return Shares(rows, columns, Ended.DONE, _message(raw), *found)
+    found = [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
+    return VarianceShares(rows, columns, ComputationStatus.DONE, _message(raw), *found)
 
 
 def mean_squares(values: Array) -> MeanSquares:
@@ -258,12 +258,12 @@ class NestedShares:
     The shares are None where the status is not ``done``.
     """
 
-    status: Ended
+    status: ComputationStatus
     message: str = ""
-    specimen: Share | None = None
-    draw: Share | None = None
-    treatment: Share | None = None
-    rest: Share | None = None
+    specimen: VarianceShare | None = None
+    draw: VarianceShare | None = None
+    treatment: VarianceShare | None = None
+    rest: VarianceShare | None = None
 
 
 def nested_shares(values: ArrayLike) -> NestedShares:
@@ -291,10 +291,12 @@ def nested_shares(values: ArrayLike) -> NestedShares:
         raise ValueError("shares need a full grid (specimens, draws, treatments) of finite numbers")
     if min(grid.shape) < FEWEST:
         shape = " x ".join(map(str, grid.shape))
-        return NestedShares(Ended.TOO_FEW, f"grid of {shape}; at least 3 x 3 x 3 are needed")
+        return NestedShares(
+            ComputationStatus.TOO_FEW, f"grid of {shape}; at least 3 x 3 x 3 are needed"
+        )
     scale = float(np.abs(grid - grid.mean()).max())
     if scale <= 1e-12 * float(np.abs(grid).max()):  # but for rounding
-        return NestedShares(Ended.CONSTANT, "all values are the same")
+        return NestedShares(ComputationStatus.CONSTANT, "all values are the same")
     return _shares_of_grid((grid - grid.mean()) / scale)
 
 
@@ -302,16 +304,18 @@ def _shares_of_grid(grid: Array) -> NestedShares:
     whole = components(grid)
     by_specimen = np.array([components(np.delete(grid, at, 0)) for at in range(grid.shape[0])])
     if min(part.sum(axis=-1).min() for part in (whole, by_specimen)) <= 0.0:
-        return NestedShares(Ended.CONSTANT, "but for one specimen all values are the same")
+        return NestedShares(
+            ComputationStatus.CONSTANT, "but for one specimen all values are the same"
+        )
     raw, left_out = (part / part.sum(axis=-1, keepdims=True) for part in (whole, by_specimen))
     kept = np.maximum(raw, 0.0)
     estimates = kept / kept.sum()
     low, high = share_intervals(raw, left_out, np.stack([raw, raw]))  # treatments do not vary
     # an estimate set to 0 changes the others a little
     low, high = np.minimum(low, estimates), np.maximum(high, estimates)
-    found = [Share(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
+    found = [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
     message = "negative treatment component set to 0" if raw[2] < 0.0 else ""
-    return NestedShares(Ended.DONE, message, *found)
+    return NestedShares(ComputationStatus.DONE, message, *found)
 
 
 def components(grid: Array) -> Array:

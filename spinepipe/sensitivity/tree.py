@@ -10,7 +10,7 @@ from sklearn.base import clone
 from sklearn.model_selection import GroupKFold
 from sklearn.tree import DecisionTreeRegressor
 
-from spinepipe.statistics import Ended
+from spinepipe.statistics import ComputationStatus
 from spinepipe.statistics.outcome import Array
 
 Groups = NDArray[np.int64]
@@ -48,7 +48,7 @@ class Tree:
     complexity: float
     r2_cross_validated: float | None
     r2_training: float | None
-    status: Ended
+    status: ComputationStatus
     message: str = ""
 
 
@@ -87,9 +87,11 @@ def regression_tree(
     n_units = len(np.unique(units))
     if len(output) < FEWEST_TO_SPLIT or n_units < FEWEST_FOLDS:
         message = f"{len(output)} rows in {n_units} groups; at least 20 in 2 are needed"
-        return _without(tuple(names), complexity, Ended.TOO_FEW, message)
+        return _without(tuple(names), complexity, ComputationStatus.TOO_FEW, message)
     if (output == output[0]).all():
-        return _without(tuple(names), complexity, Ended.CONSTANT, "all outputs are the same")
+        return _without(
+            tuple(names), complexity, ComputationStatus.CONSTANT, "all outputs are the same"
+        )
     # scaled, since scikit-learn takes a variance below 1e-16 or so for none
     output = (output - output.mean()) / output.std()
     growth = _growth(complexity, seed)
@@ -123,7 +125,9 @@ def _check(
         raise ValueError("a tree needs at least 2 folds and a complexity between 0 and 1")
 
 
-def _without(names: tuple[str, ...], complexity: float, status: Ended, message: str) -> Tree:
+def _without(
+    names: tuple[str, ...], complexity: float, status: ComputationStatus, message: str
+) -> Tree:
     return Tree(names, np.zeros(len(names)), 1, 0, complexity, None, None, status, message)
 
 
@@ -153,7 +157,7 @@ def _chosen(
         float(ends[index]),
         1.0 - float(error[index]),
         float(model.score(x, y)),
-        Ended.DONE,
+        ComputationStatus.DONE,
         message,
     )
 

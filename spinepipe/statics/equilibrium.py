@@ -39,7 +39,7 @@ class SingularTangent(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class Factored:
+class LUFactors:
     """LU factors of K (n, n); `sign` of its determinant."""
 
     lu: Array
@@ -116,7 +116,7 @@ class Equilibrium:
     """
 
     q: Array
-    factored: Factored | None
+    factored: LUFactors | None
     status: Status
     message: str
     iterations: int
@@ -136,7 +136,7 @@ class NewtonResult:
 
     q: Array
     arrived: bool
-    factored: Factored | None
+    factored: LUFactors | None
     tangent: Array
     iterations: int
     first: Array
@@ -337,7 +337,7 @@ def newton(system: System, start: Array, loading: Loading, states: States) -> Ne
     q = system.start(start, loading)
     step, drive = np.zeros(len(q)), 0.0
     first, at_start = step, np.zeros((len(q), len(q)))
-    factored: Factored | None = None
+    factored: LUFactors | None = None
     for iteration in range(1, MOST_ITERATIONS + 1):
         balance = system.balance(q, loading, states)
         work = float(balance.residual @ step)
@@ -370,7 +370,7 @@ def newton(system: System, start: Array, loading: Loading, states: States) -> Ne
     return NewtonResult(q, False, factored, at_start, iteration, first, at_start)
 
 
-def factor(tangent: Array) -> Factored:
+def factor(tangent: Array) -> LUFactors:
     """Factor a tangent.
 
     Raises
@@ -385,7 +385,7 @@ def factor(tangent: Array) -> Factored:
         raise SingularTangent("the tangent is singular")
     swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
     negative = np.count_nonzero(np.diagonal(lu) < 0.0)
-    return Factored(lu, pivots, -1 if (swaps + negative) % 2 else 1)
+    return LUFactors(lu, pivots, -1 if (swaps + negative) % 2 else 1)
 
 
 def stability(

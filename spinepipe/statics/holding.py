@@ -12,7 +12,7 @@ import numpy as np
 
 from spinepipe.effects import Advance, JointLaw, JointResponse, PathLaw
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.placement import Placed
+from spinepipe.statics.placement import JointKinematics
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Holding:
     tangent: Array
 
 
-def hold(placed: Placed, laws: Sequence[Law], states: States, moved: bool) -> Holding:
+def hold(placed: JointKinematics, laws: Sequence[Law], states: States, moved: bool) -> Holding:
     """Sum of the laws, pulled back to the joints' own coordinates where geometry moved them."""
     load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
     for law in laws:
@@ -158,7 +158,9 @@ class HoldingDerivatives:
     by_state: dict[int, Array]
 
 
-def differentiate(placed: Placed, laws: Sequence[Law], states: States) -> HoldingDerivatives:
+def differentiate(
+    placed: JointKinematics, laws: Sequence[Law], states: States
+) -> HoldingDerivatives:
     """Derivatives by every parameter and internal state, geometry effects included."""
     load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
     by_parameter: dict[int, Array] = {}

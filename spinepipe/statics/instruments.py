@@ -7,7 +7,7 @@ Some instruments follow the neighbouring joints too, or drift while a test goes 
 import numpy as np
 
 from spinepipe.effects import MeasurementEffect, Observation
-from spinepipe.effects.contract import Array, Beside, MeasurementBeside
+from spinepipe.effects.contract import Array, MeasurementBeside, MeasurementContext
 from spinepipe.model import LoadCase
 
 Instrument = MeasurementEffect | MeasurementBeside
@@ -26,7 +26,7 @@ def passed(case: LoadCase) -> Array:
     return found
 
 
-def beside(motion: Array, passed_at: Array | float) -> Beside:
+def beside(motion: Array, passed_at: Array | float) -> MeasurementContext:
     """What stands beside every joint of lanes, of motion (..., J, 6); flat, (N J, 6) and (N J,).
 
     Parameters
@@ -36,10 +36,12 @@ def beside(motion: Array, passed_at: Array | float) -> Beside:
     above, below = np.zeros(motion.shape), np.zeros(motion.shape)
     above[..., :-1, :], below[..., 1:, :] = motion[..., 1:, :], motion[..., :-1, :]
     share = np.broadcast_to(np.asarray(passed_at)[..., None], motion.shape[:-1])
-    return Beside(above.reshape(-1, 6), below.reshape(-1, 6), share.reshape(-1))
+    return MeasurementContext(above.reshape(-1, 6), below.reshape(-1, 6), share.reshape(-1))
 
 
-def read(effect: Instrument, q: Array, values: Array, around: Beside | None) -> Observation:
+def read(
+    effect: Instrument, q: Array, values: Array, around: MeasurementContext | None
+) -> Observation:
     """What an instrument reports of joints (K, 6).
 
     Raises
@@ -52,7 +54,9 @@ def read(effect: Instrument, q: Array, values: Array, around: Beside | None) -> 
     return effect.observe_beside(q, values, _known(effect, around))
 
 
-def read_by(effect: Instrument, q: Array, values: Array, around: Beside | None) -> Array:
+def read_by(
+    effect: Instrument, q: Array, values: Array, around: MeasurementContext | None
+) -> Array:
     """(K, 6, P) derivative of what it reports by its parameters."""
     if not isinstance(effect, MeasurementBeside):
         return effect.by_parameter(q, values)
@@ -75,7 +79,7 @@ def followed(seen: Observation, by_x: Array, around: tuple[Array, Array] | None)
     return found
 
 
-def _known(effect: Instrument, around: Beside | None) -> Beside:
+def _known(effect: Instrument, around: MeasurementContext | None) -> MeasurementContext:
     if around is None:
         raise ValueError(f"{effect.name} reads by the load step: say which one")
     return around

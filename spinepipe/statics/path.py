@@ -7,7 +7,7 @@ import numpy as np
 from spinepipe.effects import Advance
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
-from spinepipe.statics.equilibrium import Equilibrium, Factored, solve
+from spinepipe.statics.equilibrium import Equilibrium, LUFactors, solve
 from spinepipe.statics.holding import States, states_after
 from spinepipe.statics.system import Loading, System
 
@@ -33,7 +33,7 @@ class SolvedStep:
         return self.equilibrium.status.usable
 
     @property
-    def factored(self) -> Factored:
+    def factored(self) -> LUFactors:
         """LU of the tangent at the pose.
 
         Raises

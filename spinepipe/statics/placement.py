@@ -21,7 +21,7 @@ class ActiveGeometry:
 
 
 @dataclass(frozen=True)
-class Placed:
+class JointKinematics:
     """Coordinates the laws see, and how they follow the joint's own; J joints.
 
     Attributes
@@ -36,16 +36,18 @@ class Placed:
     by_parameter: dict[int, tuple[Array, Array]]
 
 
-def place(q: Array, geometry: Sequence[ActiveGeometry], with_parameters: bool) -> Placed:
+def place(q: Array, geometry: Sequence[ActiveGeometry], with_parameters: bool) -> JointKinematics:
     """Compose the geometry effects at joint coordinates q (J, 6), in the model's order."""
     n = len(q)
-    placed = Placed(q.copy(), np.tile(np.eye(6), (n, 1, 1)), np.zeros((n, 6, 6, 6)), {})
+    placed = JointKinematics(q.copy(), np.tile(np.eye(6), (n, 1, 1)), np.zeros((n, 6, 6, 6)), {})
     for active in geometry:
         placed = _then(placed, active, with_parameters)
     return placed
 
 
-def _then(before: Placed, active: ActiveGeometry, with_parameters: bool) -> Placed:
+def _then(
+    before: JointKinematics, active: ActiveGeometry, with_parameters: bool
+) -> JointKinematics:
     """One more geometry effect after those already placed (chain rule to second order)."""
     j = active.joints
     step = active.effect.place(before.q[j], active.values)
@@ -61,11 +63,11 @@ def _then(before: Placed, active: ActiveGeometry, with_parameters: bool) -> Plac
         carried = before.by_parameter.items()
         by_parameter = {i: _push(before, j, step, pair) for i, pair in carried}
         by_parameter[active.index] = _own(before, active)
-    return Placed(q, first, second, by_parameter)
+    return JointKinematics(q, first, second, by_parameter)
 
 
 def _push(
-    before: Placed, j: Indices, step: Placement, pair: tuple[Array, Array]
+    before: JointKinematics, j: Indices, step: Placement, pair: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     """Earlier effects' parameter derivatives carried through a later placement."""
     dq, dfirst = pair[0].copy(), pair[1].copy()
@@ -76,7 +78,7 @@ def _push(
     return dq, dfirst
 
 
-def _own(before: Placed, active: ActiveGeometry) -> tuple[Array, Array]:
+def _own(before: JointKinematics, active: ActiveGeometry) -> tuple[Array, Array]:
     """Derivatives by the effect's own parameters: a row per joint in scope, or one for all."""
     n, (rows, columns) = len(before.q), active.values.shape
     own = active.effect.by_parameter(before.q[active.joints], active.values)

@@ -24,7 +24,7 @@ from typing import NamedTuple, TypeGuard, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.effects import JointLaw, Kind
+from spinepipe.effects import EffectKind, JointLaw
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import SpineModel
 from spinepipe.statics.equilibrium import (
@@ -35,7 +35,7 @@ from spinepipe.statics.equilibrium import (
 )
 from spinepipe.statics.many.dynamics import add_cross
 from spinepipe.statics.many.survey import Plain, compiled, placed
-from spinepipe.status import Ended
+from spinepipe.status import PrescribedStatus
 
 Flags = NDArray[np.bool_]
 
@@ -77,7 +77,7 @@ SNAPS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class PrescribedPlace:
     """How far a vertebra's point lies along a direction, m.
 
     Attributes
@@ -122,7 +122,7 @@ class Tilt:
         return np.array([self.line, self.up, self.aside])
 
 
-Prescription = Place | Tilt
+Prescription = PrescribedPlace | Tilt
 """A number that the pose decides; ``unit``, m or rad, is a miss by which others are told."""
 
 
@@ -260,7 +260,7 @@ class HeldChain:
     def __init__(
         self, model: SpineModel, prescriptions: tuple[Prescription, ...], free: Flags
     ) -> None:
-        if any(scoped.effect.kind is not Kind.JOINT_LAW for scoped in model.effects):
+        if any(scoped.effect.kind is not EffectKind.JOINT_LAW for scoped in model.effects):
             raise ValueError("a chain is held in place on joint laws alone")
         self.effects, self.free, self.prescriptions = model.effects, free, prescriptions
         self.values = tuple(scoped.values for scoped in model.effects)
@@ -297,7 +297,7 @@ class HeldChain:
 
 
 @dataclass(frozen=True)
-class Held:
+class PrescribedResult:
     """End of a solve.
 
     Attributes
@@ -310,7 +310,7 @@ class Held:
     q: Array
     pushes: Array
     missed: Array
-    status: Ended
+    status: PrescribedStatus
     message: str
     iterations: int
     answers: "Answers | None" = None
@@ -346,7 +346,7 @@ class Answers:
         return q, found[count:]
 
 
-class Trial(NamedTuple):
+class NewtonTrial(NamedTuple):
     """A pose q (n,) and pushes (k,) of a chain, where one of Newton's steps is asked for.
 
     Attributes
@@ -373,11 +373,11 @@ class NewtonStep(NamedTuple):
     matrix: Array
 
 
-Ask = Callable[[Trial], NewtonStep | None]
+Ask = Callable[[NewtonTrial], NewtonStep | None]
 """One of Newton's steps; None beyond the ends of a law."""
 
 
-def newton_steps(trials: Sequence[Trial]) -> list[NewtonStep | None]:
+def newton_steps(trials: Sequence[NewtonTrial]) -> list[NewtonStep | None]:
     """Newton's steps from N poses of chains that differ in numbers alone, at once."""
     chains = [one.chain for one in trials]
     first, (tilts, bodies, free) = chains[0], chains[0].asked
@@ -427,17 +427,19 @@ def _solved(matrices: Array, right: Array) -> Array:
         return np.concatenate([_solved(one[None], other[None]) for one, other in each])
 
 
-def answered(asked: Sequence[tuple[int, Trial]]) -> list[NewtonStep | None]:
+def answered(asked: Sequence[tuple[int, NewtonTrial]]) -> list[NewtonStep | None]:
     """The steps of searches that advance in lockstep (`calibrate.lockstep`)."""
     return newton_steps([trial for _, trial in asked])
 
 
-def alone(trial: Trial) -> NewtonStep | None:
+def alone(trial: NewtonTrial) -> NewtonStep | None:
     """The step of one chain."""
     return newton_steps([trial])[0]
 
 
-def hold_at(chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask = alone) -> Held:
+def hold_at(
+    chain: HeldChain, wanted: Array, start: PrescribedResult | None = None, ask: Ask = alone
+) -> PrescribedResult:
     """The pose in which a chain is held.
 
     It is the end of the path of stable poses along which all that is prescribed comes on in
@@ -452,7 +454,9 @@ def hold_at(chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask
         be on another path; without, or where Newton leads nowhere, the above.
     """
     problem = _Problem(chain, ask)
-    rest = Held(np.zeros(len(chain.free)), np.zeros(len(wanted)), wanted, Ended.CONVERGED, "", 0)
+    rest = PrescribedResult(
+        np.zeros(len(chain.free)), np.zeros(len(wanted)), wanted, PrescribedStatus.CONVERGED, "", 0
+    )
     if start is not None:
         found = problem.newton(start, wanted, 0.0)
         if _stood(found):
@@ -469,8 +473,8 @@ def hold_at(chain: HeldChain, wanted: Array, start: Held | None = None, ask: Ask
     return replace(found, message=snaps) if _stood(found) else found
 
 
-def _stood(found: Held | None) -> TypeGuard[Held]:
-    return found is not None and found.status is Ended.CONVERGED
+def _stood(found: PrescribedResult | None) -> TypeGuard[PrescribedResult]:
+    return found is not None and found.status is PrescribedStatus.CONVERGED
 
 
 class _Problem:
@@ -483,8 +487,8 @@ class _Problem:
         self.units = chain.units
 
     def newton(
-        self, start: Held, wanted: Array, compliance: float, on_path: bool = False
-    ) -> Held | None:
+        self, start: PrescribedResult, wanted: Array, compliance: float, on_path: bool = False
+    ) -> PrescribedResult | None:
         """From a pose near by; None where the steps lead nowhere.
 
         Parameters
@@ -494,7 +498,7 @@ class _Problem:
         q, pushes = start.q.copy(), start.pushes.copy()
         step, allowed = np.zeros(self.count + len(wanted)), LONGEST_CORRECTION
         for iteration in range(1, MOST_ITERATIONS + 1):
-            found = self.ask(Trial(self.chain, q, pushes, wanted, compliance))
+            found = self.ask(NewtonTrial(self.chain, q, pushes, wanted, compliance))
             if found is None and on_path:
                 return None
             if found is None:  # beyond the ends of a law
@@ -523,12 +527,16 @@ class _Problem:
 
     def _ended(
         self, q: Array, pushes: Array, wanted: Array, matrix: Array, iterations: int
-    ) -> Held:
+    ) -> PrescribedResult:
         missed = wanted - self.chain.reached(q)
         answers = Answers(matrix, self.free)
         if self._stands(matrix):
-            return Held(q, pushes, missed, Ended.CONVERGED, "", iterations, answers)
-        return Held(q, pushes, missed, Ended.UNSTABLE, UNSTABLE, iterations, answers)
+            return PrescribedResult(
+                q, pushes, missed, PrescribedStatus.CONVERGED, "", iterations, answers
+            )
+        return PrescribedResult(
+            q, pushes, missed, PrescribedStatus.UNSTABLE, UNSTABLE, iterations, answers
+        )
 
     def _stands(self, matrix: Array) -> bool:
         """Whether the work grows along all that the prescriptions leave open."""
@@ -545,7 +553,7 @@ class _Problem:
             return False
         return True
 
-    def followed(self, rest: Held, wanted: Array) -> tuple[Held, float]:
+    def followed(self, rest: PrescribedResult, wanted: Array) -> tuple[PrescribedResult, float]:
         """The last pose of the path on which what is wanted comes on, and the share that did.
 
         Predictor along the tangent, Newton as corrector. A step is a piece of the path where Newton
@@ -569,14 +577,14 @@ class _Problem:
                 step *= 0.5
         return last, share
 
-    def led(self, rest: Held, wanted: Array) -> Held:
+    def led(self, rest: PrescribedResult, wanted: Array) -> PrescribedResult:
         """What is wanted in fractions, from the neutral pose; the nearest where the way ends."""
         first, last = self.chain.reached(rest.q), rest
         reached, increment = 0.0, FIRST_INCREMENT
         while reached < 1.0:
             target = min(1.0, reached + increment)
             found = self.newton(last, first + target * (wanted - first), 0.0)
-            if found is not None and found.status is Ended.CONVERGED:
+            if found is not None and found.status is PrescribedStatus.CONVERGED:
                 last, reached, increment = found, target, 2.0 * increment
             elif increment > SMALLEST_FRACTION:
                 increment *= 0.5
@@ -584,15 +592,17 @@ class _Problem:
                 return self._stopped(last, rest, wanted)
         return last
 
-    def _stopped(self, last: Held, rest: Held, wanted: Array) -> Held:
+    def _stopped(
+        self, last: PrescribedResult, rest: PrescribedResult, wanted: Array
+    ) -> PrescribedResult:
         """The way ends: no pose has what is wanted, or none that stands."""
         near = self.nearest(rest, wanted)
         if np.abs(near.missed / self.units).max() > REACHED:
             return near
         left = wanted - self.chain.reached(last.q)
-        return replace(last, missed=left, status=Ended.UNSTABLE, message=UNSTABLE)
+        return replace(last, missed=left, status=PrescribedStatus.UNSTABLE, message=UNSTABLE)
 
-    def nearest(self, rest: Held, wanted: Array) -> Held:
+    def nearest(self, rest: PrescribedResult, wanted: Array) -> PrescribedResult:
         """The pose that misses least of what is wanted, by a holder that grows harder."""
         last, compliance, missed = rest, SOFTEST, np.inf * self.units
         while compliance > HARDEST:
@@ -605,6 +615,10 @@ class _Problem:
             missed = found.missed
         if last is rest:
             pushes, missed = rest.pushes, wanted - self.chain.reached(rest.q)
-            return Held(rest.q, pushes, missed, Ended.NOT_CONVERGED, UNREACHABLE, 0)
+            return PrescribedResult(
+                rest.q, pushes, missed, PrescribedStatus.NOT_CONVERGED, UNREACHABLE, 0
+            )
         pose = (last.q, last.pushes, last.missed)
-        return Held(*pose, Ended.UNREACHABLE, UNREACHABLE, last.iterations, last.answers)
+        return PrescribedResult(
+            *pose, PrescribedStatus.UNREACHABLE, UNREACHABLE, last.iterations, last.answers
+        )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects import Parameter
-from spinepipe.effects.contract import Array, Beside
+from spinepipe.effects.contract import Array, MeasurementContext
 from spinepipe.model import SpineModel
 from spinepipe.statics.holding import ActivePath, Law
 from spinepipe.statics.instruments import beside, followed, passed, read, read_by
@@ -261,13 +261,13 @@ def observe(system: System, q: Array, place: int | None = None) -> Array:
 
 def _beside(
     system: System, active: ActiveMeasurement, joints: Array, place: int | None
-) -> Beside | None:
+) -> MeasurementContext | None:
     """What stands beside the joints in scope (J, 6); None where no load step is told."""
     if place is None:
         return None
     every = beside(joints, passed(system.case)[place])
     at = active.joints
-    return Beside(every.above[at], every.below[at], every.passed[at])
+    return MeasurementContext(every.above[at], every.below[at], every.passed[at])
 
 
 def observed_by_parameters(

@@ -163,7 +163,7 @@ _WEIGHTLESS = np.zeros(3)  # where weight is part of the residual
 
 
 @dataclass(frozen=True)
-class Settled:
+class TransientResult:
     """End of a settling run.
 
     Attributes
@@ -186,7 +186,7 @@ class Settled:
 
 def settle(
     system: System, program: Program, duration: float, times: Sequence[float] = ()
-) -> Settled:
+) -> TransientResult:
     """Let the chain move from rest in the neutral pose for ``duration`` seconds.
 
     Status ``converged`` says that the run reached its end and that there is an equilibrium;
@@ -211,7 +211,7 @@ def move(
     duration: float,
     times: Sequence[float] = (),
     coarseness: float = 1.0,
-) -> Settled:
+) -> TransientResult:
     """As `settle`, without looking for the equilibrium: ``converged`` means the end was reached.
 
     ``coarseness`` multiplies the tolerances, see `END_ONLY`.
@@ -220,10 +220,12 @@ def move(
     if refusal:
         nothing = np.zeros(system.chain.n)
         history = np.full((len(times), system.chain.n), np.nan)
-        return Settled(nothing, nothing, history, None, Status.REFUSED, refusal, ())
+        return TransientResult(nothing, nothing, history, None, Status.REFUSED, refusal, ())
     run = _Run(system, program, coarseness)
     history = run.to(duration, times)
-    return Settled(run.q, run.rate, history, None, run.status, run.message, tuple(run.sizes))
+    return TransientResult(
+        run.q, run.rate, history, None, run.status, run.message, tuple(run.sizes)
+    )
 
 
 def retrace(system: System, program: Program, sizes: Sequence[float]) -> Array | None:

@@ -13,9 +13,9 @@ import numpy as np
 
 from spinepipe.effects import (
     AppliedLoad,
+    EffectKind,
     GeometryEffect,
     JointLaw,
-    Kind,
     LoadEffect,
     PathLaw,
     Wrench,
@@ -34,7 +34,7 @@ from spinepipe.statics.holding import (
 from spinepipe.statics.holding import differentiate as differentiate_holding
 from spinepipe.statics.instruments import Instrument
 from spinepipe.statics.motion import ChainMotion, cross_matrix, dead_tangent
-from spinepipe.statics.placement import ActiveGeometry, Placed, place
+from spinepipe.statics.placement import ActiveGeometry, JointKinematics, place
 from spinepipe.world import Chain
 
 
@@ -162,15 +162,15 @@ class System:
         effect, joints, values = scoped.effect, np.array(scoped.joints), scoped.values
         shared = (index, joints, values, effect.per_joint)
         match effect.kind:
-            case Kind.JOINT_LAW:
+            case EffectKind.JOINT_LAW:
                 self.laws.append(ActiveLaw(cast(JointLaw, effect), *shared))
-            case Kind.PATH:
+            case EffectKind.PATH:
                 self.laws.append(ActivePath(cast(PathLaw, effect), *shared))
-            case Kind.GEOMETRY:
+            case EffectKind.GEOMETRY:
                 self.geometry.append(ActiveGeometry(cast(GeometryEffect, effect), *shared))
-            case Kind.LOAD:
+            case EffectKind.LOAD:
                 self.load_effects.append(ActiveLoad(cast(LoadEffect, effect), *shared))
-            case Kind.MEASUREMENT:
+            case EffectKind.MEASUREMENT:
                 self.measurement.append(ActiveMeasurement(cast(Instrument, effect), *shared))
             case _:
                 raise TypeError(f"{effect.name}: {effect.kind!r} is not a kind of effect")
@@ -241,13 +241,13 @@ class System:
         stiffness[self._blocks] += holding.tangent
         return Balance(holding.load.ravel() - applied, stiffness)
 
-    def placed(self, q: Array, with_parameters: bool) -> Placed:
+    def placed(self, q: Array, with_parameters: bool) -> JointKinematics:
         """Coordinates seen by the laws at q (n,)."""
         return place(q.reshape(-1, 6), self.geometry, with_parameters)
 
     def _hold(self, q: Array, states: States) -> Holding:
         if not self.geometry:
-            unmoved = Placed(q.reshape(-1, 6), _NOTHING, _NOTHING, {})
+            unmoved = JointKinematics(q.reshape(-1, 6), _NOTHING, _NOTHING, {})
             return hold(unmoved, self.laws, states, moved=False)
         return hold(self.placed(q, with_parameters=False), self.laws, states, moved=True)
 

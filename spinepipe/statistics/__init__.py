@@ -8,7 +8,14 @@ from spinepipe.statistics.normality import (
     kolmogorov_smirnov_normality,
     lilliefors_normality,
 )
-from spinepipe.statistics.outcome import Ended, Mean, Outcome, corrected, family_size, mean_of
+from spinepipe.statistics.outcome import (
+    ComputationStatus,
+    Mean,
+    StatisticalTest,
+    corrected,
+    family_size,
+    mean_of,
+)
 from spinepipe.statistics.rank_tests import (
     critical_h,
     friedman,
@@ -18,9 +25,9 @@ from spinepipe.statistics.rank_tests import (
 
 __all__ = [
     "Agreement",
-    "Ended",
+    "ComputationStatus",
     "Mean",
-    "Outcome",
+    "StatisticalTest",
     "bland_altman",
     "chi_squared_normality",
     "corrected",

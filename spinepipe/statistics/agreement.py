@@ -7,7 +7,13 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from spinepipe.statistics.correlation import spearman
-from spinepipe.statistics.outcome import Array, Ended, Outcome, constant, finite_pairs
+from spinepipe.statistics.outcome import (
+    Array,
+    ComputationStatus,
+    StatisticalTest,
+    constant,
+    finite_pairs,
+)
 
 FEWEST = 3
 LIMIT_SDS = 1.96
@@ -38,8 +44,8 @@ class Agreement:
     """
 
     n: int
-    proportional: Outcome
-    status: Ended
+    proportional: StatisticalTest
+    status: ComputationStatus
     comparable: bool
     measured_sd: float | None
     predicted_sd: float | None
@@ -70,12 +76,12 @@ def bland_altman(measured: ArrayLike, predicted: ArrayLike) -> Agreement:
     sds = _sds(first, second)
     if n < FEWEST:
         message = f"{n} pairs; at least {FEWEST} are needed"
-        return Agreement(n, proportional, Ended.TOO_FEW, *sds, message=message)
+        return Agreement(n, proportional, ComputationStatus.TOO_FEW, *sds, message=message)
     if constant(difference):
         same = float(difference[0])
         message = "the difference is the same in all pairs"
         return Agreement(
-            *(n, proportional, Ended.CONSTANT, *sds),
+            *(n, proportional, ComputationStatus.CONSTANT, *sds),
             message=message,
             bias=same,
             sd=0.0,
@@ -94,14 +100,14 @@ def _sds(first: Array, second: Array) -> tuple[bool, float | None, float | None]
 
 
 def _agreement(
-    difference: Array, proportional: Outcome, sds: tuple[bool, float | None, float | None]
+    difference: Array, proportional: StatisticalTest, sds: tuple[bool, float | None, float | None]
 ) -> Agreement:
     """Bias, limits and their intervals from differences (n,) that are not all the same."""
     n, bias, sd = len(difference), float(difference.mean()), float(difference.std(ddof=1))
     mean = sd * stats.t.ppf(TAILS, n - 1) / np.sqrt(n)
     limit = sd * stats.nct.ppf(TAILS, n - 1, LIMIT_SDS * np.sqrt(n)) / np.sqrt(n)
     return Agreement(
-        *(n, proportional, Ended.DONE, *sds),
+        *(n, proportional, ComputationStatus.DONE, *sds),
         bias=bias,
         bias_low=float(bias + mean[0]),
         bias_high=float(bias + mean[1]),

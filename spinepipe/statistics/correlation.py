@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from spinepipe.statistics.outcome import Array, Ended, Outcome, Test, constant, finite_pairs, tied
+from spinepipe.statistics.outcome import (
+    Array,
+    ComputationStatus,
+    StatisticalTest,
+    Test,
+    constant,
+    finite_pairs,
+    tied,
+)
 
 LARGEST = 10
 """Up to so many pairs; R counts up to 9 and takes an Edgeworth series above."""
@@ -57,7 +65,7 @@ SPEARMAN = Test("Spearman", "rho", "rho")
 KENDALL = Test("Kendall tau-b", "tau", "tau")
 
 
-def spearman(x: ArrayLike, y: ArrayLike) -> Outcome:
+def spearman(x: ArrayLike, y: ArrayLike) -> StatisticalTest:
     """Spearman's rank correlation of pairs x (n,) and y (n,), two-sided.
 
     p is exact up to 10 pairs, also with ties, otherwise from scipy's t approximation.
@@ -75,7 +83,7 @@ def spearman(x: ArrayLike, y: ArrayLike) -> Outcome:
     return SPEARMAN.done(rho, p, n, rho, f"exact p; {ties}" if ties else "exact p")
 
 
-def kendall(x: ArrayLike, y: ArrayLike) -> Outcome:
+def kendall(x: ArrayLike, y: ArrayLike) -> StatisticalTest:
     """Kendall's tau-b of pairs x (n,) and y (n,), two-sided; scipy counts p exactly if n <= 33."""
     first, second = finite_pairs(x, y)
     refused = _refused(KENDALL, first, second)
@@ -86,14 +94,18 @@ def kendall(x: ArrayLike, y: ArrayLike) -> Outcome:
     return KENDALL.done(found.statistic, found.pvalue, len(first), found.statistic, ties)
 
 
-def _refused(test: Test, x: Array, y: Array) -> Outcome | None:
+def _refused(test: Test, x: Array, y: Array) -> StatisticalTest | None:
     """The outcome of pairs that have no correlation, or None."""
     n = len(x)
     if n < FEWEST:
-        return test.without(Ended.TOO_FEW, n, f"{n} pairs; at least {FEWEST} are needed")
+        return test.without(
+            ComputationStatus.TOO_FEW, n, f"{n} pairs; at least {FEWEST} are needed"
+        )
     same = [name for name, values in (("first", x), ("second", y)) if constant(values)]
     if same:
-        return test.without(Ended.CONSTANT, n, f"all {' and all '.join(same)} values are the same")
+        return test.without(
+            ComputationStatus.CONSTANT, n, f"all {' and all '.join(same)} values are the same"
+        )
     return None
 
 

@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from spinepipe.statistics.outcome import Array, Ended, Outcome, Test, constant, finite
+from spinepipe.statistics.outcome import (
+    Array,
+    ComputationStatus,
+    StatisticalTest,
+    Test,
+    constant,
+    finite,
+)
 
 BINS = 10
 LEAST_EXPECTED = 5.0
@@ -29,7 +36,7 @@ LILLIEFORS_RANGE = (0.001, 0.99)
 """The table that p is read from ends here."""
 
 
-def chi_squared_normality(values: ArrayLike) -> Outcome:
+def chi_squared_normality(values: ArrayLike) -> StatisticalTest:
     """Chi-squared goodness of fit to a normal with the values' mean and SD.
 
     As MATLAB's ``chi2gof`` does by default: 10 bins of equal width over the range, the outermost
@@ -39,7 +46,7 @@ def chi_squared_normality(values: ArrayLike) -> Outcome:
     return _tested(CHI_SQUARED, finite(values), _chi_squared)
 
 
-def kolmogorov_smirnov_normality(values: ArrayLike) -> Outcome:
+def kolmogorov_smirnov_normality(values: ArrayLike) -> StatisticalTest:
     """One-sample Kolmogorov-Smirnov test of the standardised values, as Gould et al. 2024a did.
 
     Its p is too large, as mean and SD come from the same values; see `lilliefors_normality`.
@@ -47,22 +54,26 @@ def kolmogorov_smirnov_normality(values: ArrayLike) -> Outcome:
     return _tested(KOLMOGOROV_SMIRNOV, finite(values), _kolmogorov_smirnov)
 
 
-def lilliefors_normality(values: ArrayLike) -> Outcome:
+def lilliefors_normality(values: ArrayLike) -> StatisticalTest:
     """Kolmogorov-Smirnov test whose p allows for estimated mean and SD (Lilliefors 1967)."""
     return _tested(LILLIEFORS, finite(values), _lilliefors)
 
 
-def _tested(test: Test, values: Array, compute: Callable[[Array], Outcome]) -> Outcome:
+def _tested(
+    test: Test, values: Array, compute: Callable[[Array], StatisticalTest]
+) -> StatisticalTest:
     """The outcome of a test of normality, unless there is nothing to test."""
     n = len(values)
     if n < FEWEST:
-        return test.without(Ended.TOO_FEW, n, f"{n} values; at least {FEWEST} are needed")
+        return test.without(
+            ComputationStatus.TOO_FEW, n, f"{n} values; at least {FEWEST} are needed"
+        )
     if constant(values):
-        return test.without(Ended.CONSTANT, n, "all values are the same")
+        return test.without(ComputationStatus.CONSTANT, n, "all values are the same")
     return compute(values)
 
 
-def _chi_squared(values: Array) -> Outcome:
+def _chi_squared(values: Array) -> StatisticalTest:
     n = len(values)
     edges = np.linspace(values.min(), values.max(), BINS + 1)
     observed = np.histogram(values, edges)[0].astype(np.float64)
@@ -71,7 +82,7 @@ def _chi_squared(values: Array) -> Outcome:
     observed, expected = _pooled(observed, expected)
     if len(expected) - 1 - ESTIMATED < 1:
         return CHI_SQUARED.without(
-            Ended.TOO_FEW,
+            ComputationStatus.TOO_FEW,
             n,
             f"{len(expected)} bins left after pooling, which leaves no degree of freedom: "
             "use Kolmogorov-Smirnov, as the paper did",
@@ -95,7 +106,7 @@ def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
     return observed, expected
 
 
-def _kolmogorov_smirnov(values: Array) -> Outcome:
+def _kolmogorov_smirnov(values: Array) -> StatisticalTest:
     found = stats.kstest(stats.zscore(values, ddof=1), "norm")
     return KOLMOGOROV_SMIRNOV.done(
         found.statistic,
@@ -106,7 +117,7 @@ def _kolmogorov_smirnov(values: Array) -> Outcome:
     )
 
 
-def _lilliefors(values: Array) -> Outcome:
+def _lilliefors(values: Array) -> StatisticalTest:
     # Loaded here: it takes 0.6 s, and most who load this file test no normality.
     from statsmodels.stats.diagnostic import lilliefors
 
@@ -122,7 +133,9 @@ ROUNDING = 1e-9
 NESTED = Test("nested models F", "F", "partial R2")
 
 
-def f_test_nested(rss_small: float, df_small: int, rss_large: float, df_large: int) -> Outcome:
+def f_test_nested(
+    rss_small: float, df_small: int, rss_large: float, df_large: int
+) -> StatisticalTest:
     """F test of two least squares fits to the same values, one model a special case of the other.
 
     For models that are not linear the F distribution is an approximation.
@@ -146,10 +159,10 @@ def f_test_nested(rss_small: float, df_small: int, rss_large: float, df_large: i
     _check(rss_small, df_small, rss_large, df_large)
     if df_large < 1:
         message = f"{df_large} degrees of freedom left by the larger model; at least 1 is needed"
-        return NESTED.without(Ended.TOO_FEW, max(df_large, 0), message)
+        return NESTED.without(ComputationStatus.TOO_FEW, max(df_large, 0), message)
     if rss_large == 0.0:
         message = "the larger model fits exactly: no residual to compare with"
-        return NESTED.without(Ended.CONSTANT, df_large, message)
+        return NESTED.without(ComputationStatus.CONSTANT, df_large, message)
     extra, gained = df_small - df_large, max(rss_small - rss_large, 0.0)
     f = (gained / extra) / (rss_large / df_large)
     message = f"F({extra}, {df_large})"

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 P_ZERO = "p is too small for a number: 0 stands for it"
 
 
-class Ended(StrEnum):
+class ComputationStatus(StrEnum):
     """Whether a statistic could be computed."""
 
     DONE = "done"
@@ -27,7 +27,7 @@ class Ended(StrEnum):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class StatisticalTest:
     """One test, ready to be a row of a table.
 
     Attributes
@@ -45,7 +45,7 @@ class Outcome:
     n: int
     effect_name: str
     effect: float | None
-    status: Ended
+    status: ComputationStatus
     message: str = ""
 
 
@@ -66,9 +66,9 @@ class Test:
         n: int,
         effect: SupportsFloat,
         message: str = "",
-    ) -> Outcome:
+    ) -> StatisticalTest:
         """The outcome of a test that could be computed."""
-        return Outcome(
+        return StatisticalTest(
             self.test,
             self.statistic_name,
             float(statistic),
@@ -76,13 +76,13 @@ class Test:
             n,
             self.effect_name,
             float(effect),
-            Ended.DONE,
+            ComputationStatus.DONE,
             message if float(p) > 0.0 else f"{message}; {P_ZERO}".removeprefix("; "),
         )
 
-    def without(self, status: Ended, n: int, message: str) -> Outcome:
+    def without(self, status: ComputationStatus, n: int, message: str) -> StatisticalTest:
         """The outcome of a test that has no numbers."""
-        return Outcome(
+        return StatisticalTest(
             self.test, self.statistic_name, None, None, n, self.effect_name, None, status, message
         )
 

@@ -16,8 +16,8 @@ from scipy import stats
 
 from spinepipe.statistics.outcome import (
     Array,
-    Ended,
-    Outcome,
+    ComputationStatus,
+    StatisticalTest,
     Test,
     constant,
     finite,
@@ -43,7 +43,7 @@ SEED = 1952
 KRUSKAL_WALLIS = Test("Kruskal-Wallis", "H", "epsilon squared")
 
 
-def kruskal_wallis(groups: Sequence[ArrayLike]) -> Outcome:
+def kruskal_wallis(groups: Sequence[ArrayLike]) -> StatisticalTest:
     """Kruskal and Wallis' rank sum test of independent groups, H corrected for ties.
 
     Groups that hold the same specimens are paired, not independent: `friedman` (or
@@ -89,20 +89,20 @@ def critical_h(groups: int, p_below: float = 0.05) -> float:
     return float(stats.chi2.isf(p_below, groups - 1))
 
 
-def _refused(groups: Sequence[Array], n: int) -> Outcome | None:
+def _refused(groups: Sequence[Array], n: int) -> StatisticalTest | None:
     """The outcome of groups that cannot be compared, or None."""
     empty = sum(len(group) == 0 for group in groups)
     if len(groups) < FEWEST_GROUPS or empty or n == len(groups):
         message = f"{n} values in {len(groups)} groups, {empty} of them empty; at least "
         return KRUSKAL_WALLIS.without(
-            Ended.TOO_FEW, n, f"{message}{FEWEST_GROUPS} groups of two values needed"
+            ComputationStatus.TOO_FEW, n, f"{message}{FEWEST_GROUPS} groups of two values needed"
         )
     if constant(np.concatenate(groups)):
-        return KRUSKAL_WALLIS.without(Ended.CONSTANT, n, "all values are the same")
+        return KRUSKAL_WALLIS.without(ComputationStatus.CONSTANT, n, "all values are the same")
     alone = sum(len(group) == 1 for group in groups)
     if alone:
         message = f"{alone} of {len(groups)} groups with a single value; each needs two"
-        return KRUSKAL_WALLIS.without(Ended.TOO_FEW, n, message)
+        return KRUSKAL_WALLIS.without(ComputationStatus.TOO_FEW, n, message)
     return None
 
 
@@ -176,7 +176,7 @@ FEWEST_BLOCKS_FOR_CHI_SQUARED = 10
 FRIEDMAN = Test("Friedman", "chi2", "Kendall's W")
 
 
-def friedman(grid: ArrayLike) -> Outcome:
+def friedman(grid: ArrayLike) -> StatisticalTest:
     """Friedman's rank sum test of unreplicated complete blocks, corrected for ties.
 
     Parameters
@@ -195,13 +195,15 @@ def friedman(grid: ArrayLike) -> Outcome:
     blocks, treatments = values.shape
     if blocks < FEWEST_BLOCKS or treatments < FEWEST_TREATMENTS:
         return FRIEDMAN.without(
-            Ended.TOO_FEW,
+            ComputationStatus.TOO_FEW,
             blocks,
             f"{blocks} blocks of {treatments} treatments; at least "
             f"{FEWEST_BLOCKS} of {FEWEST_TREATMENTS} are needed",
         )
     if (values == values[:, :1]).all():
-        return FRIEDMAN.without(Ended.CONSTANT, blocks, "within every block all values are equal")
+        return FRIEDMAN.without(
+            ComputationStatus.CONSTANT, blocks, "within every block all values are equal"
+        )
     found = stats.friedmanchisquare(*values.T)
     effect = found.statistic / (blocks * (treatments - 1))
     tied = sum(len(np.unique(block)) < treatments for block in values)
@@ -298,7 +300,7 @@ SAME = 1e-12
 SIGNED_RANK = Test("Wilcoxon signed rank", "V", "rank-biserial r")
 
 
-def wilcoxon_signed_rank(x: ArrayLike, y: ArrayLike) -> Outcome:
+def wilcoxon_signed_rank(x: ArrayLike, y: ArrayLike) -> StatisticalTest:
     """Wilcoxon's signed rank test of pairs x (n,) and y (n,), two-sided.
 
     The statistic V is the sum of the ranks of the pairs with x above y. Pairs without a
@@ -314,10 +316,10 @@ def wilcoxon_signed_rank(x: ArrayLike, y: ArrayLike) -> Outcome:
     n, differences = len(first), _differences(first, second)
     left = len(differences)
     if left == 0 < n:
-        return SIGNED_RANK.without(Ended.CONSTANT, n, f"all {n} pairs are equal")
+        return SIGNED_RANK.without(ComputationStatus.CONSTANT, n, f"all {n} pairs are equal")
     if left < FEWEST:
         message = f"{left} of {n} pairs differ; at least {FEWEST} are needed"
-        return SIGNED_RANK.without(Ended.TOO_FEW, n, message)
+        return SIGNED_RANK.without(ComputationStatus.TOO_FEW, n, message)
     ranks = stats.rankdata(np.abs(differences))
     v, total = float(ranks[differences > 0.0].sum()), left * (left + 1) / 2
     message = _message(differences, n - left)

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.yaml_text import Document
-from spinepipe.effects import Kind, create
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.effects import EffectKind, create
 from spinepipe.model.file import EffectEntry, ModelFile, effects_for, read_model
-from spinepipe.problems import InputError, Problem, Spelling
+from spinepipe.problems import InputError, InputProblem, Spelling
 from spinepipe.studies.base_model import BUSHING, made_by
 from spinepipe.studies.places import at
 
 KEY = "base.model"
-LAWS = (Kind.JOINT_LAW, Kind.PATH)
+LAWS = (EffectKind.JOINT_LAW, EffectKind.PATH)
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class BaseCheck:
     own_bushings: bool
 
     def __call__(
-        self, document: Document, study: Any, cohort: Cohort, root: Path
-    ) -> Iterator[Problem]:
+        self, document: YamlDocument, study: Any, cohort: Cohort, root: Path
+    ) -> Iterator[InputProblem]:
         """Problems of ``study.base.model``; none where the study builds on no file.
 
         A file that another study makes may be missing until that study has run.
@@ -48,7 +48,7 @@ class BaseCheck:
         maker = made_by(path, root)
         if maker == study.study:
             allowed = "a model file that this study does not write itself"
-            yield Problem(*at(document, KEY), name, allowed, "copy it to another folder")
+            yield InputProblem(*at(document, KEY), name, allowed, "copy it to another folder")
         elif path.is_file():
             remade = f"; or delete the file, and study {maker} makes it anew" if maker else ""
             for problem in self._of_file(path, name, cohort, maker):
@@ -56,11 +56,11 @@ class BaseCheck:
         elif maker is None:
             allowed = "a model file, or a result of another study in config/studies"
             remedy = "correct the path (it begins at the folder of the Snakefile) or add the file"
-            yield Problem(*at(document, KEY), f"no file '{name}'", allowed, remedy)
+            yield InputProblem(*at(document, KEY), f"no file '{name}'", allowed, remedy)
 
     def _of_file(
         self, path: Path, name: str, cohort: Cohort, maker: str | None
-    ) -> Iterator[Problem]:
+    ) -> Iterator[InputProblem]:
         """Problems of a file that is there, told under the name that the study gives it.
 
         A result of another study may be of another cohort: its name says whose it is.
@@ -74,7 +74,7 @@ class BaseCheck:
         if maker is None and model.cohort != cohort.name:
             found, allowed = f"'{model.cohort}'", f"the study's cohort, '{cohort.name}'"
             remedy = "take another file; or, where the model is meant for this cohort too, write so"
-            yield Problem(name, None, "cohort", found, allowed, remedy)
+            yield InputProblem(name, None, "cohort", found, allowed, remedy)
         if self.own_bushings:
             yield from _order(model, name)
         for number, entry in enumerate(model.effects):
@@ -86,7 +86,7 @@ class BaseCheck:
                 yield from _without_values(entry, name, place, cohort)
 
 
-def _order(model: ModelFile, name: str) -> Iterator[Problem]:
+def _order(model: ModelFile, name: str) -> Iterator[InputProblem]:
     """The study's bushing comes first; laws before the file's would no longer be before it."""
     names = [entry.effect for entry in model.effects]
     if BUSHING not in names:
@@ -95,10 +95,12 @@ def _order(model: ModelFile, name: str) -> Iterator[Problem]:
         if create(entry.effect, entry.options).kind in LAWS:
             allowed = f"{BUSHING} before all laws: later ones may scale what it carries"
             place = (name, None, f"effects.{number}")
-            yield Problem(*place, f"{entry.effect} first", allowed, f"move {BUSHING} to the top")
+            yield InputProblem(
+                *place, f"{entry.effect} first", allowed, f"move {BUSHING} to the top"
+            )
 
 
-def _strangers(entry: EffectEntry, name: str, place: str, cohort: Cohort) -> Iterator[Problem]:
+def _strangers(entry: EffectEntry, name: str, place: str, cohort: Cohort) -> Iterator[InputProblem]:
     """Specimens and tests that the cohort does not have."""
     specimens = cohort.specimen_names
     named = [("scope.specimens", "specimen", one, specimens) for one in entry.scope.specimens]
@@ -109,10 +111,12 @@ def _strangers(entry: EffectEntry, name: str, place: str, cohort: Cohort) -> Ite
         if one != "*" and one not in known:
             spelling = words[tuple(known)]
             found, allowed = f"unknown {what} '{one}'", f"* or {spelling.allowed}"
-            yield Problem(name, None, f"{place}.{where}", found, allowed, spelling.remedy(one))
+            yield InputProblem(name, None, f"{place}.{where}", found, allowed, spelling.remedy(one))
 
 
-def _without_values(entry: EffectEntry, name: str, place: str, cohort: Cohort) -> Iterator[Problem]:
+def _without_values(
+    entry: EffectEntry, name: str, place: str, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Specimens in scope for which a file with values has none."""
     rows, scope = {row.specimen for row in entry.values}, entry.scope.specimens
     if not rows or "*" in rows:
@@ -122,4 +126,4 @@ def _without_values(entry: EffectEntry, name: str, place: str, cohort: Cohort) -
     if missing:
         found, allowed = f"no value for {', '.join(missing)}", "a value for every specimen in scope"
         remedy = "add values for them or for *, or name the others as its scope"
-        yield Problem(name, None, f"{place}.values", found, allowed, remedy)
+        yield InputProblem(name, None, f"{place}.values", found, allowed, remedy)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.subject import CM_PER_M
 from spinepipe.plausibility.warnings.bodies import person
-from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell
 from spinepipe.studies.subjects import SUBJECTS
 
 
@@ -17,5 +17,5 @@ def subject_doubts(cohort: Cohort) -> Iterator[PlausibilityWarning]:
     rows = cohort.further.get(SUBJECTS.stem)
     for line, row in () if rows is None else rows.iterrows():
         height_m = float(row["height_cm"]) / CM_PER_M
-        whose = (Place(SUBJECTS.stem, line, "height_cm"), str(row["specimen"]), CM_PER_M)
+        whose = (TableCell(SUBJECTS.stem, line, "height_cm"), str(row["specimen"]), CM_PER_M)
         yield from person(cohort, *whose, height_m, float(row["mass_kg"]), float(row["age_years"]))

@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.kept import kept_with_cohort
 from spinepipe.plausibility.warnings.judge import of_cohort
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 from spinepipe.studies.registry import PACKAGE, every_kind
 
 
@@ -24,7 +24,7 @@ def suspicions(cohort: Cohort) -> tuple[PlausibilityWarning, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def doubts(cohort: Cohort) -> tuple[Problem, ...]:
+def doubts(cohort: Cohort) -> tuple[InputProblem, ...]:
     """What is most likely wrong with a validated cohort, and no run is stopped by.
 
     That is all that cannot be certain, and what is but was meant.
@@ -32,7 +32,7 @@ def doubts(cohort: Cohort) -> tuple[Problem, ...]:
     return tuple(one.problem for one in suspicions(cohort) if not _refused(cohort, one))
 
 
-def refusals(cohort: Cohort) -> tuple[Problem, ...]:
+def refusals(cohort: Cohort) -> tuple[InputProblem, ...]:
     """What cannot be right in a validated cohort, and is not said to be meant."""
     return tuple(one.with_switch for one in suspicions(cohort) if _refused(cohort, one))
 

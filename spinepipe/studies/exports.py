@@ -5,7 +5,7 @@ from pathlib import Path
 
 from spinepipe.model import SpineModel
 from spinepipe.model.osim import expressible, osim
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.kind import Wanted
 
 
@@ -26,7 +26,7 @@ def refuse(wanted: Wanted, *, poses: bool = False, representations: bool = False
         raise InputError(problems)
 
 
-def _options(wanted: Wanted, poses: bool, representations: bool) -> Iterator[Problem]:
+def _options(wanted: Wanted, poses: bool, representations: bool) -> Iterator[InputProblem]:
     if wanted.pose is not None and not poses:
         allowed = "none: this kind of study exports no sampled joints"
         yield problem("--pose", f"pose {wanted.pose}", allowed, "leave it out")
@@ -66,6 +66,6 @@ def needed(path: Path, what: str) -> Path:
     return path
 
 
-def problem(column: str, found: str, allowed: str, remedy: str) -> Problem:
+def problem(column: str, found: str, allowed: str, remedy: str) -> InputProblem:
     """A problem of the command line."""
-    return Problem("command line", None, column, found, allowed, remedy)
+    return InputProblem("command line", None, column, found, allowed, remedy)

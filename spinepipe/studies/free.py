@@ -16,7 +16,7 @@ from spinepipe.cohort.answers import UNSURE_M, joint_loads
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.documents.yaml_text import read_yaml
 from spinepipe.effects.contract import Array
-from spinepipe.problems import Problem, one_of
+from spinepipe.problems import InputProblem, one_of
 from spinepipe.studies.parts import AUTO
 from spinepipe.studies.study import STUDIES
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
@@ -90,7 +90,7 @@ def calibration_settled(study: Any, cohort: Cohort) -> Any:
     return study if same else study.model_copy(update={"calibration": calibration})
 
 
-def unmeasured(root: Path, study: Any, cohort: Cohort) -> tuple[Problem, ...]:
+def unmeasured(root: Path, study: Any, cohort: Cohort) -> tuple[InputProblem, ...]:
     """Coordinates that a study frees by name though nobody measured them: told, not refused.
 
     Their stiffness may show in what others do, but mostly keeps its start or the bound it hits.
@@ -112,7 +112,7 @@ def unmeasured(root: Path, study: Any, cohort: Cohort) -> tuple[Problem, ...]:
     place = (file.as_posix(), document.line_of(key), key)
     found = f"{', '.join(nobody)}, which nobody measured in cohort '{cohort.name}'"
     remedy = "take it out: its stiffness would keep its start or run to a bound"
-    return (Problem(*place, found, one_of(known), remedy),)
+    return (InputProblem(*place, found, one_of(known), remedy),)
 
 
 def _names_free(data: Any, key: str) -> bool:

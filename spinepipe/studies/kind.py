@@ -12,16 +12,16 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.form import TableForm
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem
 from spinepipe.schema import Table
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles
 
-Check = Callable[[Document, Any, Cohort], Iterator[Problem]]
+Check = Callable[[YamlDocument, Any, Cohort], Iterator[InputProblem]]
 """What is asked of a study file, the study and its cohort."""
 
-CheckOfFiles = Callable[[Document, Any, Cohort, Path], Iterator[Problem]]
+CheckOfFiles = Callable[[YamlDocument, Any, Cohort, Path], Iterator[InputProblem]]
 """The same, with the folder of the Snakefile, from which paths count."""
 
 

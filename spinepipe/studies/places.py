@@ -6,31 +6,31 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.supports import motion_read
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem, Spelling
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
 
 
-def at(document: Document, key: str) -> tuple[str, int | None, str]:
+def at(document: YamlDocument, key: str) -> tuple[str, int | None, str]:
     """File, line and key of a setting."""
     return document.file, document.line_of(key), key
 
 
 def unknown_tests(
-    document: Document, tests: Sequence[str] | None, known: Sequence[str]
-) -> Iterator[Problem]:
+    document: YamlDocument, tests: Sequence[str] | None, known: Sequence[str]
+) -> Iterator[InputProblem]:
     """Tests that a study names and its cohort does not have."""
     spelling = Spelling(known, "delete it or add its loads")
     for index, name in enumerate(tests or ()):
         if name not in known:
             place = at(document, f"tests.{index}")
             found, remedy = f"unknown test '{name}'", spelling.remedy(name)
-            yield Problem(*place, found, spelling.allowed, remedy)
+            yield InputProblem(*place, found, spelling.allowed, remedy)
 
 
 def unknown_names(
-    document: Document, key: str, what: str, names: Sequence[str] | None, known: Sequence[str]
-) -> Iterator[Problem]:
+    document: YamlDocument, key: str, what: str, names: Sequence[str] | None, known: Sequence[str]
+) -> Iterator[InputProblem]:
     """Names in the list of a key that its cohort does not have.
 
     Parameters
@@ -42,19 +42,19 @@ def unknown_names(
         if name not in known:
             place = at(document, f"{key}.{index}")
             found, remedy = f"unknown {what} '{name}'", spelling.remedy(name)
-            yield Problem(*place, found, spelling.allowed, remedy)
+            yield InputProblem(*place, found, spelling.allowed, remedy)
 
 
 def unknown_levels(
-    document: Document, levels: Iterable[str], joints: Sequence[str]
-) -> Iterator[Problem]:
+    document: YamlDocument, levels: Iterable[str], joints: Sequence[str]
+) -> Iterator[InputProblem]:
     """Joints that ``level_stiffness`` has values for and the cohort does not have."""
     spelling = Spelling(joints, "delete it or correct its name")
     for name in levels:
         if name not in joints:
             place = at(document, f"level_stiffness.{name}")
             found, remedy = f"unknown joint '{name}'", spelling.remedy(name)
-            yield Problem(*place, found, spelling.allowed, remedy)
+            yield InputProblem(*place, found, spelling.allowed, remedy)
 
 
 _PLACE = ["specimen", "test", "step", "joint"]

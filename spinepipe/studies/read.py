@@ -15,8 +15,8 @@ from spinepipe.documents.form import TableForm
 from spinepipe.documents.names import COHORT_NAME
 from spinepipe.documents.settings import validate
 from spinepipe.documents.strays import files_in, folders_in, strays_in
-from spinepipe.documents.yaml_text import Document, read_yaml
-from spinepipe.problems import InputError, Problem, Spelling, closest, did_you_mean, one_of
+from spinepipe.documents.yaml_text import YamlDocument, read_yaml
+from spinepipe.problems import InputError, InputProblem, Spelling, closest, did_you_mean, one_of
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.parts import FORM
 from spinepipe.studies.registry import every_form, kind_names, kind_of
@@ -45,13 +45,13 @@ def read(path: Path, root: Path) -> Study:
     return study
 
 
-def load(path: Path, root: Path) -> tuple[Document | None, Study | None, list[Problem]]:
+def load(path: Path, root: Path) -> tuple[YamlDocument | None, Study | None, list[InputProblem]]:
     """The study file as data and as a study, None where it is neither; and its problems."""
     file = displayed(path, root)
     if not path.is_file():
         known = [other.stem for other in files_in(path.parent, ENDING)]
         remedy = did_you_mean(path.stem, known, "add it or correct the name")
-        return None, None, [Problem(file, None, None, "no such file", one_of(known), remedy)]
+        return None, None, [InputProblem(file, None, None, "no such file", one_of(known), remedy)]
     document, problems = read_yaml(path, file)
     if document is None:
         return None, None, problems
@@ -64,7 +64,7 @@ def displayed(path: Path, root: Path) -> str:
     return path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
 
 
-def _validated(document: Document) -> tuple[Study | None, list[Problem]]:
+def _validated(document: YamlDocument) -> tuple[Study | None, list[InputProblem]]:
     declared, kind = _kind(document), document.data.get("kind")
     if declared is not None:
         return validate(declared.settings, document)
@@ -73,21 +73,21 @@ def _validated(document: Document) -> tuple[Study | None, list[Problem]]:
         near = next(key for key in document.data if key.casefold() == near)
         place = (document.file, document.line_of(near), near)
         remedy = "did you mean 'kind'? it decides which other keys are allowed"
-        return None, [Problem(*place, "an unknown key", "kind", remedy)]
+        return None, [InputProblem(*place, "an unknown key", "kind", remedy)]
     place = (document.file, document.line_of("kind"), "kind")
     found = "nothing: the key is missing" if kind is None else repr(kind)
     otherwise = "the kind decides which other keys are allowed"
     remedy = did_you_mean(str(kind), kind_names(), otherwise)
-    return None, [Problem(*place, found, one_of(kind_names()), remedy)]
+    return None, [InputProblem(*place, found, one_of(kind_names()), remedy)]
 
 
-def _name_problems(document: Document, stem: str) -> list[Problem]:
+def _name_problems(document: YamlDocument, stem: str) -> list[InputProblem]:
     name = document.data.get("study")
     if not isinstance(name, str) or name == stem:
         return []
     place = (document.file, document.line_of("study"), "study")
     remedy = "rename the file or change the key"
-    return [Problem(*place, f"'{name}'", f"the file's name, '{stem}'", remedy)]
+    return [InputProblem(*place, f"'{name}'", f"the file's name, '{stem}'", remedy)]
 
 
 class Misfit(InputError):
@@ -98,7 +98,7 @@ class Misfit(InputError):
     cohort : the cohort, which may be what is wrong though each of its cells is sound.
     """
 
-    def __init__(self, problems: Iterable[Problem], cohort: Cohort) -> None:
+    def __init__(self, problems: Iterable[InputProblem], cohort: Cohort) -> None:
         super().__init__(problems)
         self.cohort = cohort
 
@@ -147,8 +147,8 @@ def _settled(study: Study, cohort: Cohort) -> Study:
 
 
 def _misfits(
-    document: Document, study: Study, cohort: Cohort, root: Path, at_start: bool
-) -> list[Problem]:
+    document: YamlDocument, study: Study, cohort: Cohort, root: Path, at_start: bool
+) -> list[InputProblem]:
     """What the kind of the study finds wrong with it, its cohort, files and machine."""
     kind = kind_of(study.kind)
     problems = [found for check in kind.checks for found in check(document, study, cohort)]
@@ -161,19 +161,19 @@ def _misfits(
     return problems
 
 
-def _held(document: Document, study: Study, cohort: Cohort) -> Problem:
+def _held(document: YamlDocument, study: Study, cohort: Cohort) -> InputProblem:
     """A rig in the cohort of a study that would leave it out."""
     place = (document.file, document.line_of("cohort"), "cohort")
     found = f"cohort '{cohort.name}', whose rig fixes joint coordinates (supports.csv)"
     holding = [name for name in kind_names() if kind_of(name).holds]
     allowed = f"studies of kind {', '.join(holding)}: {study.kind} knows no rig"
     remedy = "choose such a study, or take supports.csv out if the rig does not matter"
-    return Problem(*place, found, allowed, remedy)
+    return InputProblem(*place, found, allowed, remedy)
 
 
 def _cohort(
-    document: Document | None, root: Path, read_cohort: ReadCohort
-) -> tuple[Cohort | None, list[Problem]]:
+    document: YamlDocument | None, root: Path, read_cohort: ReadCohort
+) -> tuple[Cohort | None, list[InputProblem]]:
     """The cohort a study file names, though the rest of the file may be unsound."""
     name = document.data.get("cohort") if document else None
     if document is None or not isinstance(name, str) or not name:
@@ -189,20 +189,20 @@ def _cohort(
             remedy = "rename it with a-z, 0-9 and _ alone, in its cohort.yaml and here too"
         allowed = f"{one_of(known)}, or the path of a folder"
         place = (document.file, document.line_of("cohort"), "cohort")
-        return None, [Problem(*place, found, allowed, remedy)]
+        return None, [InputProblem(*place, found, allowed, remedy)]
     try:
         return read_cohort(folder, _further(document)), []
     except InputError as error:
         return None, list(error.problems)
 
 
-def _further(document: Document) -> tuple[TableForm, ...]:
+def _further(document: YamlDocument) -> tuple[TableForm, ...]:
     """The files that the kind of a study reads besides; where it names none, those of any kind."""
     kind = _kind(document)
     return every_form() if kind is None else kind.forms
 
 
-def _kind(document: Document) -> Kind | None:
+def _kind(document: YamlDocument) -> Kind | None:
     """The kind that a study file names, or None."""
     name = document.data.get("kind")
     return kind_of(name) if isinstance(name, str) and name in kind_names() else None
@@ -241,7 +241,7 @@ def read_selection(root: Path) -> Selection:
         if not path.parent.is_dir():  # a run that was started elsewhere
             found = f"no such file in {root}, nor a folder for it"
             remedy = "go to the folder of the project, or name it: `snakemake -d FOLDER`"
-        raise InputError([Problem(file, None, None, found, allowed, remedy)])
+        raise InputError([InputProblem(file, None, None, found, allowed, remedy)])
     document, problems = read_yaml(path, file)
     if document is None:
         raise InputError(problems)
@@ -265,11 +265,13 @@ def names_by_kind(root: Path) -> dict[str, list[str]]:
     return found
 
 
-def strays(root: Path) -> list[Problem]:
+def strays(root: Path) -> list[InputProblem]:
     """What lies among the study files and is none, which stops nothing."""
     remedy = "rename it, or leave it: no study is made of it"
     return [
-        Problem(displayed(path, root), None, None, _what(path), f"files <study>{ENDING}", remedy)
+        InputProblem(
+            displayed(path, root), None, None, _what(path), f"files <study>{ENDING}", remedy
+        )
         for path in strays_in(root / STUDIES, ENDING)
     ]
 
@@ -280,7 +282,7 @@ def _what(path: Path) -> str:
     return f"a file that ends with {path.suffix}" if path.is_file() else "a link to nothing"
 
 
-def _unknown_names(selection: Selection, document: Document, root: Path) -> list[Problem]:
+def _unknown_names(selection: Selection, document: YamlDocument, root: Path) -> list[InputProblem]:
     known = [path.stem for path in files_in(root / STUDIES, ENDING)]
     problems = []
     seen: set[str] = set()
@@ -289,9 +291,9 @@ def _unknown_names(selection: Selection, document: Document, root: Path) -> list
         for index, name in enumerate(getattr(selection, key)):
             place = (document.file, document.line_of(f"{key}.{index}"), f"{key}.{index}")
             if name in seen:
-                problems.append(Problem(*place, f"'{name}' again", "each once", "delete one"))
+                problems.append(InputProblem(*place, f"'{name}' again", "each once", "delete one"))
             elif name not in known:
                 found, remedy = f"unknown study '{name}'", spelling.remedy(name)
-                problems.append(Problem(*place, found, spelling.allowed, remedy))
+                problems.append(InputProblem(*place, found, spelling.allowed, remedy))
             seen.add(name)
     return problems

@@ -8,7 +8,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.documents.form import read_forms
 from spinepipe.muscles.subject import CM_PER_M, Subject
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 
 HEIGHT_CM = (120.0, 220.0)
 MASS_KG = (30.0, 300.0)
@@ -32,14 +32,14 @@ def subject_of(cohort: Cohort, specimen: str) -> Subject:
     return Subject(row["sex"], float(row["age_years"]), height, float(row["mass_kg"]))
 
 
-def subject_problems(cohort: Cohort, rows: pd.DataFrame) -> Iterator[Problem]:
+def subject_problems(cohort: Cohort, rows: pd.DataFrame) -> Iterator[InputProblem]:
     """Bodies that nobody has."""
     for line, row in rows.iterrows():
         place = (f"{cohort.name}/{SUBJECTS.file}", int(str(line)))
         yield from _size(place, str(row["specimen"]), row["height_cm"], row["mass_kg"])
 
 
-def _size(place: tuple[str, int], who: str, cm: float, kg: float) -> Iterator[Problem]:
+def _size(place: tuple[str, int], who: str, cm: float, kg: float) -> Iterator[InputProblem]:
     """Height and mass each by itself; only where both can be, the two together."""
     if not HEIGHT_CM[0] <= cm <= HEIGHT_CM[1]:
         remedy = "correct it"
@@ -55,17 +55,19 @@ def _size(place: tuple[str, int], who: str, cm: float, kg: float) -> Iterator[Pr
             remedy = f"is it in inches? write {100.0 * M_PER_INCH * cm:.1f}"
         elif HEIGHT_CM[0] <= cm / 10.0 <= HEIGHT_CM[1]:
             remedy = f"is it in mm? write {cm / 10.0:g}"
-        yield Problem(*place, "height_cm", f"{who} is {cm:g} cm tall", _range(HEIGHT_CM), remedy)
+        yield InputProblem(
+            *place, "height_cm", f"{who} is {cm:g} cm tall", _range(HEIGHT_CM), remedy
+        )
     if not MASS_KG[0] <= kg <= MASS_KG[1]:
         remedy = "correct it"
         if kg > MASS_KG[1]:
             remedy = f"is it the weight in N? write {kg / STANDARD_GRAVITY:.1f}"
-        yield Problem(*place, "mass_kg", f"{who} weighs {kg:g} kg", _range(MASS_KG), remedy)
+        yield InputProblem(*place, "mass_kg", f"{who} weighs {kg:g} kg", _range(MASS_KG), remedy)
     elif HEIGHT_CM[0] <= cm <= HEIGHT_CM[1]:
         bmi = kg / (cm / 100.0) ** 2
         if not BMI[0] <= bmi <= BMI[1]:
             found = f"{who} has a BMI of {bmi:.1f} ({kg:g} kg, {cm:g} cm)"
-            yield Problem(*place, "mass_kg", found, _range(BMI), "correct height or mass")
+            yield InputProblem(*place, "mass_kg", found, _range(BMI), "correct height or mass")
 
 
 def _range(pair: tuple[float, float]) -> str:

@@ -2,7 +2,7 @@
 
 from spinepipe.tables.parquet import (
     BadTable,
-    Tables,
+    StudyTables,
     arrow_schema,
     from_rows,
     join,
@@ -18,7 +18,7 @@ from spinepipe.tables.parquet import (
 
 __all__ = [
     "BadTable",
-    "Tables",
+    "StudyTables",
     "arrow_schema",
     "from_rows",
     "join",

@@ -203,7 +203,7 @@ def read_frame(path: str | Path) -> pd.DataFrame:
     return frame
 
 
-class Tables(dict[str, pd.DataFrame]):
+class StudyTables(dict[str, pd.DataFrame]):
     """Tables of a study by name, and its other result files."""
 
     def __init__(
@@ -213,14 +213,16 @@ class Tables(dict[str, pd.DataFrame]):
         self.files = dict(files or {})
 
     @classmethod
-    def read(cls, paths: Sequence[str | Path], files: Mapping[str, str] | None = None) -> "Tables":
+    def read(
+        cls, paths: Sequence[str | Path], files: Mapping[str, str] | None = None
+    ) -> "StudyTables":
         """Tables by the name of their file; other files are not opened."""
         return cls({Path(path).stem: read_frame(path) for path in paths}, files)
 
 
 def read_frames(paths: Sequence[str | Path]) -> dict[str, pd.DataFrame]:
     """Tables by name, which is that of their file."""
-    return Tables.read(paths)
+    return StudyTables.read(paths)
 
 
 def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]]) -> pa.Table:

@@ -17,7 +17,7 @@ from spinepipe.cohort.columns import COHORT_YAML, TABLES
 from spinepipe.documents.form import TableForm
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import read_yaml
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
@@ -64,7 +64,7 @@ def read(path: Path) -> Imported:
         With every problem of the YAML, else of all files, else of all tests.
     """
     mapping = _mapping(path)
-    problems: list[Problem] = []
+    problems: list[InputProblem] = []
     recordings: dict[tuple[str, str], list[Recording]] = {}
     for of in mapping.files:
         recording, faults = read_recording(path.parent / of.file, of, mapping)
@@ -87,7 +87,7 @@ def _mapping(path: Path) -> MachineMapping:
     if not path.is_file():
         allowed = "the YAML that says what the columns are"
         raise InputError(
-            [Problem(str(path), None, None, "no such file", allowed, "check the name")]
+            [InputProblem(str(path), None, None, "no such file", allowed, "check the name")]
         )
     document, problems = read_yaml(path, path.name)
     if document is None:
@@ -116,7 +116,7 @@ def write(imported: Imported, folder: Path, replace: bool) -> list[str]:
     if folder.exists() and not replace:
         remedy = "choose another `cohort:` in the YAML, or add --replace"
         found = "a folder of this name"
-        raise InputError([Problem(str(folder), None, None, found, "a new folder", remedy)])
+        raise InputError([InputProblem(str(folder), None, None, found, "a new folder", remedy)])
     texts = {
         COHORT_YAML: _header(imported),
         "specimens.csv": _table([("specimen",), *((name,) for name in _specimens(imported))]),

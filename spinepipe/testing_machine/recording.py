@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import medfilt
 
 from spinepipe.documents.text import MOST_CSV_BYTES, NUMBER, read_bytes
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.problems import InputProblem, did_you_mean, one_of
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     SECONDS,
@@ -76,12 +76,12 @@ class _Cells:
 
 def read_recording(
     path: Path, of: TestFile, mapping: MachineMapping
-) -> tuple[Recording | None, list[Problem]]:
+) -> tuple[Recording | None, list[InputProblem]]:
     """Read one file; None, and every problem, where it cannot be used."""
     file = of.file
     if not path.is_file():
         allowed = "a file, told relative to the YAML"
-        return None, [Problem(file, None, None, "no such file", allowed, "correct the path")]
+        return None, [InputProblem(file, None, None, "no such file", allowed, "correct the path")]
     data, problems = read_bytes(path, file, MOST_CSV_BYTES)
     if problems:
         return None, problems
@@ -90,12 +90,12 @@ def read_recording(
     except UnicodeError:
         remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
         found = f"letters that are not {mapping.form.encoding}"
-        return None, [Problem(file, None, None, found, "the encoding of the YAML", remedy)]
+        return None, [InputProblem(file, None, None, found, "the encoding of the YAML", remedy)]
     try:
         cells, problems = _cells(text, file, mapping.form)
     except csv.Error as error:
         found, allowed = f"no table ({error})", f"cells separated by a {mapping.form.delimiter}"
-        return None, [Problem(file, None, None, found, allowed, "look at `form.delimiter`")]
+        return None, [InputProblem(file, None, None, found, allowed, "look at `form.delimiter`")]
     if cells is None:
         return None, problems
     return _understood(cells, of, mapping, problems)
@@ -105,7 +105,7 @@ def _codec(form: FileForm) -> str:
     return "utf-8-sig" if form.encoding == "utf-8" else form.encoding
 
 
-def _cells(text: str, file: str, form: FileForm) -> tuple[_Cells | None, list[Problem]]:
+def _cells(text: str, file: str, form: FileForm) -> tuple[_Cells | None, list[InputProblem]]:
     """Rows below the names; blank lines are skipped, empty cells at the end of a row too."""
     first = form.first_line or form.names_line + 1
     names: list[str] = []
@@ -120,12 +120,14 @@ def _cells(text: str, file: str, form: FileForm) -> tuple[_Cells | None, list[Pr
             rows.append(row)
     if form.names_line and not names:
         allowed = f"names of columns in line {form.names_line}"
-        problem = Problem(file, None, None, "no such line, or an empty one", allowed, "correct it")
+        problem = InputProblem(
+            file, None, None, "no such line, or an empty one", allowed, "correct it"
+        )
         return None, [problem]
     if len(rows) < FEWEST_LINES:
         found, allowed = f"{len(rows)} lines of numbers", f"at least {FEWEST_LINES}"
         remedy = "look whether `form.first_line` is right"
-        return None, [Problem(file, first, None, found, allowed, remedy)]
+        return None, [InputProblem(file, first, None, found, allowed, remedy)]
     return _Cells(names, lines, rows, max(map(len, rows))), []
 
 
@@ -141,8 +143,8 @@ def _rows(text: str, form: FileForm) -> Iterator[tuple[int, list[str]]]:
 
 
 def _understood(
-    cells: _Cells, of: TestFile, mapping: MachineMapping, problems: list[Problem]
-) -> tuple[Recording | None, list[Problem]]:
+    cells: _Cells, of: TestFile, mapping: MachineMapping, problems: list[InputProblem]
+) -> tuple[Recording | None, list[InputProblem]]:
     time = None
     if mapping.time is not None:
         seconds = _column(cells, mapping.time.column, of.file, mapping.form, problems)
@@ -183,7 +185,7 @@ def _understood(
 
 
 def _column(
-    cells: _Cells, column: str | int, file: str, form: FileForm, problems: list[Problem]
+    cells: _Cells, column: str | int, file: str, form: FileForm, problems: list[InputProblem]
 ) -> Array | None:
     """(N,) numbers of a column as written; None, with the problems added, where some are none."""
     place = _place(cells, column)
@@ -191,7 +193,9 @@ def _column(
         known: Sequence[str] = cells.names or [str(n + 1) for n in range(cells.width)]
         remedy = did_you_mean(str(column), known, _other_delimiter(cells, form))
         line = form.names_line or None
-        problems.append(Problem(file, line, str(column), "no such column", one_of(known), remedy))
+        problems.append(
+            InputProblem(file, line, str(column), "no such column", one_of(known), remedy)
+        )
         return None
     texts = [row[place] if place < len(row) else "" for row in cells.rows]
     if form.decimal == "comma":
@@ -218,7 +222,7 @@ def _other_delimiter(cells: _Cells, form: FileForm) -> str:
 
 def _no_numbers(
     cells: _Cells, place: int, bad: NDArray[np.int64], file: str, column: str, form: FileForm
-) -> Problem:
+) -> InputProblem:
     row = cells.rows[int(bad[0])]
     found = f"'{row[place]}'" if place < len(row) and row[place] else "an empty cell"
     if bad.size > 1:
@@ -229,16 +233,16 @@ def _no_numbers(
     elif form.decimal == "comma" and place < len(row) and "." in row[place]:
         remedy = "set `form: {decimal: point}` if the machine writes decimal points"
     allowed = f"a finite number with a decimal {form.decimal} in every line"
-    return Problem(file, cells.lines[int(bad[0])], column, found, allowed, remedy)
+    return InputProblem(file, cells.lines[int(bad[0])], column, found, allowed, remedy)
 
 
-def _backwards(time: Array, cells: _Cells, file: str, column: str) -> Iterator[Problem]:
+def _backwards(time: Array, cells: _Cells, file: str, column: str) -> Iterator[InputProblem]:
     back = np.flatnonzero(np.diff(time) < 0)
     if back.size:
         more = f", {back.size} times in all" if back.size > 1 else ""
         found = f"a time before that of the line above{more}"
         remedy = "look for recordings put one below the other, and give each its own file"
-        yield Problem(
+        yield InputProblem(
             file, cells.lines[int(back[0]) + 1], column, found, "times that go on", remedy
         )
 

@@ -8,8 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from spinepipe.cohort.cohort import VertebraName, joint_names
 from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem, did_you_mean, one_of
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem, did_you_mean, one_of
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     FORCES,
@@ -189,7 +189,7 @@ class MachineMapping(BaseModel):
         return next(channel for channel in self.loads if channel.column == of.driving)
 
 
-def check_mapping(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
+def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """What is wrong with the keys taken together, each problem at its line."""
     yield from _fewest(document, mapping)
     yield from _names(document, mapping)
@@ -202,11 +202,11 @@ def check_mapping(document: Document, mapping: MachineMapping) -> Iterator[Probl
         yield _at(document, "form.first_line", str(form.first_line), allowed, "correct one of them")
 
 
-def _at(document: Document, key: str, found: str, allowed: str, remedy: str) -> Problem:
-    return Problem(document.file, document.line_of(key), key, found, allowed, remedy)
+def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str) -> InputProblem:
+    return InputProblem(document.file, document.line_of(key), key, found, allowed, remedy)
 
 
-def _fewest(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
+def _fewest(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """Lists that must not be empty (a rule of pydantic would speak up for their bad items too)."""
     fewest = {"vertebrae": 2, "loads": 1, "motion": 1, "files": 1}
     for key, least in fewest.items():
@@ -218,7 +218,7 @@ def _fewest(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
         yield _at(document, "steps.levels", "an empty list", "at least 1", remedy)
 
 
-def _names(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
+def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     moving = mapping.vertebrae[1:]
     if mapping.loaded is not None and mapping.loaded not in moving:
         remedy = did_you_mean(mapping.loaded, moving, "load a vertebra that moves")
@@ -241,7 +241,7 @@ def _names(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
         yield _at(document, "load_point_mm", "nothing", allowed, "add `load_point_mm: [x, y, z]`")
 
 
-def _directions(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
+def _directions(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """A unit tells whether something turns or shifts; the direction must do so too."""
     sides: tuple[tuple[str, tuple[LoadChannel | MotionChannel, ...]], ...] = (
         ("loads", mapping.loads),
@@ -256,7 +256,7 @@ def _directions(document: Document, mapping: MachineMapping) -> Iterator[Problem
                 yield _at(document, key, found, one_of(fit), "correct the direction or the unit")
 
 
-def _columns(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
+def _columns(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """Each column once, each quantity once; numbers only where there are no names."""
     named: list[tuple[str, _Text | int]] = []
     if mapping.time is not None:
@@ -285,7 +285,7 @@ def _columns(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
             yield _at(document, key, found, allowed, "delete one of them or correct its direction")
 
 
-def _driving(document: Document, mapping: MachineMapping) -> Iterator[Problem]:
+def _driving(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     columns = [channel.column for channel in mapping.loads]
     for number, of in enumerate(mapping.files):
         key = f"files.{number}.driving"

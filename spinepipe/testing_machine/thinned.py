@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.cycles import Cut, Cycle, cut
 from spinepipe.testing_machine.recording import Recording
@@ -58,7 +58,7 @@ class ThinnedTest:
 
 def thinned_test(
     recordings: Sequence[Recording], steps: LoadSteps, zeroed: bool
-) -> tuple[ThinnedTest | None, list[Problem]]:
+) -> tuple[ThinnedTest | None, list[InputProblem]]:
     """The cycles of recordings of one test of one specimen, on steps that all of them reach.
 
     Parameters
@@ -90,7 +90,7 @@ def thinned_test(
     for one, cycle in kept:
         planned = plan(cuts[0], sides, cycle, one.loads[one.driving])
         result = _thinned(one, cycle, planned, zeroed)
-        if isinstance(result, Problem):
+        if isinstance(result, InputProblem):
             problems.append(result)
         else:
             done.append(result)
@@ -105,12 +105,14 @@ def thinned_test(
     return made, []
 
 
-def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[Problem]:
+def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[InputProblem]:
     load = one.loads[one.driving]
     low, high = float(load.min()), float(load.max())
     if low == high:
         found, remedy = "a driving load that never changes", "look whether it is the right column"
-        yield Problem(one.file, None, one.driving, found, "a load that goes up and down", remedy)
+        yield InputProblem(
+            one.file, None, one.driving, found, "a load that goes up and down", remedy
+        )
     elif steps.reference is not None:
         start = float(np.copysign(steps.reference, low + high))
         slack = BEYOND * (high - low)
@@ -119,7 +121,9 @@ def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[Problem]:
                 f"a reference of {start:g}",
                 f"{low:.3g} to {high:.3g}, what it reaches",
             )
-            yield Problem(one.file, None, one.driving, found, allowed, "correct `steps.reference`")
+            yield InputProblem(
+                one.file, None, one.driving, found, allowed, "correct `steps.reference`"
+            )
 
 
 def _cut(one: Recording, steps: LoadSteps) -> Cut:
@@ -127,20 +131,20 @@ def _cut(one: Recording, steps: LoadSteps) -> Cut:
     return cut(load, steps.smallest_reversal, one.of.preconditioning_cycles, steps.reference)
 
 
-def _cut_problems(one: Recording, found: Cut, first: Cut) -> Iterator[Problem]:
+def _cut_problems(one: Recording, found: Cut, first: Cut) -> Iterator[InputProblem]:
     if not found.kept:
         told = f"{len(found.cycles)} cycles, of which none is kept"
         remedy = "lower `preconditioning_cycles` or `steps.smallest_reversal`, or look at the file"
-        yield Problem(one.file, None, one.driving, told, "at least one cycle", remedy)
+        yield InputProblem(one.file, None, one.driving, told, "at least one cycle", remedy)
     elif (found.way, found.both_sides) != (first.way, first.both_sides):
         told = "cycles that go another way than those of the first file of this test"
         remedy = "give the test of this file another name"
-        yield Problem(one.file, None, one.driving, told, "repeats of one test", remedy)
+        yield InputProblem(one.file, None, one.driving, told, "repeats of one test", remedy)
 
 
 def _beyond(
     one: Recording, found: Cut, cycles: Sequence[Cycle], steps: LoadSteps
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     """Levels that were asked for and that some cycle does not reach."""
     if steps.levels is None:
         return
@@ -150,12 +154,12 @@ def _beyond(
         told = f"load steps at {', '.join(f'{size:g}' for size in far)}"
         allowed = f"at most {reached + abs(found.reference):.3g}, which every cycle reaches"
         remedy = "take them out of `steps.levels`, or split the test"
-        yield Problem(one.file, None, one.driving, told, allowed, remedy)
+        yield InputProblem(one.file, None, one.driving, told, allowed, remedy)
 
 
 def _thinned(
     one: Recording, cycle: Cycle, planned: Sequence[Step], zeroed: bool
-) -> ThinnedCycle | Problem:
+) -> ThinnedCycle | InputProblem:
     load = one.loads[one.driving]
     others = [name for name in one.loads if name != one.driving]
     columns = [*one.motion.values(), *(one.loads[name] for name in others)]
@@ -169,7 +173,7 @@ def _thinned(
             line = int(one.lines[branch.first])
             found = f"{branch.last - branch.first + 1} lines on the way to or from a reversal"
             remedy = "record more often, or raise `steps.smallest_reversal`"
-            return Problem(one.file, line, one.driving, found, "at least 3", remedy)
+            return InputProblem(one.file, line, one.driving, found, "at least 3", remedy)
         readings.append(reading)
     values = np.array([reading.values for reading in readings])
     n = len(one.motion)

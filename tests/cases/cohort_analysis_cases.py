@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.jobs.tested_rows import corrected_rows
-from spinepipe.studies.cohort_stiffness.claims import Claim
+from spinepipe.studies.cohort_stiffness.claims import CohortClaim
 from spinepipe.studies.cohort_stiffness.significance import all_tests
 from spinepipe.studies.cohort_stiffness.tables import STATISTICS
 from spinepipe.tables import from_rows
@@ -92,7 +92,7 @@ def rated() -> list[Row]:
     ]
 
 
-CLAIM = Claim("name", "It is so.", "a number", "deg")
+CLAIM = CohortClaim("name", "It is so.", "a number", "deg")
 JOINTS = ("L3L4", "L4L5", "L5S1")
 
 

@@ -14,7 +14,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.studies.cohort_stiffness.kind import KIND
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.tables import Tables, from_rows
+from spinepipe.tables import StudyTables, from_rows
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, STIFFNESS_UNITS
 
 Row = dict[str, Any]
@@ -93,9 +93,9 @@ def cohort_of(size: Size) -> Cohort:
     )
 
 
-def tables_of(size: Size, **changed: pd.DataFrame) -> Tables:
+def tables_of(size: Size, **changed: pd.DataFrame) -> StudyTables:
     """Rows of all tables that figures and findings read, those of ``changed`` in their place."""
-    return Tables({name: found.copy() for name, found in _made(size).items()} | changed)
+    return StudyTables({name: found.copy() for name, found in _made(size).items()} | changed)
 
 
 @cache

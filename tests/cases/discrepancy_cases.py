@@ -24,7 +24,7 @@ from spinepipe.studies.discrepancy.tables import (
     TABULATED,
     WHERE,
 )
-from spinepipe.tables import Tables, from_rows, write
+from spinepipe.tables import StudyTables, from_rows, write
 
 Rows = list[dict[str, Any]]
 
@@ -219,11 +219,13 @@ def files_of_a_search(folder: Path) -> dict[str, str]:
     return {name.partition(".")[0]: str(folder / name) for name in names}
 
 
-def tables(verdict: Mapping[str, Any], made: Mapping[str, pd.DataFrame], folder: Path) -> Tables:
+def tables(
+    verdict: Mapping[str, Any], made: Mapping[str, pd.DataFrame], folder: Path
+) -> StudyTables:
     """What a figure or page gets; the verdict is written to ``folder``."""
     path = folder / "verdict.json"
     path.write_text(json.dumps(verdict))
-    return Tables(made, {"verdict": str(path)})
+    return StudyTables(made, {"verdict": str(path)})
 
 
 def table_of(table: Table, rows: Rows) -> pa.Table:

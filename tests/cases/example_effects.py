@@ -10,8 +10,8 @@ from spinepipe.effects import (
     Advance,
     AppliedLoad,
     Effect,
+    EffectKind,
     JointResponse,
-    Kind,
     Motion,
     Observation,
     Parameter,
@@ -42,7 +42,7 @@ class CubicStiffening:
     coordinate: str = "extension"
     per_joint: bool = True
     name: ClassVar[str] = "cubic_stiffening"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     parameters: ClassVar[tuple[Parameter, ...]] = (
         number("rise", "N m/rad^3", 1.0, 1e6, 2e3, logarithmic=True),
     )
@@ -66,7 +66,7 @@ class Laxity:
     """Joint law on what is carried: a share of the load of the laws before it is lost."""
 
     name: ClassVar[str] = "laxity"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = (number("fraction", "1", 0.0, 0.9, 0.2),)
 
@@ -83,7 +83,7 @@ class PreloadStiffening:
     """Joint law on what is carried: resistance to extension grows with the compression."""
 
     name: ClassVar[str] = "preload_stiffening"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = (number("rise", "m/rad", 0.0, 10.0, 0.1),)
 
@@ -106,7 +106,7 @@ class ExtraWeight:
 
     points: tuple[tuple[float, float, float], ...]
     name: ClassVar[str] = "extra_weight"
-    kind: ClassVar[Kind] = Kind.LOAD
+    kind: ClassVar[EffectKind] = EffectKind.LOAD
     per_joint: ClassVar[bool] = True
     parameters: ClassVar[tuple[Parameter, ...]] = (
         number("weight", "N", 0.0, 500.0, 20.0, logarithmic=True),
@@ -136,7 +136,7 @@ class FollowerLoad:
     body: int
     point: tuple[float, float, float]
     name: ClassVar[str] = "follower_load"
-    kind: ClassVar[Kind] = Kind.LOAD
+    kind: ClassVar[EffectKind] = EffectKind.LOAD
     per_joint: ClassVar[bool] = False
     parameters: ClassVar[tuple[Parameter, ...]] = (number("compression", "N", 0.0, 1e3, 60.0),)
 
@@ -165,7 +165,7 @@ class JointCentreOffset:
 
     per_joint: bool = True
     name: ClassVar[str] = "joint_centre_offset"
-    kind: ClassVar[Kind] = Kind.GEOMETRY
+    kind: ClassVar[EffectKind] = EffectKind.GEOMETRY
     parameters: ClassVar[tuple[Parameter, ...]] = (
         number("forward", "m", -0.05, 0.05, 0.0, prior_scale=0.005),
         number("up", "m", -0.05, 0.05, 0.0, prior_scale=0.005),
@@ -211,7 +211,7 @@ class Relaxation:
     """Path: a spring in extension whose rest angle creeps after the angle, step by step."""
 
     name: ClassVar[str] = "relaxation"
-    kind: ClassVar[Kind] = Kind.PATH
+    kind: ClassVar[EffectKind] = EffectKind.PATH
     per_joint: ClassVar[bool] = True
     n_states: ClassVar[int] = 1
     parameters: ClassVar[tuple[Parameter, ...]] = (
@@ -260,7 +260,7 @@ class MarkerError:
 
     per_joint: bool = True
     name: ClassVar[str] = "marker_error"
-    kind: ClassVar[Kind] = Kind.MEASUREMENT
+    kind: ClassVar[EffectKind] = EffectKind.MEASUREMENT
     parameters: ClassVar[tuple[Parameter, ...]] = (
         number("gain", "1", 0.5, 2.0, 1.0),
         number("bias", "rad", -0.2, 0.2, 0.0, prior_scale=0.02),

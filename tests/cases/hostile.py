@@ -14,7 +14,7 @@ import pandas as pd
 from made_results import Made
 from pydantic import BaseModel
 
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 from spinepipe.units import COORDINATES
 
 PAYLOAD = (
@@ -66,7 +66,7 @@ def renamed(made: Made, payload: str, folder: Path) -> Made:
 
     rows = {name: mapped(made.tables[name], change) for name in made.tables}
     files = {name: _renamed_file(path, change, folder) for name, path in made.tables.files.items()}
-    tables = Tables(rows, files)
+    tables = StudyTables(rows, files)
     study, cohort = mapped(made.study, change), mapped(made.cohort, change)
     return Made(study, cohort, tables, made.own_vertebrae)
 

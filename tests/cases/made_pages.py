@@ -4,7 +4,7 @@ from importlib import import_module
 
 from made_results import Made
 
-from spinepipe.report.page.document import Document, Picture, Results
+from spinepipe.report.page.document import Document, Picture, ResultTables
 from spinepipe.studies.registry import PACKAGE, kind_of
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
@@ -17,7 +17,9 @@ def document_of(found: Made) -> Document:
     titles = {one.name: one.title for one in kind_of(found.study.kind).figures}
     pictures = {name: Picture.of(name, title, SVG, "Words.") for name, title in titles.items()}
     write = import_module(f"{PACKAGE}.{found.study.kind}.page").document
-    shown: Document = write(found.study, found.cohort, Results(found.tables, metadata, pictures))
+    shown: Document = write(
+        found.study, found.cohort, ResultTables(found.tables, metadata, pictures)
+    )
     return shown
 
 

@@ -27,7 +27,7 @@ from spinepipe.studies.range_of_motion.summary import summary_rows
 from spinepipe.studies.range_of_motion.variance import variance_rows
 from spinepipe.studies.read import check
 from spinepipe.studies.study import Study
-from spinepipe.tables import Tables, from_rows
+from spinepipe.tables import StudyTables, from_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Made:
 
     study: Study
     cohort: Cohort
-    tables: Tables
+    tables: StudyTables
     own_vertebrae: bool = True
 
 
@@ -50,7 +50,7 @@ def _from_files(root: Path) -> Made:
     folder = study_cases.results(study_cases.project(root, size), size)
     identification_cases.identification(folder, size)
     study, cohort = check(root, study_cases.STUDY)
-    return Made(study, cohort, Tables.read([str(path) for path in folder.glob("*.parquet")]))
+    return Made(study, cohort, StudyTables.read([str(path) for path in folder.glob("*.parquet")]))
 
 
 def _of_size(cases: Any, size: Any, own_vertebrae: bool = True) -> Callable[[Path], Made]:
@@ -58,7 +58,7 @@ def _of_size(cases: Any, size: Any, own_vertebrae: bool = True) -> Callable[[Pat
 
     def make(_: Path) -> Made:
         tables = cases.tables_of(size)
-        rows = tables if isinstance(tables, Tables) else Tables(tables)
+        rows = tables if isinstance(tables, StudyTables) else StudyTables(tables)
         return Made(cases.study_of(size), cases.cohort_of(size), rows, own_vertebrae)
 
     return make
@@ -71,7 +71,9 @@ def _grid(root: Path) -> Made:
     assert isinstance(study, RangeOfMotion)
     grid = read_grid(str(path), study, cohort)
     rows = {"rom_summary": summary_rows(grid), "rom_variance": variance_rows(grid)}
-    return Made(study, cohort, Tables({name: pd.DataFrame(found) for name, found in rows.items()}))
+    return Made(
+        study, cohort, StudyTables({name: pd.DataFrame(found) for name, found in rows.items()})
+    )
 
 
 def _search(root: Path) -> Made:
@@ -92,7 +94,7 @@ def _indices(root: Path) -> Made:
     design = {"method": "sobol", "samples": 256}
     study = GlobalSensitivity.model_validate(asked | {"factors": factors, "design": design})
     rows = [_index(*place) for place in product("ab", TESTS, JOINTS, ("S1", "ST"), SHARES)]
-    return Made(study, cohort, Tables({"indices": from_rows(INDICES, rows).to_pandas()}))
+    return Made(study, cohort, StudyTables({"indices": from_rows(INDICES, rows).to_pandas()}))
 
 
 TESTS = ("flexion", "left_axial_rotation")

@@ -12,7 +12,7 @@ from cohort_cases import write as write_small
 from mistaken_cases import Mistake
 
 from spinepipe import cohort as cohorts
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.doubts import suspicions
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, make
@@ -81,7 +81,7 @@ def _few(source: Path, folder: Path, keep: Iterable[str] | None) -> Path:
     return folder
 
 
-def told(folder: Path) -> tuple[Problem, ...]:
+def told(folder: Path) -> tuple[InputProblem, ...]:
     """Everything that `check` says of a cohort."""
     try:
         return tuple(one.problem for one in suspicions(cohorts.read(folder, every_form())))
@@ -89,7 +89,7 @@ def told(folder: Path) -> tuple[Problem, ...]:
         return error.problems
 
 
-Told = Callable[[Path], tuple[Problem, ...]]
+Told = Callable[[Path], tuple[InputProblem, ...]]
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Score:
     alone: bool
 
 
-def score(name: str, mistake: Mistake, found: Iterable[Problem]) -> Score:
+def score(name: str, mistake: Mistake, found: Iterable[InputProblem]) -> Score:
     """What was told of a mistake against what is wrong."""
     lines = list(found)
     right = [one for one in lines if one.file.split("/")[-1] in mistake.places]
@@ -120,14 +120,14 @@ def score(name: str, mistake: Mistake, found: Iterable[Problem]) -> Score:
     return Score(name, mistake.name, bool(right), bool(columns), bool(remedies), alone)
 
 
-def _names(problem: Problem, columns: tuple[str, ...]) -> bool:
+def _names(problem: InputProblem, columns: tuple[str, ...]) -> bool:
     if problem.column is not None and problem.column in columns:
         return True
     said = f"{problem.column or ''} {problem.remedy}"
     return any(re.search(rf"\b{re.escape(name)}\b", said) for name in columns)
 
 
-def _mends(problem: Problem, remedy: str) -> bool:
+def _mends(problem: InputProblem, remedy: str) -> bool:
     return re.search(remedy, f"{problem.found} {problem.remedy}") is not None
 
 

@@ -8,7 +8,7 @@ import spring_chain_cases as chains
 from numpy.typing import NDArray
 from search_cases import exponential
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.design.plans import summed_loads
 from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
@@ -79,7 +79,8 @@ def shared_form(trials: Trials, **options: str) -> Form:
     return next(
         form
         for form in trials.forms
-        if form.spread is Spread.SHARED and options.items() <= dict(form.variant.options).items()
+        if form.spread is PlaceSpread.SHARED
+        and options.items() <= dict(form.variant.options).items()
     )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spinepipe.effects import Effect, Kind, create, registered
+from spinepipe.effects import Effect, EffectKind, create, registered
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 from tests.cases.sweeps import one_of_each
@@ -76,4 +76,4 @@ def timed(case: LoadCase) -> LoadCase:
 
 def stackable(effect: Effect) -> bool:
     """Whether the stack takes it."""
-    return effect.kind is not Kind.LOAD
+    return effect.kind is not EffectKind.LOAD

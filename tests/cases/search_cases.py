@@ -10,7 +10,7 @@ from spring_chain_cases import Yield
 
 from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
 from spinepipe.studies.discrepancy.search.hypothesis import trials
-from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
+from spinepipe.studies.discrepancy.search.inquiry import Rules, SearchResult
 from spinepipe.studies.discrepancy.search.noise import estimated_noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
@@ -61,7 +61,7 @@ def wavy(joint: int, moments: Array, k: float) -> Array:
 class Searched:
     """Where a search ended, and what it comes to."""
 
-    found: Found
+    found: SearchResult
     ended: Outcome
 
     def evidence(self) -> dict[str, float]:

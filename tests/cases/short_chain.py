@@ -13,7 +13,7 @@ from moving_spine import everywhere, law, spine
 
 from spinepipe.motion.asked import Ask, ForceCost, Watched, watched
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.skeleton import MarkerSet, Masses, Skeleton, Trial
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial, Masses, Skeleton
 
 INTERVALS, FRAMES, BODIES = 20, 41, 2
 SCRIPT = Path(__file__).parents[1] / "reference" / "collocation.py"
@@ -57,7 +57,7 @@ def trial() -> Watched:
     places = places + np.random.default_rng(4).normal(0.0, 2e-3, places.shape[1:])
     seen = np.ones(places.shape[:2], dtype=bool)
     times = np.linspace(0.0, 2.0, FRAMES)
-    made = Trial("made", "flexion_extension", times, places, seen, "hanging")
+    made = MarkerTrial("made", "flexion_extension", times, places, seen, "hanging")
     return watched(skeleton(), markers(), made, INTERVALS)
 
 

@@ -13,7 +13,7 @@ from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.search.base import base_parameters
-from spinepipe.studies.discrepancy.search.grounds import Start
+from spinepipe.studies.discrepancy.search.grounds import BaselineModels
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.units import ROTATIONS
 
@@ -117,8 +117,8 @@ def model(specimen: str, stiffness: Array, joints: int = len(JOINTS)) -> SpineMo
     return SpineModel(specimen, names, poses, bodies, np.zeros(3), damping, (bushing,))
 
 
-def start(given: Sequence[SpecimenReadings], grouping: str = "per_specimen") -> Start:
+def start(given: Sequence[SpecimenReadings], grouping: str = "per_specimen") -> BaselineModels:
     """Where fits of the readings start: the same stiffness everywhere."""
     models = {r.specimen: model(r.specimen, STIFFNESS, len(r.frames)) for r in given}
     base = {name: base_parameters(m, grouping, ROTATIONS) for name, m in models.items()}
-    return Start(models, base, 100.0)
+    return BaselineModels(models, base, 100.0)

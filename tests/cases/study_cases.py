@@ -17,7 +17,7 @@ from spinepipe.studies.joint_pose_sensitivity.kind import KIND
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS, POSES, SIMULATIONS
 from spinepipe.studies.registry import PACKAGE
-from spinepipe.tables import Tables, to_arrow, write
+from spinepipe.tables import StudyTables, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 STUDY = "probe"
@@ -120,11 +120,11 @@ def drawn(root: Path, name: str) -> Path:
     return svg
 
 
-def drawing(name: str) -> Callable[[JointPoseSensitivity, Cohort, Tables], Figure]:
+def drawing(name: str) -> Callable[[JointPoseSensitivity, Cohort, StudyTables], Figure]:
     """The function that draws a figure, as the kind declares it."""
     module, _, function = KIND.figure(name).at.partition(":")
     found = import_module(f"{PACKAGE}.joint_pose_sensitivity.{module}")
-    draws: Callable[[JointPoseSensitivity, Cohort, Tables], Figure] = getattr(found, function)
+    draws: Callable[[JointPoseSensitivity, Cohort, StudyTables], Figure] = getattr(found, function)
     return draws
 
 

@@ -3,14 +3,14 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from spinepipe.effects import Spread, Wrench, create
+from spinepipe.effects import PlaceSpread, Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
 from spinepipe.studies.discrepancy.design.seen import seen_in
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
 from spinepipe.studies.discrepancy.search.base import BUSHING, DAMPING, base_parameters
-from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
+from spinepipe.studies.discrepancy.search.grounds import BaselineModels, Grounds, laid
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant, trials
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
@@ -77,7 +77,7 @@ def grounds_of(
     noise = Noise(np.r_[[np.nan] * 3, [sd] * 3], 0.0, "declared", np.zeros(6, int), 0, zeroed)
     driven = [("extension", "right_bending", "left_rotation")[list(AXES).index(t)] for t in tests]
     base = {name: base_parameters(model, grouping, driven) for name, model in models.items()}
-    start = Start(models, base, 100.0)
+    start = BaselineModels(models, base, 100.0)
     return laid(readings, noise, priors or NuisancePriors(), start, at_once)
 
 
@@ -105,4 +105,4 @@ def revealed(grounds: Grounds, effect: str) -> str:
 def only(effect: str, **options) -> Trials:
     """An effect in one variant, the same at all joints."""
     variant = Variant(effect, tuple(options.items()))
-    return Trials(effect, (variant,), (Form(variant, Spread.SHARED),))
+    return Trials(effect, (variant,), (Form(variant, PlaceSpread.SHARED),))

@@ -8,7 +8,7 @@ from trunk_cases import made_up_trunk
 
 from spinepipe.cohort import Cohort, read
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import Held, How, held
+from spinepipe.muscles.settle import How, SolvedTask, held
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import Trunk
@@ -59,6 +59,6 @@ def made_up() -> Person:
 
 
 @cache
-def held_task(name: str) -> Held:
+def held_task(name: str) -> SolvedTask:
     """A task of the volunteer, settled closely."""
     return held(volunteer(), tasks()[name], CLOSELY)

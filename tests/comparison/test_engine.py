@@ -8,10 +8,10 @@ from sweeps import sweep
 
 from papers.engine import Claim, Evidence, arguments, judge
 from papers.ranges import Range
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 
 
-def missing(run: Run) -> Ours:
+def missing(run: StudyRun) -> Ours:
     raise NotComputed("this run made no table x")
 
 
@@ -25,7 +25,7 @@ def judged(value: float | None, low: float | None, high: float | None, wrong: st
         outside="for a reason",
         note="a note",
     )
-    return judge(claim, Run({}))
+    return judge(claim, StudyRun({}))
 
 
 @sweep(
@@ -76,7 +76,7 @@ def test_arguments_of_a_row() -> None:
 
 def test_rows_of_a_run() -> None:
     frame = pd.DataFrame({"a": ["x", "y", "x"], "b": [1.0, None, 3.0], "message": ["", "why", ""]})
-    run = Run({"one": frame, "none": frame.iloc[:0]})
+    run = StudyRun({"one": frame, "none": frame.iloc[:0]})
     assert list(run.rows("one", a=("x", "y"), b=3.0)["b"]) == [3.0]
     assert (run.number("one", "b", a="x"), len(run.rows("one", a="x"))) == (1.0, 2)
     for told, lacking in (

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from papers.engine import claims_of, judge, rows_of
-from papers.run import Run
+from papers.run import StudyRun
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.scoliosis.against_jalalian_2017 import facts
 from spinepipe.studies.scoliosis.jalalian_2017 import stands_for as has_the_patients
 from spinepipe.studies.scoliosis.kind import KIND, ScoliosisFiles
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.tracking.against_wang_2021 import asked_of as asked_of_tracking
-from spinepipe.studies.tracking.settings import Bounds, Tracking
+from spinepipe.studies.tracking.settings import JointLimits, Tracking
 from spinepipe.studies.trunk_loads.against_ghezelbash_2016 import asked_of as asked_of_trunk
 from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for as has_the_persons
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
@@ -66,7 +66,7 @@ def test_settings_that_trunk_loads_hands_on() -> None:
 
 @pytest.mark.parametrize(("means", "times"), [("added", 2.5), ("of_the_range", 1.5)])
 def test_settings_that_tracking_hands_on(means: str, times: float) -> None:
-    bounds = Bounds(means=means)  # type: ignore[arg-type]
+    bounds = JointLimits(means=means)  # type: ignore[arg-type]
     settings = Tracking.model_construct(bounds=bounds, intervals=50, largest_deviation_mm=40.0)
     asked = asked_of_tracking(settings)
     assert (asked["times_the_range"], asked["intervals"]) == (times, 50)
@@ -80,7 +80,7 @@ def test_the_shipped_phantom_has_the_patients_and_films_of_the_paper() -> None:
     known = facts(study_of_kind(Scoliosis, str(ROOT), "ais18_scoliosis")[1])
     claims = {claim.id: claim for claim in claims_of("jalalian_2017")}
     built = ("table_1.", "results.cobb", "results.age")
-    verdicts = [judge(one, Run(known)) for one in claims.values() if one.id.startswith(built)]
+    verdicts = [judge(one, StudyRun(known)) for one in claims.values() if one.id.startswith(built)]
     assert {row["verdict"] for row in verdicts} == {"circular"}
     films = known["films"]
     each = films.groupby(["specimen", "position"])
@@ -94,21 +94,21 @@ def test_the_shipped_phantom_has_the_patients_and_films_of_the_paper() -> None:
         "pixel_size": 0.1 * np.unique(np.round(np.abs(tenths - np.round(tenths)), 6) + 1.0),
     }
     for name, values in found.items():
-        row = judge(claims[f"results.{name}"], Run({}))
+        row = judge(claims[f"results.{name}"], StudyRun({}))
         assert [row["ours"]] == pytest.approx([float(one) for one in values]), name
     for name, ours in (
         ("equations.asymptote_right", 1.2),
         ("equations.asymptote_if_opposite", 1.2),
         ("results.bending_displacement_fraction_of_R", 1.0 / 1.2),
     ):
-        assert judge(claims[name], Run({}))["ours"] == pytest.approx(ours)
+        assert judge(claims[name], StudyRun({}))["ours"] == pytest.approx(ours)
 
 
 def test_the_shipped_volunteers_are_asked_what_the_rows_say() -> None:
     """Shares are made to sum to 100 %; pressures are those of tasks.csv."""
     claims = {claim.id: claim for claim in claims_of("ghezelbash_2016")}
     numbers = [row["id"] for row in rows_of("ghezelbash_2016") if row["selector"] == "number"]
-    found = {name: judge(claims[name], Run({}))["ours"] for name in numbers}
+    found = {name: judge(claims[name], StudyRun({}))["ours"] for name in numbers}
     for joint, flexion, sideways in (("T11T12", 6.0, 8.3), ("L4L5", 20.1, 25.6)):
         assert found[f"partition.{joint}.flexion_percent"] == pytest.approx(100 * flexion / 99.9)
         assert found[f"partition.{joint}.lateral_percent"] == pytest.approx(sideways)

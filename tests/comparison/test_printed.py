@@ -12,7 +12,7 @@ import pytest
 from sweeps import sweep
 
 from papers.engine import claims_of, judged, rows_of
-from papers.run import Run
+from papers.run import StudyRun
 from spinepipe.comparison.papers import papers
 from tests.comparison.made_up import ROOT
 from tests.generators import ais_films
@@ -62,7 +62,7 @@ def test_the_figure_shows_the_rotations_of_the_rows() -> None:
 @pytest.mark.parametrize("paper", papers())
 def test_every_check_of_a_paper_is_told(paper: str) -> None:
     letter, (named, excluded) = LETTERS[paper], CHECKS[paper]
-    told = judged(claims_of(paper), Run({}))
+    told = judged(claims_of(paper), StudyRun({}))
     reasons = " ".join(f"{row['id']}: {row['reason']}" for row in told)
     for number in named.split():
         check = f"{letter}{number}"

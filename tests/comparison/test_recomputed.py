@@ -10,7 +10,7 @@ from sweeps import sweep
 
 from papers.engine import claims_of, judge
 from papers.ranges import binomial, normal_iqr, spearman_interval, spearman_threshold
-from papers.run import Run
+from papers.run import StudyRun
 from spinepipe.anatomy import published
 from spinepipe.muscles.disc_pressure import disc_pressure
 
@@ -19,7 +19,7 @@ A, B = published("gould_2024a"), published("gould_2024b")
 
 def row_of(paper: str, name: str) -> dict[str, object]:
     (claim,) = [claim for claim in claims_of(paper) if claim.id == name]
-    return judge(claim, Run({}))
+    return judge(claim, StudyRun({}))
 
 
 COBB = (49, 53, 46, 48, 53, 53, 48, 55, 59, 86, 62, 59)

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from papers.engine import claims_of, judge, judged, rows_of
-from papers.run import Run
+from papers.run import StudyRun
 from spinepipe.comparison.papers import papers
 from spinepipe.studies.registry import every_kind
 from spinepipe.tables import from_rows
@@ -34,7 +34,7 @@ def by_hand(paper: str) -> list[dict[str, str]]:
 @cache
 def whole(paper: str) -> tuple[dict[str, Any], ...]:
     """All rows of the made-up run."""
-    return tuple(judged(claims_of(paper), Run(run_of(paper), ASKED[paper])))
+    return tuple(judged(claims_of(paper), StudyRun(run_of(paper), ASKED[paper])))
 
 
 CASES = [
@@ -47,7 +47,7 @@ CASES = [
 @pytest.mark.parametrize(("paper", "row"), CASES)
 def test_our_value_and_what_is_told_of_it(paper: str, row: dict[str, str]) -> None:
     (claim,) = [claim for claim in claims_of(paper) if claim.id == row["id"]]
-    found = judge(claim, Run(*altered(run_of(paper), ASKED[paper], row["changed"])))
+    found = judge(claim, StudyRun(*altered(run_of(paper), ASKED[paper], row["changed"])))
     ours = float(row["ours"]) if row["ours"] else None
     assert found["ours"] == (ours if ours is None else pytest.approx(ours))
     assert found["verdict"] == row["verdict"]
@@ -70,7 +70,7 @@ def test_every_selector_is_worked_by_hand(paper: str) -> None:
 def test_a_missing_table_is_told(paper: str, table: str) -> None:
     """Nothing but what hangs on the table changes, and its rows say what is missing."""
     rest = {name: frame for name, frame in run_of(paper).items() if name != table}
-    after = judged(claims_of(paper), Run(rest, ASKED[paper]))
+    after = judged(claims_of(paper), StudyRun(rest, ASKED[paper]))
     changed = [new for old, new in zip(whole(paper), after, strict=True) if old != new]
     less = [row for row in changed if row["ours"] is None]
     assert less or table in ("landmarks", "spread_over_landmark_sd")  # whose numbers are in notes
@@ -81,14 +81,14 @@ def test_a_missing_table_is_told(paper: str, table: str) -> None:
 @pytest.mark.parametrize("paper", PAPERS)
 def test_empty_tables_are_as_missing(paper: str) -> None:
     empty = {name: frame.iloc[:0] for name, frame in run_of(paper).items()}
-    after, missing = (judged(claims_of(paper), Run(run)) for run in (empty, {}))
+    after, missing = (judged(claims_of(paper), StudyRun(run)) for run in (empty, {}))
     assert [row["ours"] for row in after] == [row["ours"] for row in missing]
     from_rows(TABLES[f"against_{paper}"], after)
 
 
 @pytest.mark.parametrize("paper", PAPERS)
 def test_without_a_run_nothing_is_computed_and_why_is_told(paper: str) -> None:
-    rows = judged(claims_of(paper), Run({}))
+    rows = judged(claims_of(paper), StudyRun({}))
     given = {row["id"] for row in rows_of(paper) if row["selector"] == "number"}
     assert {row["id"] for row in rows if row["ours"] is not None} == given
     assert all(row["reason"] for row in rows)

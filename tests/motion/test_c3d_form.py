@@ -10,7 +10,7 @@ import pytest
 
 from spinepipe.motion.c3d_form import DEC, INTEL, MIPS, FormError, reals, taken_apart, words
 from spinepipe.motion.reading import read_motion
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 PLACES_MM = np.array(
     [[[-7, 20, 300], [4, -5, 6]], [[1, 2, 3], [40, 50, 60]], [[9, 8, 7], [1, 1, 1]]]
@@ -207,7 +207,7 @@ def test_as_many_sizes_as_seven_are_read() -> None:
     assert found == {("", "A"): (9.0,)}
 
 
-def problem_of(folder: Path, made: Made | bytes) -> Problem:
+def problem_of(folder: Path, made: Made | bytes) -> InputProblem:
     with pytest.raises(InputError) as caught:
         read_motion(written(folder, made))
     return caught.value.problems[0]

@@ -10,7 +10,7 @@ from spinepipe.motion.asked import SHAPE, Ask, Watched, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import MOST_STEPS
 from spinepipe.motion.posture import postures as fitted
-from spinepipe.motion.skeleton import MarkerSet, Trial
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
 
 MARKERS_ALONE = Ask(loads=False)
 SHIFT = np.array([0.3, 0.1, -0.2])
@@ -21,7 +21,7 @@ def seen(q: np.ndarray, on: MarkerSet, off: np.ndarray | float = 0.0) -> Watched
     places = marker_places(spine(), on, q) + off
     times = 0.1 * np.arange(len(q))
     whole = np.ones(places.shape[:2], dtype=bool)
-    trial = Trial("made", "stance", times, places, whole, "hanging")
+    trial = MarkerTrial("made", "stance", times, places, whole, "hanging")
     return watched(spine(), on, trial, len(q) - 1)
 
 

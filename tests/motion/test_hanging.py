@@ -9,7 +9,7 @@ from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.motion.hanging import ARMS, T1, Arms, carried_parts, elbow_between, hung
-from spinepipe.motion.rigid import Part, joined, seen_from
+from spinepipe.motion.rigid import RigidPart, joined, seen_from
 from spinepipe.motion.skeleton import Masses, Skeleton, body_poses, skeleton_of
 from spinepipe.muscles.subject import Subject
 
@@ -35,7 +35,7 @@ def made_up() -> Skeleton:
     return skeleton_of(joints, masses)
 
 
-def cloud(part: Part) -> tuple[Array, Array]:
+def cloud(part: RigidPart) -> tuple[Array, Array]:
     """Six equal points with the part's mass, centre and inertia: kg (6,) and places (6, 3)."""
     sizes, axes = eigh(part.about_com)
     squares = 0.5 * sizes.sum() - sizes  # second moments of mass along the principal axes
@@ -72,7 +72,7 @@ def test_t1_carries_the_sum_of_all_its_points(person: Subject, arms: str) -> Non
     skeleton = made_up()
     turns, places = body_poses(skeleton, np.zeros((18, 6)))
     given = skeleton.masses
-    own = Part("T1", given.kg[T1], given.com[T1], given.about_com[T1])
+    own = RigidPart("T1", given.kg[T1], given.com[T1], given.about_com[T1])
     own = seen_from(own, turns[T1].T, -turns[T1].T @ places[T1])
     clouds = [cloud(part) for part in (own, *carried_parts(arms, person, places[T1]))]
     kg, centre, about = moments(*(np.concatenate(one) for one in zip(*clouds, strict=True)))

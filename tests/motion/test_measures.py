@@ -69,7 +69,7 @@ def test_rows_of_clusters(trial_with_clusters) -> None:
 @pytest.fixture
 def trial_with_clusters():
     """A cluster that is rigid, one whose marker slides by 6 mm, and one that is hardly seen."""
-    from spinepipe.motion.skeleton import MarkerSet, Trial
+    from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
 
     names = ("L4_a", "L4_b", "L2_a", "L2_b", "T5", "T1_a", "T1_b")
     clusters = ("L4", "L4", "L2", "L2", "", "T1", "T1")
@@ -81,7 +81,7 @@ def trial_with_clusters():
     seen = np.ones((4, 7), dtype=bool)
     seen[2:, 5] = False
     times = np.arange(4) * 0.1
-    return markers, Trial("bends", "flexion_extension", times, places, seen, "hanging")
+    return markers, MarkerTrial("bends", "flexion_extension", times, places, seen, "hanging")
 
 
 def test_angles_of_neighbours_are_differences_in_one_plane() -> None:

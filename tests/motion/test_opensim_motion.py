@@ -15,7 +15,7 @@ from spinepipe.motion.export import COLUMNS, mot, osim
 from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.posture import postures as fitted
 from spinepipe.motion.rigid_body import bodies_of
-from spinepipe.motion.skeleton import BODIES, MarkerSet, Trial
+from spinepipe.motion.skeleton import BODIES, MarkerSet, MarkerTrial
 from tests.reference.peers import opensim_motion as peer
 
 REPLAYED_M = 1e-9
@@ -116,7 +116,7 @@ def test_inverse_kinematics_are_opensims(folder: Path) -> None:
     free = np.ones(SHAPE, dtype=bool)
     free[1:, :3] = False
     everything = np.ones(places.shape[:2], dtype=bool)
-    trial = Trial("made", "flexion_extension", times, places, everything, "hanging")
+    trial = MarkerTrial("made", "flexion_extension", times, places, everything, "hanging")
     found = fitted(Ask(free=free, loads=False), watched(spine(), seen, trial, frames - 1))
     assert found.settled.all()
     assert np.abs(expected[:, 1:, :3]).max() == 0.0

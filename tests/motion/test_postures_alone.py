@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from moving_spine import law, markers, postures, spine
 
-from spinepipe.motion.asked import SHAPE, Ask, Sizes, Watched, watched
+from spinepipe.motion.asked import SHAPE, Ask, ResidualScales, Watched, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import postures as fitted
-from spinepipe.motion.skeleton import JOINTS, Trial
-from spinepipe.motion.terms import Loads, Markers, beyond
+from spinepipe.motion.skeleton import JOINTS, MarkerTrial
+from spinepipe.motion.terms import Markers, MuscleDemand, beyond
 
 FRAMES = 6
 SKIN_M = 1e-3
@@ -32,7 +32,7 @@ def test_frames_of_a_trial_are_as_alone() -> None:
     def found(frames: list[int]):
         seen = np.ones((len(frames), len(markers())), dtype=bool)
         times = 0.1 * np.arange(len(frames))
-        trial = Trial("made", "stance", times, places[frames], seen, "hanging")
+        trial = MarkerTrial("made", "stance", times, places[frames], seen, "hanging")
         return fitted(ask, watched(spine(), markers(), trial, len(frames) - 1))
 
     together = found(list(range(FRAMES)))
@@ -50,7 +50,7 @@ def cost(ask: Ask, seen: Watched, q: np.ndarray) -> np.ndarray:
     still = np.zeros_like(q)
     if ask.loads:
         return found + np.sum(
-            Loads.of(seen, ask).residuals(ask.passive, (q, still, still)) ** 2, axis=1
+            MuscleDemand.of(seen, ask).residuals(ask.passive, (q, still, still)) ** 2, axis=1
         )
     if ask.passive is not None:
         force = ask.passive.forces(q[:, 1:]) / np.array([200.0] * 3 + [10.0] * 3)
@@ -82,7 +82,7 @@ def test_a_posture_has_the_least_cost(name: str) -> None:
     q = postures(31, 1, 0.02) * ask.free
     places = marker_places(spine(), markers(), q)
     whole = np.ones(places.shape[:2], bool)
-    trial = Trial("made", "stance", np.zeros(1), places, whole, "hanging")
+    trial = MarkerTrial("made", "stance", np.zeros(1), places, whole, "hanging")
     seen = watched(spine(), markers(), trial, 0)
     found = fitted(ask, seen)
     assert found.settled.all()
@@ -109,7 +109,7 @@ def test_steps_of_an_articulated_body_are_those_of_the_normal_equations(name: st
     seen = np.ones(places.shape[:2], bool)
     seen[1, 4] = False
     heavier = replace(markers(), weight=np.linspace(0.2, 2.0, len(markers())))
-    trial = Trial("made", "stance", 0.1 * np.arange(3), places, seen, "hanging")
+    trial = MarkerTrial("made", "stance", 0.1 * np.arange(3), places, seen, "hanging")
     known = watched(spine(), heavier, trial, 2)
     each = np.eye(np.prod(SHAPE))[:, ask.free.ravel()]
     for rounds in (1, 4):
@@ -130,7 +130,7 @@ def test_ratios_move_all_joints_as_fewer_numbers_say() -> None:
     q[:, 1:, 3] = [[-0.03], [0.02]]
     places = marker_places(spine(), markers(), q)
     seen = np.ones(places.shape[:2], bool)
-    trial = Trial("made", "stance", np.array([0.0, 0.1]), places, seen, "hanging")
+    trial = MarkerTrial("made", "stance", np.array([0.0, 0.1]), places, seen, "hanging")
     found = fitted(Ask(loads=False), watched(spine(), markers(), trial, 1), shares)
     np.testing.assert_allclose(found.q, q, atol=1e-7)
 
@@ -141,7 +141,7 @@ def test_what_counts_as_one() -> None:
     places = marker_places(spine(), markers(), q) + np.array([0.0, 5e-3, 0.0])
     seen = np.ones(places.shape[:2], bool)
     one = watched(
-        spine(), markers(), Trial("made", "stance", np.zeros(1), places, seen, "hanging"), 0
+        spine(), markers(), MarkerTrial("made", "stance", np.zeros(1), places, seen, "hanging"), 0
     )
     off = Markers(one, Ask()).residuals(q).reshape(-1, 3)
     np.testing.assert_allclose(np.abs(off), np.tile([0.0, 1.0, 0.0], (len(off), 1)), atol=1e-12)
@@ -151,10 +151,10 @@ def test_what_counts_as_one() -> None:
     np.testing.assert_allclose(beyond(held, bent)[0], np.sign(bent), rtol=1e-14)
     still = np.zeros_like(q)
     for loads in (1.0, 4.0, 0.0):
-        ask = Ask(sizes=Sizes(loads=loads))
-        muscles = Loads.of(one, ask)
+        ask = Ask(sizes=ResidualScales(loads=loads))
+        muscles = MuscleDemand.of(one, ask)
         active = muscles.active(None, (q, still, still))
         rows = muscles.residuals(None, (q, still, still)).reshape(len(JOINTS), 6)
         expected = np.sqrt(loads) * active[0] / ([200.0] * 3 + [10.0] * 3)
         np.testing.assert_allclose(rows, expected, rtol=1e-13)
-    np.testing.assert_array_equal(Sizes().of_accelerations, [2.0] * 3 + [10.0] * 3)
+    np.testing.assert_array_equal(ResidualScales().of_accelerations, [2.0] * 3 + [10.0] * 3)

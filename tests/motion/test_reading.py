@@ -10,7 +10,7 @@ from c3d_of_ezc3d import RATE, write_c3d
 from spinepipe.effects.contract import Array
 from spinepipe.motion.reading import axes_of, read_motion
 from spinepipe.motion.recorded import Recorded
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 NAMES = ("LPSI", "RPSI", "T1")
 ORIGINAL = ("OrigDataRate", "OrigDataStartFrame", "OrigNumFrames")
@@ -45,7 +45,7 @@ def write(path: Path, lines: list[str]) -> Path:
     return path
 
 
-def problem_of(path: Path, axes: str = "x y z", start_s: float | None = None) -> Problem:
+def problem_of(path: Path, axes: str = "x y z", start_s: float | None = None) -> InputProblem:
     """The one thing that is wrong with a file."""
     with pytest.raises(InputError) as caught:
         read_motion(path, axes, start_s)

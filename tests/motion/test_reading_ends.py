@@ -11,7 +11,7 @@ from spinepipe.motion import reading
 from spinepipe.motion import recorded as recordings
 from spinepipe.motion.reading import axes_of, read_motion
 from spinepipe.motion.recorded import Recorded, quickly, recorded
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 HEADER = "time_s,T1_x_mm,T1_y_mm,T1_z_mm"
 
@@ -27,7 +27,7 @@ def frames(folder: Path) -> Path:
     return csv(folder, *(f"{0.02 * k:.2f},{k},2,3" for k in range(1, 6)))
 
 
-def problem_of(path: Path, **asked: object) -> Problem:
+def problem_of(path: Path, **asked: object) -> InputProblem:
     with pytest.raises(InputError) as caught:
         read_motion(path, **asked)  # type: ignore[arg-type]
     (problem,) = caught.value.problems

@@ -9,9 +9,9 @@ from spinepipe.motion.scaling import SEGMENTS, fitted, scaled, segment_of
 from spinepipe.motion.skeleton import (
     BODIES,
     MarkerSet,
+    MarkerTrial,
     Masses,
     Skeleton,
-    Trial,
     body_poses,
     skeleton_of,
 )
@@ -75,10 +75,10 @@ def worn(skeleton: Skeleton, markers: MarkerSet, q: Array | None = None) -> Arra
     return found
 
 
-def standing(places: Array, frames: int = 3) -> Trial:
+def standing(places: Array, frames: int = 3) -> MarkerTrial:
     seen = np.ones((frames, len(places)), dtype=bool)
     time = np.arange(frames) / 100.0
-    return Trial("stance", "stance", time, np.tile(places, (frames, 1, 1)), seen, "hanging")
+    return MarkerTrial("stance", "stance", time, np.tile(places, (frames, 1, 1)), seen, "hanging")
 
 
 def moved_by_hand(factors: Array) -> Array:
@@ -191,7 +191,7 @@ def test_distances_are_means_over_frames_with_both_in_sight() -> None:
     places, seen = trial.places.copy(), trial.seen.copy()
     places[0, 3], seen[0, 3] = 0.0, False
     seen[:, 5] = False
-    lost = Trial("stance", "stance", trial.time_s, places, seen, "hanging")
+    lost = MarkerTrial("stance", "stance", trial.time_s, places, seen, "hanging")
     fit = fitted(generic(), marker_set(), lost)
     np.testing.assert_allclose(fit.factors, FACTORS, rtol=1e-9)
     k = len(marker_set()) - 1

@@ -7,12 +7,12 @@ import pytest
 from moving_spine import law, markers, spine
 from scipy.spatial.transform import Rotation
 
-from spinepipe.motion.asked import Ask, Sizes, Watched, watched
+from spinepipe.motion.asked import Ask, ResidualScales, Watched, watched
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.skeleton import PELVIS, Trial, body_poses
+from spinepipe.motion.skeleton import PELVIS, MarkerTrial, body_poses
 from spinepipe.motion.skin import bends, with_sliding_skin
-from spinepipe.motion.spline import Grid
-from spinepipe.motion.terms import Loads, Markers
+from spinepipe.motion.spline import KnotGrid
+from spinepipe.motion.terms import Markers, MuscleDemand
 from spinepipe.motion.trajectory import solve
 
 FRAMES = 21
@@ -27,7 +27,7 @@ def bent(largest: float = -0.6) -> np.ndarray:
 
 def seen(places: np.ndarray) -> Watched:
     times, whole = 0.1 * np.arange(len(places)), np.ones(places.shape[:2], dtype=bool)
-    trial = Trial("made", "flexion_extension", times, places, whole, "hanging")
+    trial = MarkerTrial("made", "flexion_extension", times, places, whole, "hanging")
     return watched(spine(), markers(), trial, len(places) - 1)
 
 
@@ -48,7 +48,7 @@ def test_a_bend_is_the_turn_of_the_uppermost_body_against_the_pelvis() -> None:
 
 def test_errors_that_hang_together_are_made_independent() -> None:
     """Sums of squares against the inverse of a covariance that is written down here."""
-    q, sizes = bent(), Sizes(own_skin_m=4e-3, shared_skin_m=9e-3)
+    q, sizes = bent(), ResidualScales(own_skin_m=4e-3, shared_skin_m=9e-3)
     trial = seen(at(q))
     weight = trial.weight.copy()
     weight[:, 3], weight[:, 5] = 0.0, 2.0
@@ -78,16 +78,18 @@ def test_without_a_bend_or_without_sliding_markers_are_weighed_alike() -> None:
     trial, off = seen(at(q) + 1e-3), Ask()
     plain = Markers(trial, off).residuals(q)
     np.testing.assert_allclose(
-        Markers(with_sliding_skin(trial, q, Sizes()), off).residuals(q), plain, atol=1e-12
+        Markers(with_sliding_skin(trial, q, ResidualScales()), off).residuals(q), plain, atol=1e-12
     )
-    stiff = Sizes(own_skin_m=0.0, shared_skin_m=0.0)
+    stiff = ResidualScales(own_skin_m=0.0, shared_skin_m=0.0)
     assert with_sliding_skin(seen(at(bent())), bent(), stiff).shares is None
 
 
 @pytest.mark.parametrize(
-    "sizes", [Sizes(own_skin_m=0.0), Sizes(shared_skin_m=0.0)], ids=("alike", "by itself")
+    "sizes",
+    [ResidualScales(own_skin_m=0.0), ResidualScales(shared_skin_m=0.0)],
+    ids=("alike", "by itself"),
 )
-def test_skin_that_slides_in_one_of_two_ways_slides(sizes: Sizes) -> None:
+def test_skin_that_slides_in_one_of_two_ways_slides(sizes: ResidualScales) -> None:
     assert with_sliding_skin(seen(at(bent())), bent(), sizes).shares is not None
 
 
@@ -99,10 +101,10 @@ def test_vertebrae_are_not_dragged_down_with_their_markers() -> None:
     on = np.where(markers().body == PELVIS, 0.0, 0.015)
     places = at(q) - (share * on)[..., None] * turns[:, markers().body][..., 1]
     top = []
-    for sizes in (Sizes(own_skin_m=0.0, shared_skin_m=0.0), Sizes()):
+    for sizes in (ResidualScales(own_skin_m=0.0, shared_skin_m=0.0), ResidualScales()):
         ask = Ask(passive=law(), force_cost="level_difference", sizes=sizes)
         known = with_sliding_skin(seen(places), q, sizes)
-        found = solve(ask, [known], [Grid(0.0, 0.1, FRAMES - 1).through(q)])
+        found = solve(ask, [known], [KnotGrid(0.0, 0.1, FRAMES - 1).through(q)])
         now = known.grid.at_nodes(found.coefficients[0])[0]
         apart = body_poses(spine(), now)[1][:, -1] - body_poses(spine(), q)[1][:, -1]
         top.append(float(np.linalg.norm(apart[FRAMES // 2])))
@@ -116,7 +118,7 @@ def test_a_spine_that_is_pressed_together_as_a_whole_costs_its_mean_force() -> N
     q[:, 1:, 1] = -1e-3
     soft = replace(Ask(passive=law()), force_cost="level_difference")
     rest = np.zeros_like(q)
-    loads = Loads.of(seen(at(np.repeat(q, 2, axis=0))), soft)
+    loads = MuscleDemand.of(seen(at(np.repeat(q, 2, axis=0))), soft)
     active = loads.active(soft.passive, (q, rest, rest))
     rows = loads.residuals(soft.passive, (q, rest, rest)).reshape(17, 6)
     expected = active[0, :, :3].mean(axis=0) * np.sqrt(17.0) / soft.sizes.common_n

@@ -11,14 +11,14 @@ from numpy.linalg import LinAlgError
 from spinepipe.motion import trajectory
 from spinepipe.motion.asked import SHAPE, Ask, watched
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.skeleton import MarkerSet, Trial
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
 from spinepipe.motion.trajectory import (
     _FOUND,
     SMALL,
     Costs,
-    Solved,
-    _Search,
-    _State,
+    OptimalMotions,
+    _Iterate,
+    _MotionSearch,
     _stepped,
     law_of,
     solve,
@@ -36,12 +36,12 @@ def bent() -> np.ndarray:
     return q
 
 
-def solved(ask: Ask, on: MarkerSet, off_m: float = 0.0, **more: Any) -> Solved:
+def solved(ask: Ask, on: MarkerSet, off_m: float = 0.0, **more: Any) -> OptimalMotions:
     """From a spine that stands, where it bends; markers are off their places by an SD."""
     places = marker_places(spine(), on, bent())
     places += np.random.default_rng(20031).normal(0.0, off_m, places.shape)
     seen = np.ones(places.shape[:2], dtype=bool)
-    trial = Trial("made", "stance", 0.2 * np.arange(NODES + 1), places, seen, "hanging")
+    trial = MarkerTrial("made", "stance", 0.2 * np.arange(NODES + 1), places, seen, "hanging")
     known = watched(spine(), on, trial, NODES)
     return solve(ask, [known], [np.zeros((known.grid.coefficients, *SHAPE))], **more)
 
@@ -58,7 +58,7 @@ class Slope:
         self.ends, self.gains, self.ask = ends, gains, Ask(passive=law() if elements else None)
         self.tried = list[float]()
 
-    def normal(self, state: _State, newton: bool) -> None:
+    def normal(self, state: _Iterate, newton: bool) -> None:
         """Nothing hangs on it here."""
 
     def step(self, asked: object, damping: float) -> tuple[list[np.ndarray], np.ndarray, float]:
@@ -68,14 +68,14 @@ class Slope:
             raise LinAlgError("not definite")
         return [np.array([end])], np.zeros(0), self.gains(damping)
 
-    def costs(self, state: _State) -> Costs:
+    def costs(self, state: _Iterate) -> Costs:
         return Costs(float(state.coefficients[0][0]), 0.0, 0.0, 0.0, 0.0)
 
 
-def one_step(slope: Slope, damping: float = 1e-3, newton: bool = True) -> _Search:
+def one_step(slope: Slope, damping: float = 1e-3, newton: bool = True) -> _MotionSearch:
     """From a cost of 0; where a step ends is what it costs."""
-    begin = _State((np.zeros(1),), np.zeros(0))
-    return _stepped(slope, _Search(begin, slope.costs(begin), damping, newton))  # type: ignore[arg-type]
+    begin = _Iterate((np.zeros(1),), np.zeros(0))
+    return _stepped(slope, _MotionSearch(begin, slope.costs(begin), damping, newton))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_equations_that_cannot_be_solved_are_no_least_cost(monkeypatch) -> None:
     def fails(*_: object) -> None:
         raise LinAlgError
 
-    monkeypatch.setattr(trajectory.Factor, "of", fails)
+    monkeypatch.setattr(trajectory.BandFactor, "of", fails)
     found = solved(Ask(loads=False, smooth=False), markers())
     assert found.status is Status.NOT_CONVERGED
     assert "definite" in found.message
@@ -217,7 +217,7 @@ def test_a_start_in_coordinates_that_are_not_there_is_not_taken() -> None:
     free[3] = False
     places = marker_places(spine(), markers(), np.zeros((1, *SHAPE)))
     whole = np.ones(places.shape[:2], dtype=bool)
-    trial = Trial("made", "stance", np.zeros(1), places, whole, "hanging")
+    trial = MarkerTrial("made", "stance", np.zeros(1), places, whole, "hanging")
     known, start = watched(spine(), markers(), trial, 0), np.full((3, *SHAPE), 0.01)
     found = solve(Ask(free=free, loads=False, smooth=False), [known], [start])
     assert not found.coefficients[0][:, 3].any()

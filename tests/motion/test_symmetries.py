@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from spinepipe.motion.asked import Ask, ForceCost, Watched, watched
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.skeleton import MarkerSet, Trial
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
 from spinepipe.motion.trajectory import solve
 
 FRAMES, STEP_S = 101, 0.04
@@ -42,7 +42,7 @@ def seen() -> np.ndarray:
 def at_nodes(places: np.ndarray, on: MarkerSet, intervals: int) -> Watched:
     times = STEP_S * np.arange(FRAMES)
     whole = np.ones(places.shape[:2], dtype=bool)
-    trial = Trial("made", "flexion_extension", times, places, whole, "hanging")
+    trial = MarkerTrial("made", "flexion_extension", times, places, whole, "hanging")
     return watched(spine(), on, trial, intervals)
 
 

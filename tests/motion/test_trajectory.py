@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from moving_spine import everywhere, law, markers, postures, spine
 
-from spinepipe.motion.asked import Ask, Sizes, watched
-from spinepipe.motion.banded import Band, Factor, bordered_step
+from spinepipe.motion.asked import Ask, ResidualScales, watched
+from spinepipe.motion.banded import Band, BandFactor, bordered_step
 from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.posture import postures as fitted_postures
-from spinepipe.motion.skeleton import MarkerSet, Trial
-from spinepipe.motion.spline import Grid
-from spinepipe.motion.terms import Loads, Markers, beyond
-from spinepipe.motion.trajectory import Trajectory, _State, law_of, solve
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
+from spinepipe.motion.spline import KnotGrid
+from spinepipe.motion.terms import Markers, MuscleDemand, beyond
+from spinepipe.motion.trajectory import Trajectory, _Iterate, law_of, solve
 from spinepipe.status import Status
 
 NODES = 6
 
 
-def trial_of(q: np.ndarray, seen: MarkerSet, step_s: float = 0.2) -> Trial:
+def trial_of(q: np.ndarray, seen: MarkerSet, step_s: float = 0.2) -> MarkerTrial:
     places = marker_places(spine(), seen, q)
-    return Trial(
+    return MarkerTrial(
         "made",
         "flexion_extension",
         step_s * np.arange(len(q)),
@@ -42,7 +42,7 @@ def bent(frames: int) -> np.ndarray:
 
 
 def test_a_spline_goes_through_its_nodes() -> None:
-    grid = Grid(1.0, 0.1, NODES)
+    grid = KnotGrid(1.0, 0.1, NODES)
     places = np.random.default_rng(0).normal(size=(NODES + 1, 2))
     curve = grid.through(places)
     at, velocity, acceleration = grid.at_nodes(curve)
@@ -86,7 +86,7 @@ def test_a_bordered_band_is_solved_as_the_whole_matrix_is() -> None:
     band.border[:] = whole[:size, size:].reshape(count, COUNT, shared)
     band.slope[:] = right[:size].reshape(count, COUNT)
     assert (whole_of(band) == whole[:size, :size]).all(), "nothing reaches further than three"
-    factor = Factor.of(band, 0.3 * band.diagonal + 1e-3)
+    factor = BandFactor.of(band, 0.3 * band.diagonal + 1e-3)
     square = whole[size:, size:].copy()
     (step,), params = bordered_step([band], [factor], square, right[size:])
     whole[range(size), range(size)] += 0.3 * np.diag(whole)[:size] + 1e-3
@@ -103,7 +103,7 @@ def test_slopes_of_the_cost_are_differences(force_cost: str) -> None:
     ask = Ask(low=low, high=high, passive=law(), force_cost=force_cost, fitted=fitted)  # type: ignore[arg-type]
     seen = watched(spine(), markers(), trial_of(bent(NODES + 1), markers()), NODES)
     rng = np.random.default_rng(2)
-    state = _State(
+    state = _Iterate(
         (rng.normal(0.0, 1e-3, (seen.grid.coefficients, 18, 6)),),
         rng.normal(0.0, 0.2, ask.parameters),
     )
@@ -134,15 +134,15 @@ def test_curvatures_are_products_of_differences(force_cost: str) -> None:
     ask = Ask(low=low, high=high, passive=law(), force_cost=force_cost, fitted=fitted)  # type: ignore[arg-type]
     seen = watched(spine(), markers(), trial_of(bent(NODES + 1), markers()), NODES)
     rng, nodes = np.random.default_rng(3), seen.grid.coefficients
-    state = _State((rng.normal(0.0, 0.01, (nodes, 18, 6)),), rng.normal(0.0, 0.2, 4))
+    state = _Iterate((rng.normal(0.0, 0.01, (nodes, 18, 6)),), rng.normal(0.0, 0.2, 4))
     problem = Trajectory(ask, (seen,))
 
-    def residuals(there: _State) -> np.ndarray:
+    def residuals(there: _Iterate) -> np.ndarray:
         """Everything that costs, each with its share."""
         motion = seen.grid.at_nodes(there.coefficients[0])
         parts = [
             Markers(seen, ask).residuals(motion[0]),
-            Loads.of(seen, ask).residuals(law_of(ask, there.parameters), motion),
+            MuscleDemand.of(seen, ask).residuals(law_of(ask, there.parameters), motion),
             motion[2] / ([2.0] * 3 + [10.0] * 3),
             beyond(ask, motion[0])[0],
         ]
@@ -192,7 +192,7 @@ def test_with_second_derivatives_curvatures_are_differences_of_slopes() -> None:
     seen = watched(replace(spine(), masses=weightless), markers(), trial_of(bent(4), markers()), 3)
     seen = replace(seen, weight=np.zeros_like(seen.weight))
     rng, size, shared = np.random.default_rng(3), seen.grid.coefficients * COUNT, ask.parameters
-    state = _State(
+    state = _Iterate(
         (rng.normal(0.0, 1e-2, (seen.grid.coefficients, 18, 6)) * ([0.1] * 3 + [1.0] * 3) * free,),
         rng.normal(0.0, 0.2, shared),
     )
@@ -201,7 +201,7 @@ def test_with_second_derivatives_curvatures_are_differences_of_slopes() -> None:
     assert (asked.scales[0] == plain.bands[0].diagonal).all()
     assert (asked.scale == np.diag(plain.square)).all()
 
-    def slopes(there: _State) -> np.ndarray:
+    def slopes(there: _Iterate) -> np.ndarray:
         found = problem.normal(there)
         return np.concatenate([found.bands[0].slope.ravel(), found.slope])
 
@@ -245,7 +245,7 @@ def test_a_step_is_that_of_the_whole_damped_matrix(
     loose = np.ones(4, dtype=bool) if held is None else ~np.array(held)
     given = None if held is None else np.array(held)
     problem = Trajectory(ask, (seen,), given)
-    asked = problem.normal(_State((coefficients,), rng.normal(0.0, 0.2, 4)))
+    asked = problem.normal(_Iterate((coefficients,), rng.normal(0.0, 0.2, 4)))
     band, whole = asked.bands[0], np.zeros((size + 4, size + 4))
     whole[:size, :size] = whole_of(band)
     border = band.border.reshape(size, 4)
@@ -281,9 +281,9 @@ def test_what_markers_show_is_found_when_nothing_else_costs() -> None:
 
 def test_true_elements_beat_wrong_ones() -> None:
     """Held still by passive elements alone: the truth costs less than stiffer or softer ones."""
-    free = Ask(passive=law(), sizes=Sizes(marker_m=1e-4, loads=1.0))
+    free = Ask(passive=law(), sizes=ResidualScales(marker_m=1e-4, loads=1.0))
     still = np.zeros((1, 18, 6))
-    rest = Trial(
+    rest = MarkerTrial(
         "s",
         "stance",
         np.zeros(1),
@@ -295,7 +295,7 @@ def test_true_elements_beat_wrong_ones() -> None:
     # a posture in which the true elements carry all weight: no markers, loads alone
     unseen = replace(nothing, weight=np.zeros_like(nothing.weight))
     hung = fitted_postures(free, unseen)
-    truth = Trial(
+    truth = MarkerTrial(
         "t",
         "stance",
         np.zeros(1),

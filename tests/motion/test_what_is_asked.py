@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from moving_spine import markers, spine
 
-from spinepipe.motion.asked import SHAPE, Ask, Sizes, watched
+from spinepipe.motion.asked import SHAPE, Ask, ResidualScales, watched
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.skeleton import Trial
-from spinepipe.motion.spline import Grid
+from spinepipe.motion.skeleton import MarkerTrial
+from spinepipe.motion.spline import KnotGrid
 from spinepipe.studies.tracking.approaches import sizes_of
 from spinepipe.studies.tracking.settings import Scales
 
 
-def standing(times: np.ndarray, hidden: dict[int, list[int]]) -> Trial:
+def standing(times: np.ndarray, hidden: dict[int, list[int]]) -> MarkerTrial:
     """A trial at rest; of each marker named, the frames that see it."""
     places = np.repeat(marker_places(spine(), markers(), np.zeros((1, *SHAPE))), len(times), axis=0)
     seen = np.ones(places.shape[:2], dtype=bool)
     for marker, frames in hidden.items():
         seen[:, marker] = False
         seen[frames, marker] = True
-    return Trial("made", "stance", times, places, seen, "hanging")
+    return MarkerTrial("made", "stance", times, places, seen, "hanging")
 
 
 def test_a_marker_counts_at_nodes_within_half_a_step_of_a_frame_that_saw_it() -> None:
@@ -52,7 +52,7 @@ def test_markers_count_by_their_weights() -> None:
 def test_one_frame_is_one_node() -> None:
     """A step of one second, so that what is asked per second is defined."""
     one = watched(spine(), markers(), standing(np.array([4.0]), {}), 30)
-    assert one.grid == Grid(4.0, 1.0, 0)
+    assert one.grid == KnotGrid(4.0, 1.0, 0)
     assert one.places.shape[0] == 1
 
 
@@ -63,7 +63,7 @@ def test_nodes_reach_from_the_first_frame_to_the_last() -> None:
 
 def test_sizes_are_those_of_a_study_that_changes_none() -> None:
     """600 deg/s2 is 10 rad/s2 but for rounding to a round number."""
-    ours, theirs = vars(Sizes()), vars(sizes_of(Scales()))
+    ours, theirs = vars(ResidualScales()), vars(sizes_of(Scales()))
     assert ours.keys() == theirs.keys()
     for name, value in ours.items():
         within = 0.05 if name == "turn_rad_per_s2" else 1e-12
@@ -72,9 +72,9 @@ def test_sizes_are_those_of_a_study_that_changes_none() -> None:
 
 def test_a_mean_load_costs_by_its_force_alone() -> None:
     """Four times as much of loads halves their sizes; none makes them endless."""
-    np.testing.assert_allclose(Sizes().of_common, [2000.0] * 3 + [np.inf] * 3)
-    np.testing.assert_allclose(Sizes(loads=4.0).of_common[:3], 1000.0)
-    assert np.isinf(Sizes(loads=0.0).of_loads).all()
+    np.testing.assert_allclose(ResidualScales().of_common, [2000.0] * 3 + [np.inf] * 3)
+    np.testing.assert_allclose(ResidualScales(loads=4.0).of_common[:3], 1000.0)
+    assert np.isinf(ResidualScales(loads=0.0).of_loads).all()
 
 
 def test_everything_is_free_and_nothing_is_fitted_unless_asked() -> None:

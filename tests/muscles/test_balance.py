@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from trunk_person import held_task, tasks, volunteer
 
-from spinepipe.muscles.settle import Held, held
+from spinepipe.muscles.settle import SolvedTask, held
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS, THORAX
@@ -52,7 +52,7 @@ def muscle_ends(task: str) -> Ends:
     return Ends(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def sheath(found: Held, side: int) -> tuple[np.ndarray, np.ndarray]:
+def sheath(found: SolvedTask, side: int) -> tuple[np.ndarray, np.ndarray]:
     """(3,) m, upper end of a side's sheath, and (3,) which way it runs upwards."""
     low, high = (
         found.poses.of(np.array(body), at)
@@ -62,7 +62,7 @@ def sheath(found: Held, side: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def hanging(
-    found: Held, side: int, bone: int, force: float, trace: np.ndarray
+    found: SolvedTask, side: int, bone: int, force: float, trace: np.ndarray
 ) -> list[tuple[int, np.ndarray, np.ndarray]]:
     """What a fascicle that ends in the sheath does: it pulls its bone, and the sheath hands on to
     the ribs at its upper end what runs along it."""
@@ -74,7 +74,7 @@ def hanging(
     ]
 
 
-def loads(found: Held) -> Ends:
+def loads(found: SolvedTask) -> Ends:
     return Ends(found.applied.bodies, found.applied.at, found.applied.pushes)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, Curve, JointLaws
+from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, JointLaws, MomentCurve
 from spinepipe.muscles.passive_muscle import PassiveMuscle
 
 ALL = [(name, axis) for name in CURVES for axis in range(3)]
@@ -113,7 +113,7 @@ def test_axial_stiffness_is_that_of_kitazaki_and_griffin() -> None:
 
 def test_a_curve_that_falls_is_refused() -> None:
     with pytest.raises(ValueError, match="must rise"):
-        Curve((-1.0, 0.0, 1.0), (-1.0, 0.0, -0.5))
+        MomentCurve((-1.0, 0.0, 1.0), (-1.0, 0.0, -0.5))
 
 
 def laws(stiffens: bool = True) -> JointLaws:

@@ -8,7 +8,7 @@ from trunk_person import made_up, tasks, volunteer
 
 from spinepipe.muscles.pose import (
     BodyPoses,
-    Chain,
+    JointCentres,
     posed,
     rotation_of_vector,
     rotation_vector,
@@ -19,7 +19,7 @@ from spinepipe.muscles.trunk import BODIES, LEVELS
 ROUND_OFF = 1e-14
 """Products of a few rotations, each good to 1e-16; metres of half a metre likewise."""
 
-CHAIN = Chain.of(made_up_trunk(), 0.004)
+CHAIN = JointCentres.of(made_up_trunk(), 0.004)
 STILL = np.zeros((len(LEVELS), 3))
 
 

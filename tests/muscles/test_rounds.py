@@ -9,7 +9,7 @@ import pytest
 from spinepipe.muscles import settle
 from spinepipe.muscles import upright as standing
 from spinepipe.muscles.forces import Forces
-from spinepipe.muscles.settle import How, Round, held
+from spinepipe.muscles.settle import How, SolverRound, held
 from spinepipe.muscles.trunk import BODIES, LEVELS
 from spinepipe.status import Balanced
 
@@ -18,7 +18,7 @@ NOBODY: Any = None
 
 def at_rest(forces: list[float], status: Balanced = Balanced.CONVERGED) -> Any:
     found = Forces(np.array(forces), np.zeros(21), True)
-    return settle.Held(status, "", *[NOBODY] * 4, found, *[NOBODY] * 4)
+    return settle.SolvedTask(status, "", *[NOBODY] * 4, found, *[NOBODY] * 4)
 
 
 class Rounds:
@@ -35,7 +35,7 @@ class Rounds:
 
 def asked_twice(
     monkeypatch: pytest.MonkeyPatch, how: How, *ends: Any
-) -> tuple[settle.Held, Rounds]:
+) -> tuple[settle.SolvedTask, Rounds]:
     rounds = Rounds(*ends)
     monkeypatch.setattr(settle, "_rounds", rounds)
     task: Any = SimpleNamespace(tone_share=0.03, tone="least")
@@ -160,7 +160,7 @@ def trail(*sizes: float) -> list[np.ndarray]:
 def test_rounds_that_go_to_and_fro_are_told(
     sizes: tuple[float, ...], change: float | None, status: Balanced
 ) -> None:
-    rounds = [Round(change, 1.0, 500.0)] * len(sizes)
+    rounds = [SolverRound(change, 1.0, 500.0)] * len(sizes)
     found, told = settle._ended(NOBODY, How(), rounds, trail(*sizes), settled=False)
     shown = "50.0" if change else "0.0"
     assert found is status

@@ -7,7 +7,7 @@ import pytest
 from trunk_person import CLOSELY, SETTINGS, tasks, volunteers
 
 from spinepipe.muscles.pose import BodyPoses, rotation_of_vector
-from spinepipe.muscles.settle import Held, held
+from spinepipe.muscles.settle import SolvedTask, held
 from spinepipe.muscles.stability import _joints, smallest_eigenvalue, stiffness
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.studies.subjects import subject_of
@@ -40,7 +40,7 @@ def moved(poses: BodyPoses, q: np.ndarray) -> BodyPoses:
     return replace(poses, rotations=np.array(rotations), places=np.array(places))
 
 
-def energy(person, found: Held, q: np.ndarray) -> float:
+def energy(person, found: SolvedTask, q: np.ndarray) -> float:
     """J, of fascicles that stiffen and of loads that are fixed to the bodies."""
     poses = moved(found.poses, q)
     longer = person.lines.pulls(poses).lengths - found.pulls.lengths

@@ -5,13 +5,13 @@ import pytest
 from scipy.optimize import linprog
 from trunk_person import held_task
 
-from spinepipe.muscles.settle import Held
+from spinepipe.muscles.settle import SolvedTask
 from spinepipe.muscles.strength import capacity_left, load_factor
 
 JUST = 1e-5
 
 
-def can_be_held(held: Held, required: np.ndarray) -> bool:
+def can_be_held(held: SolvedTask, required: np.ndarray) -> bool:
     """Whether forces within their bounds make the moments (21,) N m, no sheath being pushed."""
     demand = held.demand
     solved = linprog(
@@ -27,7 +27,7 @@ def can_be_held(held: Held, required: np.ndarray) -> bool:
     return bool(solved.status == 0)
 
 
-def of_loads(held: Held) -> np.ndarray:
+def of_loads(held: SolvedTask) -> np.ndarray:
     """(7, 3) N m of all loads above each joint about its centre, one by one."""
     loads, found = held.applied, np.zeros((7, 3))
     for level, centre in enumerate(held.poses.centres):

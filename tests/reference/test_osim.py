@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import Kind, Parameter
+from spinepipe.effects import EffectKind, Parameter
 from spinepipe.model import LoadCase, RefusedModel, ScopedEffect
 from spinepipe.model.osim import osim
 from tests.reference import bridge
@@ -25,7 +25,7 @@ class Foreign:
     """An effect that OpenSim knows nothing of."""
 
     name: ClassVar[str] = "foreign"
-    kind: ClassVar[Kind] = Kind.JOINT_LAW
+    kind: ClassVar[EffectKind] = EffectKind.JOINT_LAW
     per_joint: ClassVar[bool] = False
     parameters: ClassVar[tuple[Parameter, ...]] = ()
 

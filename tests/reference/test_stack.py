@@ -13,7 +13,7 @@ import random_stacks as draw
 from example_effects import ExtraWeight
 from sweeps import sweep
 
-from spinepipe.effects import Effect, Kind, Parameter
+from spinepipe.effects import Effect, EffectKind, Parameter
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import (
@@ -157,7 +157,9 @@ def test_loads_that_do_not_come_on_at_once(
 ) -> None:
     """Loads that some chains carry only in fractions, and others not at all: as the engine says."""
     rng = np.random.default_rng(40 + n_joints)
-    without_memory = [e for e in VARIANTS if e.kind not in (Kind.PATH, Kind.MEASUREMENT)]
+    without_memory = [
+        e for e in VARIANTS if e.kind not in (EffectKind.PATH, EffectKind.MEASUREMENT)
+    ]
     names = sorted({effect.name for effect in without_memory})
     drawn = []
     for _ in range(16):

@@ -14,7 +14,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.statics import System
 from spinepipe.statics.equilibrium import decays
 from spinepipe.statics.many import stability
-from spinepipe.statics.many.dynamics import Factored, Moving
+from spinepipe.statics.many.dynamics import BatchedLUFactors, Moving
 from spinepipe.statics.many.newton import newton
 from spinepipe.statics.many.proofs import respond
 from spinepipe.statics.many.stack import Stack
@@ -81,7 +81,7 @@ def test_inertia_is_pybullet_s(n_joints: int) -> None:
     seen = survey(stack.chains, stack.loads, q, tangents)
     moving = Moving.of(stack.chains, stack.loads.chain, seen)
     inertial, accelerations = moving.inertial(rates), moving.accelerations(forces)
-    solved = Factored(moving.mass).solve(forces)
+    solved = BatchedLUFactors(moving.mass).solve(forces)
     for lane, chain in enumerate(made):
         engine = Chain(bridge.spine_model(chain))
         mass = engine.mass_matrix(q[lane].ravel())

@@ -11,7 +11,7 @@ import pytest
 import random_stacks as draw
 from sweeps import sweep
 
-from spinepipe.effects import Effect, Kind, Wrench, create
+from spinepipe.effects import Effect, EffectKind, Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import (
@@ -345,4 +345,4 @@ def test_what_moves_in_time_has_no_rig() -> None:
 
 def test_effects_cover_what_remembers() -> None:
     """The comparisons above mean something only while laws with a state are among the variants."""
-    assert any(effect.kind is Kind.PATH for effect in VARIANTS)
+    assert any(effect.kind is EffectKind.PATH for effect in VARIANTS)

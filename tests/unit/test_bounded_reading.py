@@ -24,7 +24,7 @@ from spinepipe.documents.text import (
     longest_word,
 )
 from spinepipe.model.file import read_model
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form
 
@@ -35,7 +35,7 @@ MOTION_HEADER = "specimen,test,cycle,step,joint,extension_deg\n"
 DIGITS = "1" * 100_000
 
 
-def told(folder: Path, *changes: Change) -> tuple[Problem, ...]:
+def told(folder: Path, *changes: Change) -> tuple[InputProblem, ...]:
     """What reading the changed cohort complains about."""
     with pytest.raises(InputError) as caught:
         cohort.read(write(folder / NAME, *changes))
@@ -358,7 +358,7 @@ def test_whatever_is_put_into_the_files_is_accepted_or_told(spoils, tmp_path_fac
     assert len("\n".join(map(str, found))) < 100_000
 
 
-def problems_in(folder: Path) -> tuple[Problem, ...]:
+def problems_in(folder: Path) -> tuple[InputProblem, ...]:
     """What is wrong with a cohort, if anything; any other exception fails the test."""
     try:
         cohort.read(folder)

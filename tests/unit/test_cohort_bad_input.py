@@ -23,7 +23,7 @@ from cohort_cases import (
 from sweeps import sweep
 
 from spinepipe import cohort
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 YAML, SPECIMENS, LANDMARKS = "cohort.yaml", "specimens.csv", "landmarks.csv"
 JOINTS, BODIES, LOADS, MOTION = "joints.csv", "bodies.csv", "loads.csv", "motion.csv"
@@ -180,7 +180,7 @@ CASES = [
 ]
 
 
-def problems_of(folder: Path) -> tuple[Problem, ...]:
+def problems_of(folder: Path) -> tuple[InputProblem, ...]:
     """What reading the folder complains about."""
     with pytest.raises(InputError) as caught:
         cohort.read(folder)

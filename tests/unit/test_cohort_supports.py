@@ -19,7 +19,7 @@ from spinepipe import problems
 from spinepipe.cohort import Cohort, check_supports
 from spinepipe.cohort.measured import MeasuredCycle, measured_specimen
 from spinepipe.cohort.supports import STATES, Rig, motion_read
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.places import readings
 from spinepipe.units import COORDINATES
 
@@ -40,7 +40,7 @@ def flexion(cohort: Cohort, specimen: str = "a") -> MeasuredCycle:
     return measured_specimen(cohort, specimen, ["flexion"]).tested[0]
 
 
-def refused(folder: Path, *changes: Change) -> tuple[Problem, ...]:
+def refused(folder: Path, *changes: Change) -> tuple[InputProblem, ...]:
     with pytest.raises(InputError) as caught:
         read(folder, *changes)
     return caught.value.problems

@@ -13,7 +13,7 @@ from cohort_cases import Change, swap, text, write
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.zeroing import zeroed_alike
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 
 LOADS = """\
 specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm
@@ -44,7 +44,7 @@ def read(folder: Path, *changes: Change) -> Cohort:
     return cohorts.read(write(folder / "small", *ROWS, *changes))
 
 
-def refused(folder: Path, *changes: Change) -> tuple[Problem, ...]:
+def refused(folder: Path, *changes: Change) -> tuple[InputProblem, ...]:
     with pytest.raises(InputError) as caught:
         read(folder, *changes)
     return caught.value.problems

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import Kind, Spread, create, registered
+from spinepipe.effects import EffectKind, PlaceSpread, create, registered
 from spinepipe.effects.contract import Parameter
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
@@ -302,17 +302,17 @@ def test_a_strength_has_the_side_that_its_bounds_leave(
 
 
 def test_what_stays_of_one_joint_may_differ_in_every_way() -> None:
-    every = tuple(one for one in Spread if one is not Spread.BY_TEST)
+    every = tuple(one for one in PlaceSpread if one is not PlaceSpread.BY_TEST)
     for name in ("creep", "hysteresis", "neutral_pose_drift"):
         assert registered()[name].trial.spreads == every
     skin = registered()["soft_tissue_artefact"].trial
-    assert skin.spreads == (Spread.SHARED, Spread.BY_SPECIMEN)
+    assert skin.spreads == (PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN)
     both = {(one["coordinate"], one["neighbour"]) for one in skin.variants}
     assert both == {(c, n) for c in COORDINATES for n in ("above", "below")}
 
 
 def test_loads_of_a_specimen_are_tried_once_for_all_joints() -> None:
-    loads = [name for name, cls in registered().items() if cls.kind is Kind.LOAD]
+    loads = [name for name, cls in registered().items() if cls.kind is EffectKind.LOAD]
     assert all(not registered()[name].per_joint for name in loads if "_for_a_test" not in name)
     offset = registered()["load_offset"].trial.variants
     assert {one.get("coordinate") for one in offset} == {None, *TRANSLATIONS}

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear, minimize
 
-from spinepipe.calibrate.descent import Settled, descend_along
+from spinepipe.calibrate.descent import DescentTolerances, descend_along
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric
 
-TIGHT = Settled(cost=1e-13, step=1e-10, slope=0.0, evaluations=200)
+TIGHT = DescentTolerances(cost=1e-13, step=1e-10, slope=0.0, evaluations=200)
 
 
 def test_a_linear_problem_ends_on_the_bounds_that_scipy_finds() -> None:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.calibrate.descent import Settled, damped_step, descend, descend_along, once
+from spinepipe.calibrate.descent import DescentTolerances, damped_step, descend, descend_along, once
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric
 
-NOTHING = Settled(cost=0.0, step=0.0, slope=0.0, evaluations=100)
+NOTHING = DescentTolerances(cost=0.0, step=0.0, slope=0.0, evaluations=100)
 FAR = (np.full(1, -1e3), np.full(1, 1e3))
 ONE = np.ones(1)
 
@@ -70,7 +70,7 @@ class Looked:
 def test_damping_is_eased_by_ten_after_each_step_that_keeps_its_promise() -> None:
     """Of what is left, d / (1 + d) stays; d = 1e-3, 1e-4, ..."""
     point = Looked()
-    ended = descend_along(point, np.zeros(1), FAR, ONE, Settled(0.0, 0.0, 0.0, 4))
+    ended = descend_along(point, np.zeros(1), FAR, ONE, DescentTolerances(0.0, 0.0, 0.0, 4))
     left = np.cumprod([1.0, 1e-3 / 1.001, 1e-4 / 1.0001, 1e-5 / 1.00001])
     np.testing.assert_allclose(1.0 - np.array(point.looks), left, rtol=1e-3)
     assert not ended.arrived
@@ -92,9 +92,11 @@ def test_a_scale_is_the_unit_in_which_steps_are_taken() -> None:
     """Of one unknown the step is the same in any scale, but for when it counts as nothing."""
     for scale in (0.1, 10.0):
         point = Looked()
-        descend_along(point, np.zeros(1), FAR, np.array([scale]), Settled(0.0, 0.0, 0.0, 2))
+        descend_along(
+            point, np.zeros(1), FAR, np.array([scale]), DescentTolerances(0.0, 0.0, 0.0, 2)
+        )
         np.testing.assert_allclose(point.looks, [0.0, 1.0 / 1.001])
-    whole = Settled(cost=0.0, step=0.5, slope=0.0, evaluations=9)
+    whole = DescentTolerances(cost=0.0, step=0.5, slope=0.0, evaluations=9)
     for scale, looks in ((1.0, 2), (1.9, 2), (2.1, 1)):
         point = Looked()
         ended = descend_along(point, np.zeros(1), FAR, np.array([scale]), whole)
@@ -105,7 +107,7 @@ def test_a_scale_is_the_unit_in_which_steps_are_taken() -> None:
 def test_a_gain_that_is_a_small_share_of_the_cost_is_none(tolerance: float, looks: int) -> None:
     """1 of 5 is to be gained at first; then next to nothing."""
     point = Looked(constant=2.0)
-    settled = Settled(cost=tolerance, step=0.0, slope=0.0, evaluations=9)
+    settled = DescentTolerances(cost=tolerance, step=0.0, slope=0.0, evaluations=9)
     ended = descend_along(point, np.zeros(1), FAR, ONE, settled)
     assert (len(point.looks), ended.arrived, ended.evaluations) == (looks, True, looks)
     assert ended.half_cost == pytest.approx(2.5 if looks == 1 else 2.0, rel=1e-5)
@@ -118,7 +120,7 @@ def test_a_step_that_breaks_its_promise_is_not_taken(share: float, taken: bool) 
     def point(x: Array) -> tuple[Array, Array]:
         return np.array([np.sqrt(1.0 - share) if x[0] else 1.0]), -np.ones((1, 1))
 
-    ended = descend_along(point, np.zeros(1), FAR, ONE, Settled(0.0, 0.0, 0.0, 2))
+    ended = descend_along(point, np.zeros(1), FAR, ONE, DescentTolerances(0.0, 0.0, 0.0, 2))
     assert bool(ended.x[0] > 0.9) is taken
     assert ended.half_cost == pytest.approx(0.5 * (1.0 - share if taken else 1.0))
 
@@ -127,7 +129,7 @@ def test_a_step_that_breaks_its_promise_is_not_taken(share: float, taken: bool) 
 def test_it_stops_at_a_bound_from_either_side(low: float, high: float, end: float) -> None:
     for scale in (0.2, 5.0):
         start, bounds = np.array([0.5 * (low + high)]), (np.array([low]), np.array([high]))
-        settled = Settled(1e-12, 1e-12, 0.0, 30)
+        settled = DescentTolerances(1e-12, 1e-12, 0.0, 30)
         ended = descend_along(Looked(), start, bounds, np.array([scale]), settled)
         assert ended.arrived
         assert ended.x[0] == end
@@ -153,12 +155,12 @@ def test_a_descent_asks_once_and_again_for_what_is_new() -> None:
 
 
 def test_inside_bounds_a_straight_cost_ends_at_its_least() -> None:
-    settled = Settled(cost=1e-12, step=1e-12, slope=1e-12, evaluations=50)
+    settled = DescentTolerances(cost=1e-12, step=1e-12, slope=1e-12, evaluations=50)
     ended = descend(Looked(2.0), np.zeros(1), FAR, ONE, 2, settled)
     assert ended.arrived
     assert ended.x[0] == pytest.approx(1.0, abs=1e-5)
     assert ended.half_cost == pytest.approx(2.0)
-    few = Settled(cost=1e-15, step=1e-15, slope=1e-15, evaluations=1)
+    few = DescentTolerances(cost=1e-15, step=1e-15, slope=1e-15, evaluations=1)
     given_up = descend(Looked(2.0), np.zeros(1), FAR, ONE, 2, few)
     assert not given_up.arrived
     assert given_up.evaluations == 1
@@ -167,7 +169,7 @@ def test_inside_bounds_a_straight_cost_ends_at_its_least() -> None:
 
 def test_inside_bounds_it_turns_back_from_where_nothing_stands() -> None:
     """And takes the slope of the point before for one that is lost on being asked again."""
-    settled = Settled(cost=1e-9, step=1e-9, slope=1e-9, evaluations=60)
+    settled = DescentTolerances(cost=1e-9, step=1e-9, slope=1e-9, evaluations=60)
     ended = descend(Looked(most=0.5), np.zeros(1), FAR, ONE, 2, settled)
     assert 0.3 < ended.x[0] <= 0.5
     asked: set[bytes] = set()

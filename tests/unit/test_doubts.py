@@ -17,7 +17,7 @@ from cohort_cases import write as write_small
 from cohort_edge_cases import A
 
 from spinepipe import cohort as cohorts
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 from spinepipe.studies.doubts import suspicions
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, draw_hidden, make
@@ -33,7 +33,7 @@ POINTS = ["px_mm", "py_mm", "pz_mm"]
 ANGLES_OF_TESTS = {"flexion": "extension_deg", "left_lateral_bending": "right_bending_deg"}
 
 
-def told(folder: Path) -> tuple[Problem, ...]:
+def told(folder: Path) -> tuple[InputProblem, ...]:
     return tuple(one.problem for one in suspicions(cohorts.read(folder, every_form())))
 
 

@@ -27,9 +27,9 @@ from sweeps import sweep
 
 from spinepipe.calibrate import MeasuredCase, Problem, fit
 from spinepipe.effects import (
+    EffectKind,
     GeometryEffect,
     JointLaw,
-    Kind,
     LoadEffect,
     MeasurementBeside,
     MeasurementEffect,
@@ -57,11 +57,11 @@ from spinepipe.status import Status
 from spinepipe.world import Chain
 
 PROTOCOLS = {
-    Kind.JOINT_LAW: JointLaw,
-    Kind.LOAD: LoadEffect,
-    Kind.GEOMETRY: GeometryEffect,
-    Kind.PATH: PathLaw,
-    Kind.MEASUREMENT: MeasurementEffect,
+    EffectKind.JOINT_LAW: JointLaw,
+    EffectKind.LOAD: LoadEffect,
+    EffectKind.GEOMETRY: GeometryEffect,
+    EffectKind.PATH: PathLaw,
+    EffectKind.MEASUREMENT: MeasurementEffect,
 }
 
 ALONE = {

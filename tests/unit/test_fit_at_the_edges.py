@@ -10,7 +10,7 @@ import pytest
 
 from spinepipe.calibrate import MeasuredCase, Problem, fit
 from spinepipe.calibrate.fit import TIPPED, _start_points
-from spinepipe.calibrate.pooled_specimen import Member
+from spinepipe.calibrate.pooled_specimen import PoolMember
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel
@@ -66,7 +66,7 @@ def test_a_coordinate_that_is_not_fitted_and_gives_way_is_named() -> None:
     found = fit(asked)
     assert found.status is Status.UNSTABLE
     assert found.message.startswith(f"{TIPPED} {gives_way}")
-    member = Member(asked, np.zeros(1), None)
+    member = PoolMember(asked, np.zeros(1), None)
     assert member.result(np.zeros(1), np.eye(1), 0.0).message == found.message
 
 

@@ -11,7 +11,12 @@ from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices.convergence import convergence
 from spinepipe.sensitivity.global_indices.design import DUMMY, Design, draw
-from spinepipe.sensitivity.global_indices.estimates import Index, Known, Settings, masked
+from spinepipe.sensitivity.global_indices.estimates import (
+    IndexStatus,
+    SensitivityIndex,
+    Settings,
+    masked,
+)
 from spinepipe.sensitivity.global_indices.floor import (
     Floor,
     above_floor,
@@ -25,11 +30,11 @@ QUICK = Settings(bootstraps=5, delta_bootstraps=4)
 ALONE = ("a", "b")
 
 
-def one(index: str, *ends: tuple[float, float, float]) -> Index:
+def one(index: str, *ends: tuple[float, float, float]) -> SensitivityIndex:
     """An index with estimate, low and high for each output."""
     estimate, low, high = (masked(values, np.isnan(values)) for values in np.array(ends).T)
-    done = (Known.DONE,) * len(ends)
-    return Index(index, "a", "", estimate, low, high, 8, 0, done, ("",) * len(ends))
+    done = (IndexStatus.DONE,) * len(ends)
+    return SensitivityIndex(index, "a", "", estimate, low, high, 8, 0, done, ("",) * len(ends))
 
 
 def floors_of(design: Design, outputs: np.ndarray, resolution: float = 0.0, **asked: object):
@@ -143,7 +148,7 @@ def test_pairs_without_numbers_have_a_floor_without() -> None:
 def test_the_fewest_whole_blocks_with_an_index(method: str, fewest: int) -> None:
     design = draw(method, ALONE, 64, 20026)
     outputs = np.exp(design.unit[:, :1])
-    for samples, status in ((fewest, Known.DONE), (fewest - 1, Known.TOO_FEW)):
+    for samples, status in ((fewest, IndexStatus.DONE), (fewest - 1, IndexStatus.TOO_FEW)):
         part = design.first(samples)
         found = indices(part, outputs[: part.n], settings=replace(QUICK, wanted=None))
         assert {index.status for index in found} == {(status,)}
@@ -154,13 +159,15 @@ def test_as_many_may_be_lost_as_is_said() -> None:
     ok = np.ones(design.n, dtype=bool)
     ok[[0, -1]] = False
     assert kept(design, ok).lost == 0.25
-    for most, status in ((0.25, Known.DONE), (0.24, Known.TOO_MANY_FAILED)):
+    for most, status in ((0.25, IndexStatus.DONE), (0.24, IndexStatus.TOO_MANY_FAILED)):
         found = indices(design, design.unit[:, :1], ok, replace(QUICK, most_failed=most))
         assert {index.status for index in found} == {(status,)}
 
 
-@sweep("resolution, status", [(0.4, Known.DONE), (1.0, Known.CONSTANT)])
-def test_outputs_closer_than_the_resolution_are_alike(resolution: float, status: Known) -> None:
+@sweep("resolution, status", [(0.4, IndexStatus.DONE), (1.0, IndexStatus.CONSTANT)])
+def test_outputs_closer_than_the_resolution_are_alike(
+    resolution: float, status: IndexStatus
+) -> None:
     """Levels of two: the outputs are 0 and 1, no further apart than 1."""
     design = draw("morris", ALONE, 8, 20028, levels=2)
     assert set(design.unit[:, 0].tolist()) == {0.0, 1.0}
@@ -204,7 +211,10 @@ def test_a_design_settles_in_eight_parts_at_most() -> None:
 def test_nothing_is_too_fine_where_no_resolution_is_told() -> None:
     design = draw("morris", ALONE, 16, 20033)
     outputs = 1e-3 * np.exp(design.unit[:, :1])
-    for resolution, status in (({}, Known.DONE), ({"resolution": 0.01}, Known.CONSTANT)):
+    for resolution, status in (
+        ({}, IndexStatus.DONE),
+        ({"resolution": 0.01}, IndexStatus.CONSTANT),
+    ):
         (stage,) = convergence(design, outputs, settings=QUICK, sizes=1, **resolution)
         assert {index.status for index in stage.indices} == {(status,)}
 
@@ -213,7 +223,7 @@ def test_a_design_too_small_for_indices_is_one_stage_that_says_so() -> None:
     design = draw("latin_hypercube", ALONE, 30, 20032)
     (stage,) = convergence(design, np.exp(design.unit[:, :1]), settings=QUICK)
     assert (stage.samples, stage.runs) == (30, 30)
-    assert {index.status for index in stage.indices} == {(Known.TOO_FEW,)}
+    assert {index.status for index in stage.indices} == {(IndexStatus.TOO_FEW,)}
     assert {index.index for index in stage.indices} == {
         *("S1_RBD", "PAWN", "KS_low", "KS_high", "delta")
     }

@@ -15,7 +15,7 @@ from chain_cases import JOINTS, STUDY, Chains, by_joint
 from spinepipe import cohort as cohorts
 from spinepipe.cohort.specimen import followers
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.specimen import view_of
 from spinepipe.report.specimen_text import describe
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
@@ -80,7 +80,7 @@ def test_the_specimen_s_text_tells_it(tmp_path: Path) -> None:
 # --- what is refused ------------------------------------------------------------------------------
 
 
-def problems(folder: Path, chains: Chains) -> tuple[Problem, ...]:
+def problems(folder: Path, chains: Chains) -> tuple[InputProblem, ...]:
     chains.write(folder)
     with pytest.raises(InputError) as caught:
         cohorts.read(folder / "config" / "cohorts" / "chains")

@@ -17,7 +17,7 @@ from spinepipe.motion.hanging import ARMS
 from spinepipe.motion.joint_tables import SIDES
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.muscles import regressions
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, FILMS, NEEDED
 from spinepipe.studies.tracking.forms import FORMS, MOVING, STANCE, TRIALS
 from spinepipe.studies.trunk_loads.checks_of_muscles import CARRIERS
@@ -39,7 +39,7 @@ COLUMNS = (
 
 def told(
     *rows: dict[str, object], rule: Rule | None = None, bad: Place = (2, "high"), **other: object
-) -> list[Problem]:
+) -> list[InputProblem]:
     """What is said of rows; each is sound but for what it gives."""
     whole = [{"name": f"n{k}", "way": "up"} | row for k, row in enumerate(rows)]
     table = pd.DataFrame(whole, columns=[c.name for c in COLUMNS], index=range(2, 2 + len(rows)))
@@ -56,7 +56,7 @@ def told(
     return list(check.problems())
 
 
-def places(problems: list[Problem]) -> list[tuple[int | None, str | None, str]]:
+def places(problems: list[InputProblem]) -> list[tuple[int | None, str | None, str]]:
     return [(one.row, one.column, one.found) for one in problems]
 
 

@@ -18,7 +18,7 @@ from example_effects import scoped
 from scipy.spatial.transform import Rotation
 from sweeps import sweep
 
-from spinepipe.effects import Spread, create
+from spinepipe.effects import PlaceSpread, create
 
 NAMES = ("joint_centre_offset", "joint_centre_migration", "axes_tilt", "rotation_order")
 JOINTS = (0, 1, 2)
@@ -161,6 +161,6 @@ def test_effects_change_the_motion_of_a_spine(name: str) -> None:
 
 def test_only_physics_is_looked_for() -> None:
     for name in ("joint_centre_offset", "joint_centre_migration"):
-        assert set(create(name).trial.spreads) == set(Spread) - {Spread.BY_TEST}
+        assert set(create(name).trial.spreads) == set(PlaceSpread) - {PlaceSpread.BY_TEST}
     for name in ("axes_tilt", "rotation_order"):
         assert not hasattr(create(name), "trial")

@@ -12,7 +12,7 @@ from scipy.stats import ks_2samp, norm
 from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices.design import Design, draw
-from spinepipe.sensitivity.global_indices.estimates import Index, Known, Settings
+from spinepipe.sensitivity.global_indices.estimates import IndexStatus, SensitivityIndex, Settings
 from spinepipe.sensitivity.global_indices.indices import indices
 
 G = FUNCTIONS["g"]
@@ -27,7 +27,7 @@ def problem_of(design: Design) -> dict[str, object]:
     return problem | ({"groups": groups} if design.groups != design.factors else {})
 
 
-def by_name(found: tuple[Index, ...]) -> dict[tuple[str, str, str], Index]:
+def by_name(found: tuple[SensitivityIndex, ...]) -> dict[tuple[str, str, str], SensitivityIndex]:
     return {(index.index, index.factor, index.other): index for index in found}
 
 
@@ -190,11 +190,11 @@ def test_a_broken_fast_curve_costs_its_factor_alone() -> None:
     whole = by_name(indices(design, two_outputs(design)))
     for key, index in found.items():
         if key[1] == "x3":
-            assert set(index.status) == {Known.TOO_MANY_FAILED}
+            assert set(index.status) == {IndexStatus.TOO_MANY_FAILED}
             assert index.estimate.tolist() == [None, None]
             assert "1 of 6 curves left out, x3's among them" in index.message[0]
         else:
-            assert set(index.status) == {Known.DONE}
+            assert set(index.status) == {IndexStatus.DONE}
             assert index.estimate.tolist() == whole[key].estimate.tolist()
 
 
@@ -203,7 +203,7 @@ def test_too_many_failures_leave_no_index(method: str) -> None:
     design = draw(method, G.factors, 64, 5)
     outputs, ok = with_failures(design, [row * design.block for row in range(13)])  # 20.3 %
     for index in indices(design, outputs, ok, QUICK):
-        assert set(index.status) == {Known.TOO_MANY_FAILED}
+        assert set(index.status) == {IndexStatus.TOO_MANY_FAILED}
         assert index.estimate.tolist() == index.low.tolist() == [None, None]
         assert "at most 20% may be lost" in index.message[0]
 
@@ -213,13 +213,13 @@ def test_all_failed_is_no_error(method: str) -> None:
     design = draw(method, G.factors, 513 if method == "fast" else 64, 5)
     outputs = np.full((design.n, 2), np.nan)
     found = indices(design, outputs, np.zeros(design.n, dtype=bool))
-    assert {status for index in found for status in index.status} == {Known.TOO_MANY_FAILED}
+    assert {status for index in found for status in index.status} == {IndexStatus.TOO_MANY_FAILED}
 
 
 def test_too_few_points_leave_no_index() -> None:
     design = draw("latin_hypercube", G.factors, 30, 5)
     found = indices(design, two_outputs(design), settings=QUICK)
-    assert {status for index in found for status in index.status} == {Known.TOO_FEW}
+    assert {status for index in found for status in index.status} == {IndexStatus.TOO_FEW}
     assert "30 points; at least 50 are needed" in found[0].message[0]
 
 
@@ -232,7 +232,7 @@ def test_a_constant_output_has_no_indices_and_leaves_the_others_alone(method: st
     outputs = np.column_stack([np.zeros(design.n), both[:, 0], rounding, tiny, both[:, 1]])
     found = indices(design, outputs, settings=QUICK, resolution=[0, 0, 0, 1e-8, 0])
     alone = indices(design, both, settings=QUICK)
-    constant, done = Known.CONSTANT, Known.DONE
+    constant, done = IndexStatus.CONSTANT, IndexStatus.DONE
     for index, other in zip(found, alone, strict=True):
         assert index.status == (constant, done, constant, constant, done)
         assert index.estimate.compressed().tolist() == other.estimate.tolist()
@@ -246,7 +246,7 @@ def test_an_output_of_one_run_alone_gives_numbers(method: str) -> None:
     outputs = np.zeros((design.n, 2))
     outputs[7, 0] = outputs[0, 1] = 1.0
     for index in indices(design, outputs, settings=Settings(bootstraps=50, delta_bootstraps=20)):
-        assert set(index.status) == {Known.DONE}
+        assert set(index.status) == {IndexStatus.DONE}
         assert np.isfinite([index.estimate.data, index.low.data, index.high.data]).all()
 
 

@@ -13,7 +13,7 @@ from scipy import stats
 from sweeps import sweep
 
 from spinepipe.statistics import (
-    Ended,
+    ComputationStatus,
     critical_h,
     f_test_nested,
     kruskal_wallis,
@@ -46,7 +46,7 @@ def test_kruskal_wallis_gives_the_published_result_with_ties() -> None:
     found = kruskal_wallis(FERTILISERS)
     assert found.statistic == pytest.approx(9.4207, abs=5e-5)
     assert found.p == pytest.approx(0.009002, abs=5e-7)
-    assert (found.n, found.status) == (18, Ended.DONE)
+    assert (found.n, found.status) == (18, ComputationStatus.DONE)
     # 3 5 7 13 stand alone; 4 6 8 9 11 12 share their ranks
     assert found.message == "H_c 5.99 (df 2); chi-squared p; ties: 14 of 18 values"
 
@@ -141,13 +141,13 @@ def test_critical_h_is_that_of_the_degrees_of_freedom() -> None:
 @sweep("groups", [[], [[1, 2, 3]], [[1, 2], []], [[1], [2], [3]]])
 def test_groups_that_cannot_be_compared(groups) -> None:
     found = kruskal_wallis(groups)
-    assert (found.status, found.statistic, found.p) == (Ended.TOO_FEW, None, None)
+    assert (found.status, found.statistic, found.p) == (ComputationStatus.TOO_FEW, None, None)
     assert f"in {len(groups)} groups" in found.message
 
 
 def test_groups_of_one_and_the_same_value_are_constant() -> None:
     found = kruskal_wallis([[0.1, 0.1], [0.1]])
-    assert (found.status, found.p, found.n) == (Ended.CONSTANT, None, 3)
+    assert (found.status, found.p, found.n) == (ComputationStatus.CONSTANT, None, 3)
 
 
 # Wilcoxon
@@ -236,14 +236,14 @@ def test_exchanging_the_two_turns_the_effect() -> None:
 @sweep("values", [[1.0, 2.0, 3.0, 4.0], [0.0, 0.0]])
 def test_pairs_without_a_difference(values) -> None:
     found = wilcoxon_signed_rank(values, values)
-    assert (found.status, found.p, found.n) == (Ended.CONSTANT, None, len(values))
+    assert (found.status, found.p, found.n) == (ComputationStatus.CONSTANT, None, len(values))
 
 
 def test_three_differences_are_too_few() -> None:
     found = wilcoxon_signed_rank([1, 2, 3, 4], [2, 3, 5, 4])
-    assert (found.status, found.p, found.n) == (Ended.TOO_FEW, None, 4)
+    assert (found.status, found.p, found.n) == (ComputationStatus.TOO_FEW, None, 4)
     assert found.message == "3 of 4 pairs differ; at least 4 are needed"
-    assert wilcoxon_signed_rank([], []).status is Ended.TOO_FEW
+    assert wilcoxon_signed_rank([], []).status is ComputationStatus.TOO_FEW
 
 
 def test_what_is_not_finite_or_has_no_partner_is_refused() -> None:
@@ -262,7 +262,7 @@ def test_f_test_gives_the_published_puromycin_result() -> None:
     found = f_test_nested(2241, 20, 2055, 19)
     assert found.statistic == pytest.approx(1.7, abs=0.05)
     assert found.p == pytest.approx(0.21, abs=0.005)
-    assert (found.status, found.message) == (Ended.DONE, "F(1, 19)")
+    assert (found.status, found.message) == (ComputationStatus.DONE, "F(1, 19)")
 
 
 def test_two_further_parameters_have_a_closed_form() -> None:
@@ -291,8 +291,8 @@ def test_a_larger_model_that_fits_worse_says_so() -> None:
 
 def test_fits_without_residual_have_no_test() -> None:
     exact, none_left = f_test_nested(1.0, 5, 0.0, 3), f_test_nested(1.0, 1, 0.0, 0)
-    assert (exact.status, exact.p) == (Ended.CONSTANT, None)
-    assert (none_left.status, none_left.p) == (Ended.TOO_FEW, None)
+    assert (exact.status, exact.p) == (ComputationStatus.CONSTANT, None)
+    assert (none_left.status, none_left.p) == (ComputationStatus.TOO_FEW, None)
 
 
 @sweep("bad", [(1.0, 10, 0.5, 10), (-1.0, 10, 0.5, 8), (1.0, 10, math.nan, 8)])

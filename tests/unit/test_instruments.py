@@ -19,8 +19,8 @@ from effect_slopes import (
 from example_effects import loaded, scoped, spine
 from sweeps import sweep
 
-from spinepipe.effects import Kind, Spread, create
-from spinepipe.effects.contract import Beside
+from spinepipe.effects import EffectKind, PlaceSpread, create
+from spinepipe.effects.contract import MeasurementContext
 from spinepipe.model import LoadCase, ScopedEffect
 from spinepipe.statics import System, follow, observe
 from spinepipe.statics.instruments import passed
@@ -46,10 +46,10 @@ def effect_of(name: str, on: bool = True, joints: tuple[int, ...] = (0, 1, 2)) -
     return scoped(create(kind, options), joints, values if on else (0.0, values[1]))
 
 
-def around(q: np.ndarray) -> Beside:
+def around(q: np.ndarray) -> MeasurementContext:
     above = np.vstack([q[1:], np.zeros(6)])
     below = np.vstack([np.zeros(6), q[:-1]])
-    return Beside(above, below, np.linspace(0.0, 1.0, len(q)))
+    return MeasurementContext(above, below, np.linspace(0.0, 1.0, len(q)))
 
 
 def with_times(times: tuple[float | None, ...]) -> LoadCase:
@@ -151,10 +151,10 @@ def test_who_reads_by_the_step_must_be_told_which() -> None:
 def test_what_is_looked_for() -> None:
     for name in ("soft_tissue_artefact", "neutral_pose_drift"):
         effect = create(name)
-        assert effect.kind is Kind.MEASUREMENT
+        assert effect.kind is EffectKind.MEASUREMENT
         assert effect.parameters[0].off == 0.0
         assert {dict(v)["coordinate"] for v in effect.trial.variants} == set(COORDINATES)
-        assert Spread.SHARED in effect.trial.spreads
+        assert PlaceSpread.SHARED in effect.trial.spreads
     with pytest.raises(ValueError, match="neighbour 'beside' is not one of above, below"):
         create("soft_tissue_artefact", {"neighbour": "beside"})
 

@@ -8,7 +8,7 @@ import pytest
 from joint_law_cases import DEFAULT, EVERY, law_of
 from sweeps import sweep
 
-from spinepipe.effects import JointLaw, Kind, Spread, create, registered
+from spinepipe.effects import EffectKind, JointLaw, PlaceSpread, create, registered
 from spinepipe.units import COORDINATES
 
 
@@ -206,10 +206,12 @@ def test_what_a_search_may_try(name: str) -> None:
     trial = registered()[name].trial
     made = [create(name, options) for options in trial.variants]
     assert len(set(made)) == len(made)
-    assert {law.kind for law in made} == {Kind.JOINT_LAW}
+    assert {law.kind for law in made} == {EffectKind.JOINT_LAW}
     assert trial.told_by
-    only = {"level_dependence": (Spread.BY_JOINT,), "local_laxity": (Spread.ONE,)}
-    assert trial.spreads == only.get(name, tuple(s for s in Spread if s is not Spread.BY_TEST))
+    only = {"level_dependence": (PlaceSpread.BY_JOINT,), "local_laxity": (PlaceSpread.ONE,)}
+    assert trial.spreads == only.get(
+        name, tuple(s for s in PlaceSpread if s is not PlaceSpread.BY_TEST)
+    )
     places = {o.get("coordinate", o.get("pair")) for o in trial.variants} - {"rotations", "all"}
     if name == "bending_rotation_coupling":
         assert {frozenset(pair) for pair in places} == {

@@ -14,7 +14,7 @@ from sweeps import sweep
 
 from papers.engine import Claim, Evidence, claims_of, judge
 from papers.ranges import Limit, Range, factor_of_two
-from papers.run import NotComputed, Ours, Run
+from papers.run import NotComputed, Ours, StudyRun
 from spinepipe.comparison import papers
 from spinepipe.report.page.document import judged as told
 from spinepipe.studies.tracking.tables import AGAINST_WANG_2021
@@ -22,7 +22,7 @@ from tests.validation import comparisons
 
 ROOT = Path(__file__).parents[2]
 PAPERS = papers.papers()
-NOTHING = Run({}, {"failed_when": "all"})
+NOTHING = StudyRun({}, {"failed_when": "all"})
 
 NO_OTHER_NUMBER = (
     *(f"joint_orientation.reduced.{joint}.extension.iqr" for joint in ("L1L2", "L2L3", "L3L4")),

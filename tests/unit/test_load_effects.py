@@ -19,7 +19,7 @@ from example_effects import NOWHERE, loaded, scoped, slope, spine
 from scipy.spatial.transform import Rotation
 from sweeps import sweep
 
-from spinepipe.effects import Spread, Wrench, create
+from spinepipe.effects import PlaceSpread, Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, SpineModel
@@ -341,7 +341,7 @@ def test_each_test_has_its_own_values(name: str) -> None:
 
 
 def test_spreads_of_what_is_looked_for() -> None:
-    everywhere = {Spread.SHARED, Spread.BY_SPECIMEN}
+    everywhere = {PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN}
     for name, by_test in (
         ("segment_weight", False),
         ("follower_load", False),
@@ -349,6 +349,6 @@ def test_spreads_of_what_is_looked_for() -> None:
         ("load_offset", True),
     ):
         trial = create(name).trial
-        assert set(trial.spreads) == everywhere | ({Spread.BY_TEST} if by_test else set())
+        assert set(trial.spreads) == everywhere | ({PlaceSpread.BY_TEST} if by_test else set())
         assert [create(name, dict(options)) for options in trial.variants]
     assert not hasattr(create("load_gain"), "trial")

@@ -10,7 +10,13 @@ from scipy import integrate
 from sweeps import sweep
 
 from spinepipe.experiment.double_sigmoid import FEWEST_POINTS, Zone, fitted, neutral_zone
-from spinepipe.experiment.loop import Loop, Measure, Spread, reading_noise, stiffness_interval
+from spinepipe.experiment.loop import (
+    Loop,
+    Measure,
+    RotationErrors,
+    reading_noise,
+    stiffness_interval,
+)
 
 Array = NDArray[np.float64]
 
@@ -244,7 +250,7 @@ def test_a_zone_narrower_than_the_steps_of_load_has_no_number() -> None:
 
 def test_what_nothing_is_known_of_leaves_no_interval() -> None:
     root, free = np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
-    spread = Spread(root, free, 2.0)
+    spread = RotationErrors(root, free, 2.0)
     assert spread.way(Measure(1.0, np.array([1.0, 0.0]))) == 2.0
     assert spread.way(Measure(1.0, np.array([1.0, 0.1]))) is None
 

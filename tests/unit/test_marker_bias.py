@@ -21,7 +21,7 @@ from example_effects import scoped
 from scipy.spatial.transform import Rotation
 from sweeps import sweep
 
-from spinepipe.effects import Spread, create
+from spinepipe.effects import PlaceSpread, create
 
 FORMS = ("offset", "tilt")
 BIAS = (0.001, -0.002, 0.0015, 0.03, -0.02, 0.04)
@@ -108,4 +108,9 @@ def test_forms_and_spreads() -> None:
         create("marker_bias", {"form": "gain"})
     trial = create("marker_bias").trial
     assert [create("marker_bias", dict(v)).form for v in trial.variants] == ["offset", "tilt"]
-    assert set(trial.spreads) == {Spread.EACH, Spread.BY_JOINT, Spread.ONE_JOINT, Spread.ONE}
+    assert set(trial.spreads) == {
+        PlaceSpread.EACH,
+        PlaceSpread.BY_JOINT,
+        PlaceSpread.ONE_JOINT,
+        PlaceSpread.ONE,
+    }

@@ -18,7 +18,7 @@ from spinepipe.calibrate.hierarchy import (
     change,
     tellable,
 )
-from spinepipe.calibrate.pooled_specimen import Member
+from spinepipe.calibrate.pooled_specimen import PoolMember
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric
@@ -41,7 +41,7 @@ class Asked:
 
 def member(size: int = 1, most: float = np.inf, scale: float = 1.0, high: float = 5.0) -> Any:
     """At 0, bounds of 5, about to step by 1."""
-    made = cast(Any, Member.__new__(Member))
+    made = cast(Any, PoolMember.__new__(PoolMember))
     made.problem = SimpleNamespace(lower=np.full(size, -5.0), upper=np.full(size, high) * scale)
     made.x, made.scale, made.noise = np.zeros(size), np.full(size, scale), None
     made.evaluator, made.step = Asked(most), np.ones(size)

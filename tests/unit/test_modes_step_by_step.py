@@ -17,8 +17,8 @@ from spinepipe.calibrate.posterior import (
     NOT_LEVEL,
     SADDLE,
     TIPPED,
-    Noise,
     Point,
+    ResidualNoise,
     Target,
     between,
     modes,
@@ -181,7 +181,10 @@ class Evaluated:
 
 
 def target() -> tuple[Target, Evaluated]:
-    evaluator, noise = Evaluated(), Noise(np.array([1.0, 0.25, 1, 1, 1, 4.0]), np.array([1, 5]))
+    evaluator, noise = (
+        Evaluated(),
+        ResidualNoise(np.array([1.0, 0.25, 1, 1, 1, 4.0]), np.array([1, 5])),
+    )
     return Target(cast(Any, evaluator), Straight(), noise), evaluator
 
 

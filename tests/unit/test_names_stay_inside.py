@@ -21,8 +21,8 @@ from sweeps import sweep
 from spinepipe import cohort as cohorts
 from spinepipe.documents.inside import leads_out
 from spinepipe.documents.names import folder_fault, name_fault
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import InputError, Problem
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.registry import kind_of
 from spinepipe.studies.study_files import StudyFiles
 from spinepipe.studies.subjects import SUBJECTS
@@ -31,7 +31,7 @@ from spinepipe.studies.tracking.forms import FORMS
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.trunk_loads.checks import check_trunk
 
-DOCUMENT = Document("s.yaml", {}, {})
+DOCUMENT = YamlDocument("s.yaml", {}, {})
 SPECIMEN, TEST = "Specimen0", "Test0"
 LONGEST_PART = 255
 """Bytes that systems allow in the name of a folder or file."""
@@ -109,7 +109,7 @@ def test_any_accepted_name_stays_below_the_folder_of_its_study(
             assert max(len(part.encode()) for part in path.split("/")) <= LONGEST_PART
 
 
-def told(folder: Path) -> list[Problem]:
+def told(folder: Path) -> list[InputProblem]:
     """What is said of a cohort."""
     try:
         cohorts.read(folder)

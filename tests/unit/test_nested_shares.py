@@ -14,7 +14,7 @@ from sweeps import sweep
 
 from spinepipe.designs import latin_hypercube_normal, sample_factors
 from spinepipe.sensitivity.shares import components, nested_shares, variance_shares
-from spinepipe.statistics import Ended
+from spinepipe.statistics import ComputationStatus
 
 PARTS = ("specimen", "draw", "treatment", "rest")
 
@@ -68,7 +68,7 @@ def test_shares_and_intervals_by_the_long_way() -> None:
     np.testing.assert_allclose([share.estimate for share in shares], whole)
     np.testing.assert_allclose([share.low for share in shares], expit(logit(whole) - half))
     np.testing.assert_allclose([share.high for share in shares], expit(logit(whole) + half))
-    assert (found.status, found.message) == (Ended.DONE, "")
+    assert (found.status, found.message) == (ComputationStatus.DONE, "")
 
 
 def test_the_truth_is_found_in_a_large_grid() -> None:
@@ -165,15 +165,15 @@ def test_intervals_cover_the_shares_under_the_same_treatments() -> None:
 
 def test_what_has_no_shares_says_why() -> None:
     few = nested_shares(np.random.default_rng(5).normal(size=(3, 2, 3)))
-    assert (few.status, few.specimen) == (Ended.TOO_FEW, None)
+    assert (few.status, few.specimen) == (ComputationStatus.TOO_FEW, None)
     assert "3 x 2 x 3" in few.message
-    assert nested_shares(np.full((3, 3, 3), 0.1)).status is Ended.CONSTANT
+    assert nested_shares(np.full((3, 3, 3), 0.1)).status is ComputationStatus.CONSTANT
     rounded = np.full((3, 3, 3), 0.1)
     rounded[0, 0, 0] += 1e-16
-    assert nested_shares(rounded).status is Ended.CONSTANT
+    assert nested_shares(rounded).status is ComputationStatus.CONSTANT
     single = np.zeros((3, 3, 3))
     single[1] = np.random.default_rng(6).normal(size=(3, 3))
-    assert nested_shares(single).status is Ended.CONSTANT
+    assert nested_shares(single).status is ComputationStatus.CONSTANT
     with pytest.raises(ValueError, match="full grid"):
         nested_shares(np.full((3, 3, 3), np.nan))
 

@@ -14,7 +14,7 @@ from known_indices import FUNCTIONS, linear_gaussian
 
 from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import DUMMY, draw
-from spinepipe.sensitivity.global_indices.estimates import Index, Settings
+from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
 from spinepipe.sensitivity.global_indices.floor import (
     REPLICATES,
     Floor,
@@ -29,7 +29,7 @@ NAMES = (*ISHIGAMI.factors, "inert")
 RESOLUTION = 1e-3
 """How far two runs of the same input lie apart at most, where a solver is imitated."""
 
-Names = dict[tuple[str, str], Index]
+Names = dict[tuple[str, str], SensitivityIndex]
 
 
 def analysed(

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from sweeps import sweep
 
 from spinepipe.effects import create
-from spinepipe.effects.contract import Beside
+from spinepipe.effects.contract import MeasurementContext
 from tests.generators.hidden import CATALOGUE, Hidden, Recipe
 from tests.generators.hidden.anatomy import COORDINATES, JOINTS
 from tests.generators.hidden.scene import scene
@@ -163,7 +163,7 @@ def test_skin_and_a_moving_zero_read_alike() -> None:
         told = world(hidden).views[-1](q)[0]
         for step, pose in enumerate(q[0]):
             above = np.vstack([pose[1:], np.zeros((1, 6))])
-            beside = Beside(above, np.zeros((N, 6)), np.full(N, step / 3.0))
+            beside = MeasurementContext(above, np.zeros((N, 6)), np.full(N, step / 3.0))
             assert effect.observe_beside(pose, values, beside).q == pytest.approx(
                 told[step], abs=1e-12
             )

@@ -18,16 +18,16 @@ from spinepipe.frames import Pose
 from spinepipe.model import Body, ScopedEffect, SpineModel
 from spinepipe.statics.motion import ChainMotion
 from spinepipe.statics.prescribed import (
-    Held,
     HeldChain,
-    Place,
+    NewtonTrial,
+    PrescribedPlace,
+    PrescribedResult,
     Prescription,
     Tilt,
-    Trial,
     hold_at,
     newton_steps,
 )
-from spinepipe.status import Ended
+from spinepipe.status import PrescribedStatus
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 
@@ -77,7 +77,11 @@ def model(mirrored: bool = False, aside: float = 1.0) -> SpineModel:
 def grips(side: float = 1.0) -> tuple[Prescription, ...]:
     point = np.array([0.0, TOP[1], side * TOP[0]])
     top = COUNT - 1
-    return Place(top, point, RIGHT), Place(top, point, UP), Tilt(top, UP, UP, RIGHT)
+    return (
+        PrescribedPlace(top, point, RIGHT),
+        PrescribedPlace(top, point, UP),
+        Tilt(top, UP, UP, RIGHT),
+    )
 
 
 def rotations(n: int = COUNT) -> Array:
@@ -89,7 +93,7 @@ def chain(made: SpineModel, side: float = 1.0) -> HeldChain:
     return HeldChain(made, grips(side), rotations())
 
 
-def held(wanted: Array, mirrored: bool = False) -> Held:
+def held(wanted: Array, mirrored: bool = False) -> PrescribedResult:
     return hold_at(chain(model(mirrored), -1.0 if mirrored else 1.0), wanted)
 
 
@@ -159,7 +163,7 @@ def bent_by(share: float) -> Array:
 def test_a_planar_chain_stands_where_its_energy_is_least(share: float) -> None:
     wanted = bent_by(share)
     found = held(wanted)
-    assert found.status is Ended.CONVERGED
+    assert found.status is PrescribedStatus.CONVERGED
     angles, pushes = Planar().held(wanted)
     np.testing.assert_allclose(found.q.reshape(-1, 6)[:, BENDING], angles, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.pushes, pushes, rtol=1e-7, atol=1e-7)
@@ -174,7 +178,7 @@ def test_from_its_own_end_nothing_is_left_to_do() -> None:
     there = hold_at(own, wanted)
     again = hold_at(own, wanted, there)
     near = hold_at(own, wanted + 1e-5, there)
-    assert (again.status, again.iterations) == (Ended.CONVERGED, 1)
+    assert (again.status, again.iterations) == (PrescribedStatus.CONVERGED, 1)
     np.testing.assert_allclose(again.q, there.q, rtol=0, atol=1e-12)
     assert near.iterations < min(there.iterations, 5)
 
@@ -218,7 +222,7 @@ def test_a_chain_that_cannot_reach_misses_by_least() -> None:
     planar, unit = Planar(), np.array([1e-3, 1e-3, np.deg2rad(1.0)])
     wanted = planar.top(np.zeros(COUNT)) + np.array([0.0, 0.1, 0.0])
     found = held(wanted)
-    assert found.status is Ended.UNREACHABLE
+    assert found.status is PrescribedStatus.UNREACHABLE
     q = found.q.reshape(-1, 6)[:, BENDING]
     missed = wanted - planar.top(q)
     np.testing.assert_allclose(found.missed, missed, rtol=0, atol=1e-12)
@@ -235,13 +239,13 @@ def test_a_chain_that_cannot_reach_misses_by_least() -> None:
 def test_a_chain_that_buckles_out_of_its_plane_is_unstable() -> None:
     """Pushed down by more than a column of such springs carries, with its top free to swerve."""
     found = hold_at(chain(model(aside=0.05)), bent_by(0.8))
-    assert found.status is Ended.UNSTABLE
+    assert found.status is PrescribedStatus.UNSTABLE
     assert "buckles" in found.message
     assert found.missed.any()
 
 
 PRESCRIBED: tuple[Prescription, ...] = (
-    Place(2, np.array([0.02, 0.12, -0.01]), np.array([0.6, 0.0, 0.8])),
+    PrescribedPlace(2, np.array([0.02, 0.12, -0.01]), np.array([0.6, 0.0, 0.8])),
     Tilt(2, np.array([0.2, 0.9, -0.1]), UP, RIGHT),
     Tilt(1, np.array([-0.3, 0.7, 0.4]), UP, RIGHT),
 )
@@ -255,7 +259,7 @@ def test_slopes_and_bends_are_those_of_the_value(prescription: Prescription) -> 
     q, push = np.tile([2e-3] * 3 + [0.2] * 3, 3) * rng.normal(size=18), 300.0
 
     def matrix(at: Array, pushed: float) -> Array:
-        (found,) = newton_steps([Trial(own, at, np.array([pushed]), np.zeros(1), 0.0)])
+        (found,) = newton_steps([NewtonTrial(own, at, np.array([pushed]), np.zeros(1), 0.0)])
         assert found is not None
         return found.matrix
 
@@ -268,7 +272,7 @@ def test_slopes_and_bends_are_those_of_the_value(prescription: Prescription) -> 
         assert slope[k] == pytest.approx(by_value, abs=1e-8)
         np.testing.assert_allclose(bend[:, k], by_slope, rtol=0, atol=1e-8)
     motion = ChainMotion(Chain(plain), q)
-    if isinstance(prescription, Place):
+    if isinstance(prescription, PrescribedPlace):
         by_bullet = motion.velocities(prescription.body, prescription.point)
         np.testing.assert_allclose(slope, by_bullet @ prescription.direction, rtol=0, atol=1e-12)
 
@@ -278,13 +282,13 @@ def test_steps_that_stand_together_are_those_of_each_alone() -> None:
     rng, wanted = np.random.default_rng(5), bent_by(0.4)
     chains = [chain(model()), chain(model(mirrored=True), -1.0), chain(model(aside=2.0))]
     place = grips()[0]
-    assert isinstance(place, Place)
+    assert isinstance(place, PrescribedPlace)
     nothing = (replace(place, direction=np.zeros(3)), *grips()[1:])  # asks for what no push moves
     poses = [0.01 * rng.normal(size=6 * COUNT) * rotations() for _ in range(4)]
     poses[1] += np.where(np.arange(6 * COUNT) % 6 == BENDING, 1.0, 0.0)
     pushes = rng.normal(size=(4, 3))
     trials = [
-        Trial(one, q, push, wanted, 0.1 * number)
+        NewtonTrial(one, q, push, wanted, 0.1 * number)
         for number, (one, q, push) in enumerate(zip(chains, poses, pushes, strict=False))
     ]
     together = newton_steps(trials)
@@ -295,7 +299,7 @@ def test_steps_that_stand_together_are_those_of_each_alone() -> None:
         if one is not None and alone is not None:
             np.testing.assert_allclose(one.step, alone.step, rtol=1e-9, atol=1e-12)
     singular = HeldChain(model(), nothing, rotations())
-    none, one = newton_steps([Trial(singular, poses[3], pushes[3], wanted, 0.0), trials[0]])
+    none, one = newton_steps([NewtonTrial(singular, poses[3], pushes[3], wanted, 0.0), trials[0]])
     assert none is not None
     assert np.isnan(none.step).all()
     assert one is not None

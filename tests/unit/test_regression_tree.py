@@ -17,7 +17,7 @@ from spinepipe.sensitivity.tree import (
     _weakest_links,
     regression_tree,
 )
-from spinepipe.statistics import Ended
+from spinepipe.statistics import ComputationStatus
 
 MILEAGE = np.array(
     [
@@ -106,7 +106,7 @@ def test_importance_is_the_share_of_the_variance_taken() -> None:
 def test_noise_is_left_one_leaf() -> None:
     rng = np.random.default_rng(2)
     found = regression_tree(rng.normal(size=(200, 3)), rng.normal(size=200), "abc", seed=3)
-    assert (found.leaves, found.depth, found.status) == (1, 0, Ended.DONE)
+    assert (found.leaves, found.depth, found.status) == (1, 0, ComputationStatus.DONE)
     assert found.importance.tolist() == [0.0, 0.0, 0.0]
     assert found.r2_training == pytest.approx(0.0, abs=1e-12)
     # the mean of nine tenths predicts a little worse than that of all
@@ -170,11 +170,14 @@ def test_one_row_that_differs_makes_no_tree() -> None:
     y = np.zeros(50)
     y[17] = 1.0
     found = regression_tree(np.arange(50.0)[:, None], y, ["x"], seed=1)
-    assert (found.status, found.leaves) == (Ended.DONE, 1)
+    assert (found.status, found.leaves) == (ComputationStatus.DONE, 1)
 
 
-@sweep("n, groups, status", [(19, None, Ended.TOO_FEW), (40, np.zeros(40, int), Ended.TOO_FEW)])
-def test_too_few_rows_or_groups(n: int, groups, status: Ended) -> None:
+@sweep(
+    "n, groups, status",
+    [(19, None, ComputationStatus.TOO_FEW), (40, np.zeros(40, int), ComputationStatus.TOO_FEW)],
+)
+def test_too_few_rows_or_groups(n: int, groups, status: ComputationStatus) -> None:
     x, y = data(n, 3, seed=10)
     found = regression_tree(x, y, "abc", 1, groups=groups)
     assert (found.status, found.leaves, found.depth) == (status, 1, 0)
@@ -192,7 +195,9 @@ def test_twenty_rows_are_split_into_leaves_of_seven_at_least(rows: int, leaves: 
 
 def test_twenty_rows_in_two_groups_are_enough_for_a_tree() -> None:
     x, y = data(20, 3, seed=20040)
-    assert regression_tree(x, y, "abc", 1, groups=np.arange(20) % 2).status is Ended.DONE
+    assert (
+        regression_tree(x, y, "abc", 1, groups=np.arange(20) % 2).status is ComputationStatus.DONE
+    )
 
 
 @sweep("folds, same", [(10, True), (9, False), (11, False)])
@@ -213,7 +218,7 @@ def test_a_step_is_one_split_however_few_folds(folds: int) -> None:
 
 def test_a_constant_output_has_no_tree() -> None:
     found = regression_tree(data(50, 3, seed=11)[0], np.full(50, 0.1), "abc", 1)
-    assert (found.status, found.r2_training) == (Ended.CONSTANT, None)
+    assert (found.status, found.r2_training) == (ComputationStatus.CONSTANT, None)
     assert found.importance.tolist() == [0.0, 0.0, 0.0]
 
 

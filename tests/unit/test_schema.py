@@ -10,14 +10,14 @@ from typing import get_args
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import Kind, Spread
+from spinepipe.effects import EffectKind, PlaceSpread
 from spinepipe.effects.field_numbers import NUMBERS
 from spinepipe.experiment.double_sigmoid import Zone
 from spinepipe.motion.scaling import SEGMENTS
 from spinepipe.muscles.task import Tone
 from spinepipe.muscles.trunk import BODIES, LEVELS
 from spinepipe.schema import Column, Table, read_tables
-from spinepipe.status import Balanced, Ended, Status
+from spinepipe.status import Balanced, PrescribedStatus, Status
 from spinepipe.studies.cohort_stiffness.claims import HOLDS
 from spinepipe.studies.cohort_stiffness.settings import COVARIATES
 from spinepipe.studies.registry import kind_of
@@ -87,8 +87,8 @@ def test_columns_that_a_folder_carries_are_left_out_of_the_key_too(tmp_path: Pat
     "kind, table, column, values",
     [
         ("range_of_motion", "range_of_motion", "status", Status),
-        ("scoliosis", "positions", "status", Ended),
-        ("scoliosis", "variants", "status", (*Ended, "singular")),
+        ("scoliosis", "positions", "status", PrescribedStatus),
+        ("scoliosis", "variants", "status", (*PrescribedStatus, "singular")),
         ("scoliosis", "laws", "model", MODELS),
         ("scoliosis", "population", "quantity", PER_SEGMENT),
         ("trunk_loads", "tasks", "status", Balanced),
@@ -97,8 +97,8 @@ def test_columns_that_a_folder_carries_are_left_out_of_the_key_too(tmp_path: Pat
         ("trunk_loads", "upright", "body", BODIES),
         ("tracking", "fits", "status", (*Status, "marker_off")),
         ("tracking", "sizes", "segment", SEGMENTS),
-        ("discrepancy", "candidates", "kind", Kind),
-        ("discrepancy", "candidates", "spread", Spread),
+        ("discrepancy", "candidates", "kind", EffectKind),
+        ("discrepancy", "candidates", "spread", PlaceSpread),
         ("discrepancy", "candidates", "status", (*Status, "not_testable")),
         ("discrepancy", "field_numbers", "number", NUMBERS),
         ("discrepancy", "gap", "coordinate", COORDINATES),

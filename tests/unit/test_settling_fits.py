@@ -10,7 +10,7 @@ import pytest
 from example_effects import loaded, spine
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit, fit_alike
-from spinepipe.calibrate.solvers import Seen, Settling
+from spinepipe.calibrate.solvers import CaseResiduals, Settling
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
 from spinepipe.statics import (
@@ -138,7 +138,7 @@ def test_ends_are_those_of_the_engine_of_record(course: Course) -> None:
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
     solver = Settling(model, [case, twice(case)], free, course)
     seen = solver.solve([(0, np.zeros(3))])[0]
-    assert isinstance(seen, Seen)
+    assert isinstance(seen, CaseResiduals)
     expected = sampled(model, case, course, END_ONLY)
     np.testing.assert_allclose(seen.poses[0], expected, rtol=0, atol=1e-11)
     np.testing.assert_array_equal(seen.poses[1], np.repeat(seen.poses[0], 2, axis=0))
@@ -150,10 +150,10 @@ def test_ends_are_those_of_the_engine_of_record(course: Course) -> None:
 
 def ends(
     model: SpineModel, case: LoadCase, free: tuple[FreeParameter, ...], course: Course
-) -> Seen:
+) -> CaseResiduals:
     """What a fit sees of a case."""
     found = Settling(model, [case], free, course).solve([(0, np.zeros(len(free)))])[0]
-    assert isinstance(found, Seen)
+    assert isinstance(found, CaseResiduals)
     return found
 
 

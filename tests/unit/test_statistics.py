@@ -15,7 +15,7 @@ from statsmodels.stats.multitest import multipletests
 from sweeps import sweep
 
 from spinepipe.statistics import (
-    Ended,
+    ComputationStatus,
     bland_altman,
     chi_squared_normality,
     corrected,
@@ -62,7 +62,7 @@ def test_kendall_gives_the_published_tuna_result() -> None:
     found = kendall(HUNTER, PANEL)
     assert found.effect == pytest.approx(0.4444444, abs=5e-8)
     assert found.p == pytest.approx(0.1194, abs=5e-5)
-    assert (found.n, found.status, found.message) == (9, Ended.DONE, "")
+    assert (found.n, found.status, found.message) == (9, ComputationStatus.DONE, "")
 
 
 def test_spearman_gives_the_published_tuna_result() -> None:
@@ -126,7 +126,7 @@ def test_spearman_of_four_pairs_with_ties_is_never_certain() -> None:
 def test_spearman_p_with_ties_is_the_share_of_orderings(n: int, levels: int, seed: int) -> None:
     x, y = np.random.default_rng(seed).integers(0, levels, (2, n))
     found = spearman(x, y)
-    if found.status is not Ended.DONE:
+    if found.status is not ComputationStatus.DONE:
         return
     first, second = stats.rankdata(x), np.array(list(permutations(stats.rankdata(y))))
     every, own = second @ first, first @ stats.rankdata(y)
@@ -140,7 +140,7 @@ def test_spearman_p_with_ties_is_the_share_of_orderings(n: int, levels: int, see
 def test_a_constant_has_no_correlation(test) -> None:
     found = test([1, 2, 3, 4, 5], [7, 7, 7, 7, 7])
     assert (found.statistic, found.p, found.effect) == (None, None, None)
-    assert (found.status, found.n) == (Ended.CONSTANT, 5)
+    assert (found.status, found.n) == (ComputationStatus.CONSTANT, 5)
     assert "second" in found.message
     assert "first" not in found.message
 
@@ -148,8 +148,8 @@ def test_a_constant_has_no_correlation(test) -> None:
 @sweep("test", CORRELATIONS)
 def test_three_pairs_are_too_few(test) -> None:
     found = test([1, 2, 3], [1, 3, 2])
-    assert (found.p, found.status, found.n) == (None, Ended.TOO_FEW, 3)
-    assert test([1, 2, 3, 4], [1, 3, 2, 4]).status is Ended.DONE
+    assert (found.p, found.status, found.n) == (None, ComputationStatus.TOO_FEW, 3)
+    assert test([1, 2, 3, 4], [1, 3, 2, 4]).status is ComputationStatus.DONE
 
 
 @sweep("test", CORRELATIONS)
@@ -209,7 +209,7 @@ def test_friedman_s_p_with_ties_is_the_share_of_orders(
     """Listed one by one; the order of the blocks, or of the treatments, is of no account."""
     values = np.random.default_rng(seed).integers(0, levels, (blocks, treatments))
     found = friedman(values)
-    if found.status is not Ended.DONE:
+    if found.status is not ComputationStatus.DONE:
         return
     ranks = stats.rankdata(values, axis=1)
     sums = ranks[0]
@@ -265,12 +265,12 @@ def test_friedman_ranks_within_blocks_only() -> None:
 @sweep("shape", [(1, 5), (5, 2)])
 def test_friedman_of_a_small_grid_is_too_few(shape) -> None:
     found = friedman(np.arange(float(np.prod(shape))).reshape(shape))
-    assert (found.status, found.p, found.effect) == (Ended.TOO_FEW, None, None)
+    assert (found.status, found.p, found.effect) == (ComputationStatus.TOO_FEW, None, None)
 
 
 def test_friedman_of_equal_treatments_is_constant() -> None:
     found = friedman(np.repeat([[1.0], [2.0], [3.0]], 4, axis=1))
-    assert (found.status, found.p) == (Ended.CONSTANT, None)
+    assert (found.status, found.p) == (ComputationStatus.CONSTANT, None)
 
 
 def test_friedman_wants_a_full_grid() -> None:
@@ -320,7 +320,7 @@ def test_chi_squared_has_the_degrees_of_freedom_that_its_bins_leave() -> None:
         found = chi_squared_normality(values)
         bins = int(found.message.split()[0])
         seen.add(bins)
-        assert found.status is (Ended.DONE if bins > 3 else Ended.TOO_FEW)
+        assert found.status is (ComputationStatus.DONE if bins > 3 else ComputationStatus.TOO_FEW)
         if bins > 3:
             expected = stats.chi2.sf(found.statistic, bins - 1 - 2)
             assert found.p == pytest.approx(expected, rel=1e-12)
@@ -329,7 +329,7 @@ def test_chi_squared_has_the_degrees_of_freedom_that_its_bins_leave() -> None:
 
 def test_chi_squared_without_degree_of_freedom_points_to_kolmogorov_smirnov() -> None:
     found = chi_squared_normality(np.linspace(0.0, 1.0, 15))
-    assert (found.status, found.p) == (Ended.TOO_FEW, None)
+    assert (found.status, found.p) == (ComputationStatus.TOO_FEW, None)
     assert "Kolmogorov-Smirnov" in found.message
 
 
@@ -399,8 +399,8 @@ def test_normality_does_not_depend_on_the_unit(test) -> None:
 @sweep("test", NORMALITY)
 def test_normality_of_what_cannot_be_tested(test) -> None:
     same, few = test([0.1] * 50), test([1.0, 2.0, 4.0])
-    assert (same.status, same.p, same.effect) == (Ended.CONSTANT, None, None)
-    assert (few.status, few.p, few.n) == (Ended.TOO_FEW, None, 3)
+    assert (same.status, same.p, same.effect) == (ComputationStatus.CONSTANT, None, None)
+    assert (few.status, few.p, few.n) == (ComputationStatus.TOO_FEW, None, 3)
     with pytest.raises(ValueError, match="finite"):
         test([1.0, 2.0, 3.0, np.nan])
 
@@ -458,7 +458,7 @@ def test_bland_and_altman_1986() -> None:
         (found.upper_limit_low, found.upper_limit_high),
     ):
         assert high - low == pytest.approx(69.2, rel=0.04)
-    assert (found.n, found.status) == (17, Ended.DONE)
+    assert (found.n, found.status) == (17, ComputationStatus.DONE)
 
 
 def test_exchanging_the_two_mirrors_the_agreement() -> None:
@@ -514,16 +514,16 @@ def test_spreads_are_comparable_within_a_factor_of_two(times: float, comparable:
 
 def test_agreement_of_one_and_the_same_difference_has_no_intervals() -> None:
     found = bland_altman([1.0, 2.0, 3.0, 4.0], [1.5, 2.5, 3.5, 4.5])
-    assert (found.status, found.bias, found.sd) == (Ended.CONSTANT, 0.5, 0.0)
+    assert (found.status, found.bias, found.sd) == (ComputationStatus.CONSTANT, 0.5, 0.0)
     assert (found.lower_limit, found.upper_limit) == (0.5, 0.5)
     assert found.bias_low is None
     assert found.upper_limit_high is None
-    assert found.proportional.status is Ended.CONSTANT
+    assert found.proportional.status is ComputationStatus.CONSTANT
 
 
 def test_agreement_of_two_pairs_is_too_few() -> None:
     found = bland_altman([1.0, 2.0], [1.5, 3.0])
-    assert (found.status, found.bias, found.lower_limit) == (Ended.TOO_FEW, None, None)
+    assert (found.status, found.bias, found.lower_limit) == (ComputationStatus.TOO_FEW, None, None)
     with pytest.raises(ValueError, match="finite"):
         bland_altman([1.0, np.nan, 3.0], [1.0, 2.0, 3.0])
 

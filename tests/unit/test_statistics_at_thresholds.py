@@ -9,7 +9,7 @@ from scipy.stats import norm
 from sweeps import sweep
 
 from spinepipe.statistics import (
-    Ended,
+    ComputationStatus,
     bland_altman,
     f_test_nested,
     kendall,
@@ -89,14 +89,14 @@ def test_how_p_of_groups_is_found_hangs_on_their_sizes(sizes: tuple[int, ...], h
 
 def test_a_group_of_a_single_value_is_said_to_be_too_small() -> None:
     """It was an error of a library's before."""
-    assert kruskal_wallis([[1.0], [2.0]]).status is Ended.TOO_FEW
+    assert kruskal_wallis([[1.0], [2.0]]).status is ComputationStatus.TOO_FEW
     for groups, alone in (([[1.0], [2.0, 3.0]], 1), ([[5.0], [1.0, 2.0, 3.0, 4.0], [9.0]], 2)):
         found = kruskal_wallis(groups)
-        assert (found.status, found.p) == (Ended.TOO_FEW, None)
+        assert (found.status, found.p) == (ComputationStatus.TOO_FEW, None)
         assert found.message.startswith(f"{alone} of {len(groups)} groups with a single value")
     least = kruskal_wallis([[1.0, 2.0], [3.0, 4.0]])
     assert least.p == pytest.approx(2.0 / 6.0)
-    assert least.status is Ended.DONE
+    assert least.status is ComputationStatus.DONE
 
 
 def test_signed_ranks_are_exact_up_to_fifty_differences() -> None:
@@ -124,11 +124,11 @@ def test_differences_are_told_apart_by_a_millionth_of_a_millionth(unit: float) -
 
 def test_three_pairs_are_enough_for_limits_of_agreement() -> None:
     found = bland_altman([1.0, 2.0, 3.0], [1.0, 2.5, 3.1])
-    assert (found.status, found.n) == (Ended.DONE, 3)
+    assert (found.status, found.n) == (ComputationStatus.DONE, 3)
     assert found.bias == pytest.approx(0.2)
     one, none = bland_altman([1.0], [2.0]), bland_altman([], [])
     assert (one.measured_sd, one.predicted_sd, one.comparable) == (None, None, False)
-    assert none.status is Ended.TOO_FEW
+    assert none.status is ComputationStatus.TOO_FEW
     two = bland_altman([1.0, 3.0], [2.0, 4.0])
     assert (two.measured_sd, two.predicted_sd) == pytest.approx((np.sqrt(2.0), np.sqrt(2.0)))
     assert two.comparable
@@ -141,7 +141,7 @@ def test_a_model_that_fits_worse_by_rounding_is_not_said_to() -> None:
     assert f_test_nested(4.0, 12, 4.0 * (1.0 + 1e-10), 10).message == "F(2, 10)"
     assert "worse" in f_test_nested(4.0, 12, 4.0 * (1.0 + 1e-8), 10).message
     assert f_test_nested(1.0, 0, 0.5, -2).n == 0
-    assert f_test_nested(1.0, 2, 0.5, 1).status is Ended.DONE
+    assert f_test_nested(1.0, 2, 0.5, 1).status is ComputationStatus.DONE
     assert f_test_nested(1.0, 2, 0.0, 1).n == 1
 
 
@@ -151,7 +151,7 @@ def test_what_is_as_normal_as_can_be_is_at_the_other_end_of_the_table() -> None:
     found = lilliefors_normality(norm.ppf((np.arange(40) + 0.5) / 40))
     assert found.message == "p at least 0.99"
     assert found.p == pytest.approx(0.99)
-    assert lilliefors_normality([1.0, 2.0, 4.0, 9.0]).status is Ended.DONE
+    assert lilliefors_normality([1.0, 2.0, 4.0, 9.0]).status is ComputationStatus.DONE
     between = lilliefors_normality([0.0, 1.0, 1.2, 3.0, 3.1, 7.0, 3.3])
     assert between.message == ""
 

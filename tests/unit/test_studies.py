@@ -11,7 +11,7 @@ from cohort_cases import Change, cell, joints, line, swap, text, without, write
 from sweeps import sweep
 
 from spinepipe import cohort
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
@@ -38,7 +38,7 @@ def project(root: Path, study: str = STUDY, *changes: Change) -> Path:
     return root
 
 
-def complaints(root: Path) -> tuple[Problem, ...]:
+def complaints(root: Path) -> tuple[InputProblem, ...]:
     """What checking the study complains about."""
     with pytest.raises(InputError) as caught:
         studies.check(root, "probe")

@@ -13,7 +13,7 @@ from installed import need_male
 from trunk_cases import made_up_trunk
 
 from spinepipe.frames import rotation_zxy
-from spinepipe.muscles.folder import Tables, source_of_folder
+from spinepipe.muscles.folder import SpecimenTables, source_of_folder
 from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY, SLICES, THORAX, Trunk
 
 ROUNDING_M = 1e-12
@@ -21,7 +21,7 @@ ABOVE = {f"T{n}T{n + 1}": n for n in range(10, 0, -1)}
 ORIGIN_MM = np.array([-98.0, 71.0, 0.0])
 
 
-def tables_of(trunk: Trunk) -> Tables:
+def tables_of(trunk: Trunk) -> SpecimenTables:
     """As a folder would hold the trunk, points in ground and L5S1 away from the origin."""
     at = dict(zip(LEVELS, trunk.joints, strict=True))
     top = trunk.joints[-1]
@@ -54,19 +54,19 @@ def tables_of(trunk: Trunk) -> Tables:
             "optimal_fibre_length_mm": muscles.fibre * 1e3,
         }
     )
-    return Tables(points, parameters, joints)
+    return SpecimenTables(points, parameters, joints)
 
 
 @pytest.fixture
-def tables() -> Tables:
+def tables() -> SpecimenTables:
     return tables_of(made_up_trunk())
 
 
-def read(tables: Tables, stress_pa: float | None = None) -> Trunk:
+def read(tables: SpecimenTables, stress_pa: float | None = None) -> Trunk:
     return source_of_folder("a folder", tables, stress_pa).trunk
 
 
-def in_frames(tables: Tables, turned_deg: tuple[float, float, float]) -> Tables:
+def in_frames(tables: SpecimenTables, turned_deg: tuple[float, float, float]) -> SpecimenTables:
     """The same with points in frames of their bodies: each displaced and turned, a rib on T12."""
     rib = tables.muscles["body"].where(tables.muscles["body"] != "T12", "rib12")
     turn = rotation_zxy(*np.radians(turned_deg))
@@ -83,7 +83,7 @@ def in_frames(tables: Tables, turned_deg: tuple[float, float, float]) -> Tables:
     return replace(tables, muscles=points, frames=pd.DataFrame(frames, columns=names))
 
 
-def test_a_trunk_comes_back_as_it_was_written(tables: Tables) -> None:
+def test_a_trunk_comes_back_as_it_was_written(tables: SpecimenTables) -> None:
     expected, found = made_up_trunk(), read(tables)
     np.testing.assert_allclose(found.joints, expected.joints, atol=ROUNDING_M)
     np.testing.assert_allclose(found.disc_tilt, expected.disc_tilt, atol=ROUNDING_M)
@@ -100,7 +100,9 @@ def test_a_trunk_comes_back_as_it_was_written(tables: Tables) -> None:
         )
 
 
-def test_what_tables_do_not_say_is_that_of_the_generic_male_at_this_height(tables: Tables) -> None:
+def test_what_tables_do_not_say_is_that_of_the_generic_male_at_this_height(
+    tables: SpecimenTables,
+) -> None:
     """Entered again: T1T2 is 450.66 mm above L5S1 in the male of Allaire 2020."""
     found = read(tables)
     at = tables.joints.set_index("joint")[["x_mm", "y_mm", "z_mm"]] / 1e3
@@ -114,7 +116,7 @@ def test_what_tables_do_not_say_is_that_of_the_generic_male_at_this_height(table
     assert found.arm_length == pytest.approx(0.6 * size)
 
 
-def test_vertebrae_lie_midway_between_their_joints(tables: Tables) -> None:
+def test_vertebrae_lie_midway_between_their_joints(tables: SpecimenTables) -> None:
     """T1, above which no joint is told, is as high as T2 and stands as its frame does: upright."""
     at = tables.joints.set_index("joint")[["x_mm", "y_mm", "z_mm"]] / 1e3
     at -= at.loc["L5S1"]
@@ -128,7 +130,7 @@ def test_vertebrae_lie_midway_between_their_joints(tables: Tables) -> None:
     np.testing.assert_allclose(found["T1"], upwards, atol=ROUNDING_M)
 
 
-def test_discs_are_as_high_and_wide_as_their_sources_say(tables: Tables) -> None:
+def test_discs_are_as_high_and_wide_as_their_sources_say(tables: SpecimenTables) -> None:
     """Entered again: mm, and shares of the area of L4L5, 1455 mm2 (Ghezelbash 2016)."""
     found = read(tables)
     high = {
@@ -147,13 +149,13 @@ def test_discs_are_as_high_and_wide_as_their_sources_say(tables: Tables) -> None
     np.testing.assert_allclose(found.disc_area, areas, rtol=1e-14)
 
 
-def test_points_in_frames_of_bodies_are_the_same_trunk(tables: Tables) -> None:
+def test_points_in_frames_of_bodies_are_the_same_trunk(tables: SpecimenTables) -> None:
     plain, framed = read(tables), read(in_frames(tables, (10.0, -20.0, 30.0)))
     np.testing.assert_allclose(framed.muscles.point, plain.muscles.point, atol=ROUNDING_M)
     np.testing.assert_array_equal(framed.muscles.body, plain.muscles.body)
 
 
-def test_cross_section_is_force_over_stress(tables: Tables) -> None:
+def test_cross_section_is_force_over_stress(tables: SpecimenTables) -> None:
     """The stress of the row goes before that of the call."""
     forces = tables.parameters.drop(columns="pcsa_mm2")
     forces["max_isometric_force_n"] = tables.parameters["pcsa_mm2"] * 0.5
@@ -164,7 +166,7 @@ def test_cross_section_is_force_over_stress(tables: Tables) -> None:
     np.testing.assert_allclose(read(rows, 0.5e6).muscles.pcsa, 2.0 * expected, rtol=1e-12)
 
 
-def test_a_muscle_on_the_wrong_side_is_mirrored_and_named(tables: Tables) -> None:
+def test_a_muscle_on_the_wrong_side_is_mirrored_and_named(tables: SpecimenTables) -> None:
     wrong = tables.muscles.copy()
     wrong.loc[wrong["muscle"] == "global_back_l", "z_mm"] *= -1.0
     source = source_of_folder("a folder", replace(tables, muscles=wrong))
@@ -174,7 +176,7 @@ def test_a_muscle_on_the_wrong_side_is_mirrored_and_named(tables: Tables) -> Non
     )
 
 
-def added(tables: Tables, name: str, group: str, bodies: tuple[str, str]) -> Tables:
+def added(tables: SpecimenTables, name: str, group: str, bodies: tuple[str, str]) -> SpecimenTables:
     """With one muscle more."""
     rows = [(name, k, body, 0.0, 400.0 + 9.0 * k, 80.0) for k, body in enumerate(bodies)]
     parameters = pd.DataFrame([{"muscle": name, "group": group, "side": "right", "pcsa_mm2": 9.0}])
@@ -193,13 +195,13 @@ def added(tables: Tables, name: str, group: str, bodies: tuple[str, str]) -> Tab
         ("transversus_abdominis", ("T9", "Abdomen"), "they end in the abdominal wall"),
     ],
 )
-def test_muscles_that_do_not_count_are_counted(tables: Tables, group, bodies, why) -> None:
+def test_muscles_that_do_not_count_are_counted(tables: SpecimenTables, group, bodies, why) -> None:
     source = source_of_folder("a folder", added(tables, "further", group, bodies))
     assert f"1 of 45 muscles are left out: {why}" in source.remarks
     assert "further" not in source.trunk.muscles.names
 
 
-def test_iliocostalis_that_reaches_ribs_is_its_thoracic_part(tables: Tables) -> None:
+def test_iliocostalis_that_reaches_ribs_is_its_thoracic_part(tables: SpecimenTables) -> None:
     more = added(tables, "lumbar", "iliocostalis_lumborum", ("S1", "L2"))
     more = added(more, "thoracic", "iliocostalis_lumborum", ("S1", "T9"))
     muscles = read(more).muscles
@@ -208,12 +210,12 @@ def test_iliocostalis_that_reaches_ribs_is_its_thoracic_part(tables: Tables) -> 
     assert of["thoracic"] == ("iliocostalis_thoracis", True)
 
 
-def refused(tables: Tables, message: str) -> None:
+def refused(tables: SpecimenTables, message: str) -> None:
     with pytest.raises(ValueError, match=re.escape(message)):
         read(tables)
 
 
-def test_what_is_missing_is_told(tables: Tables) -> None:
+def test_what_is_missing_is_told(tables: SpecimenTables) -> None:
     joints = tables.joints[tables.joints["joint"] != "T3T4"]
     refused(replace(tables, joints=joints), "joints of a trunk are missing: T3T4")
     bare = tables.parameters.drop(columns="pcsa_mm2")
@@ -235,7 +237,7 @@ def male():
         pd.read_csv(folder / f"{name}.csv")
         for name in ("muscles", "muscle_parameters", "joints", "body_frames")
     ]
-    return source_of_folder("thoracolumbar_male", Tables(*tables), 1.0e6)
+    return source_of_folder("thoracolumbar_male", SpecimenTables(*tables), 1.0e6)
 
 
 def test_the_generic_male_runs_as_it_stands(male) -> None:

@@ -13,7 +13,7 @@ from statsmodels.stats.anova import anova_lm
 from sweeps import sweep
 
 from spinepipe.sensitivity.shares import mean_squares, share_intervals, variance_shares
-from spinepipe.statistics import Ended
+from spinepipe.statistics import ComputationStatus
 
 PARTS = ("row", "column", "interaction", "total_row", "total_column")
 
@@ -140,7 +140,7 @@ def test_a_product_of_centred_effects_is_all_interaction() -> None:
     found = variance_shares(np.outer([-1.0, 0.0, 1.0, 2.0, -2.0], [-1.0, 0.0, 1.0]))
     assert estimates(found).tolist() == [0.0, 0.0, 1.0, 1.0, 1.0]
     assert found.message == "negative row and column component set to 0"
-    assert found.status is Ended.DONE
+    assert found.status is ComputationStatus.DONE
 
 
 def test_columns_alone_are_all_of_the_variance() -> None:
@@ -182,7 +182,7 @@ def test_shares_add_up_and_lie_in_their_intervals() -> None:
 
 def test_a_constant_grid_has_no_shares() -> None:
     found = variance_shares(np.full((5, 4), 0.1))
-    assert (found.status, found.row, found.total_column) == (Ended.CONSTANT, None, None)
+    assert (found.status, found.row, found.total_column) == (ComputationStatus.CONSTANT, None, None)
     assert (found.n_rows, found.n_columns) == (5, 4)
 
 
@@ -191,24 +191,24 @@ def test_variance_in_one_row_or_column_only_cannot_be_shared(where) -> None:
     grid = np.full((5, 4), 0.1)
     grid[where] += np.arange(1.0, 1.0 + grid[where].size).reshape(np.shape(grid[where]))
     found = variance_shares(grid)
-    assert (found.status, found.row) == (Ended.CONSTANT, None)
+    assert (found.status, found.row) == (ComputationStatus.CONSTANT, None)
     assert "but for one" in found.message
     grid[3, 0] += 1.0
     grid[1, 3] += 1.0
-    assert variance_shares(grid).status is Ended.DONE
+    assert variance_shares(grid).status is ComputationStatus.DONE
 
 
 @sweep("shape", [(2, 10), (10, 2)])
 def test_two_rows_or_columns_are_too_few(shape) -> None:
     found = variance_shares(np.random.default_rng(8).normal(size=shape))
-    assert (found.status, found.interaction) == (Ended.TOO_FEW, None)
+    assert (found.status, found.interaction) == (ComputationStatus.TOO_FEW, None)
     assert (found.n_rows, found.n_columns) == shape
     assert found.message.startswith(f"grid of {shape[0]} x {shape[1]};")
 
 
 def test_three_by_three_are_enough() -> None:
     grid = np.random.default_rng(20050).normal(size=(3, 3))
-    assert variance_shares(grid).status is Ended.DONE
+    assert variance_shares(grid).status is ComputationStatus.DONE
 
 
 @sweep("grid", [np.ones(5), np.full((4, 4), np.nan)])

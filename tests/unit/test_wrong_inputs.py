@@ -12,7 +12,7 @@ import pytest
 from sweeps import sweep
 
 from spinepipe import problems
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from tests.cases.spoilt_cases import MOST_TOLD, Seen, Verdict, asked, look, look_at, looked, verdict
 from tests.generators.spoilt.case import Case, Expected
 from tests.generators.spoilt.catalogue import cases
@@ -131,9 +131,11 @@ def test_unknown_names_are_compared_a_few_times(what, file, tmp_path, monkeypatc
 
 
 def test_problems_of_one_input_fit_on_a_few_pages() -> None:
-    wordy = [Problem(f"f{n}", n, f"c{n}", "x" * 150, "y" * 1400, "z" * 1400) for n in range(900)]
+    wordy = [
+        InputProblem(f"f{n}", n, f"c{n}", "x" * 150, "y" * 1400, "z" * 1400) for n in range(900)
+    ]
     error = InputError(wordy)
     assert len(str(error)) < problems.MOST_CHARACTERS + 5000
     assert sum(1 + problem.others for problem in error.problems) == 900
-    one = InputError([Problem("f", 1, "c", "x", "y" * 10**6, "z")])
+    one = InputError([InputProblem("f", 1, "c", "x", "y" * 10**6, "z")])
     assert len(str(one)) < 5000

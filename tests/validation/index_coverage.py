@@ -8,7 +8,7 @@ import pandas as pd
 from SALib.analyze import fast
 
 from spinepipe.sensitivity.global_indices.design import Design, draw
-from spinepipe.sensitivity.global_indices.estimates import Index, Settings
+from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
 from spinepipe.sensitivity.global_indices.indices import indices
 from tests.cases.known_indices import FUNCTIONS, KnownFunction, morris_truth
 
@@ -67,7 +67,7 @@ def _truth(function: KnownFunction) -> Truth:
     return {**function.truth, **first}
 
 
-def _row(index: Index, seed: int, truth: Truth) -> dict[str, object]:
+def _row(index: SensitivityIndex, seed: int, truth: Truth) -> dict[str, object]:
     key = (index.index, index.factor, index.other)
     ends = {"low": index.low.item(), "high": index.high.item()}
     return _named(key, seed, truth) | ends | {"estimate": index.estimate.item()}

@@ -28,7 +28,7 @@ from spinepipe.studies.tracking.approaches_of_trials import BOTH
 from spinepipe.studies.tracking.kind import KIND
 from spinepipe.studies.tracking.moved import Moved
 from spinepipe.studies.tracking.off_truth import Bones, errors_of
-from spinepipe.studies.tracking.persons import Person, person_of, ratio_sets
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of, ratio_sets
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, held_in, profiled, verdict
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.truth import Truth, truths
@@ -78,7 +78,7 @@ class Made:
     def __init__(self, one: Subject, folder: Path) -> None:
         write(one.wanted, [one], folder)
         self.cohort = read(folder, KIND.forms)
-        self.person: Person = person_of(self.cohort, one.name, folder)
+        self.person: TrackedPerson = person_of(self.cohort, one.name, folder)
         self.bones = Bones(self.person.skeleton, self.person.centres)
         self.truths: dict[str, Truth] = {
             truth.trial: truth for truth in truths(dict(self.cohort.further))

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.trajectory import SMALL, Solved, solve
+from spinepipe.motion.trajectory import SMALL, OptimalMotions, solve
 from spinepipe.progress import Progress
 from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import trials_of_law
@@ -49,7 +49,7 @@ def table() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _row(first: Solved, again: Solved, others: list[Solved]) -> Row:
+def _row(first: OptimalMotions, again: OptimalMotions, others: list[OptimalMotions]) -> Row:
     found = [first, again, *others]
     ended = [one for one in found if one.status.usable]
     optima = list(_apart(ended))
@@ -66,9 +66,9 @@ def _row(first: Solved, again: Solved, others: list[Solved]) -> Row:
     }
 
 
-def _apart(found: list[Solved]) -> Iterator[Solved]:
+def _apart(found: list[OptimalMotions]) -> Iterator[OptimalMotions]:
     """One of each optimum, the lowest first."""
-    known: list[Solved] = []
+    known: list[OptimalMotions] = []
     for one in sorted(found, key=lambda one: one.costs.total):
         if all(np.abs(one.parameters - other.parameters).max() > SAME for other in known):
             known.append(one)

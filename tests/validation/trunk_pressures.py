@@ -14,14 +14,14 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import read
-from spinepipe.muscles.folder import Tables, source_of_folder
+from spinepipe.muscles.folder import SpecimenTables, source_of_folder
 from spinepipe.muscles.settle import held
 from spinepipe.muscles.trunk import Trunk
 from spinepipe.progress import Progress
 from spinepipe.studies.subjects import SUBJECTS, subject_of
 from spinepipe.studies.trunk_loads.forms import TASKS
 from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
-from spinepipe.studies.trunk_loads.settings import TrunkLoads, Volunteer
+from spinepipe.studies.trunk_loads.settings import TrunkLoads, VolunteerSettings
 from spinepipe.studies.trunk_loads.tune import rows_of, volunteer_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,7 +33,7 @@ SETTINGS = TrunkLoads(
     study="trunk_volunteers",
     kind="trunk_loads",
     cohort="trunk_volunteers",
-    volunteer=Volunteer(specimen="volunteer"),
+    volunteer=VolunteerSettings(specimen="volunteer"),
 )
 
 
@@ -47,7 +47,7 @@ def male() -> Trunk | None:
     if not MALE.is_dir():
         return None
     frames = (pd.read_csv(MALE / f"{name}.csv") for name in _FILES)
-    return source_of_folder("thoracolumbar_male", Tables(*frames), MALE_STRESS_PA).trunk
+    return source_of_folder("thoracolumbar_male", SpecimenTables(*frames), MALE_STRESS_PA).trunk
 
 
 _FILES = ("muscles", "muscle_parameters", "joints", "body_frames")

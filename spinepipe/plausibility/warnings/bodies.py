@@ -9,10 +9,10 @@ import pandas as pd
 from spinepipe.cohort.answers import typical
 from spinepipe.cohort.check_geometry import INERTIA
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.plausibility.score import BETTER, Hypothesis, suspect, usual
+from spinepipe.plausibility.score import BETTER, MistakeHypothesis, suspect, usual
 from spinepipe.plausibility.warnings.levels import least_kg
 from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
-from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, first_row, warn
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, first_row, warn
 
 
 def masses(cohort: Cohort, poses: Sequence[NeutralPose]) -> Iterator[PlausibilityWarning]:
@@ -22,7 +22,7 @@ def masses(cohort: Cohort, poses: Sequence[NeutralPose]) -> Iterator[Plausibilit
     table = cohort.bodies[cohort.bodies["vertebra"] != cohort.vertebrae[0]]
     exchanged = {pose.specimen: one for pose in poses for one in _exchanged(cohort, pose)}
     yield from exchanged.values()
-    in_unit: dict[Hypothesis | None, list[str]] = defaultdict(list)
+    in_unit: dict[MistakeHypothesis | None, list[str]] = defaultdict(list)
     for specimen, own in table.groupby("specimen", sort=False):
         if specimen in exchanged:
             continue
@@ -34,7 +34,7 @@ def masses(cohort: Cohort, poses: Sequence[NeutralPose]) -> Iterator[Plausibilit
             in_unit[suspect("body_mass", size, "body_mass")].append(str(specimen))
     for unit, names in in_unit.items():
         own = table[table["specimen"].isin(names)]
-        place = Place("bodies", first_row(cohort, "bodies", specimen=names[0]), "mass_kg")
+        place = TableCell("bodies", first_row(cohort, "bodies", specimen=names[0]), "mass_kg")
         remedy = unit.mend() if unit else None
         yield warn(
             cohort,
@@ -59,7 +59,7 @@ def _single(cohort: Cohort, own: pd.DataFrame) -> Iterator[PlausibilityWarning]:
             yield warn(
                 cohort,
                 "one_body_mass",
-                Place("bodies", row, "mass_kg"),
+                TableCell("bodies", row, "mass_kg"),
                 mass=mass,
                 vertebra=vertebra,
                 least=least,
@@ -80,7 +80,7 @@ def _gyration(cohort: Cohort, own: pd.DataFrame) -> Iterator[PlausibilityWarning
         yield warn(
             cohort,
             "gyration",
-            Place("bodies", row, INERTIA[0]),
+            TableCell("bodies", row, INERTIA[0]),
             remedy=remedy,
             radius=radius[row],
             whose=[own["specimen"].iloc[0]],
@@ -101,7 +101,7 @@ def _exchanged(cohort: Cohort, pose: NeutralPose) -> Iterator[PlausibilityWarnin
         yield warn(
             cohort,
             "mass_exchanged",
-            Place("bodies", own.index[0], "mass_kg"),
+            TableCell("bodies", own.index[0], "mass_kg"),
             low=mass.min(),
             high=mass.max(),
             whose=[pose.specimen],
@@ -119,12 +119,12 @@ def persons_of_specimens(cohort: Cohort) -> Iterator[PlausibilityWarning]:
         for row, (who, size) in enumerate(
             zip(cohort.specimens["specimen"], numbers.to_numpy(float), strict=True)
         ):
-            yield from person(cohort, Place("specimens", row, columns[0]), who, 1.0, *size)
+            yield from person(cohort, TableCell("specimens", row, columns[0]), who, 1.0, *size)
 
 
 def person(
     cohort: Cohort,
-    place: Place,
+    place: TableCell,
     who: str,
     per_m: float,
     height_m: float,

@@ -12,7 +12,7 @@ from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.cohort.supports import PRESCRIBED
 from spinepipe.plausibility.score import suspect, table, usual
-from spinepipe.plausibility.warnings.warning import PACKAGE, Place, PlausibilityWarning, warn
+from spinepipe.plausibility.warnings.warning import PACKAGE, PlausibilityWarning, TableCell, warn
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 FORCES = ["fx_n", "fy_n", "fz_n"]
@@ -58,7 +58,7 @@ def _beyond(
     return warn(
         cohort,
         quantity,
-        Place(check["table"], row, str(sizes.loc[row].idxmax())),
+        TableCell(check["table"], row, str(sizes.loc[row].idxmax())),
         remedy=unit and unit.mend(mended=f"{value * unit.factor:.3g}", columns=names),
         certain=quantity.endswith("_sd") and not usual("any_sd").holds(value),
         value=value,
@@ -76,7 +76,7 @@ def declared_errors(cohort: Cohort) -> Warnings:
     told = {} if cohort.measurement_sd is None else cohort.measurement_sd.model_dump()
     for name, sd in told.items():
         if sd is not None and not usual(f"{name}_sd").holds(sd):
-            place = Place(COHORT_YAML, None, f"measurement_sd.{name}")
+            place = TableCell(COHORT_YAML, None, f"measurement_sd.{name}")
             sure = not usual("any_sd").holds(sd)
             yield warn(
                 cohort, "reading_sd", place, certain=sure, value=sd, range=usual(f"{name}_sd")
@@ -96,7 +96,7 @@ def rigs(cohort: Cohort) -> Warnings:
         if up.any() and up.sum() == (size > 0.0).sum():
             row = int(np.argmax(up))
             yield warn(
-                cohort, "preload_pulls", Place("preload", row, FORCES[1]), value=forces[row, 1]
+                cohort, "preload_pulls", TableCell("preload", row, FORCES[1]), value=forces[row, 1]
             )
     if cohort.supports is not None and cohort.motion is not None:
         yield from _prescribed(cohort, cohort.supports, cohort.motion)
@@ -113,5 +113,5 @@ def _prescribed(cohort: Cohort, supports: pd.DataFrame, motion: pd.DataFrame) ->
         size = sizes.max() if len(sizes) else 0.0
         if size > 0.0 and not usual(f"prescribed_{kind}").holds(size) and coordinate not in told:
             told.add(coordinate)
-            place = Place("motion", sizes.idxmax(), column)
+            place = TableCell("motion", sizes.idxmax(), column)
             yield warn(cohort, f"prescribed_{kind}", place, value=size, test=test)

@@ -21,9 +21,9 @@ from spinepipe.plausibility.score import BETTER, hypotheses, suspect, usual
 from spinepipe.plausibility.warnings.levels import height_mm, spacing_mm
 from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
 from spinepipe.plausibility.warnings.warning import (
-    Found,
-    Place,
     PlausibilityWarning,
+    TableCell,
+    WarningGroup,
     first_row,
     warn,
 )
@@ -53,7 +53,7 @@ def stem_of_joints(cohort: Cohort) -> str:
 # --- sizes of vertebrae ---------------------------------------------------------------------------
 
 
-def sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> Found:
+def sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> WarningGroup:
     """Vertebrae of a size that no spine has: all of a specimen, or one between its neighbours."""
     whole: dict[Any, dict[str, float]] = defaultdict(dict)
     single: dict[str, list[PlausibilityWarning]] = {}
@@ -70,7 +70,7 @@ def sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> Found:
     found = [one for warnings in single.values() for one in warnings]
     for unit, own in whole.items():
         stem = stem_of_joints(cohort)
-        place = Place(stem, first_row(cohort, stem, specimen=next(iter(own))), XYZ[0])
+        place = TableCell(stem, first_row(cohort, stem, specimen=next(iter(own))), XYZ[0])
         remedy = unit and unit.mend(what="lengths", columns=", ".join(XYZ))
         found.append(
             warn(
@@ -83,7 +83,7 @@ def sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> Found:
                 size=typical(list(own.values())),
             )
         )
-    return Found.of(found, [*single, *(name for own in whole.values() for name in own)])
+    return WarningGroup.of(found, [*single, *(name for own in whole.values() for name in own)])
 
 
 def _spacings(pose: NeutralPose) -> dict[str, float]:
@@ -125,7 +125,9 @@ def _odd_vertebrae(
         if not usual("vertebra_size").holds(ratio / size):
             joint = cohort.joint_names[cohort.vertebrae.index(vertebra) - 1]
             named = {"vertebra": vertebra} if stem == "landmarks" else {"joint": joint}
-            place = Place(stem, first_row(cohort, stem, specimen=pose.specimen, **named), XYZ[1])
+            place = TableCell(
+                stem, first_row(cohort, stem, specimen=pose.specimen, **named), XYZ[1]
+            )
             yield warn(
                 cohort, "vertebra_size", place, whose=[pose.specimen], vertebra=vertebra, size=ratio
             )
@@ -172,7 +174,7 @@ def points(cohort: Cohort, poses: Sequence[NeutralPose]) -> Iterator[Plausibilit
             yield warn(
                 cohort,
                 f"{stem}_away",
-                Place(stem, lines[0], one.column),
+                TableCell(stem, lines[0], one.column),
                 remedy=one.remedy,
                 certain=one.certain,
                 whose=[name for _, name, _ in found],

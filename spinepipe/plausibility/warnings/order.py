@@ -15,7 +15,7 @@ from spinepipe.cohort.load_tests import DRIVEN
 from spinepipe.cohort.loaded_cycles import LoadedCycle
 from spinepipe.effects.contract import Array
 from spinepipe.plausibility.score import AGAINST
-from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, first_row, warn
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, first_row, warn
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 FOLLOWS, BEST = 0.75, 0.95
@@ -79,7 +79,9 @@ def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
 
 def _warning(cohort: Cohort, key: _Order, places: Sequence[Where]) -> PlausibilityWarning:
     specimen, test = places[0]
-    place = Place(key.stem, first_row(cohort, key.stem, specimen=specimen, test=test), key.column)
+    place = TableCell(
+        key.stem, first_row(cohort, key.stem, specimen=specimen, test=test), key.column
+    )
     return warn(cohort, key.warning, place, whose=dict(places), tests=tests_of(places), **key.names)
 
 

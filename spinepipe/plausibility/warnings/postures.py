@@ -28,9 +28,9 @@ from spinepipe.plausibility.warnings.lengths import stem_of_joints
 from spinepipe.plausibility.warnings.levels import EXTENSION_DEG, extension_range_deg, is_level
 from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
 from spinepipe.plausibility.warnings.warning import (
-    Found,
-    Place,
     PlausibilityWarning,
+    TableCell,
+    WarningGroup,
     first_row,
     warn,
 )
@@ -48,7 +48,7 @@ _Told = tuple[str, str, bool]
 """Remedy, column, and whether a joint lies below the one that it should be above."""
 
 
-def postures(cohort: Cohort, poses: list[NeutralPose]) -> Found:
+def postures(cohort: Cohort, poses: list[NeutralPose]) -> WarningGroup:
     """Axes and order of joints, where vertebrae are levels of the spine."""
     told: dict[_Told, list[str]] = defaultdict(list)
     single: dict[str, list[PlausibilityWarning]] = {}
@@ -66,15 +66,15 @@ def postures(cohort: Cohort, poses: list[NeutralPose]) -> Found:
         place = _place(cohort, names[0], cohort.joint_names[0], column)
         name = "joint_below" if upset else "axes_off_line"
         found.append(warn(cohort, name, place, remedy=remedy, whose=names))
-    return Found.of(found, [*single, *(name for names in told.values() for name in names)])
+    return WarningGroup.of(found, [*single, *(name for names in told.values() for name in names)])
 
 
-def _place(cohort: Cohort, specimen: str, joint: str, column: str | None) -> Place:
+def _place(cohort: Cohort, specimen: str, joint: str, column: str | None) -> TableCell:
     """The first row of a joint or, of landmarks, of its upper vertebra."""
     stem = stem_of_joints(cohort)
     upper = cohort.vertebrae[cohort.joint_names.index(joint) + 1]
     named = {"joint": joint} if stem == "joints" else {"vertebra": upper}
-    return Place(stem, first_row(cohort, stem, specimen=specimen, **named), column)
+    return TableCell(stem, first_row(cohort, stem, specimen=specimen, **named), column)
 
 
 def _upward(pose: NeutralPose) -> tuple[Array, Array]:
@@ -232,7 +232,7 @@ def _axes(cohort: Cohort, pose: NeutralPose) -> Iterator[PlausibilityWarning]:
 # --- landmarks ------------------------------------------------------------------------------------
 
 
-def exchanged_landmarks(cohort: Cohort) -> Found:
+def exchanged_landmarks(cohort: Cohort) -> WarningGroup:
     """Landmarks that make a spine once two columns, a sign, sides or names are exchanged."""
     told: dict[tuple[str, str], list[str]] = defaultdict(list)
     for specimen in cohort.specimen_names if cohort.landmarks is not None else ():
@@ -245,16 +245,16 @@ def exchanged_landmarks(cohort: Cohort) -> Found:
         warn(
             cohort,
             "landmarks_of_no_spine",
-            Place("landmarks", first_row(cohort, "landmarks", specimen=names[0]), column),
+            TableCell("landmarks", first_row(cohort, "landmarks", specimen=names[0]), column),
             remedy=remedy,
             whose=names,
         )
         for (remedy, column), names in told.items()
     ]
-    return Found.of(warnings, [name for names in told.values() for name in names])
+    return WarningGroup.of(warnings, [name for names in told.values() for name in names])
 
 
-def shapes(cohort: Cohort, left_out: Container[str]) -> Found:
+def shapes(cohort: Cohort, left_out: Container[str]) -> WarningGroup:
     """Vertebrae whose four landmarks are those of no vertebra, one line for each fault."""
     found: dict[str, list[tuple[str, str]]] = defaultdict(list)
     for specimen in cohort.specimen_names if cohort.landmarks is not None else ():
@@ -268,8 +268,10 @@ def shapes(cohort: Cohort, left_out: Container[str]) -> Found:
         specimen, vertebra = places[0]
         row = first_row(cohort, "landmarks", specimen=specimen, vertebra=vertebra)
         shown = ", ".join(f"{v} of {s}" for s, v in places[:3]) + (", …" if places[3:] else "")
-        warnings.append(warn(cohort, fault, Place("landmarks", row, XYZ[0]), where=shown))
-    return Found.of(warnings, [specimen for places in found.values() for specimen, _ in places])
+        warnings.append(warn(cohort, fault, TableCell("landmarks", row, XYZ[0]), where=shown))
+    return WarningGroup.of(
+        warnings, [specimen for places in found.values() for specimen, _ in places]
+    )
 
 
 def _fault(points: Mapping[str, Array]) -> str | None:
@@ -305,4 +307,6 @@ def sides(cohort: Cohort, left_out: Container[str]) -> Iterator[PlausibilityWarn
         to_the_right = length > 0.0 and float(np.sum(across, axis=0)[2]) >= ACROSS * length
         if length > 0.0 and not to_the_right and specimen not in left_out:
             row = first_row(cohort, "landmarks", specimen=specimen)
-            yield warn(cohort, "sides_exchanged", Place("landmarks", row, XYZ[2]), whose=[specimen])
+            yield warn(
+                cohort, "sides_exchanged", TableCell("landmarks", row, XYZ[2]), whose=[specimen]
+            )

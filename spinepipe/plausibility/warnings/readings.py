@@ -15,7 +15,7 @@ from spinepipe.cohort.load_tests import DRIVEN
 from spinepipe.plausibility.score import suspect, usual
 from spinepipe.plausibility.warnings.columns import beyond_ranges, declared_errors
 from spinepipe.plausibility.warnings.lengths import COLUMNS
-from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, warn
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
 from spinepipe.units import COORDINATE_COLUMNS
 
 LOADS = ["fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm"]
@@ -95,7 +95,7 @@ def feeble(cohort: Cohort) -> Warnings:
     tested = usual("tested_with_force").holds(force) or usual("tested_with_moment").holds(moment)
     if tested and turned > 0.0 and not usual("largest_rotation").holds(turned):
         row = int(np.argmax(sizes.max(axis=1)))
-        place = Place("motion", row, str(sizes.iloc[row].idxmax()))
+        place = TableCell("motion", row, str(sizes.iloc[row].idxmax()))
         yield warn(cohort, "largest_rotation", place, value=turned)
     for column in READ:
         read = motion[column].dropna().abs()
@@ -104,7 +104,7 @@ def feeble(cohort: Cohort) -> Warnings:
         if len(read) >= 8 and float(read.max()) < SHARE_OF_SD * error:
             turns = column.endswith("_deg")
             name = "rotations_below_sd" if turns else "translations_below_sd"
-            place = Place("motion", read.index[0], column)
+            place = TableCell("motion", read.index[0], column)
             yield warn(cohort, name, place, value=read.max(), sd=error)
 
 
@@ -123,7 +123,7 @@ def _repeated(cohort: Cohort) -> Warnings:
             values = table[first]
             given = values.notna() & (values != 0.0)
             if values.equals(table[second]) and values[given].nunique() > 1:
-                place = Place(stem, given.idxmax(), second)
+                place = TableCell(stem, given.idxmax(), second)
                 yield warn(cohort, "column_repeated", place, group=group, first=first)
 
 
@@ -139,7 +139,7 @@ def _unloaded(cohort: Cohort, motion: pd.DataFrame, loads: pd.DataFrame) -> Warn
         loaded = (rows[[*LOADS, "follower_n"]].fillna(0.0) != 0.0).any(axis=None)
         moved = motion.loc[motion["test"] == test, READ].fillna(0.0).ne(0.0).any(axis=None)
         if moved and not loaded and not _held(cohort, test):
-            place = Place("loads", rows.index[0], f"{LOADS[0]} to {LOADS[-1]}")
+            place = TableCell("loads", rows.index[0], f"{LOADS[0]} to {LOADS[-1]}")
             yield warn(cohort, "motion_without_load", place, count=len(rows), test=test)
 
 
@@ -148,7 +148,7 @@ def _unmoved(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
     for (specimen, test), rows in motion.groupby(["specimen", "test"], sort=False):
         later = rows.loc[rows["step"] > 0, READ]
         if later.notna().any(axis=None) and not later.fillna(0.0).ne(0.0).any(axis=None):
-            place = Place("motion", rows.index[0], str(later.notna().any().idxmax()))
+            place = TableCell("motion", rows.index[0], str(later.notna().any().idxmax()))
             yield warn(cohort, "load_without_motion", place, whose=[specimen], test=test)
 
 
@@ -159,7 +159,7 @@ def _read_unloaded(cohort: Cohort, motion: pd.DataFrame, loads: pd.DataFrame) ->
         own = motion[motion["test"] == test]
         read = own[own[READ].fillna(0.0).ne(0.0).any(axis=1)]
         if loaded and len(read) and not read["step"].isin(loaded).any() and not _held(cohort, test):
-            place = Place("motion", read.index[0], "step")
+            place = TableCell("motion", read.index[0], "step")
             yield warn(cohort, "motion_at_unloaded_steps", place, test=test)
 
 
@@ -176,7 +176,7 @@ def _constant(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
                 told[str(specimen)] = read
         if told:
             read = next(iter(told.values()))
-            place, value = Place("motion", read.index[0], column), read.iloc[0]
+            place, value = TableCell("motion", read.index[0], column), read.iloc[0]
             yield warn(cohort, "column_constant", place, value=value, count=len(read), whose=told)
 
 
@@ -186,7 +186,7 @@ def _never(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
     for column in READ[3:] if moved else ():
         read = motion[column].dropna()
         if len(read) and column not in moved and (motion.loc[read.index, "step"] > 0).any():
-            place = Place("motion", read.index[0], column)
+            place = TableCell("motion", read.index[0], column)
             yield warn(cohort, "column_zero", place, count=len(read))
 
 
@@ -200,7 +200,7 @@ def _absurd(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
         beyond = motion.index[motion[column].abs() > most]
         if len(beyond):
             more = f" and {len(beyond) - 1} more so large" if len(beyond) > 1 else ""
-            place, value = Place("motion", beyond[0], column), motion.loc[beyond[0], column]
+            place, value = TableCell("motion", beyond[0], column), motion.loc[beyond[0], column]
             yield warn(cohort, "reading_absurd", place, value=value, more=more, limit=limit)
 
 
@@ -216,11 +216,13 @@ def _step_0(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
             end = motion.loc[last, READ].abs()
             turned = bool(end.notna().any(axis=None) and not (end > ZERO).any(axis=None))
             name = "step_0_at_the_end" if turned else "step_0_not_zero"
-            yield warn(cohort, name, Place("motion", row, column), value=motion.loc[row, column])
+            yield warn(
+                cohort, name, TableCell("motion", row, column), value=motion.loc[row, column]
+            )
         return
     cycles = len(motion.loc[size.index, _CYCLE].drop_duplicates())
     if cycles >= CYCLES and cohort.measurement_sd and not (size > 0.0).any():
-        yield warn(cohort, "step_0_zero", Place("motion", size.index[0], "step"), cycles=cycles)
+        yield warn(cohort, "step_0_zero", TableCell("motion", size.index[0], "step"), cycles=cycles)
 
 
 # --- single readings and series -------------------------------------------------------------------
@@ -240,7 +242,7 @@ def _slips(cohort: Cohort, stem: str, table: pd.DataFrame, columns: Sequence[str
                 yield warn(
                     cohort,
                     "slip",
-                    Place(stem, row, column),
+                    TableCell(stem, row, column),
                     group="loads" if stem == "loads" else "motion",
                     whose=[specimen],
                     test=test,
@@ -259,7 +261,7 @@ def _times(cohort: Cohort, loads: pd.DataFrame) -> Warnings:
     steps = steps[steps > 0.0]
     if len(steps) and not usual("time_step").holds(typical := float(steps.median())):
         unit = suspect("time_step", typical, "time_step")
-        place = Place("loads", steps.index[0], "time_s")
+        place = TableCell("loads", steps.index[0], "time_s")
         yield warn(cohort, "time_step", place, remedy=unit and unit.mend(), value=typical)
 
 
@@ -275,7 +277,7 @@ def _silent(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
             if joint not in told:
                 told.add(joint)
                 own = rows[rows["joint"] == joint]
-                place = Place("motion", own.index[0], str(own[READ].notna().any().idxmax()))
+                place = TableCell("motion", own.index[0], str(own[READ].notna().any().idxmax()))
                 yield warn(cohort, "joint_silent", place, whose=[specimen], joint=joint, test=test)
 
 
@@ -295,7 +297,7 @@ def _copies(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
         if which is not None and which not in told:
             told.add(which)
             said = [f"{one[0]}, test {one[1]}, cycle {one[2]}" for one in (first, place)]
-            at = Place("motion", rows.index[0], which)
+            at = TableCell("motion", rows.index[0], which)
             yield warn(cohort, "readings_copied", at, first=said[0], second=said[1])
 
 
@@ -307,5 +309,5 @@ def _unsigned(cohort: Cohort, motion: pd.DataFrame, loads: pd.DataFrame) -> Warn
         both = loads[moment].min() <= -0.5 * large and loads[moment].max() >= 0.5 * large
         turned = motion.loc[motion[column].fillna(0.0) != 0.0, column]
         if large > 0.0 and both and len(turned) >= COPIED and (turned > 0.0).all():
-            place, count = Place("motion", turned.index[0], column), len(turned)
+            place, count = TableCell("motion", turned.index[0], column), len(turned)
             yield warn(cohort, "signs_lost", place, count=count, moment=moment, column=column)

@@ -17,16 +17,16 @@ from math import log, sqrt
 import numpy as np
 
 from spinepipe.anatomy.stiffness_range import plausible, range_of_level
-from spinepipe.cohort.answers import Answer, answers_of_test, typical
+from spinepipe.cohort.answers import LoadResponse, answers_of_test, typical
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.load_tests import DRIVEN, PUSHED
 from spinepipe.cohort.loaded_cycles import LoadedCycle
 from spinepipe.plausibility.motion_size import geometric_mean, is_plausible, unit_like
-from spinepipe.plausibility.score import AGAINST, CLEAR, Hypothesis, usual
+from spinepipe.plausibility.score import AGAINST, CLEAR, MistakeHypothesis, usual
 from spinepipe.plausibility.warnings.order import tests_of
 from spinepipe.plausibility.warnings.warning import (
-    Place,
     PlausibilityWarning,
+    TableCell,
     file_of,
     first_row,
     warn,
@@ -71,7 +71,7 @@ class _Response:
         below 0 where it goes against its load.
     """
 
-    answer: Answer
+    answer: LoadResponse
     joint: str
     ratio: float
 
@@ -115,7 +115,7 @@ def responses(
             yield warn(
                 cohort,
                 "motion_against_name",
-                Place("motion", row, column),
+                TableCell("motion", row, column),
                 whose=[place[0]],
                 test=place[1],
                 column=column,
@@ -136,7 +136,9 @@ def _responses(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Iterator[_Respo
 
 def _sizes(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWarning]:
     """Motion that is too large or too small for its load, grouped by what may be behind it."""
-    found: dict[tuple[str, Hypothesis | None], list[tuple[str, str, float]]] = defaultdict(list)
+    found: dict[tuple[str, MistakeHypothesis | None], list[tuple[str, str, float]]] = defaultdict(
+        list
+    )
     for specimen in cohort.specimen_names:
         own = [one for one in told if one.answer.specimen == specimen]
         for (_, test, coordinate), ratio, unit in _of_specimen(own):
@@ -149,7 +151,7 @@ def _sizes(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
         yield warn(
             cohort,
             "motion_over_expected",
-            Place(stem, row, column),
+            TableCell(stem, row, column),
             remedy=unit and unit.mend(),
             whose=[name for name, *_ in places],
             tests=tests_of(places),
@@ -160,7 +162,7 @@ def _sizes(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
 
 def _of_specimen(
     told: Sequence[_Response],
-) -> Iterator[tuple[tuple[str, str, str], float, Hypothesis | None]]:
+) -> Iterator[tuple[tuple[str, str, str], float, MistakeHypothesis | None]]:
     """Tests and coordinates of a specimen whose joints move too far or too little in the median.
 
     A unit of loads or angles is mostly of all tests: where it explains all of them better, those
@@ -183,7 +185,7 @@ def _of_specimen(
                 yield place, beyond, unit_like(sizes[place], place[2])
 
 
-def _shared(together: float, sizes: Sequence[float]) -> Hypothesis | None:
+def _shared(together: float, sizes: Sequence[float]) -> MistakeHypothesis | None:
     """The unit of rotations that all tests of a specimen have wrong; None where some have not."""
     unit = None if is_plausible(together) else unit_like(together, ROTATIONS[0])
     worse = unit and any(abs(log(size * unit.factor)) > abs(log(size)) for size in sizes)
@@ -209,7 +211,7 @@ def _signs(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
         yield warn(
             cohort,
             "joints_against_load" if named else "test_against_load",
-            Place("motion", first_row(cohort, "motion", filled=column, **where), column),
+            TableCell("motion", first_row(cohort, "motion", filled=column, **where), column),
             whose=names,
             test=test,
             column=column,

@@ -13,7 +13,7 @@ from spinepipe.cohort.cohort import Cohort, Group
 from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.documents.csv_table import read_rows
 from spinepipe.plausibility.score import has_range, table, usual
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 
 PACKAGE = "spinepipe.plausibility.warnings"
 
@@ -28,32 +28,34 @@ class PlausibilityWarning:
     certain : it cannot be right; no run starts with it unless the cohort says that it is meant.
     """
 
-    problem: Problem
+    problem: InputProblem
     group: Group
     certain: bool = False
 
     @property
-    def with_switch(self) -> Problem:
+    def with_switch(self) -> InputProblem:
         """The problem, with what to write where it is meant."""
         told = self.problem
         remedy = f"{told.remedy} (if you mean it: i_mean_it: [{self.group}] in cohort.yaml)"
         place = (told.file, told.row, told.column)
-        return Problem(*place, told.found, told.allowed, remedy)
+        return InputProblem(*place, told.found, told.allowed, remedy)
 
 
-class Found(NamedTuple):
+class WarningGroup(NamedTuple):
     """Warnings of one sort, and the specimens that they are about."""
 
     warnings: tuple[PlausibilityWarning, ...]
     specimens: frozenset[str]
 
     @classmethod
-    def of(cls, warnings: Iterable[PlausibilityWarning], specimens: Iterable[str]) -> "Found":
+    def of(
+        cls, warnings: Iterable[PlausibilityWarning], specimens: Iterable[str]
+    ) -> "WarningGroup":
         """From anything that yields them."""
         return cls(tuple(warnings), frozenset(specimens))
 
 
-class Place(NamedTuple):
+class TableCell(NamedTuple):
     """A table by its stem, a row as the table counts it from 0, and a column."""
 
     stem: str
@@ -69,7 +71,7 @@ def _texts() -> dict[str, dict[str, Any]]:
 def warn(
     cohort: Cohort,
     name: str,
-    place: Place,
+    place: TableCell,
     /,
     *,
     remedy: str | None = None,
@@ -89,7 +91,7 @@ def warn(
     values["whose"] = of_specimens(dict.fromkeys(map(str, whose)), cohort.specimen_names)
     if has_range(name):
         values.setdefault("range", usual(name))
-    problem = Problem(
+    problem = InputProblem(
         file_of(cohort, place.stem),
         line_of(cohort, place),
         place.column,
@@ -106,7 +108,7 @@ def file_of(cohort: Cohort, stem: str) -> str:
     return f"{cohort.folder.resolve().name}/{stem if '.' in stem else f'{stem}.csv'}"
 
 
-def line_of(cohort: Cohort, place: Place) -> int | None:
+def line_of(cohort: Cohort, place: TableCell) -> int | None:
     """Line, as an editor shows it; tables that kinds read besides count rows by it already."""
     stem, row, _ = place
     if row is None or stem == COHORT_YAML:

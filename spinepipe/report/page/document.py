@@ -19,7 +19,7 @@ from spinepipe.report.page.space import Space, segment
 from spinepipe.report.words import count, listed, number
 from spinepipe.schema import Column, Table
 from spinepipe.studies.study import Study
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 _VERSION = "version_"
 _OF_A_TABLE = ("code_digest", "config_digest", "data_digest", "specimens_digest", KEY)
@@ -74,7 +74,7 @@ class Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class Results:
+class ResultTables:
     """Results of one study, each by its name.
 
     Attributes
@@ -84,7 +84,7 @@ class Results:
     pictures : each figure with its title and caption, in the order of the report.
     """
 
-    tables: Tables
+    tables: StudyTables
     metadata: Mapping[str, Mapping[str, str]]
     pictures: Mapping[str, Picture]
 

@@ -7,18 +7,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from spinepipe.sensitivity.global_indices.design import Design, Method
-from spinepipe.sensitivity.global_indices.estimates import Index, Settings
+from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
 from spinepipe.sensitivity.global_indices.indices import FEWEST, indices, names_of
 
 
 @dataclass(frozen=True)
-class Stage:
+class DesignStage:
     """Indices from part of a design: how many base samples, trajectories or points, how many runs
     with those that failed, and the indices."""
 
     samples: int
     runs: int
-    indices: tuple[Index, ...]
+    indices: tuple[SensitivityIndex, ...]
 
 
 def convergence(
@@ -28,8 +28,8 @@ def convergence(
     settings: Settings | None = None,
     sizes: int = 8,
     resolution: ArrayLike = 0.0,
-    whole: Sequence[Index] = (),
-) -> tuple[Stage, ...]:
+    whole: Sequence[SensitivityIndex] = (),
+) -> tuple[DesignStage, ...]:
     """Indices but for those of pairs on growing parts of a design, the whole last.
 
     Parameters
@@ -58,7 +58,7 @@ def convergence(
         part = design.first(samples)
         found = known if samples == design.samples else ()
         found = found or indices(part, values[: part.n], good[: part.n], settings, resolution)
-        stages.append(Stage(samples, part.n, found))
+        stages.append(DesignStage(samples, part.n, found))
     return tuple(stages)
 
 

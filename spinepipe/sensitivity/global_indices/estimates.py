@@ -17,7 +17,7 @@ from spinepipe.sensitivity.global_indices.design import Method
 
 
 @dataclass(frozen=True, eq=False)
-class Estimated:
+class IndexEstimates:
     """C indices of K outputs.
 
     Attributes
@@ -33,7 +33,7 @@ class Estimated:
     note: str = ""
 
 
-NOTHING = Estimated((), np.empty((0, 0)), None)
+NOTHING = IndexEstimates((), np.empty((0, 0)), None)
 """No index of no output."""
 
 
@@ -41,7 +41,7 @@ Masked = np.ma.MaskedArray[Any, np.dtype[np.float64]]
 """Numbers of which some may be missing; ``tolist()`` gives None for these."""
 
 
-class Known(StrEnum):
+class IndexStatus(StrEnum):
     """Whether an index could be computed."""
 
     DONE = "done"
@@ -51,7 +51,7 @@ class Known(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Index:
+class SensitivityIndex:
     """One index of one factor for K outputs.
 
     Attributes
@@ -61,7 +61,7 @@ class Index:
     estimate, low, high : (K,) estimates and ends of their intervals; masked where the status is
         not ``done``, the ends also where a method has no interval.
     runs : how many runs the estimate rests on. failed : how many runs of the design failed.
-    status : (K,) of `Known`. message : (K,) what a reader of the numbers must know.
+    status : (K,) of `IndexStatus`. message : (K,) what a reader of the numbers must know.
     """
 
     index: str
@@ -72,7 +72,7 @@ class Index:
     high: Masked
     runs: int
     failed: int
-    status: tuple[Known, ...]
+    status: tuple[IndexStatus, ...]
     message: tuple[str, ...]
 
 

@@ -22,9 +22,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import DUMMY, Design, Method
 from spinepipe.sensitivity.global_indices.estimates import (
     INDICES,
-    Index,
-    Known,
+    IndexStatus,
     Masked,
+    SensitivityIndex,
     Settings,
     masked,
     normal_interval,
@@ -73,7 +73,7 @@ class Floor:
 def noise_floor(
     design: Design,
     outputs: ArrayLike,
-    found: Sequence[Index],
+    found: Sequence[SensitivityIndex],
     ok: ArrayLike | None = None,
     settings: Settings | None = None,
     resolution: float = 0.0,
@@ -99,7 +99,7 @@ def noise_floor(
         if name == "S2":
             floors[name] = _of_pairs(found)
             continue
-        known = np.array([status is Known.DONE for status in of_dummy[name].status])
+        known = np.array([status is IndexStatus.DONE for status in of_dummy[name].status])
         drawn = np.empty((0, 0))
         if known.any():
             part = design if design.method is Method.FAST else without_lost(design, left)
@@ -109,7 +109,7 @@ def noise_floor(
     return floors
 
 
-def above_floor(index: Index, floors: dict[str, Floor]) -> tuple[bool | None, ...]:
+def above_floor(index: SensitivityIndex, floors: dict[str, Floor]) -> tuple[bool | None, ...]:
     """(K,) whether the whole interval lies above the floor; None where one of both is missing.
 
     An index without an interval (FAST) is held against it itself.
@@ -123,7 +123,7 @@ def above_floor(index: Index, floors: dict[str, Floor]) -> tuple[bool | None, ..
     return tuple((nearest > floors[index.index].high).tolist())
 
 
-def negligible(index: Index) -> tuple[bool | None, ...]:
+def negligible(index: SensitivityIndex) -> tuple[bool | None, ...]:
     """(K,) whether all of the interval of a total index lies below `NEGLIGIBLE`.
 
     None for other indices, which do not tell what may be fixed, and without an interval: a small
@@ -147,7 +147,7 @@ def _floor(name: str, drawn: Array, known: NDArray[np.bool_], confidence: float)
     return Floor(masked(ends[0], ~known), masked(ends[1], ~known), len(drawn))
 
 
-def _of_pairs(found: Sequence[Index]) -> Floor:
+def _of_pairs(found: Sequence[SensitivityIndex]) -> Floor:
     """From the lowest to the highest end of the dummy's pairs."""
     pairs = [i for i in found if i.index == "S2" and DUMMY in (i.factor, i.other)]
     low = np.ma.stack([pair.low for pair in pairs]).min(axis=0)

@@ -24,7 +24,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import Design
 from spinepipe.sensitivity.global_indices.estimates import (
     INDICES,
-    Estimated,
+    IndexEstimates,
     Settings,
     normal_interval,
     resample_weights,
@@ -81,7 +81,7 @@ LOWEST = {"S1_RBD": -np.inf}
 """Lowest value of an index where it is not 0: corrected for bias, a small S1_RBD may be below."""
 
 
-def given_data_indices(design: Design, outputs: Array, settings: Settings) -> Estimated:
+def given_data_indices(design: Design, outputs: Array, settings: Settings) -> IndexEstimates:
     """Indices of each factor on its own.
 
     Parameters
@@ -98,7 +98,7 @@ def given_data_indices(design: Design, outputs: Array, settings: Settings) -> Es
     names = tuple((name, factor, "") for name in wanted for factor in design.factors)
     empty = np.empty((3, 0, outputs.shape[1]))
     estimate, low, high = np.concatenate([empty, *parts], axis=1)
-    return Estimated(names, estimate, np.stack([low, high]))
+    return IndexEstimates(names, estimate, np.stack([low, high]))
 
 
 def _one(index: str, unit: Array, outputs: Array, settings: Settings) -> Array:

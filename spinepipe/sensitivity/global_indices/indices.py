@@ -15,10 +15,10 @@ from spinepipe.sensitivity.global_indices.design import Design, Method
 from spinepipe.sensitivity.global_indices.estimates import (
     INDICES,
     NOTHING,
-    Estimated,
-    Index,
-    Known,
+    IndexEstimates,
+    IndexStatus,
     Masked,
+    SensitivityIndex,
     Settings,
     masked,
 )
@@ -38,7 +38,7 @@ BLOCKS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class CompleteBlocks:
     """What is left of a design.
 
     Attributes
@@ -58,7 +58,7 @@ class Kept:
         return float(1.0 - self.blocks.mean())
 
 
-def kept(design: Design, ok: NDArray[np.bool_]) -> Kept:
+def kept(design: Design, ok: NDArray[np.bool_]) -> CompleteBlocks:
     """A failed run takes its whole block with it: a base sample of Sobol, a trajectory of Morris,
     a curve of FAST; of a Latin hypercube itself.
 
@@ -68,10 +68,10 @@ def kept(design: Design, ok: NDArray[np.bool_]) -> Kept:
     failed, lost = int((~ok).sum()), int((~blocks).sum())
     what = BLOCKS[design.method]
     message = f"{failed} failed runs: {lost} of {len(blocks)} {what} left out" if failed else ""
-    return Kept(np.repeat(blocks, design.block), blocks, failed, message)
+    return CompleteBlocks(np.repeat(blocks, design.block), blocks, failed, message)
 
 
-def without_lost(design: Design, left: Kept) -> Design:
+def without_lost(design: Design, left: CompleteBlocks) -> Design:
     """The design's whole blocks alone; not for FAST, whose blocks are not alike."""
     return replace(design, unit=design.unit[left.rows], samples=int(left.blocks.sum()))
 
@@ -91,13 +91,13 @@ class Report:
     """
 
     design: Design
-    left: Kept
-    found: Estimated
+    left: CompleteBlocks
+    found: IndexEstimates
     varies: NDArray[np.bool_]
-    status: Known
+    status: IndexStatus
     why: str
 
-    def index(self, name: Name) -> Index:
+    def index(self, name: Name) -> SensitivityIndex:
         """One index of all outputs."""
         status, message = self._told(name)
         at = self._at.get(name)
@@ -105,7 +105,7 @@ class Report:
         ends = None if self.found.ends is None or at is None else self.found.ends[:, at]
         low, high = (None, None) if ends is None else ends
         estimate = None if at is None else self.found.estimate[at]
-        return Index(
+        return SensitivityIndex(
             *name,
             self._spread_out(estimate, known),
             self._spread_out(low, known),
@@ -125,18 +125,18 @@ class Report:
         one_curve = self.design.method is Method.FAST
         return self.design.block if one_curve else int(self.left.rows.sum())
 
-    def _told(self, name: Name) -> tuple[tuple[Known, ...], tuple[str, ...]]:
+    def _told(self, name: Name) -> tuple[tuple[IndexStatus, ...], tuple[str, ...]]:
         each = [self._told_of_one(name, bool(varies)) for varies in self.varies]
         return tuple(status for status, _ in each), tuple(message for _, message in each)
 
-    def _told_of_one(self, name: Name, varies: bool) -> tuple[Known, str]:
-        if self.status is not Known.DONE:
+    def _told_of_one(self, name: Name, varies: bool) -> tuple[IndexStatus, str]:
+        if self.status is not IndexStatus.DONE:
             return self.status, self.why
         if not varies:
-            return Known.CONSTANT, "the output is the same in all runs"
+            return IndexStatus.CONSTANT, "the output is the same in all runs"
         if name not in self._at:
-            return Known.TOO_MANY_FAILED, f"{self.left.message}, {name[1]}'s among them"
-        return Known.DONE, "; ".join(filter(None, (self.left.message, self.found.note)))
+            return IndexStatus.TOO_MANY_FAILED, f"{self.left.message}, {name[1]}'s among them"
+        return IndexStatus.DONE, "; ".join(filter(None, (self.left.message, self.found.note)))
 
     def _spread_out(self, part: Array | None, known: NDArray[np.bool_]) -> Masked:
         """(K,) of numbers for the outputs that vary, or of nothing."""
@@ -178,7 +178,7 @@ def indices(
     ok: ArrayLike | None = None,
     settings: Settings | None = None,
     resolution: ArrayLike = 0.0,
-) -> tuple[Index, ...]:
+) -> tuple[SensitivityIndex, ...]:
     """Indices of K outputs with intervals.
 
     Parameters
@@ -202,7 +202,7 @@ def indices(
     values, good = _checked(design, outputs, ok)
     left = kept(design, good)
     status, why = _for_all(design, left, settings)
-    varies = _varies(values[left.rows], resolution) & (status is Known.DONE)
+    varies = _varies(values[left.rows], resolution) & (status is IndexStatus.DONE)
     found = _found(design, values[:, varies], left, settings) if varies.any() else NOTHING
     report = Report(design, left, found, varies, status, why)
     return tuple(report.index(name) for name in names_of(design) if settings.asks(name[0]))
@@ -223,18 +223,18 @@ def _checked(
     return values, good
 
 
-def _for_all(design: Design, left: Kept, settings: Settings) -> tuple[Known, str]:
+def _for_all(design: Design, left: CompleteBlocks, settings: Settings) -> tuple[IndexStatus, str]:
     """Status and message for all outputs alike; ``done`` where nothing stands against indices."""
     whole = int(left.blocks.sum())
     if design.method is Method.FAST:
-        return (Known.DONE, "") if whole else (Known.TOO_MANY_FAILED, left.message)
+        return (IndexStatus.DONE, "") if whole else (IndexStatus.TOO_MANY_FAILED, left.message)
     if left.lost > settings.most_failed:
         allowed = f"; at most {settings.most_failed:.0%} may be lost"
-        return Known.TOO_MANY_FAILED, left.message + allowed
+        return IndexStatus.TOO_MANY_FAILED, left.message + allowed
     if whole < FEWEST[design.method]:
         what = f"{whole} {BLOCKS[design.method]}; at least {FEWEST[design.method]} are needed"
-        return Known.TOO_FEW, what
-    return Known.DONE, ""
+        return IndexStatus.TOO_FEW, what
+    return IndexStatus.DONE, ""
 
 
 def _varies(values: Array, resolution: ArrayLike) -> NDArray[np.bool_]:
@@ -245,7 +245,9 @@ def _varies(values: Array, resolution: ArrayLike) -> NDArray[np.bool_]:
     return np.ptp(values, axis=0) > np.maximum(size, resolution)
 
 
-def _found(design: Design, values: Array, left: Kept, settings: Settings) -> Estimated:
+def _found(
+    design: Design, values: Array, left: CompleteBlocks, settings: Settings
+) -> IndexEstimates:
     if design.method is Method.FAST:
         return fast_indices(design, values, left.blocks)
     analyse = {

@@ -18,7 +18,7 @@ MORRIS_ENDS = (0.005, 0.995)
 """Quantiles that stand for the lowest and highest level of Morris where a spread has no ends."""
 
 
-class Spread(Protocol):
+class Distribution(Protocol):
     """A distribution of one factor."""
 
     @property
@@ -115,7 +115,7 @@ class LogNormal:
         return np.exp(self._log.values(shares))
 
 
-def values_of(design: Design, spreads: Sequence[Spread]) -> Array:
+def values_of(design: Design, spreads: Sequence[Distribution]) -> Array:
     """(n, D) values of the factors at the design's points.
 
     The levels of Morris reach from the lowest to the highest value; of a spread without these,
@@ -130,7 +130,7 @@ def values_of(design: Design, spreads: Sequence[Spread]) -> Array:
     return np.column_stack([s.values(_shares(design, u, s)) for u, s in columns])
 
 
-def _shares(design: Design, unit: Array, spread: Spread) -> Array:
+def _shares(design: Design, unit: Array, spread: Distribution) -> Array:
     if design.method is not Method.MORRIS or spread.bounded:
         return unit
     low, high = MORRIS_ENDS

@@ -16,7 +16,7 @@ from SALib.analyze import fast
 from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import Design
 from spinepipe.sensitivity.global_indices.estimates import (
-    Estimated,
+    IndexEstimates,
     Settings,
     percentile_interval,
     resample_weights,
@@ -25,7 +25,7 @@ from spinepipe.sensitivity.global_indices.estimates import (
 NO_INTERVAL = "FAST has no interval: its one curve per factor cannot be resampled"
 
 
-def fast_indices(design: Design, outputs: Array, whole: NDArray[np.bool_]) -> Estimated:
+def fast_indices(design: Design, outputs: Array, whole: NDArray[np.bool_]) -> IndexEstimates:
     """S1 and ST of each factor whose curve is whole.
 
     Parameters
@@ -44,7 +44,7 @@ def fast_indices(design: Design, outputs: Array, whole: NDArray[np.bool_]) -> Es
     )
     estimate = np.moveaxis(found.reshape(len(kept), -1, 2), 2, 0)
     names = tuple((index, design.factors[at], "") for index in ("S1", "ST") for at in kept)
-    return Estimated(names, estimate.reshape(len(names), -1), None, NO_INTERVAL)
+    return IndexEstimates(names, estimate.reshape(len(names), -1), None, NO_INTERVAL)
 
 
 def _of_curve(curve: Array, harmonics: int) -> tuple[float, float]:
@@ -65,7 +65,7 @@ def _of_curve(curve: Array, harmonics: int) -> tuple[float, float]:
 ALONE = ("mu", "mu_star", "sigma")
 
 
-def morris_indices(design: Design, outputs: Array, settings: Settings) -> Estimated:
+def morris_indices(design: Design, outputs: Array, settings: Settings) -> IndexEstimates:
     """mu, mu_star and sigma of each factor, mu_star alone of a group of several.
 
     Parameters
@@ -88,7 +88,7 @@ def morris_indices(design: Design, outputs: Array, settings: Settings) -> Estima
     ]
     estimate, low, high = np.stack(found, axis=-1)
     names = tuple((index, design.inputs[g], "") for index, g in kinds)
-    return Estimated(names, estimate, np.stack([low, high]))
+    return IndexEstimates(names, estimate, np.stack([low, high]))
 
 
 def elementary_effects(design: Design, outputs: Array) -> Array:
@@ -142,7 +142,7 @@ def _indices(weights: Array, effects: Array) -> Array:
     return np.stack([mean + centre, size, sigma], axis=-1).reshape(len(weights), -1)
 
 
-def sobol_indices(design: Design, outputs: Array, settings: Settings) -> Estimated:
+def sobol_indices(design: Design, outputs: Array, settings: Settings) -> IndexEstimates:
     """First-order, total and second-order indices with percentile intervals.
 
     Parameters
@@ -166,7 +166,7 @@ def sobol_indices(design: Design, outputs: Array, settings: Settings) -> Estimat
     estimate, low, high = np.stack(found, axis=-1)
     names = [(index, name, "") for index in ("S1", "ST") for name in inputs]
     names += [("S2", inputs[j], inputs[k]) for j, k in pairs]
-    return Estimated(tuple(names), estimate, np.stack([low, high]))
+    return IndexEstimates(tuple(names), estimate, np.stack([low, high]))
 
 
 def _pairs(inputs: int) -> Array:

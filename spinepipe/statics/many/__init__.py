@@ -10,23 +10,23 @@ from spinepipe.statics.many.derive import (
 )
 from spinepipe.statics.many.dynamics import Moving
 from spinepipe.statics.many.idle import Acting, Answering, Idle, acts_here
-from spinepipe.statics.many.settling import Ends, settle
+from spinepipe.statics.many.settling import CourseEnds, settle
 from spinepipe.statics.many.solve import ManySolved, solve_many
 from spinepipe.statics.many.spines import Cases, Spines
-from spinepipe.statics.many.stack import Poses, Stack
+from spinepipe.statics.many.stack import Stack, StepPoses
 from spinepipe.statics.many.survey import survey
 
 __all__ = [
     "Acting",
     "Answering",
     "Cases",
-    "Ends",
+    "CourseEnds",
     "Idle",
     "ManySolved",
     "Moving",
-    "Poses",
     "Spines",
     "Stack",
+    "StepPoses",
     "acts_here",
     "answered",
     "poses_by",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects import Kind
+from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import AcrossJoints, Array, Indices, Neutral
 from spinepipe.statics.holding import (
     ActiveLaw,
@@ -21,7 +21,7 @@ from spinepipe.statics.holding import (
     states_after,
 )
 from spinepipe.statics.many.lanes import Acting, Effects
-from spinepipe.statics.placement import ActiveGeometry, Placed, place
+from spinepipe.statics.placement import ActiveGeometry, JointKinematics, place
 
 NOTHING = np.empty(0)
 
@@ -105,7 +105,7 @@ class Bound:
             if not len(places):
                 continue
             self.places[number] = places
-            if one.effect.kind is Kind.PATH:
+            if one.effect.kind is EffectKind.PATH:
                 of[number], lasting[number] = states[number][places], seconds[at]
                 self.laws.append(ActivePath(one.effect, *there))  # type: ignore[arg-type]
             else:
@@ -138,11 +138,11 @@ class Bound:
         own = neutral.part(chain[lanes])
         return _Cable(one.effect, places[first], lanes, there[lanes], values, own)
 
-    def placed(self, q: Array) -> Placed:
+    def placed(self, q: Array) -> JointKinematics:
         """What the laws see at q (N, J, 6)."""
         flat = q.reshape(-1, 6)
         if not self.geometry:
-            return Placed(flat, NOTHING, NOTHING, {})
+            return JointKinematics(flat, NOTHING, NOTHING, {})
         return place(flat, self.geometry, with_parameters=False)
 
     def held(self, q: Array) -> Holding:

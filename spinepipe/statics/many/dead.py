@@ -12,7 +12,7 @@ from spinepipe.statics.many.survey import Chains, Loads
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _DeadLoadLanes:
     """A dead load on lanes (n,) on which it acts on the same joints; values (n, P)."""
 
     effect: DeadLoad
@@ -36,7 +36,7 @@ def with_dead_loads(
     return found
 
 
-def _parts(one: Acting, chains: Chains, listed: Loads, run: Indices) -> Iterator[_Part]:
+def _parts(one: Acting, chains: Chains, listed: Loads, run: Indices) -> Iterator[_DeadLoadLanes]:
     """An effect's lanes by the joints that it acts on."""
     count = np.diff(one.first)[run]
     places, at = one.on(run)
@@ -52,7 +52,7 @@ def _parts(one: Acting, chains: Chains, listed: Loads, run: Indices) -> Iterator
         wrenches = Wrenches(
             listed.bodies[there], listed.points[there], listed.forces[there], listed.moments[there]
         )
-        yield _Part(
+        yield _DeadLoadLanes(
             one.effect,
             there,
             rows,

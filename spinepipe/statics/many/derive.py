@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from spinepipe.effects import MeasurementEffect
-from spinepipe.effects.contract import Array, Beside, Indices, MeasurementBeside
+from spinepipe.effects.contract import Array, Indices, MeasurementBeside, MeasurementContext
 from spinepipe.statics.instruments import Instrument, beside, followed, passed, read, read_by
 from spinepipe.statics.many.bound import Bound, Slopes
 from spinepipe.statics.many.dead import pushes
@@ -128,7 +128,7 @@ def reactions(stack: Stack, q: Array) -> Array:
 
 def reactions_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
     """(L, J, 6, m) derivative of the reactions, from that of the poses (L, J, 6, m)."""
-    moved = _Moved(stack, unknowns)
+    moved = _DerivedEffects(stack, unknowns)
     found = np.zeros(dq.shape)
     states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
     for lanes in _supported(stack):
@@ -155,7 +155,7 @@ def _system(stack: Stack, run: int) -> System:
 
 def poses_by(stack: Stack, q: Array, unknowns: Unknowns) -> Array:
     """(L, J, 6, m) derivative of all poses q (L, J, 6) by the unknowns."""
-    moved = _Moved(stack, unknowns)
+    moved = _DerivedEffects(stack, unknowns)
     found = np.zeros((*q.shape, moved.m))
     states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
     for runs in stack.chunks(np.flatnonzero(~stack.remembers & ~stack.alone)):
@@ -179,7 +179,9 @@ def _by_engine(stack: Stack, run: int, unknowns: Unknowns, found: Array) -> None
         found[lane, ..., : len(free)] = dq.reshape(stack.joints, 6, len(free))
 
 
-def _step_by_step(stack: Stack, runs: Indices, q: Array, moved: "_Moved", found: Array) -> None:
+def _step_by_step(
+    stack: Stack, runs: Indices, q: Array, moved: "_DerivedEffects", found: Array
+) -> None:
     """Enter the derivatives of runs with laws that remember, step by step."""
     states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
     for _, lanes in stack.steps(runs):
@@ -192,7 +194,7 @@ def _step_by_step(stack: Stack, runs: Indices, q: Array, moved: "_Moved", found:
         stack.remember(states, bound, bound.after(q[lanes]))
 
 
-class _Moved:
+class _DerivedEffects:
     """The effects of a stack with the derivatives of their values by m unknowns."""
 
     def __init__(self, stack: Stack, unknowns: Unknowns) -> None:
@@ -267,14 +269,16 @@ def observing(one: Acting) -> Instrument:
     return one.effect
 
 
-def _beside(stack: Stack, effect: Instrument, seen: Array, flat: Indices) -> Beside | None:
+def _beside(
+    stack: Stack, effect: Instrument, seen: Array, flat: Indices
+) -> MeasurementContext | None:
     """What stands beside joints at places ``flat`` of all (L J, 6), if the effect asks for it."""
     if not isinstance(effect, MeasurementBeside):
         return None
     runs = range(len(stack.remembers))
     along = np.concatenate([passed(stack.case(run)) for run in runs])
     every = beside(seen.reshape(-1, stack.joints, 6), along)
-    return Beside(every.above[flat], every.below[flat], every.passed[flat])
+    return MeasurementContext(every.above[flat], every.below[flat], every.passed[flat])
 
 
 def _neighbours(stack: Stack, by_x: Array, flat: Indices) -> tuple[Array, Array]:

@@ -212,7 +212,7 @@ def _answer(matrices: Array, right: Array) -> None:
                 x[c] -= lower[r, c] * x[r]
 
 
-class Factored:
+class BatchedLUFactors:
     """LU factors of N matrices (n, n), each with its row exchanges."""
 
     def __init__(self, matrices: Array) -> None:

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeGuard, cast
 
 import numpy as np
 
-from spinepipe.effects import Effect, Kind
+from spinepipe.effects import Effect, EffectKind
 from spinepipe.effects.contract import Array, GeometryEffect, JointLaw, PathLaw
 from spinepipe.statics.holding import hold
 from spinepipe.statics.instruments import Instrument
@@ -25,7 +25,7 @@ Acting = JointLaw | PathLaw | GeometryEffect | Instrument
 
 def acts_here(effect: Effect) -> TypeGuard[Acting]:
     """Whether what an effect that is off would do can be told without a model of its own."""
-    return effect.kind is not Kind.LOAD
+    return effect.kind is not EffectKind.LOAD
 
 
 class Idle(NamedTuple):
@@ -88,7 +88,7 @@ class Answering:
         found: dict[int, Array] = {}
         loads: dict[int, _Own] = {}
         for number, one in enumerate(idle):
-            if one.effect.kind is Kind.MEASUREMENT:
+            if one.effect.kind is EffectKind.MEASUREMENT:
                 found[number] = self._reported(cast(Instrument, one.effect), one.values)
             else:
                 loads[number] = self._own(one)
@@ -165,12 +165,12 @@ class Answering:
         (effect, values), kind = idle, idle.effect.kind
         held, (points, count) = self.held, (len(values), self.q.size // 6)
         shape = (*self.q.shape, -1)
-        if kind is Kind.PATH:
+        if kind is EffectKind.PATH:
             own = self._by_step(cast(PathLaw, effect), values)
             return _Own(held.pulled(own).reshape(shape), None)
         q, every = np.tile(held.q, (points, 1)), np.repeat(values, count, axis=0)
         load = np.tile(held.load, (points, 1))
-        if kind is Kind.GEOMETRY:
+        if kind is EffectKind.GEOMETRY:
             moved = cast(GeometryEffect, effect).by_parameter(q, every)
             turned = (moved.by_coordinate * load[:, :, None, None]).sum(axis=1)
             shift = _shapes_last(moved.q, points)

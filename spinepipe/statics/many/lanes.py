@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.effects import Effect, Kind
+from spinepipe.effects import Effect, EffectKind
 from spinepipe.effects.contract import AcrossJoints, Array, Indices
 from spinepipe.effects.dead_load import DeadLoad
 from spinepipe.model import ScopedEffect, SpineModel
@@ -119,11 +119,11 @@ class Effects:
 
 def _group(effect: Effect) -> str:
     match effect.kind:
-        case Kind.GEOMETRY:
+        case EffectKind.GEOMETRY:
             return "geometry"
-        case Kind.MEASUREMENT:
+        case EffectKind.MEASUREMENT:
             return "measurement"
-        case Kind.LOAD:
+        case EffectKind.LOAD:
             if isinstance(effect, DeadLoad):
                 return "dead"
             return "cables" if isinstance(effect, AcrossJoints) else "others"

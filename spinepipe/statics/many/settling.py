@@ -14,7 +14,7 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.equilibrium import LARGEST_ROTATION
 from spinepipe.statics.many.bound import Bound
 from spinepipe.statics.many.dead import with_dead_loads
-from spinepipe.statics.many.dynamics import Factored, Moving, tangents_of
+from spinepipe.statics.many.dynamics import BatchedLUFactors, Moving, tangents_of
 from spinepipe.statics.many.stack import Stack
 from spinepipe.statics.many.survey import Loads, part, survey
 from spinepipe.statics.settling import (
@@ -43,7 +43,7 @@ LOST = "the steps of the run that it follows lead it nowhere"
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
+class CourseEnds:
     """Where lanes are at the end of their course.
 
     Attributes
@@ -57,7 +57,7 @@ class Ends:
     sizes: dict[int, tuple[float, ...]]
 
 
-def settle(stack: Stack, course: Course, leads: Indices) -> Ends:
+def settle(stack: Stack, course: Course, leads: Indices) -> CourseEnds:
     """Let all lanes move from rest in the neutral pose until the course ends.
 
     Parameters
@@ -73,7 +73,7 @@ def settle(stack: Stack, course: Course, leads: Indices) -> Ends:
     q = runs.q.copy()
     q[list(runs.trouble)] = np.nan
     sizes = {lane: tuple(runs.sizes[lane]) for lane in np.unique(leads).tolist()}
-    return Ends(q, runs.trouble, sizes)
+    return CourseEnds(q, runs.trouble, sizes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,10 +181,10 @@ class _Runs:
     def _try(self, lanes: Indices, time: Array, size: Array) -> tuple[Array, Array, Array]:
         """Poses, rates (N, J, 6) and scaled errors (N,) after steps of these sizes (N,)."""
         with np.errstate(all="ignore"):
-            return _Step(self, lanes, time, size).taken()
+            return _RosenbrockStep(self, lanes, time, size).taken()
 
 
-class _Step:
+class _RosenbrockStep:
     """One step of N lanes by the four stages of ROS34PW2."""
 
     def __init__(self, runs: _Runs, lanes: Indices, time: Array, size: Array) -> None:
@@ -203,7 +203,7 @@ class _Step:
         moving, force = self._force(self.q0, self.v0, self.time)
         tangents, identity = tangents_of(moving.seen), np.eye(self.q0.shape[1])
         square = implicit[..., None]
-        lu = Factored(
+        lu = BatchedLUFactors(
             moving.mass + identity * (implicit * self.damping)[:, None] + square**2 * tangents
         )
         ramp = self._ramp(moving)

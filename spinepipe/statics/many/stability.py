@@ -59,12 +59,12 @@ def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Fl
     return proven
 
 
-def lanes_of(chains: Chains, loads: Loads, q: Array, tangents: Array) -> "Lanes":
+def lanes_of(chains: Chains, loads: Loads, q: Array, tangents: Array) -> "DynamicLanes":
     """Lanes at q (N, J, 6) with all that decides their stability."""
     seen, chain = survey(chains, loads, q, _held(loads, tangents)), loads.chain
     bent = np.abs(tangents - tangents.swapaxes(2, 3)).max(axis=(1, 2, 3))
     even = bent <= EVEN * np.abs(tangents).max(axis=(1, 2, 3))
-    return Lanes(seen, inertias_of(chains, chain, seen), chains.damping[chain], loads, even)
+    return DynamicLanes(seen, inertias_of(chains, chain, seen), chains.damping[chain], loads, even)
 
 
 def _held(loads: Loads, tangents: Array) -> Array:
@@ -82,7 +82,7 @@ def _held(loads: Loads, tangents: Array) -> Array:
     return found
 
 
-def proven_by_forms(every: "Lanes") -> Flags:
+def proven_by_forms(every: "DynamicLanes") -> Flags:
     """(N,) which lanes are proven stable without the rates of their modes."""
     top = every.top
     proven = every.apart(top)
@@ -93,7 +93,7 @@ def proven_by_forms(every: "Lanes") -> Flags:
 
 
 @dataclass(frozen=True, eq=False)
-class Lanes:
+class DynamicLanes:
     """Lanes with the inertia of each vertebra by its twist, in blocks (B, J, 6, 6, 4), and damping.
 
     Attributes
@@ -107,11 +107,11 @@ class Lanes:
     loads: Loads
     even: Flags
 
-    def part(self, chosen: Indices) -> "Lanes":
+    def part(self, chosen: Indices) -> "DynamicLanes":
         """Some of them."""
         inertia = blocks(lanes(self.inertia, self.seen.count)[chosen])
         of = (self.damping[chosen], part(self.loads, chosen), self.even[chosen])
-        return Lanes(self.seen.part(chosen), inertia, *of)
+        return DynamicLanes(self.seen.part(chosen), inertia, *of)
 
     @property
     def top(self) -> Array:
@@ -138,7 +138,7 @@ class Lanes:
         return there.sum(axis=1) == 1, body, total[rows, body]
 
 
-def _by_response(every: Lanes, top: Array) -> Flags:
+def _by_response(every: DynamicLanes, top: Array) -> Flags:
     """(N,) which spines under a moment on one vertebra have no mode with w up to top (N,)."""
     low = np.zeros(len(top))
     for share in FIRST:
@@ -185,7 +185,7 @@ def _by_response(every: Lanes, top: Array) -> Flags:
     return found
 
 
-def matrices(lane: Lanes) -> tuple[Array, Array]:
+def matrices(lane: DynamicLanes) -> tuple[Array, Array]:
     """Mass matrix and tangent (n, n) of one lane's free coordinates, where damping is one."""
     scale = 1.0 / np.sqrt(lane.damping.ravel())
     both = scale[:, None] * scale

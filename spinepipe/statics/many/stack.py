@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf
 
-from spinepipe.effects import Kind
+from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array, Indices, Neutral, straight_over
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
 from spinepipe.statics.equilibrium import NOT_POSITIVE, PAST_CRITICAL, ROUNDING, SPACING
@@ -39,7 +39,7 @@ CHUNK = 80_000
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class StepPoses:
     """Where the steps of all runs end; a lane is a step of a run.
 
     Attributes
@@ -129,7 +129,7 @@ class Stack:
     ) -> "Stack":
         """Runs of chains; ``steps`` (R,) of each run, and how long each takes, ``seconds`` (L,)."""
         run = np.repeat(np.arange(len(steps)), steps)
-        paths = [law for law in effects.laws if law.effect.kind is Kind.PATH]
+        paths = [law for law in effects.laws if law.effect.kind is EffectKind.PATH]
         return cls(
             model,
             case,
@@ -157,7 +157,7 @@ class Stack:
         loads = with_dead_loads(effects.dead, self.chains, self.listed, self.run)
         return replace(self, model=tuple(models).__getitem__, effects=effects, loads=loads)
 
-    def solve(self, guess: Array | None = None, why: bool = True) -> Poses:
+    def solve(self, guess: Array | None = None, why: bool = True) -> StepPoses:
         """Equilibria of all lanes.
 
         Parameters
@@ -184,7 +184,7 @@ class Stack:
             lanes = range(self.first[number], self.first[number + 1])
             status[lanes] = Status.UNSTABLE.value
             messages |= dict.fromkeys(lanes, NO_WAY)
-        return Poses(q, status, messages, by_engine)
+        return StepPoses(q, status, messages, by_engine)
 
     def past_critical(self, q: Array, at_once: Flags) -> dict[int, str]:
         """By lane with a pose q (L, J, 6) whose load would move the neutral pose away.
@@ -308,7 +308,7 @@ class Stack:
         return {
             number: np.zeros((len(law.joint), law.effect.n_states, *unknowns))  # type: ignore[attr-defined]
             for number, law in enumerate(self.effects.laws)
-            if law.effect.kind is Kind.PATH
+            if law.effect.kind is EffectKind.PATH
         }
 
     @staticmethod

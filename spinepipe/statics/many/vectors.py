@@ -53,7 +53,7 @@ def lanes(found: NDArray[Any], count: int) -> NDArray[Any]:
     return apart.reshape(WIDTH * len(found), *found.shape[1:last])[:count]
 
 
-class Lanes(types.Type):
+class LaneType(types.Type):
     """The type of four lanes."""
 
     def __init__(self) -> None:
@@ -64,16 +64,16 @@ class Lanes(types.Type):
         return Conversion.promote if other == types.float64 else None
 
 
-LANES = Lanes()
+LANES = LaneType()
 
 
-@register_model(Lanes)
+@register_model(LaneType)
 class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, numba_type: Any) -> None:
         super().__init__(manager, numba_type, _VECTOR)
 
 
-@lower_cast(types.Float, Lanes)
+@lower_cast(types.Float, LaneType)
 def _equal(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
     vector = ir.Constant(_VECTOR, ir.Undefined)
     for lane in range(WIDTH):
@@ -95,7 +95,7 @@ def _define(function: Any, instruction: str) -> None:
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return getattr(builder, instruction)(*args)
 
-    lower_builtin(function, *[Lanes] * (1 if function is operator.neg else 2))(lower)
+    lower_builtin(function, *[LaneType] * (1 if function is operator.neg else 2))(lower)
 
 
 for _operator, _instruction in (

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects import create
 from spinepipe.model.file import read_model
-from spinepipe.problems import InputError, Problem, one_of
+from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.studies.cohort_stiffness.representations import (
     NUISANCE,
     STIFFENING,
@@ -28,8 +28,8 @@ from spinepipe.units import ROTATIONS
 
 
 def check_cohort_stiffness(
-    document: Document, study: CohortStiffness, cohort: Cohort
-) -> Iterator[Problem]:
+    document: YamlDocument, study: CohortStiffness, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Every way in which a sound study and a sound cohort do not fit.
 
     Parameters
@@ -44,13 +44,15 @@ def check_cohort_stiffness(
     yield from _nuisances(document, study)
 
 
-def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+def _tests(
+    document: YamlDocument, study: CohortStiffness, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Tests must exist, have names that can name files, and someone must have been measured."""
     if cohort.motion is None:
         found = f"cohort '{cohort.name}', which has no motion.csv"
         allowed = "a cohort with loads.csv and motion.csv: stiffness is fitted to motion"
         remedy = "choose another cohort, or a study of kind range_of_motion"
-        yield Problem(*at(document, "cohort"), found, allowed, remedy)
+        yield InputProblem(*at(document, "cohort"), found, allowed, remedy)
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
     for name in study.tests or cohort.tests:
@@ -58,19 +60,21 @@ def _tests(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterat
         if name in cohort.tests and reserved:
             allowed = f"names other than '{ALL}', '{NOTHING}' and '{ALL_BUT}...'"
             place = (f"{cohort.folder.name}/loads.csv", None, "test")
-            yield Problem(*place, f"test {name!r}", allowed, "rename it in loads and motion")
+            yield InputProblem(*place, f"test {name!r}", allowed, "rename it in loads and motion")
     yield from _measured(document, study, cohort)
 
 
-def _specimens(cohort: Cohort) -> Iterator[Problem]:
+def _specimens(cohort: Cohort) -> Iterator[InputProblem]:
     """A name that folders of results use for something else."""
     if NOBODY in cohort.specimen_names:
         place = (f"{cohort.folder.name}/specimens.csv", None, "specimen")
         allowed = f"any other name: '{NOBODY}' stands for fits that leave no specimen out"
-        yield Problem(*place, f"'{NOBODY}'", allowed, "rename the specimen in every file")
+        yield InputProblem(*place, f"'{NOBODY}'", allowed, "rename the specimen in every file")
 
 
-def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+def _measured(
+    document: YamlDocument, study: CohortStiffness, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Readings of a free coordinate in each test that is asked for, and of every specimen."""
     measured = readings(cohort, study.tests, study.free)
     for index, name in enumerate(study.tests or ()):
@@ -78,16 +82,18 @@ def _measured(document: Document, study: CohortStiffness, cohort: Cohort) -> Ite
             found = f"test '{name}', which has no motion"
             allowed = f"tests with readings of {one_of(study.free)} of a specimen at least"
             place = at(document, f"tests.{index}")
-            yield Problem(*place, found, allowed, "delete it or add its motion")
+            yield InputProblem(*place, found, allowed, "delete it or add its motion")
     for specimen in cohort.specimen_names:
         if specimen not in set(measured["specimen"]):
             found = f"no motion of specimen '{specimen}' in any chosen test"
             allowed = f"readings of {one_of(study.free)} of every specimen in one test at least"
             remedy = "choose more tests, or leave the specimen out of the cohort"
-            yield Problem(*at(document, "tests"), found, allowed, remedy)
+            yield InputProblem(*at(document, "tests"), found, allowed, remedy)
 
 
-def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+def _levels(
+    document: YamlDocument, study: CohortStiffness, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Ratios of levels need a value for each level, and a value needs its level."""
     given = study.level_stiffness if "level_stiffness" in study.model_fields_set else ()
     yield from unknown_levels(document, given, cohort.joint_names)
@@ -101,28 +107,30 @@ def _levels(document: Document, study: CohortStiffness, cohort: Cohort) -> Itera
         names, verb = " and ".join(chosen), "is" if len(chosen) == 1 else "are"
         allowed = f"a value for every joint of the cohort, as {names} {verb} among representations"
         remedy = f"add them, or leave {names} out of representations"
-        yield Problem(*at(document, "level_stiffness"), found, allowed, remedy)
+        yield InputProblem(*at(document, "level_stiffness"), found, allowed, remedy)
     elif "representations" in asked and not set(study.free) & set(ROTATIONS):
         allowed = f"{one_of(ROTATIONS)} among them, as published levels differ in rotations alone"
         remedy = f"free a rotation, or leave {' and '.join(chosen)} out of representations"
-        yield Problem(*at(document, "free"), ", ".join(study.free), allowed, remedy)
+        yield InputProblem(*at(document, "free"), ", ".join(study.free), allowed, remedy)
 
 
-def _cost(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+def _cost(document: YamlDocument, study: CohortStiffness, cohort: Cohort) -> Iterator[InputProblem]:
     """Weights need SDs; the published cost knows rotations only."""
     if study.cost == "measurement_sd" and (study.measurement_sd or cohort.measurement_sd) is None:
         found = "null, and the cohort has none"
         allowed = "SDs of one reading, here or in cohort.yaml, for cost: measurement_sd"
         remedy = "fill them in, or choose cost: published"
-        yield Problem(*at(document, "measurement_sd"), found, allowed, remedy)
+        yield InputProblem(*at(document, "measurement_sd"), found, allowed, remedy)
     others = [name for name in study.free if name not in ROTATIONS]
     if study.cost == "published" and others:
         allowed = f"{one_of(ROTATIONS)} with cost: published, which has no translations"
         remedy = "free rotations only, or choose cost: measurement_sd"
-        yield Problem(*at(document, "free"), ", ".join(others), allowed, remedy)
+        yield InputProblem(*at(document, "free"), ", ".join(others), allowed, remedy)
 
 
-def _covariates(document: Document, study: CohortStiffness, cohort: Cohort) -> Iterator[Problem]:
+def _covariates(
+    document: YamlDocument, study: CohortStiffness, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Covariates must be known of someone, and sexes be written so that they are known."""
     for index, name in enumerate(study.covariates or ()):
         known = cohort.specimens[name].dropna()
@@ -130,17 +138,17 @@ def _covariates(document: Document, study: CohortStiffness, cohort: Cohort) -> I
             found = f"'{name}', which {cohort.folder.name}/specimens.csv has of no specimen"
             allowed = "covariates that are known of the specimens"
             remedy = "fill in the column, or delete it here"
-            yield Problem(*at(document, f"covariates.{index}"), found, allowed, remedy)
+            yield InputProblem(*at(document, f"covariates.{index}"), found, allowed, remedy)
     if "sex" not in (study.covariates or ()):
         return
     for specimen, sex in zip(cohort.specimens["specimen"], cohort.specimens["sex"], strict=True):
         if isinstance(sex, str) and sex.strip() and sex.strip().lower() not in SEXES:
             place = (f"{cohort.folder.name}/specimens.csv", None, "sex")
             remedy = "write one of them, or leave the cell empty"
-            yield Problem(*place, f"'{sex}' of specimen '{specimen}'", one_of(SEXES), remedy)
+            yield InputProblem(*place, f"'{sex}' of specimen '{specimen}'", one_of(SEXES), remedy)
 
 
-def _nuisances(document: Document, study: CohortStiffness) -> Iterator[Problem]:
+def _nuisances(document: YamlDocument, study: CohortStiffness) -> Iterator[InputProblem]:
     """Priors and representations that fit them need each other, SDs, and the fit without."""
     asked = [name for name in study.representations if name in NUISANCE]
     sds = study.nuisance and (study.nuisance.centre_mm, study.nuisance.axes_deg)
@@ -148,28 +156,28 @@ def _nuisances(document: Document, study: CohortStiffness) -> Iterator[Problem]:
         found = "null" if sds is None else "0 mm and 0 deg"
         allowed = f"an SD above 0, as {', '.join(asked)} needs"
         remedy = "write nuisance: {centre_mm: 3, axes_deg: 3}, or leave it out of representations"
-        yield Problem(*at(document, "nuisance"), found, allowed, remedy)
+        yield InputProblem(*at(document, "nuisance"), found, allowed, remedy)
     if sds is not None and not asked:
         found = f"SDs, and none of {', '.join(NUISANCE)} among representations"
         allowed = "one of them, as no other fits errors of centres and axes"
         remedy = f"add {NUISANCE[-1]} to representations, or delete nuisance"
-        yield Problem(*at(document, "nuisance"), found, allowed, remedy)
+        yield InputProblem(*at(document, "nuisance"), found, allowed, remedy)
     for name in asked:
         plain = named(name).without_nuisances
         if plain not in study.representations:
             found, allowed = f"{name} without {plain}", f"{plain} too, which it is compared with"
             place = at(document, "representations")
-            yield Problem(*place, found, allowed, f"add {plain}, or leave {name} out")
+            yield InputProblem(*place, found, allowed, f"add {plain}, or leave {name} out")
     if asked and study.cost == "published":
         found = f"published, and {', '.join(asked)} among representations"
         allowed = "cost: measurement_sd, as priors are weighed against readings in their SDs"
         remedy = "choose cost: measurement_sd, or leave them out of representations"
-        yield Problem(*at(document, "cost"), found, allowed, remedy)
+        yield InputProblem(*at(document, "cost"), found, allowed, remedy)
 
 
 def check_one_stiffening(
-    document: Document, study: CohortStiffness, cohort: Cohort, root: Path
-) -> Iterator[Problem]:
+    document: YamlDocument, study: CohortStiffness, cohort: Cohort, root: Path
+) -> Iterator[InputProblem]:
     """A base model that stiffens leaves nothing for a representation that does."""
     asked = [name for name in study.representations if name in STIFFENING]
     path = None if study.base is None else study.base.path(root)
@@ -186,7 +194,7 @@ def check_one_stiffening(
         found = f"{one_of(asked)}, and {STIFFENING_EFFECT} in the base model too"
         allowed = "one of them: two laws that scale one bushing cannot be told apart"
         remedy = "leave these representations out, or take the effect out of the model file"
-        yield Problem(*at(document, "representations"), found, allowed, remedy)
+        yield InputProblem(*at(document, "representations"), found, allowed, remedy)
 
 
 def _coordinate(options: Mapping[str, Any] | None) -> str:

@@ -27,7 +27,7 @@ FEWEST = 3
 
 
 @dataclass(frozen=True)
-class Claim:
+class CohortClaim:
     """What is claimed; see the columns of table ``findings``."""
 
     finding: str
@@ -67,7 +67,7 @@ class Claim:
         return self.row(NOT_ASKED, message)
 
 
-def above_zero(claim: Claim, values: pd.Series, significance: float, note: str = "") -> Row:
+def above_zero(claim: CohortClaim, values: pd.Series, significance: float, note: str = "") -> Row:
     """Claim that the mean over specimens is above zero.
 
     Yes and no where the t test tells the mean from zero, by its sign; else undecided.

@@ -16,7 +16,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
     CIRCULAR,
     FACTORS,
     NO_SUCH_FITS,
-    Claim,
+    CohortClaim,
     Row,
     above_zero,
     listed,
@@ -75,10 +75,10 @@ class Comparison:
     smaller: Errors
     own_readings: bool = False
 
-    def claim(self, unit: str = "deg") -> Claim:
+    def claim(self, unit: str = "deg") -> CohortClaim:
         """The claim in words, about errors in that unit."""
         quantity = QUANTITY.format(self.larger.words, self.smaller.words, MOTIONS[unit])
-        return Claim(self.finding, self.statement, quantity, unit)
+        return CohortClaim(self.finding, self.statement, quantity, unit)
 
 
 PUBLISHED = Errors("published stiffness", "literature", LITERATURE)
@@ -181,7 +181,7 @@ COMPARISONS = (
 
 OWN_READINGS = "expected by construction: fitted to the readings it is judged by"
 
-EVERY_LEVEL = Claim(
+EVERY_LEVEL = CohortClaim(
     "wrong_level_ratio_worse_at_every_level",
     "The published ratio of levels, scaled to a specimen, describes every joint worse than one "
     "stiffness for all joints.",
@@ -189,7 +189,7 @@ EVERY_LEVEL = Claim(
     "joints",
 )
 
-LOADED = Claim(
+LOADED = CohortClaim(
     "error_is_largest_in_loaded_direction",
     "With one stiffness per specimen the error is larger in the direction of the load than in the "
     "others.",
@@ -306,7 +306,7 @@ def _lost(found: Mapping[str, pd.Series], asked: Iterable[str]) -> str:
 
 
 def _against(
-    claim: Claim,
+    claim: CohortClaim,
     results: Mapping[str, pd.Series],
     asked: Iterable[str],
     significance: float,
@@ -321,7 +321,7 @@ def _against(
     return row if set(asked) <= set(better.index) else row | {"holds": "undecided"}
 
 
-def _nothing(claim: Claim, larger: pd.DataFrame, smaller: pd.DataFrame) -> Row:
+def _nothing(claim: CohortClaim, larger: pd.DataFrame, smaller: pd.DataFrame) -> Row:
     """The row where there is nothing to compare: was it asked for at all?"""
     if larger.empty and smaller.empty:
         return claim.not_asked("neither was computed in this study")
@@ -342,7 +342,7 @@ def overpredictions(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
     """Does the published stiffness predict too much motion? One finding per load case."""
     published = errors[(errors["representation"] == "literature") & errors["loaded"].astype(bool)]
     for test, rows in published.groupby("test", sort=False):
-        claim = Claim(
+        claim = CohortClaim(
             f"literature_overpredicts_motion_{test}",
             f"The published stiffness predicts too much motion under {words(str(test))}.",
             "predicted less measured motion in the loaded coordinate at the largest load, mean "
@@ -370,7 +370,7 @@ def error_spreads(statistics: pd.DataFrame, significance: float) -> Iterator[Row
     for representation, prefix in ERROR_CLAIMS.items():
         described = named(representation).sentence
         for what in FACTORS:
-            claim = Claim(
+            claim = CohortClaim(
                 f"{prefix}errors_differ_between_{what}",
                 f"With {described}, fitted, errors in the loaded coordinate differ between {what} "
                 "under some load case.",
@@ -384,7 +384,7 @@ def error_spreads(statistics: pd.DataFrame, significance: float) -> Iterator[Row
             yield _errors_differ(claim, what, tests, significance)
 
 
-def _errors_differ(claim: Claim, what: str, tests: pd.DataFrame, significance: float) -> Row:
+def _errors_differ(claim: CohortClaim, what: str, tests: pd.DataFrame, significance: float) -> Row:
     """Yes where a test is significant, else undecided: a small cohort cannot tell no difference."""
     known = tests.dropna(subset="p")
     if tests.empty:

@@ -11,7 +11,14 @@ from spinepipe.effects.contract import Array
 from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status, joined
-from spinepipe.studies.cohort_stiffness.claims import FACTORS, NO_SUCH_FITS, Claim, Row, told, words
+from spinepipe.studies.cohort_stiffness.claims import (
+    FACTORS,
+    NO_SUCH_FITS,
+    CohortClaim,
+    Row,
+    told,
+    words,
+)
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, label_of_others
 from spinepipe.studies.cohort_stiffness.significance import FAMILY
@@ -29,13 +36,13 @@ SHARE = (
 )
 
 SPECIFIC = {
-    "per_joint": Claim(
+    "per_joint": CohortClaim(
         "stiffness_is_load_case_specific",
         "With a stiffness for each joint, load cases ask for different stiffness.",
         SHARE,
         "",
     ),
-    "per_specimen": Claim(
+    "per_specimen": CohortClaim(
         "uniform_stiffness_is_load_case_specific",
         "With one stiffness for all joints, load cases ask for different stiffness.",
         SHARE,
@@ -47,7 +54,7 @@ NO_BY_SIZE = "no by the size of this share alone: no test of its absence, so non
 
 MISFIT = "also misfit of a uniform stiffness, which differs between load cases, counts here"
 
-STIFFER = Claim(
+STIFFER = CohortClaim(
     "loaded_stiffness_differs",
     "A joint is stiffer, or softer, against the main moment than the other load cases tell.",
     "stiffness against the loaded coordinate, fitted to that load case, over that fitted to the "
@@ -74,7 +81,7 @@ def load_case_findings(
     yield _ratio(ratios, significance)
 
 
-def specific(claim: Claim, tests: pd.DataFrame, significance: float, note: str = "") -> Row:
+def specific(claim: CohortClaim, tests: pd.DataFrame, significance: float, note: str = "") -> Row:
     """Yes where the F tests together are significant; no where none is and they explain little."""
     known = tests.dropna(subset="p")
     if tests.empty:
@@ -196,9 +203,9 @@ def stiffness_spreads(
             yield share_between(claim, rows, factor, block, significance, note)
 
 
-def _spread_claim(what: str, coordinate: str) -> Claim:
+def _spread_claim(what: str, coordinate: str) -> CohortClaim:
     other = "levels" if what == "specimens" else "specimens"
-    return Claim(
+    return CohortClaim(
         f"stiffness_differs_between_{what}_{coordinate}",
         f"{what.capitalize()} differ in {words(coordinate)} stiffness: some are stiffer "
         f"than others in all {other} alike.",
@@ -223,7 +230,7 @@ def _pooled_spread(pooling: pd.DataFrame | None, label: str, coordinate: str, wh
 
 
 def share_between(
-    claim: Claim, rows: pd.DataFrame, factor: str, block: str, significance: float, note: str
+    claim: CohortClaim, rows: pd.DataFrame, factor: str, block: str, significance: float, note: str
 ) -> Row:
     """Yes where the F test is significant, no where the share is surely small.
 

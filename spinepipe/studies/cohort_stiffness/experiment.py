@@ -16,20 +16,20 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
-from spinepipe.experiment.loop import Loop, Spread, reading_noise
+from spinepipe.experiment.loop import Loop, RotationErrors, reading_noise
 from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.status import USABLE, Status, joined
 from spinepipe.studies.cohort_stiffness.loop_rows import (
     TWO_ZEROS,
-    Seen,
+    LoopReading,
     axis_row,
     displacement_row,
     empty,
     noise_of_poses,
 )
-from spinepipe.studies.cohort_stiffness.loops import Cycle, cycles_of
+from spinepipe.studies.cohort_stiffness.loops import LoadingLoop, cycles_of
 from spinepipe.studies.cohort_stiffness.predict import predicted
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
@@ -175,7 +175,7 @@ def _covariance(
 
 
 def _of_joint(
-    cycle: Cycle,
+    cycle: LoadingLoop,
     joint: int,
     sd: MeasurementSd | None,
     zeroed: bool,
@@ -210,8 +210,8 @@ def _of_joint(
     yield _simulated(read, joint, model, why)
 
 
-def _scaled(noise: Spread, sd: float) -> Spread:
-    return Spread(sd * noise.root, noise.free, noise.reach)
+def _scaled(noise: RotationErrors, sd: float) -> RotationErrors:
+    return RotationErrors(sd * noise.root, noise.free, noise.reach)
 
 
 def _refused(
@@ -239,7 +239,7 @@ class _Read:
     place : of the coordinate. known : (T,). sd : rad, of one reading, if it is declared.
     """
 
-    cycle: Cycle
+    cycle: LoadingLoop
     place: int
     known: NDArray[np.bool_]
     sd: float | None
@@ -254,9 +254,9 @@ class _Read:
         steps, load = np.flatnonzero(self.known), self.cycle.load[self.known]
         return int(steps[np.argmin(load)]), int(steps[np.argmax(load)])
 
-    def curve(self, motion: Array, spread: Spread | None) -> Row:
+    def curve(self, motion: Array, spread: RotationErrors | None) -> Row:
         """Row of the curve of motion (T, 6), without its source."""
-        row = displacement_row(Seen(self.loop(motion), spread, self.sd))
+        row = displacement_row(LoopReading(self.loop(motion), spread, self.sd))
         return row | {"coordinate": self.cycle.coordinate}
 
     def axis(
@@ -296,7 +296,9 @@ def _simulated(
     else:
         by = cycle.of(model.slopes)[:, joint]
         held, loose = by[..., model.held] @ model.root, by[..., ~model.held]
-        spread = Spread(held[:, read.place], loose[:, read.place], model.reach).at(read.known)
+        spread = RotationErrors(held[:, read.place], loose[:, read.place], model.reach).at(
+            read.known
+        )
         row = read.curve(motion, spread)
         both = list(read.ends)
         flat = (held[both].reshape(12, -1), loose[both].reshape(12, -1))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from spinepipe.calibrate import Fit, Problem, fit
-from spinepipe.calibrate.profile import Reach
+from spinepipe.calibrate.profile import RegionEnds
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.inputs import study_of_kind
@@ -44,7 +44,7 @@ from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
 
-UNTOLD = Reach(None, None, open_below=True, open_above=True)
+UNTOLD = RegionEnds(None, None, open_below=True, open_above=True)
 """Of a stiffness that was held as no reading tells of it."""
 
 

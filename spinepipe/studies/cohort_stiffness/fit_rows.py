@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from spinepipe.calibrate import Problem
-from spinepipe.calibrate.profile import Reach
+from spinepipe.calibrate.profile import RegionEnds
 from spinepipe.effects.contract import Array
 from spinepipe.studies.cohort_stiffness.stiffening import AT_BOUND, LINEAR, Growth
 from spinepipe.units import COORDINATES, STIFFNESS_UNITS
@@ -28,7 +28,7 @@ def stiffness_rows(
     degrees_of_freedom: float,
     identifiable: NDArray[np.bool_] | None,
     at_bound: NDArray[np.int64],
-    reaches: Mapping[tuple[int, int], Reach] | None = None,
+    reaches: Mapping[tuple[int, int], RegionEnds] | None = None,
     growth: Growth | None = None,
 ) -> list[Row]:
     """One row per joint and free coordinate.

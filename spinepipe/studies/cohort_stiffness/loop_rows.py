@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.experiment.double_sigmoid import NeutralZone, Zone, neutral_zone
-from spinepipe.experiment.loop import Loop, Measure, Spread, stiffness_interval
+from spinepipe.experiment.double_sigmoid import FittedNeutralZone, Zone, neutral_zone
+from spinepipe.experiment.loop import Loop, Measure, RotationErrors, stiffness_interval
 from spinepipe.experiment.screw import SMALLEST_ANGLE, derivatives, screw_between
 from spinepipe.schema import Table
 from spinepipe.status import Status, joined
@@ -44,7 +44,7 @@ def empty(table: Table) -> Row:
 
 
 @dataclass(frozen=True)
-class Seen:
+class LoopReading:
     """Rotation of one joint in one cycle, and what is uncertain of it.
 
     Attributes
@@ -54,11 +54,11 @@ class Seen:
     """
 
     loop: Loop
-    spread: Spread | None
+    spread: RotationErrors | None
     sd: float | None
 
 
-def displacement_row(seen: Seen) -> Row:
+def displacement_row(seen: LoopReading) -> Row:
     """What is read off a curve of two steps at least; without key and coordinate."""
     loop = seen.loop
     row = empty(LOAD_DISPLACEMENT) | {
@@ -85,11 +85,11 @@ def displacement_row(seen: Seen) -> Row:
     return row | {"message": joined(lacking, lost)}
 
 
-def _way(seen: Seen, measure: Measure) -> float | None:
+def _way(seen: LoopReading, measure: Measure) -> float | None:
     return None if seen.spread is None else seen.spread.way(measure)
 
 
-def _cells(seen: Seen, name: str, suffix: str, measure: Measure, unit: float) -> Row:
+def _cells(seen: LoopReading, name: str, suffix: str, measure: Measure, unit: float) -> Row:
     """A number and the ends of its interval, ``unit`` times each."""
     way = _way(seen, measure)
     ends = (None, None) if way is None else (measure.value - way, measure.value + way)
@@ -98,18 +98,18 @@ def _cells(seen: Seen, name: str, suffix: str, measure: Measure, unit: float) ->
     return dict(zip(names, (unit * measure.value, low, high), strict=True))
 
 
-def _in_deg(seen: Seen, name: str, measure: Measure) -> Row:
+def _in_deg(seen: LoopReading, name: str, measure: Measure) -> Row:
     return _cells(seen, name, "deg", measure, DEG_PER_RAD)
 
 
-def _stiffness_cells(seen: Seen, name: str, compliance: Measure) -> Row:
+def _stiffness_cells(seen: LoopReading, name: str, compliance: Measure) -> Row:
     """Stiffness of a compliance and the ends of its interval."""
     numbers = stiffness_interval(compliance, _way(seen, compliance))
     names = (f"{name}_{part}nm_per_rad" for part in ("", "low_", "high_"))
     return dict(zip(names, numbers, strict=True))
 
 
-def _zones(seen: Seen) -> tuple[list[NeutralZone], Zone, str]:
+def _zones(seen: LoopReading) -> tuple[list[FittedNeutralZone], Zone, str]:
     """Neutral zones of each direction, told for the whole loop, or why there is none."""
     loop = seen.loop
     if not loop.two_sided:
@@ -126,7 +126,7 @@ def _zones(seen: Seen) -> tuple[list[NeutralZone], Zone, str]:
     return [], *words[0]
 
 
-def _of_loop(zone: NeutralZone, places: Any, steps: int) -> NeutralZone:
+def _of_loop(zone: FittedNeutralZone, places: Any, steps: int) -> FittedNeutralZone:
     """A zone with weights by the rotations of the whole loop."""
 
     def whole(measure: Measure) -> Measure:
@@ -134,7 +134,7 @@ def _of_loop(zone: NeutralZone, places: Any, steps: int) -> NeutralZone:
         np.add.at(weights, places, measure.weights)
         return Measure(measure.value, weights)
 
-    return NeutralZone(whole(zone.size), whole(zone.compliance), zone.ends)
+    return FittedNeutralZone(whole(zone.size), whole(zone.compliance), zone.ends)
 
 
 def _mean(measures: Sequence[Measure]) -> Measure:
@@ -142,7 +142,7 @@ def _mean(measures: Sequence[Measure]) -> Measure:
     return Measure(float(np.mean([one.value for one in measures])), weights)
 
 
-def _zone_cells(seen: Seen, zones: Sequence[NeutralZone]) -> Row:
+def _zone_cells(seen: LoopReading, zones: Sequence[FittedNeutralZone]) -> Row:
     if not zones:
         return {}
     size = _in_deg(seen, "neutral_zone", _mean([one.size for one in zones]))
@@ -160,7 +160,7 @@ def _zone_cells(seen: Seen, zones: Sequence[NeutralZone]) -> Row:
     }
 
 
-def _elastic_cells(seen: Seen, zones: Sequence[NeutralZone]) -> tuple[Row, str]:
+def _elastic_cells(seen: LoopReading, zones: Sequence[FittedNeutralZone]) -> tuple[Row, str]:
     """Stiffness of both elastic zones, as far as their sides were loaded, and what is lost."""
     row: Row = {"elastic_zone": BEYOND if zones else UPPER_HALF}
     notes, found = [], False

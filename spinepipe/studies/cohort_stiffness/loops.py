@@ -16,7 +16,7 @@ AND = "+"
 
 
 @dataclass(frozen=True)
-class Cycle:
+class LoadingLoop:
     """One cycle of a test, or of two tests to opposite sides one behind the other.
 
     Attributes
@@ -60,19 +60,19 @@ def _with_zero(one: MeasuredCycle) -> Array:
     return motion
 
 
-def cycles_of(tested: Sequence[MeasuredCycle]) -> list[Cycle]:
+def cycles_of(tested: Sequence[MeasuredCycle]) -> list[LoadingLoop]:
     """The cycles of a specimen in their order, two tests to opposite sides joined to one.
 
     Joined are tests that drive one rotation, each to its own side alone and the only one to it;
     their cycles of one number make a loop, others stay by themselves.
     """
     alone = [
-        Cycle(one.case.test, one.case.cycle, _turned(one), (place,), (one,))
+        LoadingLoop(one.case.test, one.case.cycle, _turned(one), (place,), (one,))
         for place, one in enumerate(tested)
     ]
     partner = dict(_opposite(alone))
     found = {(one.test, one.number): one for one in alone}
-    made: list[Cycle] = []
+    made: list[LoadingLoop] = []
     for one in alone:
         there = found.get((partner.get(one.test, ""), one.number))
         if there is None:
@@ -87,7 +87,7 @@ def _turned(one: MeasuredCycle) -> str | None:
     return one.loaded if one.loaded in DRIVEN else None
 
 
-def _opposite(cycles: Sequence[Cycle]) -> Iterator[tuple[str, str]]:
+def _opposite(cycles: Sequence[LoadingLoop]) -> Iterator[tuple[str, str]]:
     """Each test with the one to the other side, where there is exactly one for each side."""
     sides: dict[tuple[str | None, int], set[str]] = {}
     for one in cycles:
@@ -107,8 +107,8 @@ def _only_side(load: Array) -> int:
     return reached[0] if len(reached) == 1 else 0
 
 
-def _joined(one: Cycle, other: Cycle) -> Cycle:
-    return Cycle(
+def _joined(one: LoadingLoop, other: LoadingLoop) -> LoadingLoop:
+    return LoadingLoop(
         f"{one.test}{AND}{other.test}",
         one.number,
         one.coordinate,

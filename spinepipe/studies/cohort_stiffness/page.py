@@ -10,7 +10,7 @@ from spinepipe.comparison import papers
 from spinepipe.report.page.document import (
     Document,
     Picture,
-    Results,
+    ResultTables,
     Sortable,
     beside_paper,
     sortable,
@@ -100,7 +100,7 @@ NOT_HELD_OUT = (
 )
 
 
-def document(study: CohortStiffness, cohort: Cohort, results: Results) -> Document:
+def document(study: CohortStiffness, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
     return Document(
         question=QUESTION,
@@ -146,7 +146,7 @@ def left_out(study: CohortStiffness, specimens: int, joints: Sequence[str] = ())
     return tuple(f"{part} ({why})" for part, why, done in parts if not done)
 
 
-def shown_tables(results: Results) -> list[Sortable]:
+def shown_tables(results: ResultTables) -> list[Sortable]:
     """Tables that the study has, as the page shows them; those without rows are left out."""
     found = []
     for name, title in SHOWN.items():

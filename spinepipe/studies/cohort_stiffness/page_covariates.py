@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import AXIS, number
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
@@ -17,7 +17,7 @@ _WORDS = {
 }
 
 
-def covariates(study: CohortStiffness, results: Results) -> Iterator[str]:
+def covariates(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """What goes with stiffness, what cannot be told, and what was not to be asked."""
     rows = results.table("covariates")
     if rows.empty:

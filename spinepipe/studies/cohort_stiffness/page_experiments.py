@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spinepipe.experiment.double_sigmoid import Zone
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import count, number
 from spinepipe.studies.cohort_stiffness.curves_compared import both
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
@@ -28,7 +28,7 @@ _WHY = {
 }
 
 
-def ranges(study: CohortStiffness, results: Results) -> Iterator[str]:
+def ranges(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """How far joints move, and how far the fitted model does.
 
     A curve agrees where the difference is within its 95 % limit. The model was fitted to these
@@ -60,7 +60,7 @@ def ranges(study: CohortStiffness, results: Results) -> Iterator[str]:
     yield f"{told}. The stiffness was fitted to these readings, so this is no prediction."
 
 
-def zones(study: CohortStiffness, results: Results) -> Iterator[str]:
+def zones(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """How many curves are softer in the middle, by how much, and whether the model's are.
 
     Softer: a sigmoid fits better than a straight line, by more than noise (5 %).
@@ -90,7 +90,7 @@ def zones(study: CohortStiffness, results: Results) -> Iterator[str]:
     yield f"{told}."
 
 
-def hysteresis(study: CohortStiffness, results: Results) -> Iterator[str]:
+def hysteresis(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """How much work a cycle loses, measured and in the model."""
     rows = results.table("load_displacement")
     if rows.empty:
@@ -115,7 +115,7 @@ def _rounded(joules: float) -> float:
     return 0.0 if abs(joules) < 1e-9 else float(joules)
 
 
-def axes(study: CohortStiffness, results: Results) -> Iterator[str]:
+def axes(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """How many motions have an axis, and how sure its place is."""
     rows = results.table("helical_axes")
     if rows.empty:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.page.document import Results, judged
+from spinepipe.report.page.document import ResultTables, judged
 from spinepipe.report.words import AXIS, after_number, case, count, number, percent
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.page_covariates import covariates
@@ -47,16 +47,16 @@ _PARTS = {
     "between_joints": "of joints beyond that",
 }
 
-Finding = Callable[[CohortStiffness, Results], Iterator[str]]
+Finding = Callable[[CohortStiffness, ResultTables], Iterator[str]]
 
 
-def findings(study: CohortStiffness, results: Results) -> list[str]:
+def findings(study: CohortStiffness, results: ResultTables) -> list[str]:
     """The sentences, without those that the study has no table for."""
     told = [sentence for make in MAKERS for sentence in make(study, results)]
     return [sentence.replace(" %", "\u00a0%") for sentence in told]
 
 
-def signs(study: CohortStiffness, results: Results) -> Iterator[str]:
+def signs(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """Where the measured motion goes against the load."""
     rows = results.table("sign_checks")
     if rows.empty:
@@ -97,7 +97,7 @@ def _sizes(implausible: pd.DataFrame) -> Iterator[str]:
     )
 
 
-def failed(study: CohortStiffness, results: Results) -> Iterator[str]:
+def failed(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """Fits without a stiffness, and why."""
     rows = results.table("fits")
     if rows.empty:
@@ -111,7 +111,7 @@ def failed(study: CohortStiffness, results: Results) -> Iterator[str]:
     yield f"{len(lost)} of {count(len(rows), 'fit')} have no stiffness: {_some(places)}."
 
 
-def bounds(study: CohortStiffness, results: Results) -> Iterator[str]:
+def bounds(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """Fits with a stiffness at a bound."""
     rows = results.table("fits")
     if rows.empty:
@@ -136,7 +136,7 @@ def bounds(study: CohortStiffness, results: Results) -> Iterator[str]:
     )
 
 
-def optima(study: CohortStiffness, results: Results) -> Iterator[str]:
+def optima(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """Fits whose answer hangs on the start."""
     rows = results.table("fits")
     several = rows[rows["n_optima"] > 1] if len(rows) else rows
@@ -146,7 +146,7 @@ def optima(study: CohortStiffness, results: Results) -> Iterator[str]:
         yield f"{found} several optima, so that the answer depends on the start: {_some(places)}."
 
 
-def identifiable(study: CohortStiffness, results: Results) -> Iterator[str]:
+def identifiable(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """How many fitted values the data do not constrain, and how well errors are explained."""
     rows = results.table("stiffness")
     if rows.empty:
@@ -184,7 +184,7 @@ CHOSEN_AFTER = (
 )
 
 
-def ranking(study: CohortStiffness, results: Results) -> Iterator[str]:
+def ranking(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """The order of representations by each criterion."""
     rows = results.table("ranking")
     if rows.empty:
@@ -221,7 +221,7 @@ def _best(part: pd.DataFrame) -> str:
     return " and ".join(IN_WORDS[name] for name in part["representation"])
 
 
-def claims(study: CohortStiffness, results: Results) -> Iterator[str]:
+def claims(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """How many claims hold, and the first of each verdict with their numbers."""
     rows = results.table("findings")
     if rows.empty:
@@ -256,7 +256,7 @@ def _claim(row: dict[Any, Any]) -> str:
     return f"{words} ({', '.join(numbers)})"
 
 
-def loaded_errors(study: CohortStiffness, results: Results) -> Iterator[str]:
+def loaded_errors(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """Errors in the loaded direction at the largest load, load case by load case."""
     rows = results.table("mae")
     if rows.empty:
@@ -285,7 +285,7 @@ def _share(row: dict[Any, Any]) -> str:
     return "" if pd.isna(share) else f" ({number(share, 2)} %)"
 
 
-def spreads(study: CohortStiffness, results: Results) -> Iterator[str]:
+def spreads(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """Spreads that the hierarchical fit found, as factors: one SD up or down."""
     rows = results.table("pooling")
     if rows.empty:
@@ -311,7 +311,7 @@ def _spread(row: dict[Any, Any]) -> str:
     return f"{centre} ({', '.join(factors)})" if factors else centre
 
 
-def beside_the_paper(study: CohortStiffness, results: Results) -> Iterator[str]:
+def beside_the_paper(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """How the published quantities were judged."""
     told = judged(results.table("against_gould_2024b"))
     if told:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import after_number, count, number, percent
 from spinepipe.studies.cohort_stiffness.claims import FEWEST
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, NUISANCE, named
@@ -25,7 +25,7 @@ FAR = 3
 """A pull beyond this, either way, is seldom of its prior: one in 370."""
 
 
-def nuisances(study: CohortStiffness, results: Results) -> Iterator[str]:
+def nuisances(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """What fitting them beside does to the order on held-out motion, and how large they are."""
     ranking = results.table("ranking")
     for criterion, words in _HELD_OUT.items():

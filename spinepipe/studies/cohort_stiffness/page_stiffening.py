@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import number, percent
 from spinepipe.studies.cohort_stiffness.claims_of_errors import CONTESTS
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, SHARED, STIFFENING
@@ -25,7 +25,7 @@ _VERDICTS = {
 }
 
 
-def stiffening(study: CohortStiffness, results: Results) -> Iterator[str]:
+def stiffening(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     """Laws that stiffen beside their linear counterparts, and whether the data hold them."""
     rows = results.table("findings")
     for better, worse in CONTESTS:

@@ -60,7 +60,7 @@ class CrossValidation(BaseModel):
     )
 
 
-class Nuisance(BaseModel):
+class PoseNuisance(BaseModel):
     """How far joint centres and axes may be from where they are stated."""
 
     model_config = FORM
@@ -123,7 +123,7 @@ class CohortStiffness(Study):
         default_factory=_published_levels,
         description="published rotational stiffness joint by joint, whose ratios level_ratio keeps",
     )
-    nuisance: Nuisance | None = Field(
+    nuisance: PoseNuisance | None = Field(
         default=None,
         description="errors of joint centres and axes, fitted beside the stiffness by the "
         "representations whose name ends in _nuisance; null: none",

@@ -14,8 +14,8 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
 from spinepipe.statistics import (
-    Ended,
-    Outcome,
+    ComputationStatus,
+    StatisticalTest,
     f_test_nested,
     friedman,
     kruskal_wallis,
@@ -98,7 +98,7 @@ def response_of(rows: pd.DataFrame) -> str:
     return "rotation_error" if unit_of(rows) == "deg" else "translation_error"
 
 
-def _both(rows: pd.DataFrame, factor: str) -> Iterator[Outcome]:
+def _both(rows: pd.DataFrame, factor: str) -> Iterator[StatisticalTest]:
     known = rows.dropna(subset="peak_error")
     errors = known["peak_error"].astype(float).abs()
     groups = [part.to_numpy(float) for _, part in errors.groupby(known[factor], sort=False)]
@@ -115,7 +115,7 @@ def _both(rows: pd.DataFrame, factor: str) -> Iterator[Outcome]:
     yield _noted(friedman(ranks.to_numpy(float)), note, lost > 0)
 
 
-def _noted(outcome: Outcome, note: str, when: bool = True) -> Outcome:
+def _noted(outcome: StatisticalTest, note: str, when: bool = True) -> StatisticalTest:
     """The outcome with a note in its message."""
     if not when:
         return outcome
@@ -211,7 +211,7 @@ def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
         yield Tested(family, "*", "stiffness", "load case", "", outcome, str(specimen))
 
 
-def nested_fits(rows: pd.DataFrame) -> Outcome:
+def nested_fits(rows: pd.DataFrame) -> StatisticalTest:
     """The test for the fits of one specimen in one representation."""
     if joint_label(rows["fitted_to"]) != ALL:
         return _without("one load case only: nothing to compare")
@@ -231,7 +231,7 @@ def nested_fits(rows: pd.DataFrame) -> Outcome:
         return _without("the separate fits have no more unknowns inside their bounds")
     costs = float(joint["cost"].sum()), float(single["cost"].sum())
     outcome = f_test_nested(costs[0], small, costs[1], large)
-    return replace(outcome, n=readings) if outcome.status is Ended.DONE else outcome
+    return replace(outcome, n=readings) if outcome.status is ComputationStatus.DONE else outcome
 
 
 def _correlated(rows: pd.DataFrame) -> bool:
@@ -240,5 +240,5 @@ def _correlated(rows: pd.DataFrame) -> bool:
     return bool(notes.str.contains(SHARED_ERROR, regex=False).any())
 
 
-def _without(message: str) -> Outcome:
-    return NESTED.without(Ended.TOO_FEW, 0, message)
+def _without(message: str) -> StatisticalTest:
+    return NESTED.without(ComputationStatus.TOO_FEW, 0, message)

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.supports import MEASURED
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects import registered
-from spinepipe.problems import Problem, Spelling, one_of
+from spinepipe.problems import InputProblem, Spelling, one_of
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.places import at, measured_columns, readings, repeated, unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS
@@ -17,7 +17,9 @@ def effects_to_try() -> tuple[str, ...]:
     return tuple(sorted(name for name, cls in registered().items() if hasattr(cls, "trial")))
 
 
-def check_discrepancy(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:
+def check_discrepancy(
+    document: YamlDocument, study: Discrepancy, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Every way in which a sound study and a sound cohort do not fit.
 
     Parameters
@@ -29,7 +31,7 @@ def check_discrepancy(document: Document, study: Discrepancy, cohort: Cohort) ->
         found = f"cohort '{cohort.name}', which has no motion.csv"
         allowed = "a cohort with loads.csv and motion.csv: what a model lacks shows in motion"
         remedy = "choose another cohort, or a study of kind range_of_motion"
-        yield Problem(*at(document, "cohort"), found, allowed, remedy)
+        yield InputProblem(*at(document, "cohort"), found, allowed, remedy)
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
     yield from _measured(document, study, cohort)
@@ -38,7 +40,7 @@ def check_discrepancy(document: Document, study: Discrepancy, cohort: Cohort) ->
     yield from _loads_of_a_rig(document, study, cohort)
 
 
-def _effects(document: Document, study: Discrepancy) -> Iterator[Problem]:
+def _effects(document: YamlDocument, study: Discrepancy) -> Iterator[InputProblem]:
     """Names of effects that are in the registry and can be tried."""
     known = effects_to_try()
     spelling = Spelling(known, "delete it")
@@ -50,10 +52,10 @@ def _effects(document: Document, study: Discrepancy) -> Iterator[Problem]:
         if name in registered():
             found = f"'{name}', which does not say how it may be tried"
             remedy = "delete it"
-        yield Problem(*place, found, spelling.allowed, remedy)
+        yield InputProblem(*place, found, spelling.allowed, remedy)
 
 
-def _measured(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:
+def _measured(document: YamlDocument, study: Discrepancy, cohort: Cohort) -> Iterator[InputProblem]:
     """Readings in each test that is asked for, and of every specimen."""
     rows = readings(cohort, study.tests, study.coordinates)
     for index, name in enumerate(study.tests or ()):
@@ -61,16 +63,18 @@ def _measured(document: Document, study: Discrepancy, cohort: Cohort) -> Iterato
             found = f"test '{name}', which has no motion"
             place = at(document, f"tests.{index}")
             allowed = "tests with readings of a specimen at least"
-            yield Problem(*place, found, allowed, "delete it or add its motion")
+            yield InputProblem(*place, found, allowed, "delete it or add its motion")
     for specimen in cohort.specimen_names:
         if specimen not in set(rows["specimen"]):
             found = f"no motion of specimen '{specimen}' in any chosen test"
             allowed = "readings of every specimen in one test at least"
             remedy = "choose more tests or coordinates, or leave the specimen out of the cohort"
-            yield Problem(*at(document, "tests"), found, allowed, remedy)
+            yield InputProblem(*at(document, "tests"), found, allowed, remedy)
 
 
-def _coordinates(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:
+def _coordinates(
+    document: YamlDocument, study: Discrepancy, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Coordinates that are asked for were measured."""
     present = measured_columns(readings(cohort, study.tests, None))
     names = dict(zip(COORDINATE_COLUMNS, COORDINATES, strict=True))
@@ -79,10 +83,14 @@ def _coordinates(document: Document, study: Discrepancy, cohort: Cohort) -> Iter
         if name not in known:
             place = at(document, f"coordinates.{index}")
             found = f"'{name}', which was not measured in the chosen tests"
-            yield Problem(*place, found, one_of(known), "delete it, or add its column to motion")
+            yield InputProblem(
+                *place, found, one_of(known), "delete it, or add its column to motion"
+            )
 
 
-def _loads_of_a_rig(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:
+def _loads_of_a_rig(
+    document: YamlDocument, study: Discrepancy, cohort: Cohort
+) -> Iterator[InputProblem]:
     """SDs of a rig's loads stand beside those of motion, in the cohort."""
     if cohort.supports is None or study.measurement_sd is None:
         return
@@ -90,10 +98,10 @@ def _loads_of_a_rig(document: Document, study: Discrepancy, cohort: Cohort) -> I
         found = "SDs of motion beside loads of a rig that were measured (supports.csv)"
         allowed = "null: cohort.yaml says the SDs of motion and of loads together"
         remedy = "set measurement_sd in cohort.yaml, and take it out here"
-        yield Problem(*at(document, "measurement_sd"), found, allowed, remedy)
+        yield InputProblem(*at(document, "measurement_sd"), found, allowed, remedy)
 
 
-def _noise(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[Problem]:
+def _noise(document: YamlDocument, study: Discrepancy, cohort: Cohort) -> Iterator[InputProblem]:
     """Repeated cycles or declared SDs: without either nobody knows what is above the noise."""
     if (study.measurement_sd or cohort.measurement_sd) is not None:
         return
@@ -105,5 +113,5 @@ def _noise(document: Document, study: Discrepancy, cohort: Cohort) -> Iterator[P
             found = f"null; the cohort has none, and no {kind} was read in two cycles of a test"
             allowed = "SDs of one reading, here or in cohort.yaml, or repeated cycles in motion.csv"
             remedy = "set measurement_sd: {rotation_deg: 0.1, translation_mm: 0.1} to what is known"
-            yield Problem(*at(document, "measurement_sd"), found, allowed, remedy)
+            yield InputProblem(*at(document, "measurement_sd"), found, allowed, remedy)
             return

@@ -32,7 +32,7 @@ _SIDES = {"minus": 0, "plus": 1}
 
 
 @dataclass(frozen=True)
-class Reach:
+class LoadRange:
     """Loads that tests put on a coordinate of a joint, N m or N: lowest and highest, 0 within."""
 
     low: float
@@ -44,7 +44,7 @@ class Reach:
         return max(-self.low, self.high)
 
 
-Reaches = Mapping[tuple[str, str], Reach]
+Reaches = Mapping[tuple[str, str], LoadRange]
 """By joint and coordinate."""
 
 
@@ -55,13 +55,13 @@ def reaches(gap: Sequence[Row]) -> Reaches:
     ----------
     gap : its rows, with `joint`, `coordinate`, `unit`, `load` and `measured`.
     """
-    found: dict[tuple[str, str], Reach] = {}
+    found: dict[tuple[str, str], LoadRange] = {}
     for row in gap:
         on_a_rig = row["unit"] == LOAD_UNITS[row["coordinate"]]
         load = row["measured"] if on_a_rig else row["load"]
         key = row["joint"], row["coordinate"]
-        before = found.get(key, Reach(0.0, 0.0))
-        found[key] = Reach(min(before.low, load), max(before.high, load))
+        before = found.get(key, LoadRange(0.0, 0.0))
+        found[key] = LoadRange(min(before.low, load), max(before.high, load))
     return found
 
 
@@ -171,7 +171,9 @@ def _read(joints: Sequence[Laws], coordinate: str, load: float) -> list[Array]:
     return found
 
 
-def _of_place(place: Row, fit: JointFit, specimens: Sequence[str], reach: Reach) -> Iterator[Row]:
+def _of_place(
+    place: Row, fit: JointFit, specimens: Sequence[str], reach: LoadRange
+) -> Iterator[Row]:
     """Rows of each specimen, and of their mean, at a joint, coordinate and load."""
     coordinate, load = place["coordinate"], place["load"]
     found = told(fit, specimens, place["joint"], lambda laws: _read(laws, coordinate, load))
@@ -193,7 +195,7 @@ def _of_place(place: Row, fit: JointFit, specimens: Sequence[str], reach: Reach)
             }
 
 
-def _seen(number: str, reach: Reach, load: float) -> bool:
+def _seen(number: str, reach: LoadRange, load: float) -> bool:
     """Whether tests loaded the side, or the sides, that a number tells of."""
     sides = (-reach.low > ONE_SIDED * load, reach.high > ONE_SIDED * load)
     if number in ("zone", "loop_area"):

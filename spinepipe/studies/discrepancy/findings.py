@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import capital, fixed, listed, number
 from spinepipe.studies.discrepancy.advice_words import advice_sentences
 from spinepipe.studies.discrepancy.gap_words import before_and_after, where_most
@@ -19,7 +19,13 @@ from spinepipe.studies.discrepancy.unnamed_words import (
     why_not_all,
     without_a_name,
 )
-from spinepipe.studies.discrepancy.verdict import DECLARED, Answer, Missing, Verdict, share_of_gap
+from spinepipe.studies.discrepancy.verdict import (
+    DECLARED,
+    Conclusion,
+    Missing,
+    Verdict,
+    share_of_gap,
+)
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import (
     called,
@@ -49,11 +55,11 @@ def headline(verdict: Verdict, where: pd.DataFrame) -> str:
     ----------
     where : rows of the table of that name.
     """
-    if verdict.verdict is Answer.UNKNOWN:
+    if verdict.verdict is Conclusion.UNKNOWN:
         return without_a_name(verdict, where)
-    if verdict.verdict is Answer.NULL:
+    if verdict.verdict is Conclusion.NULL:
         return _nothing(verdict)
-    told = _one_of(verdict) if verdict.verdict is Answer.SET else _lacks(verdict.effects)
+    told = _one_of(verdict) if verdict.verdict is Conclusion.SET else _lacks(verdict.effects)
     return f"{told} {more_stays(verdict, where)}".strip()
 
 
@@ -163,7 +169,7 @@ def warnings(verdict: Verdict) -> tuple[str, ...]:
     )
 
 
-def findings(verdict: Verdict, results: Results) -> list[str]:
+def findings(verdict: Verdict, results: ResultTables) -> list[str]:
     """The sentences, without those that there is nothing to say for."""
     where = results.table("where")
     told = [
@@ -212,7 +218,7 @@ def _noise(verdict: Verdict) -> str:
 
 def would_have_been_seen(verdict: Verdict) -> str:
     """Of a search that named nothing: the gaps from which effects would have been found."""
-    if verdict.verdict is not Answer.NULL or not verdict.smallest_detectable:
+    if verdict.verdict is not Conclusion.NULL or not verdict.smallest_detectable:
         return ""
     ordered = sorted(verdict.smallest_detectable, key=lambda one: one.gap)
     told = [f"{general(one.name)} {number(one.gap, 2)}" for one in ordered]
@@ -264,7 +270,7 @@ def not_testable(verdict: Verdict) -> str:
     if not names:
         return ""
     told = f"These tests cannot show {listed(names, 8, 'or')}"
-    if verdict.verdict is Answer.NULL:
+    if verdict.verdict is Conclusion.NULL:
         told += ", so nothing is said about them"
     by_test: dict[str, list[str]] = {}
     for one in verdict.not_testable:

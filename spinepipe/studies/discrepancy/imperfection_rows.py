@@ -8,7 +8,7 @@ from spinepipe.studies.discrepancy.search.imperfections import (
     EVERYWHERE,
     Imperfection,
     InCommon,
-    Place,
+    NuisancePlace,
     TakenUp,
 )
 from spinepipe.studies.discrepancy.search.model_files import border
@@ -48,7 +48,7 @@ def imperfection_rows(taken: TakenUp, model: str) -> Iterator[Row]:
         }
 
 
-def _row(at: Place, model: str, size: float, sd: float) -> Row:
+def _row(at: NuisancePlace, model: str, size: float, sd: float) -> Row:
     prior, unit = border(at.unit, at.sd)
     return {
         "model": model,
@@ -95,7 +95,7 @@ def _common(one: InCommon) -> CommonImperfection:
     return CommonImperfection(one.at.kind, where(one.at), one.size, one.sd, value, unit)
 
 
-def where(at: Place) -> str:
+def where(at: NuisancePlace) -> str:
     """``anterior, L4L5, specimen s01``; of a mean: ``anterior, all joints, all specimens``."""
     by_test = at.kind in _BY_TEST
     own = (at.test, "test", "all tests") if by_test else (at.joint, "", "all joints")

@@ -54,7 +54,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import model_file
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.store import Run, Store
+from spinepipe.studies.discrepancy.store import PieceRunner, Store
 from spinepipe.studies.discrepancy.table_rows import tabulated_rows
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
@@ -67,9 +67,9 @@ from spinepipe.studies.discrepancy.tables import (
     TABULATED,
     WHERE,
 )
-from spinepipe.studies.discrepancy.verdict import EVERY, Answer, Threshold, Verdict, plain_data
+from spinepipe.studies.discrepancy.verdict import EVERY, Conclusion, Threshold, Verdict, plain_data
 from spinepipe.studies.discrepancy.verdict_found import noise_told, verdict_found
-from spinepipe.studies.discrepancy.verdict_unnamed import Reason, Unknown
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason, UnnamedMisfit
 from spinepipe.tables import from_rows, write
 from spinepipe.units import STIFFNESS_COLUMNS
 
@@ -85,7 +85,7 @@ NO_SHAPE = "not known: there is no motion of the base model to compare with"
 
 
 @dataclass(frozen=True)
-class Results:
+class DiscrepancyResults:
     """Everything that the files of a study hold.
 
     Attributes
@@ -156,8 +156,12 @@ def _say(study: str, line: str) -> None:
 
 
 def searched(
-    study: Discrepancy, cohort: Cohort, root: str, run: Run, progress: Progress | None = None
-) -> Results:
+    study: Discrepancy,
+    cohort: Cohort,
+    root: str,
+    run: PieceRunner,
+    progress: Progress | None = None,
+) -> DiscrepancyResults:
     """All that the files of a study hold, whether or not its base has a fit."""
     file = None if study.base.model is None else read_model(Path(root) / study.base.model)
     ready = prepared(study, cohort, file)
@@ -168,20 +172,20 @@ def searched(
     return _with_base(ready, ended, run)
 
 
-def _without_base(ready: Prepared, trouble: NoBase) -> Results:
+def _without_base(ready: Prepared, trouble: NoBase) -> DiscrepancyResults:
     """The results of a study whose base has no fit; ``trouble`` says where and why."""
     cohort, noise = ready.cohort, ready.noise
     errors = before_a_fit(ready.measured, cohort.joint_names, noise.sd, zeroed=noise.zeroed)
     verdict = Verdict(
         cohort=cohort.name,
-        verdict=Answer.UNKNOWN,
+        verdict=Conclusion.UNKNOWN,
         why=f"the base model cannot be fitted: {trouble}",
         noise=noise_told(noise),
-        unknown=Unknown(str(trouble), NO_SHAPE, Reason.NO_BASE),
+        unknown=UnnamedMisfit(str(trouble), NO_SHAPE, Reason.NO_BASE),
         suspected_data_errors=errors,
         threshold=Threshold(false_alarm=ready.study.false_alarm),
     )
-    return Results(
+    return DiscrepancyResults(
         verdict=verdict,
         rows={},
         model_base=_start_model(ready, "base"),
@@ -199,7 +203,7 @@ def _start_model(ready: Prepared, of: str) -> ModelFile:
     return ModelFile(model=name, cohort=ready.cohort.name, effects=effects)
 
 
-def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
+def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> DiscrepancyResults:
     """The results of an investigation, and what the tests could tell apart."""
     needed = ended.found.stages[0].screen.threshold + ended.rules.margin
     seed, trials = ended.rules.seed, ended.rules.trials
@@ -211,7 +215,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
     hidden = hidden_effects(ended.found, ended.ended, ended.rules, run)
     rows = _rows(ready.cohort.joint_names, ended, told, stays)
     numbers = _field_numbers(ended, rows[GAP.name])
-    return Results(
+    return DiscrepancyResults(
         verdict=replace(
             verdict_found(ready, ended, told, stays, numbers, run),
             imperfections=told_imperfections(imperfect["with_effects"]),
@@ -241,10 +245,10 @@ def _with_base(ready: Prepared, ended: Investigation, run: Run) -> Results:
     )
 
 
-def _beyond(ended: Investigation, run: Run) -> Beyond:
+def _beyond(ended: Investigation, run: PieceRunner) -> Beyond:
     """What no effect explains, described; nothing where nothing is left, or the data look wrong."""
     final, outcome = ended.found.final, ended.ended
-    told = outcome.verdict in (Answer.UNKNOWN, Answer.PART)
+    told = outcome.verdict in (Conclusion.UNKNOWN, Conclusion.PART)
     if not told or outcome.reason is Reason.DATA_ERRORS:
         return Beyond(None, None, final)
     stays = beyond(final, ended.rules, run)
@@ -253,7 +257,9 @@ def _beyond(ended: Investigation, run: Run) -> Beyond:
     return stays
 
 
-def _imperfections(joints: Sequence[str], ended: Investigation, run: Run) -> Mapping[str, TakenUp]:
+def _imperfections(
+    joints: Sequence[str], ended: Investigation, run: PieceRunner
+) -> Mapping[str, TakenUp]:
     """What imperfections took up beside the base, and beside the model with the effects."""
     found = ended.found
     base = taken_up(found.base, found.base.fit, joints, run)

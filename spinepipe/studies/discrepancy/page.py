@@ -7,7 +7,14 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Headline, Picture, Results, Sortable, sortable
+from spinepipe.report.page.document import (
+    Document,
+    Headline,
+    Picture,
+    ResultTables,
+    Sortable,
+    sortable,
+)
 from spinepipe.report.words import listed, plain
 from spinepipe.schema import Column
 from spinepipe.studies.discrepancy.advice_words import shown_advice
@@ -25,7 +32,7 @@ from spinepipe.studies.discrepancy.findings import findings, headline, how_sure,
 from spinepipe.studies.discrepancy.quantities import estimate, quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, NEXT_TESTS, WHERE
-from spinepipe.studies.discrepancy.verdict import EVERY, Answer, Missing, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict import EVERY, Conclusion, Missing, Verdict, read_verdict
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula
 from spinepipe.studies.discrepancy.words import (
     called,
@@ -142,7 +149,7 @@ READ = (
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def document(study: Discrepancy, cohort: Cohort, results: Results) -> Document:
+def document(study: Discrepancy, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
     verdict = read_verdict(results.tables.files["verdict"])
     return Document(
@@ -160,7 +167,7 @@ def document(study: Discrepancy, cohort: Cohort, results: Results) -> Document:
 
 def _ordered(pictures: Mapping[str, Picture], verdict: Verdict) -> list[Picture]:
     """Where nothing is missing, what could have been seen comes first."""
-    first = "effect_confusions" if verdict.verdict is Answer.NULL else ""
+    first = "effect_confusions" if verdict.verdict is Conclusion.NULL else ""
     return sorted(pictures.values(), key=lambda picture: picture.name != first)
 
 
@@ -169,7 +176,7 @@ def _joined(words: str) -> str:
     return words.replace(" %", "\u00a0%")
 
 
-def shown_tables(verdict: Verdict, results: Results) -> list[Sortable]:
+def shown_tables(verdict: Verdict, results: ResultTables) -> list[Sortable]:
     """Tables with rows, those that say most first."""
     made = _from_verdict(verdict)
     found = []
@@ -184,7 +191,7 @@ def shown_tables(verdict: Verdict, results: Results) -> list[Sortable]:
     return [table for table in found if table.rows]
 
 
-def in_field_units(verdict: Verdict, results: Results) -> Iterator[Parts]:
+def in_field_units(verdict: Verdict, results: ResultTables) -> Iterator[Parts]:
     """File, title, what is said of it, rows and columns of tables in the field's units."""
     told = verdict.part or verdict.unknown
     formula = None if told is None else told.formula
@@ -268,7 +275,7 @@ def _place(effect: Missing, own: str) -> str:
     return "; ".join(part for part in (where_of(effect), own or differing(effect)) if part)
 
 
-def file_tables(results: Results) -> Iterator[Parts]:
+def file_tables(results: ResultTables) -> Iterator[Parts]:
     """File, title, what is said of it, rows and columns of each table."""
     advised = shown_advice(results.table("next_tests"))
     if len(advised):

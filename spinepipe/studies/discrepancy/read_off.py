@@ -35,7 +35,7 @@ def laws_at(model: SpineModel, joint: int) -> Laws:
 
 
 @dataclass(frozen=True)
-class Told:
+class JointNumbers:
     """Numbers (N,) of one joint of a specimen; NaN where one is not there.
 
     Attributes
@@ -48,7 +48,7 @@ class Told:
     at_bound: Array
 
 
-def mean_of(ones: Sequence[Told], number: int, spread: Array) -> tuple[float, float | None]:
+def mean_of(ones: Sequence[JointNumbers], number: int, spread: Array) -> tuple[float, float | None]:
     """Mean of a number over joints, and half its 95 % interval.
 
     None where the number comes and goes within the errors.
@@ -68,7 +68,7 @@ def told(
     specimens: Sequence[str],
     joint: str,
     read: Callable[[Sequence[Laws]], list[Array]],
-) -> dict[str, Told]:
+) -> dict[str, JointNumbers]:
     """Numbers by specimen, read off where the fit stands and beside it.
 
     Parameters
@@ -109,7 +109,7 @@ def _with(x: Array, place: int, value: float) -> Array:
 
 def _one(
     fit: JointFit, specimen: str, asked: Sequence[tuple[str, int | None, float]], read: list[Array]
-) -> Told:
+) -> JointNumbers:
     values = next(
         found
         for (name, unknown, _), found in zip(asked, read, strict=True)
@@ -124,4 +124,4 @@ def _one(
         (low, first), (high, last) = sides if len(sides) == 2 else ((0.0, values), sides[0])
         slopes[:, unknown] = (last - first) / (high - low)
         at_bound |= fit.at_bound[unknown] & (slopes[:, unknown] != 0.0)
-    return Told(values, slopes, at_bound)
+    return JointNumbers(values, slopes, at_bound)

@@ -12,9 +12,9 @@ from spinepipe.model import LoadStep, Support
 from spinepipe.status import Status
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart
 from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
-from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, Place, places, residual_frame
+from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, GapPlace, places, residual_frame
 from spinepipe.studies.discrepancy.search.hypothesis import Form, shape_at
-from spinepipe.studies.discrepancy.search.inquiry import Found, Stage
+from spinepipe.studies.discrepancy.search.inquiry import SearchResult, SearchStage
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import border, fitted_values
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
@@ -40,7 +40,7 @@ _MODELLED = (
 
 
 def gap_rows(
-    found: Found,
+    found: SearchResult,
     joints: Sequence[str],
     held_out: Mapping[str, Sequence[tuple[Array, Array, Array]]],
     tabulated: JointFit | None = None,
@@ -60,7 +60,7 @@ def gap_rows(
 
 
 def _rows_of(
-    found: Found,
+    found: SearchResult,
     name: str,
     readings: SpecimenReadings,
     joints: Sequence[str],
@@ -140,7 +140,7 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
     return at | found
 
 
-def where_rows(found: Found, joints: Sequence[str]) -> list[Row]:
+def where_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
     """Gaps of both models in every way of pooling."""
     return [
         _place_row(place, model)
@@ -149,7 +149,7 @@ def where_rows(found: Found, joints: Sequence[str]) -> list[Row]:
     ]
 
 
-def _place_row(place: Place, model: str) -> Row:
+def _place_row(place: GapPlace, model: str) -> Row:
     low, high = place.gap.interval
     at = {key: str(place.at.get(key, "*")) for key in KEYS}
     return {
@@ -164,7 +164,7 @@ def _place_row(place: Place, model: str) -> Row:
     }
 
 
-def candidate_rows(found: Found, joints: Sequence[str]) -> list[Row]:
+def candidate_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
     """What was tried, stage by stage."""
     excess = max(found.base_gap.excess, np.finfo(float).tiny)
     rows = []
@@ -174,7 +174,7 @@ def candidate_rows(found: Found, joints: Sequence[str]) -> list[Row]:
     return rows
 
 
-def _screened(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
+def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[Row]:
     rows = []
     for one in stage.screen.effects:
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
@@ -238,7 +238,7 @@ def _share(drop: float, excess: float) -> float | None:
     return float(drop / excess) if excess > 1.0 else None
 
 
-def _refitted(stage: Stage, joints: Sequence[str], excess: float) -> list[Row]:
+def _refitted(stage: SearchStage, joints: Sequence[str], excess: float) -> list[Row]:
     rows, seen = [], set()
     for one in stage.refits:
         row = _form_row(f"refit {stage.name}", stage.beside, one.form, joints)

@@ -8,7 +8,7 @@ from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.studies.parts import FORM, Coordinates, EachOnce, PublishedStiffness, Tests
 from spinepipe.studies.study import Study
 
-__all__ = ["Discrepancy", "DiscrepancyBase", "HeldOut", "Nuisance"]
+__all__ = ["Discrepancy", "DiscrepancyBase", "HeldOutSettings", "Nuisance"]
 
 _Name = Annotated[str, StringConstraints(min_length=1)]
 
@@ -38,7 +38,7 @@ class DiscrepancyBase(BaseModel):
         return self
 
 
-class HeldOut(BaseModel):
+class HeldOutSettings(BaseModel):
     """What is left out of the fits, one at a time, to see whether a named effect carries over."""
 
     model_config = FORM
@@ -122,7 +122,9 @@ class Discrepancy(Study):
         description="log evidence by which a name must beat its runner-up; with less both form a "
         "set",
     )
-    held_out: HeldOut = Field(default_factory=HeldOut, description="what is held out")
+    held_out: HeldOutSettings = Field(
+        default_factory=HeldOutSettings, description="what is held out"
+    )
     measurement_sd: MeasurementSd | None = Field(
         default=None,
         description="SDs of one reading where no cycle is repeated; null: the cohort's",

@@ -47,7 +47,7 @@ _HEAD = len(MARK) + 65
 _NAME = re.compile(rf"[0-9a-f]{{64}}{SUFFIX}")
 
 
-class Run:
+class PieceRunner:
     """Runs pieces: here and now, and keeps nothing."""
 
     def __call__(self, function: Callable[..., R], /, *arguments: Any) -> R:
@@ -59,10 +59,10 @@ class Run:
         return [function(*one) for one in arguments]
 
 
-at_once = Run()
+at_once = PieceRunner()
 
 
-class Store(Run):
+class Store(PieceRunner):
     """Runs functions of plain data once per content of code and arguments."""
 
     def __init__(self, folder: str | Path, module: str, threads: int = 1) -> None:

@@ -15,7 +15,12 @@ from pydantic import TypeAdapter
 
 from spinepipe.marks import read_json
 from spinepipe.studies.discrepancy.verdict_imperfections import Imperfections, WithheldEffect
-from spinepipe.studies.discrepancy.verdict_unnamed import Part, Reason, Tabulated, Unknown
+from spinepipe.studies.discrepancy.verdict_unnamed import (
+    Reason,
+    Tabulated,
+    UnnamedMisfit,
+    UnnamedRest,
+)
 
 EVERY = ("*",)
 """All joints, coordinates or specimens."""
@@ -26,7 +31,7 @@ REPEATS, DECLARED = "repeats", "declared"
 UNIT = "noise sd"
 
 
-class Answer(StrEnum):
+class Conclusion(StrEnum):
     """What a search came to.
 
     NAMED: these effects are missing and nothing else. PART: these are, and more stays. SET: one of
@@ -41,7 +46,7 @@ class Answer(StrEnum):
 
 
 @dataclass(frozen=True)
-class Scope:
+class VerdictScope:
     """Where an effect acts; ``*`` stands for all."""
 
     joints: tuple[str, ...] = EVERY
@@ -74,7 +79,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Rival:
+class RivalName:
     """Another name, and by how much log evidence it is behind.
 
     ``coordinates`` : those that its best form loads; ``*`` where it names none.
@@ -136,12 +141,12 @@ class Missing:
 
     name: str
     kind: str
-    scope: Scope
+    scope: VerdictScope
     variant: Mapping[str, Any]
     spread: str
     parameters: tuple[Estimate, ...]
     log_evidence: float
-    rivals: tuple[Rival, ...]
+    rivals: tuple[RivalName, ...]
     field_numbers: tuple[FieldNumber, ...] = ()
 
 
@@ -155,7 +160,7 @@ class NotTestable:
 
 
 @dataclass(frozen=True)
-class Noise:
+class ReportedNoise:
     """SDs of one reading, None where none was read, and how they are known."""
 
     source: str = ""
@@ -166,7 +171,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class Sizes:
+class MisfitSizes:
     """A measure of the misfit, in fits and held out, without and with the effects."""
 
     unit: str = field(default=UNIT, init=False)
@@ -182,7 +187,7 @@ def share_of_gap(excess: float) -> float:
 
 
 @dataclass(frozen=True)
-class Gaps(Sizes):
+class Gaps(MisfitSizes):
     """The gap.
 
     Attributes
@@ -265,18 +270,18 @@ class Verdict:
     """
 
     cohort: str
-    verdict: Answer
+    verdict: Conclusion
     why: str = ""
     effects: tuple[Missing, ...] = ()
     candidates_in_set: tuple[str, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     not_testable: tuple[NotTestable, ...] = ()
-    noise: Noise = field(default_factory=Noise)
-    rms_residual: Sizes = field(default_factory=Sizes)
+    noise: ReportedNoise = field(default_factory=ReportedNoise)
+    rms_residual: MisfitSizes = field(default_factory=MisfitSizes)
     gap: Gaps = field(default_factory=Gaps)
     smallest_detectable: tuple[SmallestDetectable, ...] = ()
-    unknown: Unknown | None = None
-    part: Part | None = None
+    unknown: UnnamedMisfit | None = None
+    part: UnnamedRest | None = None
     suspected_data_errors: tuple[SuspectedError, ...] = ()
     threshold: Threshold = field(default_factory=Threshold)
     families: tuple[tuple[str, ...], ...] = ()

@@ -11,31 +11,31 @@ from spinepipe.studies.discrepancy.curve_numbers import numbers_at
 from spinepipe.studies.discrepancy.design.told_apart import ToldApart
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.beyond import Beyond
-from spinepipe.studies.discrepancy.search.gaps import Place, places, residual_frame, worst
+from spinepipe.studies.discrepancy.search.gaps import GapPlace, places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.hypothesis import Form
-from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
+from spinepipe.studies.discrepancy.search.inquiry import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.search.investigation import Investigation, Prepared
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
-from spinepipe.studies.discrepancy.search.regions import Estimated, estimated
+from spinepipe.studies.discrepancy.search.regions import ValueWithRegion, estimated
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
     Candidate,
     Estimate,
     Gaps,
     LeftOut,
+    MisfitSizes,
     Missing,
-    Noise,
-    Rival,
-    Scope,
-    Sizes,
+    ReportedNoise,
+    RivalName,
     Threshold,
     Verdict,
+    VerdictScope,
     share_of_gap,
 )
-from spinepipe.studies.discrepancy.verdict_unnamed import Part, Unknown
+from spinepipe.studies.discrepancy.verdict_unnamed import UnnamedMisfit, UnnamedRest
 from spinepipe.units import BORDER_PER_SI
 
 Row = dict[str, Any]
@@ -49,7 +49,7 @@ def verdict_found(
     told: ToldApart,
     stays: Beyond,
     numbers: Sequence[Row],
-    run: Run,
+    run: PieceRunner,
 ) -> Verdict:
     """What a search found, in a few words.
 
@@ -77,7 +77,7 @@ def verdict_found(
         candidates=near_alone(_in_set(found, ended), ready.study.margin),
         not_testable=told.not_testable,
         noise=noise_told(found.base.noise),
-        rms_residual=Sizes(**{name: gap.rms if gap else None for name, gap in gaps.items()}),
+        rms_residual=MisfitSizes(**{name: gap.rms if gap else None for name, gap in gaps.items()}),
         gap=Gaps(
             **{name: gap.gap if gap else None for name, gap in gaps.items()},
             held_out_closed=proof.closed,
@@ -119,7 +119,7 @@ def near_alone(candidates: Iterable[Candidate], margin: float) -> tuple[Candidat
     )
 
 
-def _in_set(found: Found, ended: Outcome) -> Iterator[Candidate]:
+def _in_set(found: SearchResult, ended: Outcome) -> Iterator[Candidate]:
     """Names of the set: what stands there, then its rivals, wherever they are."""
     for one in found.standing:
         if one.name not in ended.tied or any(one is named for named in ended.named):
@@ -135,7 +135,7 @@ def _in_set(found: Found, ended: Outcome) -> Iterator[Candidate]:
 
 
 def _missing(
-    found: Found, one: Standing, cohort: Cohort, numbers: Sequence[Row], run: Run
+    found: SearchResult, one: SelectedTerm, cohort: Cohort, numbers: Sequence[Row], run: PieceRunner
 ) -> Missing:
     number = next(k for k, standing in enumerate(found.standing) if standing is one)
     form = one.supposed.form
@@ -151,13 +151,14 @@ def _missing(
         ),
         log_evidence=one.log_evidence,
         rivals=tuple(
-            Rival(other.name, other.margin, other.on or EVERY) for other in one.rivals[:MOST_RIVALS]
+            RivalName(other.name, other.margin, other.on or EVERY)
+            for other in one.rivals[:MOST_RIVALS]
         ),
         field_numbers=numbers_at(numbers, form, cohort.joint_names),
     )
 
 
-def _estimate(value: Estimated) -> Estimate:
+def _estimate(value: ValueWithRegion) -> Estimate:
     return Estimate(
         "@".join([value.name, *value.place]),
         value.value,
@@ -170,18 +171,18 @@ def _estimate(value: Estimated) -> Estimate:
     )
 
 
-def _scope(form: Form, cohort: Cohort) -> Scope:
-    return Scope(
+def _scope(form: Form, cohort: Cohort) -> VerdictScope:
+    return VerdictScope(
         joints=EVERY if form.joint is None else (cohort.joint_names[form.joint],),
         coordinates=form.variant.acts_on or EVERY,
         specimens=EVERY if form.specimen is None else (form.specimen,),
     )
 
 
-def noise_told(noise: FittedNoise) -> Noise:
+def noise_told(noise: FittedNoise) -> ReportedNoise:
     """SDs of one reading in the units of tables, and how they are known."""
     sd = noise.sd * BORDER_PER_SI
-    return Noise(
+    return ReportedNoise(
         source=noise.source,
         rotation_sd_deg=_rms(sd[3:]),
         translation_sd_mm=_rms(sd[:3]),
@@ -196,24 +197,28 @@ def _rms(sd: Array) -> float | None:
     return float(np.sqrt(np.mean(read**2))) if len(read) else None
 
 
-def _unknown(found: Found, ended: Outcome, final: Sequence[Place], stays: Beyond) -> Unknown | None:
+def _unknown(
+    found: SearchResult, ended: Outcome, final: Sequence[GapPlace], stays: Beyond
+) -> UnnamedMisfit | None:
     if ended.reason is None:
         return None
     shape = _shape(found)
     coordinate = found.lack.coordinate if shape else None
-    return Unknown(_where(final), shape, ended.reason, coordinate, stays.formula)
+    return UnnamedMisfit(_where(final), shape, ended.reason, coordinate, stays.formula)
 
 
-def _part(found: Found, ended: Outcome, final: Sequence[Place], stays: Beyond) -> Part | None:
+def _part(
+    found: SearchResult, ended: Outcome, final: Sequence[GapPlace], stays: Beyond
+) -> UnnamedRest | None:
     """What stays beside the effects that are certain; None where nothing is said to."""
     if not ended.left:
         return None
     shape, gap = _shape(found), found.final_gap.gap
     coordinate = found.lack.coordinate if shape else None
-    return Part(gap, _where(final), shape, ended.left, coordinate, stays.formula)
+    return UnnamedRest(gap, _where(final), shape, ended.left, coordinate, stays.formula)
 
 
-def _where(final: Sequence[Place]) -> str:
+def _where(final: Sequence[GapPlace]) -> str:
     """The largest gaps that are left, in words."""
     named = "; ".join(
         f"{p.at['joint']}, {str(p.at['coordinate']).replace('_', ' ')}, test {p.at['test']} "
@@ -223,7 +228,7 @@ def _where(final: Sequence[Place]) -> str:
     return named or "no single place stands out"
 
 
-def _shape(found: Found) -> str | None:
+def _shape(found: SearchResult) -> str | None:
     """What the generic basis sees there; None without evidence."""
     evident = found.lack.log_evidence > max(LEAST_THRESHOLD, found.generic_threshold)
     return found.lack.shape if evident else None

@@ -77,7 +77,7 @@ class Tabulated:
 
 
 @dataclass(frozen=True)
-class Unknown:
+class UnnamedMisfit:
     """What is missing without a name.
 
     Attributes
@@ -95,7 +95,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Part:
+class UnnamedRest:
     """What stays beside effects that are certain.
 
     Attributes

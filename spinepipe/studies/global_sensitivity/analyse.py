@@ -15,7 +15,7 @@ from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.sensitivity.global_indices.convergence import convergence
 from spinepipe.sensitivity.global_indices.design import Design
-from spinepipe.sensitivity.global_indices.estimates import Index, Settings
+from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
 from spinepipe.sensitivity.global_indices.floor import (
     Floor,
     above_floor,
@@ -61,7 +61,7 @@ _LOAD = {
 
 
 @dataclass(frozen=True, eq=False)
-class Output:
+class OutputGroup:
     """K outputs that succeed or fail together.
 
     Attributes
@@ -109,7 +109,7 @@ def run(
 
 
 def _analysed(
-    settings: GlobalSensitivity, design: Design, one: Output
+    settings: GlobalSensitivity, design: Design, one: OutputGroup
 ) -> tuple[list[Columns], list[Columns]]:
     """Columns of each index of K outputs, and of each while the design grows; K cells each."""
     asked = Settings(
@@ -133,7 +133,7 @@ def _analysed(
     return [common | _screened(index, floors) for index in found], of_stages
 
 
-def _screened(index: Index, floors: dict[str, Floor]) -> Columns:
+def _screened(index: SensitivityIndex, floors: dict[str, Floor]) -> Columns:
     """An index, what tells it from noise, and a factor from one that may be fixed."""
     count, floor = len(index.status), floors.get(index.index)
     nothing = [None] * count
@@ -157,7 +157,7 @@ def _screened(index: Index, floors: dict[str, Floor]) -> Columns:
     }
 
 
-def _numbers(index: Index) -> Columns:
+def _numbers(index: SensitivityIndex) -> Columns:
     ends = {"estimate": index.estimate, "ci_low": index.low, "ci_high": index.high}
     told = _repeated(len(index.status), index=index.index, factor=index.factor)
     return told | {name: numbers.tolist() for name, numbers in ends.items()}
@@ -168,7 +168,7 @@ def _repeated(count: int, **values: Any) -> Columns:
     return {name: [value] * count for name, value in values.items()}
 
 
-def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:
+def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[OutputGroup]:
     """Outputs of each test and step from the blocks of a specimen's responses."""
     if not (study.outputs.motion or study.outputs.joint_load):
         return
@@ -194,10 +194,10 @@ def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterato
         )
         values = [numbers[column][:, at] for kind in kinds.values() for column in kind.values()]
         ok: NDArray[np.bool_] = np.all(good[:, at], axis=1, keepdims=False)
-        yield Output(where, np.where(ok[:, None], np.hstack(values), 0.0), ok, SETTLED)
+        yield OutputGroup(where, np.where(ok[:, None], np.hstack(values), 0.0), ok, SETTLED)
 
 
-def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[Output]:
+def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[OutputGroup]:
     """Stiffness in each coordinate from the blocks of a specimen's fits."""
     if not blocks:
         return
@@ -207,7 +207,7 @@ def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Itera
     ok = np.asarray(pc.is_in(rows["status"], value_set=pa.array(["converged"])))
     values = np.column_stack([np.nan_to_num(rows[names[name]].to_numpy()) for name in free])
     where = tuple(("stiffness", EVERY, 0, EVERY, name) for name in free)
-    yield Output(where, np.where(ok[:, None], values, 0.0), ok, SETTLED)
+    yield OutputGroup(where, np.where(ok[:, None], values, 0.0), ok, SETTLED)
 
 
 def _rows(blocks: Sequence[str], columns: list[str]) -> pa.Table:

@@ -25,7 +25,7 @@ from spinepipe.studies.asked_tests import AskedTest
 from spinepipe.studies.global_sensitivity.loaded import loaded
 from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.start import Start, asked_tests, start_of
+from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, asked_tests, start_of
 from spinepipe.studies.global_sensitivity.tables import BASE_MOTION, BASE_STIFFNESS, EVERY
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.tables import from_rows, write
@@ -102,7 +102,7 @@ def _given(settings: GlobalSensitivity, values: Array) -> Rows:
     return rows
 
 
-def _fitted(settings: GlobalSensitivity, cohort: Cohort, start: Start) -> Rows:
+def _fitted(settings: GlobalSensitivity, cohort: Cohort, start: DescribedSpecimen) -> Rows:
     """One stiffness of all joints, fitted; what runs to a bound goes back to its start.
 
     A spring at its bound has left the data: it would carry factors beyond any stiffness that a
@@ -125,7 +125,7 @@ _ALL_AT_BOUNDS = "every stiffness ran to a bound"
 
 
 def _fit(
-    settings: GlobalSensitivity, cohort: Cohort, start: Start, free: Sequence[str]
+    settings: GlobalSensitivity, cohort: Cohort, start: DescribedSpecimen, free: Sequence[str]
 ) -> tuple[Fit | None, str]:
     """The fit, or None and why there is none."""
     options, specimen = settings.calibration, start.model.specimen

@@ -13,7 +13,7 @@ from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.global_sensitivity.drawn import drawn_values
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.start import Start, start_of
+from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, start_of
 from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.studies.global_sensitivity.vary import Varied, vary
 from spinepipe.studies.parts import stiffness_of_joints
@@ -27,7 +27,7 @@ class Batch:
 
     first: int
     count: int
-    start: Start
+    start: DescribedSpecimen
     varied: Varied
 
 
@@ -73,7 +73,7 @@ def batch_of(
 @lru_cache(maxsize=16)
 def start_of_specimen(
     root: str, study: str, specimen: str, all_steps: bool, _digest: str, fitted: tuple[Stamp, ...]
-) -> Start:
+) -> DescribedSpecimen:
     """The specimen before factors change it; ``_digest`` is that of its cohort."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
     given = stiffness_of_joints(cohort, settings.start_stiffness, settings.level_stiffness)

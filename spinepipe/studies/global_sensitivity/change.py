@@ -21,7 +21,7 @@ class Of(StrEnum):
 
 
 @dataclass(frozen=True)
-class Change:
+class FactorChange:
     """One factor, its value left open.
 
     Attributes

@@ -5,10 +5,10 @@ from math import log2
 from typing import Any
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.frames import FRAME_LANDMARKS
-from spinepipe.problems import Problem, did_you_mean, one_of
-from spinepipe.studies.global_sensitivity.change import Change, Of
+from spinepipe.problems import InputProblem, did_you_mean, one_of
+from spinepipe.studies.global_sensitivity.change import FactorChange, Of
 from spinepipe.studies.global_sensitivity.settings import DUMMY, INDICES, GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import frame_landmarks, given_joints, moved_by
 from spinepipe.studies.parts import AUTO
@@ -29,8 +29,8 @@ _MOMENTS = ["mx_nm", "my_nm", "mz_nm"]
 
 
 def check_global_sensitivity(
-    document: Document, study: GlobalSensitivity, cohort: Cohort
-) -> Iterator[Problem]:
+    document: YamlDocument, study: GlobalSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Every way in which a sound study and a sound cohort do not fit.
 
     Parameters
@@ -47,7 +47,9 @@ def check_global_sensitivity(
     yield from check_factors(document, study, cohort)
 
 
-def check_sensitivity_design(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
+def check_sensitivity_design(
+    document: YamlDocument, study: GlobalSensitivity
+) -> Iterator[InputProblem]:
     """Everything about names, groups and numbers that a method cannot do with."""
     yield from _samples(document, study)
     yield from _indices(document, study)
@@ -57,40 +59,44 @@ def check_sensitivity_design(document: Document, study: GlobalSensitivity) -> It
     if len(compared) < FEWEST:
         what = f"{len(study.factors)} factors, compared as {len(compared)}"
         allowed = f"at least {FEWEST} factors or groups: one alone has nothing to be compared with"
-        yield Problem(*at(document, "factors"), what, allowed, "add factors, or split the group")
+        yield InputProblem(
+            *at(document, "factors"), what, allowed, "add factors, or split the group"
+        )
 
 
-def _samples(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
+def _samples(document: YamlDocument, study: GlobalSensitivity) -> Iterator[InputProblem]:
     """Numbers that the methods ask for."""
     design = study.design
     n, place = design.samples, at(document, "design.samples")
     if design.method == "sobol" and n & (n - 1):
         below = 2 ** int(log2(n))
         remedy = f"take {below} or {2 * below}"
-        yield Problem(*place, str(n), "a power of two with method sobol", remedy)
+        yield InputProblem(*place, str(n), "a power of two with method sobol", remedy)
     others = max(1, len(study.factor_names) - 1)
     fewest = 4 * design.harmonics**2 * others + 1  # for each factor a frequency of its own
     if design.method == "fast" and n < fewest:
         count = f"{design.harmonics} harmonics and {others + 1} factors"
         allowed = f"at least {fewest} with method fast, {count}"
-        yield Problem(*place, str(n), allowed, "take more samples, or fewer harmonics")
+        yield InputProblem(*place, str(n), allowed, "take more samples, or fewer harmonics")
     if design.method == "morris" and design.levels % 2:
         allowed = "an even number: steps of half the levels must stay on the grid"
         levels = str(design.levels)
-        yield Problem(*at(document, "design.levels"), levels, allowed, "take one more or one less")
+        yield InputProblem(
+            *at(document, "design.levels"), levels, allowed, "take one more or one less"
+        )
 
 
-def _indices(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
+def _indices(document: YamlDocument, study: GlobalSensitivity) -> Iterator[InputProblem]:
     """Each method has indices of its own."""
     there = INDICES[study.design.method]
     for number, index in enumerate(study.indices or ()):
         if index not in there:
             place = at(document, f"indices.{number}")
             allowed = f"with method {study.design.method}: {one_of(there)}"
-            yield Problem(*place, index, allowed, "delete it, or choose another method")
+            yield InputProblem(*place, index, allowed, "delete it, or choose another method")
 
 
-def _names(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
+def _names(document: YamlDocument, study: GlobalSensitivity) -> Iterator[InputProblem]:
     """Factors are told apart by their names."""
     seen: dict[str, int] = {}
     for number, factor in enumerate(study.factors):
@@ -98,15 +104,15 @@ def _names(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
         key = f"factors.{number}.name" if factor.name else f"factors.{number}"
         if name == DUMMY and study.dummy:
             allowed = f"any other name: '{DUMMY}' is the factor that changes nothing"
-            yield Problem(*at(document, key), f"'{name}'", allowed, "rename it")
+            yield InputProblem(*at(document, key), f"'{name}'", allowed, "rename it")
         if name in seen:
             found = f"'{name}', the name of factor {seen[name] + 1} as well"
             remedy = "delete one, or give one a `name:` of its own"
-            yield Problem(*at(document, key), found, "each name once", remedy)
+            yield InputProblem(*at(document, key), found, "each name once", remedy)
         seen.setdefault(name, number)
 
 
-def _groups(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
+def _groups(document: YamlDocument, study: GlobalSensitivity) -> Iterator[InputProblem]:
     """Groups are told apart from factors, and only some methods have indices of groups."""
     labels = [*(factor.label for factor in study.factors), *([DUMMY] if study.dummy else [])]
     for number, factor in enumerate(study.factors):
@@ -115,19 +121,23 @@ def _groups(document: Document, study: GlobalSensitivity) -> Iterator[Problem]:
         place = at(document, f"factors.{number}.group")
         if factor.group in labels:
             allowed = "a name that no factor has"
-            yield Problem(*place, f"'{factor.group}'", allowed, "rename the group")
+            yield InputProblem(*place, f"'{factor.group}'", allowed, "rename the group")
         if study.design.method not in TAKE_GROUPS:
             found = f"'{factor.group}' with method {study.design.method}"
             allowed = f"no group, or method {one_of(TAKE_GROUPS)}"
-            yield Problem(*place, found, allowed, "delete the group, or choose another method")
+            yield InputProblem(*place, found, allowed, "delete the group, or choose another method")
 
 
-def _tests(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iterator[Problem]:
+def _tests(
+    document: YamlDocument, study: GlobalSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Tests must exist, and every specimen must have one."""
     if cohort.loads is None:
         found = f"cohort '{cohort.name}', which has no loads.csv"
         allowed = "a cohort with loads.csv: the study moves specimens in its tests"
-        yield Problem(*at(document, "cohort"), found, allowed, "add loads, or take another cohort")
+        yield InputProblem(
+            *at(document, "cohort"), found, allowed, "add loads, or take another cohort"
+        )
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
     rows = cohort.loads[cohort.loads["test"].isin(study.chosen_tests(cohort))]
@@ -139,10 +149,12 @@ def _tests(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iter
             found = f"no load of specimen '{specimen}' in any chosen test"
             remedy = "choose more tests, or leave the specimen out"
             allowed = "a load of every chosen specimen in one chosen test at least"
-            yield Problem(*at(document, "tests"), found, allowed, remedy)
+            yield InputProblem(*at(document, "tests"), found, allowed, remedy)
 
 
-def _motion(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iterator[Problem]:
+def _motion(
+    document: YamlDocument, study: GlobalSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Stiffness is fitted to measured motion, which every specimen must have."""
     asked = (
         ("stiffness", "fitted", "give `stiffness` as a mapping", study.is_fitted),
@@ -154,10 +166,10 @@ def _motion(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Ite
             if missing:
                 remedy = f"{otherwise}, or choose other specimens and tests"
                 allowed = f"{word} with {_WITH_MOTION}"
-                yield Problem(*at(document, key), f"{word}, and {missing}", allowed, remedy)
+                yield InputProblem(*at(document, key), f"{word}, and {missing}", allowed, remedy)
     if study.is_fitted and study.level_stiffness:
         found = "levels of their own with stiffness: fitted, which all joints of a specimen share"
-        yield Problem(*at(document, "level_stiffness"), found, "none of them", "delete it")
+        yield InputProblem(*at(document, "level_stiffness"), found, "none of them", "delete it")
     if study.is_fitted or study.outputs.stiffness:
         yield from _weights(document, study, cohort)
 
@@ -176,7 +188,9 @@ def _without_motion(study: GlobalSensitivity, cohort: Cohort) -> str:
     return f"no motion of {', '.join(names)}" if names else ""
 
 
-def _weights(document: Document, study: GlobalSensitivity, cohort: Cohort) -> Iterator[Problem]:
+def _weights(
+    document: YamlDocument, study: GlobalSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Something that was measured must count."""
     if cohort.motion is None:
         return
@@ -186,16 +200,20 @@ def _weights(document: Document, study: GlobalSensitivity, cohort: Cohort) -> It
     if columns and not any(weight for name, weight in weights if name in columns):
         place = at(document, "calibration.weights")
         found = "no weight on anything that was measured"
-        yield Problem(*place, found, f"a weight on {one_of(columns)}", "weigh what was measured")
+        yield InputProblem(
+            *place, found, f"a weight on {one_of(columns)}", "weigh what was measured"
+        )
     elif AUTO in study.calibration.free:
         found = "auto, and no coordinate was both loaded and measured"
         place = at(document, "calibration.free")
-        yield Problem(*place, found, "coordinates that were", "name some, or choose other tests")
+        yield InputProblem(
+            *place, found, "coordinates that were", "name some, or choose other tests"
+        )
 
 
 def check_factors(
-    document: Document, study: GlobalSensitivity, cohort: Cohort
-) -> Iterator[Problem]:
+    document: YamlDocument, study: GlobalSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Problems of all factors, in their order."""
     specimens = [s for s in study.chosen_specimens(cohort) if s in cohort.specimen_names]
     for number, factor in enumerate(study.factors):
@@ -207,31 +225,33 @@ def check_factors(
 
 
 def _joints(
-    document: Document, key: str, change: Change, cohort: Cohort, *_: Any
-) -> Iterator[Problem]:
+    document: YamlDocument, key: str, change: FactorChange, cohort: Cohort, *_: Any
+) -> Iterator[InputProblem]:
     yield from unknown_names(document, f"{key}.joints", "joint", change.at, cohort.joint_names)
 
 
 def _bodies(
-    document: Document,
+    document: YamlDocument,
     key: str,
-    change: Change,
+    change: FactorChange,
     cohort: Cohort,
     study: GlobalSensitivity,
     specimens: Sequence[str],
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     """Bodies must be vertebrae that move, listed, and felt: in equilibrium only weight is."""
     moving, place = cohort.vertebrae[1:], f"{key}.vertebrae"
     yield from unknown_names(document, place, "moving vertebra", change.at, moving)
     if cohort.bodies is None:
         found = f"{change.of.value} in cohort '{cohort.name}', which has no bodies.csv"
         allowed = "factors of bodies in a cohort that lists them"
-        yield Problem(*at(document, key), found, allowed, "delete the factor, or add bodies.csv")
+        yield InputProblem(
+            *at(document, key), found, allowed, "delete the factor, or add bodies.csv"
+        )
         return
     if not cohort.gravity:
         found = f"{change.of.value} in cohort '{cohort.name}' without gravity: it would do nothing"
         allowed = "factors of bodies where gravity is true: in equilibrium bodies only weigh"
-        yield Problem(*at(document, key), found, allowed, "delete the factor")
+        yield InputProblem(*at(document, key), found, allowed, "delete the factor")
     rows = zip(cohort.bodies["specimen"], cohort.bodies["vertebra"], strict=True)
     listed = set(rows)
     asked = [name for name in change.at or moving if name in moving]
@@ -239,17 +259,19 @@ def _bodies(
     if missing:
         found = f"no body in bodies.csv for {', '.join(missing[:5])}"
         allowed = "bodies that the cohort lists, of all chosen specimens"
-        yield Problem(*at(document, place), found, allowed, "leave them out, or add their bodies")
+        yield InputProblem(
+            *at(document, place), found, allowed, "leave them out, or add their bodies"
+        )
 
 
 def _loads(
-    document: Document,
+    document: YamlDocument,
     key: str,
-    change: Change,
+    change: FactorChange,
     cohort: Cohort,
     study: GlobalSensitivity,
     specimens: Sequence[str],
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     """Something must act: a point matters to forces, direction and size to moments as well."""
     if cohort.loads is None:
         return
@@ -260,14 +282,14 @@ def _loads(
         what = "force" if change.of is Of.LOAD_POINT else "load"
         found = f"{change.of.value}, but no {what} acts in any chosen test: it would do nothing"
         allowed = f"{change.of.value} in tests with a {what}"
-        yield Problem(
+        yield InputProblem(
             *at(document, key), found, allowed, "delete the factor, or choose other tests"
         )
 
 
 def check_landmark(
-    document: Document, key: str, change: Change, cohort: Cohort, specimens: Sequence[str]
-) -> Iterator[Problem]:
+    document: YamlDocument, key: str, change: FactorChange, cohort: Cohort, specimens: Sequence[str]
+) -> Iterator[InputProblem]:
     """Problems of one factor.
 
     Parameters
@@ -280,20 +302,22 @@ def check_landmark(
         found = f"a landmark in cohort '{cohort.name}', which has no landmarks.csv"
         allowed = "landmarks of a cohort that has them"
         remedy = "use joint_centre and joint_axes, or take another cohort"
-        yield Problem(*at(document, key), found, allowed, remedy)
+        yield InputProblem(*at(document, key), found, allowed, remedy)
         return
     if vertebra not in cohort.vertebrae:
         known = cohort.vertebrae
         remedy = did_you_mean(vertebra, known, "correct its name")
         place = at(document, f"{key}.vertebra")
-        yield Problem(*place, f"unknown vertebra '{vertebra}'", one_of(known), remedy)
+        yield InputProblem(*place, f"unknown vertebra '{vertebra}'", one_of(known), remedy)
     if change.landmark not in FRAME_LANDMARKS:
         yield _no_frame_landmark(document, key, change, cohort)
     elif vertebra in cohort.vertebrae:
         yield from _of_specimens(document, key, change, cohort, specimens)
 
 
-def _no_frame_landmark(document: Document, key: str, change: Change, cohort: Cohort) -> Problem:
+def _no_frame_landmark(
+    document: YamlDocument, key: str, change: FactorChange, cohort: Cohort
+) -> InputProblem:
     """A landmark that makes no frame may be moved as far as one likes."""
     assert cohort.landmarks is not None
     there = change.landmark in set(cohort.landmarks["landmark"])
@@ -302,12 +326,14 @@ def _no_frame_landmark(document: Document, key: str, change: Change, cohort: Coh
         change.landmark, FRAME_LANDMARKS, "correct its name, or delete the factor"
     )
     place = at(document, f"{key}.landmark")
-    return Problem(*place, f"landmark '{change.landmark}', {why}", one_of(FRAME_LANDMARKS), remedy)
+    return InputProblem(
+        *place, f"landmark '{change.landmark}', {why}", one_of(FRAME_LANDMARKS), remedy
+    )
 
 
 def _of_specimens(
-    document: Document, key: str, change: Change, cohort: Cohort, specimens: Sequence[str]
-) -> Iterator[Problem]:
+    document: YamlDocument, key: str, change: FactorChange, cohort: Cohort, specimens: Sequence[str]
+) -> Iterator[InputProblem]:
     """Specimens without the landmark, then those in which nothing hangs on it."""
     vertebra = cohort.vertebrae.index(change.at[0])
     landmark = FRAME_LANDMARKS.index(change.landmark)
@@ -322,15 +348,15 @@ def _of_specimens(
     if without:
         found = f"{what}, which landmarks.csv does not have of {', '.join(without[:5])}"
         allowed = "a landmark of all chosen specimens"
-        yield Problem(*at(document, f"{key}.landmark"), found, allowed, "delete the factor")
+        yield InputProblem(*at(document, f"{key}.landmark"), found, allowed, "delete the factor")
     if idle:
         found = f"{what}, on which no joint frame of {', '.join(idle[:5])} hangs"
         allowed = "a landmark of a frame that joints.csv does not give: it would do nothing"
         remedy = "delete the factor, or use joint_centre and joint_axes"
-        yield Problem(*at(document, key), found, allowed, remedy)
+        yield InputProblem(*at(document, key), found, allowed, remedy)
 
 
-_CHECKS: dict[Of, Callable[..., Iterator[Problem]]] = {
+_CHECKS: dict[Of, Callable[..., Iterator[InputProblem]]] = {
     Of.STIFFNESS: _joints,
     Of.JOINT_CENTRE: _joints,
     Of.JOINT_AXES: _joints,

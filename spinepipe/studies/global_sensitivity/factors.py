@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
-from spinepipe.studies.global_sensitivity.change import Change, Of
+from spinepipe.studies.global_sensitivity.change import FactorChange, Of
 from spinepipe.studies.parts import FORM, Coordinate, EachOnce
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, ROTATIONS, TRANSLATIONS
 
@@ -147,7 +147,7 @@ class Factor(BaseModel):
         return self.name or "_".join((change.of.value, *change.at, *self._what))
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """What it changes."""
         raise NotImplementedError
 
@@ -186,9 +186,9 @@ class StiffnessFactor(Factor):
     times: Times = _TIMES
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """One coordinate's stiffness, of these joints alike."""
-        return Change(Of.STIFFNESS, self.joints or (), COORDINATES.index(self.coordinate))
+        return FactorChange(Of.STIFFNESS, self.joints or (), COORDINATES.index(self.coordinate))
 
     @property
     def _what(self) -> tuple[str, ...]:
@@ -209,10 +209,10 @@ class LandmarkFactor(Factor):
     offset_mm: Millimetres = _OFFSET_MM
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """One landmark, along one axis."""
         axis = GROUND_AXES.index(self.axis)
-        return Change(Of.LANDMARK, (self.vertebra,), axis, self.landmark)
+        return FactorChange(Of.LANDMARK, (self.vertebra,), axis, self.landmark)
 
     @property
     def _what(self) -> tuple[str, ...]:
@@ -228,9 +228,9 @@ class JointCentreFactor(Factor):
     offset_mm: Millimetres = _OFFSET_MM
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """The origins of these joints alike."""
-        return Change(Of.JOINT_CENTRE, self.joints or (), TRANSLATIONS.index(self.axis))
+        return FactorChange(Of.JOINT_CENTRE, self.joints or (), TRANSLATIONS.index(self.axis))
 
 
 class JointAxesFactor(Factor):
@@ -245,9 +245,9 @@ class JointAxesFactor(Factor):
     offset_deg: Degrees = _OFFSET_DEG
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """The frames of these joints alike."""
-        return Change(Of.JOINT_AXES, self.joints or (), ROTATIONS.index(self.axis))
+        return FactorChange(Of.JOINT_AXES, self.joints or (), ROTATIONS.index(self.axis))
 
 
 class LoadPointFactor(Factor):
@@ -258,9 +258,9 @@ class LoadPointFactor(Factor):
     offset_mm: Millimetres = _OFFSET_MM
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """All load points alike."""
-        return Change(Of.LOAD_POINT, axis=GROUND_AXES.index(self.axis))
+        return FactorChange(Of.LOAD_POINT, axis=GROUND_AXES.index(self.axis))
 
 
 class LoadDirectionFactor(Factor):
@@ -274,9 +274,9 @@ class LoadDirectionFactor(Factor):
     offset_deg: Degrees = _OFFSET_DEG
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """All loads alike."""
-        return Change(Of.LOAD_DIRECTION, axis=GROUND_AXES.index(self.axis))
+        return FactorChange(Of.LOAD_DIRECTION, axis=GROUND_AXES.index(self.axis))
 
 
 class LoadSizeFactor(Factor):
@@ -286,9 +286,9 @@ class LoadSizeFactor(Factor):
     times: Times = _TIMES
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """All loads alike."""
-        return Change(Of.LOAD_SIZE)
+        return FactorChange(Of.LOAD_SIZE)
 
 
 class MassFactor(Factor):
@@ -301,9 +301,9 @@ class MassFactor(Factor):
     times: Times = _TIMES
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """Mass and inertia of these bodies alike."""
-        return Change(Of.MASS, self.vertebrae or ())
+        return FactorChange(Of.MASS, self.vertebrae or ())
 
 
 class CentreOfMassFactor(Factor):
@@ -317,9 +317,9 @@ class CentreOfMassFactor(Factor):
     offset_mm: Millimetres = _OFFSET_MM
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """The centres of these bodies alike."""
-        return Change(Of.CENTRE_OF_MASS, self.vertebrae or (), GROUND_AXES.index(self.axis))
+        return FactorChange(Of.CENTRE_OF_MASS, self.vertebrae or (), GROUND_AXES.index(self.axis))
 
 
 class DampingFactor(Factor):
@@ -329,9 +329,9 @@ class DampingFactor(Factor):
     times: Times = _TIMES
 
     @property
-    def change(self) -> Change:
+    def change(self) -> FactorChange:
         """All damping alike."""
-        return Change(Of.DAMPING)
+        return FactorChange(Of.DAMPING)
 
 
 AnyFactor = Annotated[

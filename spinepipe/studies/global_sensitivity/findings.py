@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.report.words import capital, count, fixed, listed, number
 from spinepipe.sensitivity.global_indices.floor import NEGLIGIBLE
 from spinepipe.studies.global_sensitivity.figures.panels import (
@@ -84,7 +84,7 @@ _EXACT = {
 """What the dummy can say in these designs."""
 
 
-def opening(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Headline:
+def opening(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> Headline:
     """The leading factors in a sentence, how sure they are, and what casts doubt on them."""
     indices = results.table("indices")
     found, measures = _outputs(cohort, results)
@@ -102,7 +102,7 @@ def opening(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Headl
     )
 
 
-def findings(study: GlobalSensitivity, cohort: Cohort, results: Results) -> list[str]:
+def findings(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> list[str]:
     """A sentence or two for each output, then interactions and outputs without an index."""
     indices = results.table("indices")
     found, measures = _outputs(cohort, results)
@@ -117,7 +117,7 @@ def findings(study: GlobalSensitivity, cohort: Cohort, results: Results) -> list
     return [sentence for sentence in told if sentence]
 
 
-def _outputs(cohort: Cohort, results: Results) -> tuple[Sequence[Panel], Measures | None]:
+def _outputs(cohort: Cohort, results: ResultTables) -> tuple[Sequence[Panel], Measures | None]:
     indices = results.table("indices")
     measures = measures_of(indices) if len(indices) else None
     return (outputs(cohort, indices, measures) if measures else []), measures

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Results, Sortable, page_tables, sortable
+from spinepipe.report.page.document import Document, ResultTables, Sortable, page_tables, sortable
 from spinepipe.report.words import fixed, number
 from spinepipe.schema import Column
 from spinepipe.studies.global_sensitivity.figures.panels import (
@@ -39,7 +39,7 @@ _PLACE = ("specimen", "output", "test", "step", "joint", "coordinate")
 _RANKS = ("first", "second", "third")
 
 
-def document(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Document:
+def document(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
     return Document(
         question=QUESTION,
@@ -69,7 +69,7 @@ def left_out(study: GlobalSensitivity) -> tuple[str, ...]:
     return tuple(f"{part} ({setting})" for part, setting, done in parts if not done)
 
 
-def shown_tables(cohort: Cohort, results: Results) -> list[Sortable]:
+def shown_tables(cohort: Cohort, results: ResultTables) -> list[Sortable]:
     """Leading factors of every output, interactions, and the indices of what is drawn."""
     indices = results.table("indices")
     measures = measures_of(indices) if len(indices) else None
@@ -82,7 +82,7 @@ def shown_tables(cohort: Cohort, results: Results) -> list[Sortable]:
     return [table for table in every if table.rows]
 
 
-def _rests_on(results: Results) -> Iterator[Sortable]:
+def _rests_on(results: ResultTables) -> Iterator[Sortable]:
     """The spine that the indices were taken at, and the runs that they lack."""
     for title, shape in (
         ("Stiffness from which the factors start", BASE_STIFFNESS),

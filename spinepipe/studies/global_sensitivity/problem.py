@@ -12,14 +12,14 @@ from spinepipe.cohort.specimen import joint_frames
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import free_parameters
 from spinepipe.studies.global_sensitivity.settings import SampleCalibration
-from spinepipe.studies.global_sensitivity.start import Start
+from spinepipe.studies.global_sensitivity.start import DescribedSpecimen
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 
 def problem_of(
     options: SampleCalibration,
     cohort: Cohort,
-    start: Start,
+    start: DescribedSpecimen,
     model: SpineModel,
     cases: Sequence[LoadCase],
     free: Sequence[str],

@@ -16,13 +16,13 @@ from pydantic import (
 from spinepipe.cohort import Cohort
 from spinepipe.documents.names import distinct
 from spinepipe.sensitivity.global_indices.spread import (
+    Distribution,
     LogNormal,
     LogUniform,
     Normal,
-    Spread,
     Uniform,
 )
-from spinepipe.studies.global_sensitivity.change import Change, Of
+from spinepipe.studies.global_sensitivity.change import FactorChange, Of
 from spinepipe.studies.global_sensitivity.factors import AnyFactor, AnySpread, Times
 from spinepipe.studies.parts import (
     AUTO,
@@ -254,9 +254,9 @@ class GlobalSensitivity(Study):
         return tuple(dict.fromkeys(self.groups))
 
     @property
-    def changes(self) -> tuple[Change, ...]:
+    def changes(self) -> tuple[FactorChange, ...]:
         """(D,) what each factor changes."""
-        nothing = (Change(Of.NOTHING),) if self.dummy else ()
+        nothing = (FactorChange(Of.NOTHING),) if self.dummy else ()
         return (*(factor.change for factor in self.factors), *nothing)
 
     @property
@@ -294,13 +294,13 @@ class GlobalSensitivity(Study):
         return self.tests or cohort.tests
 
 
-def spreads_of(study: GlobalSensitivity) -> tuple[Spread, ...]:
+def spreads_of(study: GlobalSensitivity) -> tuple[Distribution, ...]:
     """(D,) how each value is spread: m, rad, or a multiplier; the dummy's from 0 to 1."""
     own = tuple(_in_si(factor.spread) for factor in study.factors)
     return (*own, Uniform(0.0, 1.0)) if study.dummy else own
 
 
-def _in_si(spread: AnySpread) -> Spread:
+def _in_si(spread: AnySpread) -> Distribution:
     found = {"low": spread.low, "high": spread.high}
     ends = {name: end / spread.per_si for name, end in found.items() if end is not None}
     times = isinstance(spread, Times)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import asked_tests
 from spinepipe.studies.places import at
@@ -99,8 +99,8 @@ def size_of_design(study: GlobalSensitivity, cohort: Cohort) -> Size:
 
 
 def check_size_of_design(
-    document: Document, study: GlobalSensitivity, cohort: Cohort, root: Path
-) -> Iterator[Problem]:
+    document: YamlDocument, study: GlobalSensitivity, cohort: Cohort, root: Path
+) -> Iterator[InputProblem]:
     """Refuse a study for which there is not enough disk or memory, before it starts.
 
     What an earlier run of the study has left counts as disk that is there for it.
@@ -113,15 +113,15 @@ def check_size_of_design(
 
 
 def _short(
-    document: Document, size: Size, what: str, needed: int, there: int | None
-) -> Iterator[Problem]:
+    document: YamlDocument, size: Size, what: str, needed: int, there: int | None
+) -> Iterator[InputProblem]:
     if there is None or needed <= there:
         return
     runs = f"{size.runs:,} runs per specimen and {size.response_rows:,} rows of responses"
     found = f"{runs}: about {_read(needed)} of {what}"
     place = at(document, "design.samples")
     remedy = "take fewer samples, factors, tests, steps or specimens, or make room"
-    yield Problem(*place, found, f"what there is, {_read(there)} of {what}", remedy)
+    yield InputProblem(*place, found, f"what there is, {_read(there)} of {what}", remedy)
 
 
 def free_disk(folder: Path) -> int:

@@ -22,7 +22,7 @@ from spinepipe.studies.global_sensitivity.many_frames import INFERIOR, SUPERIOR,
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class DescribedSpecimen:
     """A specimen as the cohort describes it.
 
     Attributes
@@ -50,7 +50,7 @@ def start_of(
     damping: Array,
     tests: Sequence[str],
     all_steps: bool,
-) -> Start:
+) -> DescribedSpecimen:
     """A specimen of a cohort with loads.
 
     Parameters
@@ -59,7 +59,7 @@ def start_of(
     tests : names of tests; those that the specimen does not have are left out.
     all_steps : all load steps, or that of the largest load only.
     """
-    return Start(
+    return DescribedSpecimen(
         on_bushings(cohort, specimen, joint_frames(cohort, specimen), stiffness, damping),
         cohort.vertebrae,
         *frame_landmarks(cohort, specimen),

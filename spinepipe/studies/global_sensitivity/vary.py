@@ -14,9 +14,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.model import LoadCase, ScopedEffect
 from spinepipe.statics.many.spines import Cases, Spines
-from spinepipe.studies.global_sensitivity.change import Change, Of
+from spinepipe.studies.global_sensitivity.change import FactorChange, Of
 from spinepipe.studies.global_sensitivity.many_frames import many_joint_frames, why_none
-from spinepipe.studies.global_sensitivity.start import Start
+from spinepipe.studies.global_sensitivity.start import DescribedSpecimen
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Varied:
     refused: dict[int, str]
 
 
-def vary(start: Start, changes: Sequence[Change], values: Array) -> Varied:
+def vary(start: DescribedSpecimen, changes: Sequence[FactorChange], values: Array) -> Varied:
     """Give factors their values.
 
     Landmarks are moved first; the joint frames that they make are then moved along their own axes
@@ -144,7 +144,7 @@ def _of_kept(spines: Spines, cases: tuple[Cases, ...], refused: dict[int, str]) 
 
 
 def variation(
-    changes: Sequence[Change], values: Array, joints: Sequence[str], vertebrae: Sequence[str]
+    changes: Sequence[FactorChange], values: Array, joints: Sequence[str], vertebrae: Sequence[str]
 ) -> Variation:
     """Changes with their values as one variation.
 
@@ -166,58 +166,58 @@ class _Places:
     joints: tuple[str, ...]
     vertebrae: tuple[str, ...]
 
-    def of_joints(self, change: Change) -> list[int]:
+    def of_joints(self, change: FactorChange) -> list[int]:
         return [self.joints.index(name) for name in change.at or self.joints]
 
-    def of_bodies(self, change: Change) -> list[int]:
+    def of_bodies(self, change: FactorChange) -> list[int]:
         """Places among the moving vertebrae."""
         moving = self.vertebrae[1:]
         return [moving.index(name) for name in change.at or moving]
 
 
-def _stiffness(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _stiffness(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.stiffness[:, places.of_joints(change), change.axis] *= column[:, None]
 
 
-def _landmark(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _landmark(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     point = FRAME_LANDMARKS.index(change.landmark)
     for vertebra in change.at:
         total.landmarks[:, places.vertebrae.index(vertebra), point, change.axis] += column
 
 
-def _joint_centre(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _joint_centre(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.frames[:, places.of_joints(change), change.axis] += column[:, None]
 
 
-def _joint_axes(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _joint_axes(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.frames[:, places.of_joints(change), 3 + change.axis] += column[:, None]
 
 
-def _load_point(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _load_point(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.load_points[:, change.axis] += column
 
 
-def _load_direction(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _load_direction(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.load_turns[:, change.axis] += column
 
 
-def _load_size(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _load_size(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.load_sizes[:] *= column
 
 
-def _mass(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _mass(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.masses[:, places.of_bodies(change)] *= column[:, None]
 
 
-def _centre_of_mass(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _centre_of_mass(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.coms[:, places.of_bodies(change), change.axis] += column[:, None]
 
 
-def _damping(total: Variation, change: Change, places: _Places, column: Array) -> None:
+def _damping(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
     total.damping[:] *= column
 
 
-_APPLY: dict[Of, Callable[[Variation, Change, _Places, Array], None]] = {
+_APPLY: dict[Of, Callable[[Variation, FactorChange, _Places, Array], None]] = {
     Of.STIFFNESS: _stiffness,
     Of.LANDMARK: _landmark,
     Of.JOINT_CENTRE: _joint_centre,
@@ -231,7 +231,7 @@ _APPLY: dict[Of, Callable[[Variation, Change, _Places, Array], None]] = {
 }
 
 
-def varied_frames(start: Start, change: Variation) -> Frames:
+def varied_frames(start: DescribedSpecimen, change: Variation) -> Frames:
     """First the landmarks are moved, then the frames that they make."""
     count = len(change.frames)
     rotations = np.tile([frame.rotation for frame in start.model.frames], (count, 1, 1, 1))
@@ -242,7 +242,7 @@ def varied_frames(start: Start, change: Variation) -> Frames:
 
 
 def _from_landmarks(
-    start: Start, offsets: Array, rotations: Array, origins: Array
+    start: DescribedSpecimen, offsets: Array, rotations: Array, origins: Array
 ) -> dict[int, str]:
     """Replace frames of joints one of whose vertebrae has a moved landmark."""
     refused: dict[int, str] = {}

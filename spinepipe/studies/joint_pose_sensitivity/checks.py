@@ -8,9 +8,9 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.check_geometry import landmark_problems
 from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.draft import Draft
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.frames import FRAME_LANDMARKS
-from spinepipe.problems import Problem, one_of
+from spinepipe.problems import InputProblem, one_of
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.parts import AUTO
 from spinepipe.studies.places import at, unknown_tests
@@ -20,8 +20,8 @@ __all__ = ["check_joint_pose_sensitivity"]
 
 
 def check_joint_pose_sensitivity(
-    document: Document, study: JointPoseSensitivity, cohort: Cohort
-) -> Iterator[Problem]:
+    document: YamlDocument, study: JointPoseSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Every way in which a sound study and a sound cohort do not fit.
 
     Parameters
@@ -35,20 +35,20 @@ def check_joint_pose_sensitivity(
     if study.best_models > study.poses:
         place = at(document, "best_models")
         allowed = f"at most the number of poses, {study.poses}"
-        yield Problem(*place, str(study.best_models), allowed, "take fewer, or more poses")
+        yield InputProblem(*place, str(study.best_models), allowed, "take fewer, or more poses")
 
 
 def _landmarks(
-    document: Document, study: JointPoseSensitivity, cohort: Cohort
-) -> Iterator[Problem]:
+    document: YamlDocument, study: JointPoseSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     if cohort.landmarks is None:
         allowed = "a cohort with landmarks.csv: the study samples landmarks"
         found = f"cohort '{cohort.name}', which has none"
-        yield Problem(*at(document, "cohort"), found, allowed, "choose another cohort")
+        yield InputProblem(*at(document, "cohort"), found, allowed, "choose another cohort")
         return
     for problem in landmark_problems(_draft(cohort, cohort.landmarks), set()):
         place = (problem.file, None, problem.column)  # blank lines may have shifted the rows
-        yield Problem(*place, problem.found, problem.allowed, problem.remedy)
+        yield InputProblem(*place, problem.found, problem.allowed, problem.remedy)
     frame = cohort.landmarks[cohort.landmarks["landmark"].isin(FRAME_LANDMARKS)]
     bare = frame[frame["sd_mm"].isna()]
     if study.landmark_sd_mm is None and len(bare):
@@ -56,7 +56,7 @@ def _landmarks(
         found = f"null, and {len(bare)} of {len(frame)} landmarks without sd_mm (first: {first})"
         allowed = "a number in mm, or an sd_mm for every landmark of a joint frame"
         remedy = "set landmark_sd_mm or fill the column"
-        yield Problem(*at(document, "landmark_sd_mm"), found, allowed, remedy)
+        yield InputProblem(*at(document, "landmark_sd_mm"), found, allowed, remedy)
 
 
 def _draft(cohort: Cohort, landmarks: pd.DataFrame) -> Draft:
@@ -65,7 +65,9 @@ def _draft(cohort: Cohort, landmarks: pd.DataFrame) -> Draft:
     return Draft(cohort.name, cohort.vertebrae, cohort.gravity, tables, absent)
 
 
-def _loading(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Problem]:
+def _loading(
+    document: YamlDocument, study: JointPoseSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Settling moves the vertebrae in time: each needs mass and inertia."""
     if study.loading != "settle":
         return
@@ -84,12 +86,14 @@ def _loading(document: Document, study: JointPoseSensitivity, cohort: Cohort) ->
         lacking = f"no inertia in bodies.csv for {', '.join(missing[:5])}"
     place = at(document, "loading")
     allowed = "equilibrium, or a cohort with masses and inertias of all moving vertebrae"
-    yield Problem(*place, f"settle, but {lacking}", allowed, "choose equilibrium, or fill them in")
+    yield InputProblem(
+        *place, f"settle, but {lacking}", allowed, "choose equilibrium, or fill them in"
+    )
 
 
 def _load_point(
-    document: Document, study: JointPoseSensitivity, cohort: Cohort
-) -> Iterator[Problem]:
+    document: YamlDocument, study: JointPoseSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Only forces have a point: another one changes nothing under pure moments."""
     if not study.load_point.asked or cohort.loads is None:
         return
@@ -103,15 +107,17 @@ def _load_point(
     found = "other load points, but no force in any chosen test"
     place = at(document, "load_point")
     allowed = "tests with a force: a pure moment has no point"
-    yield Problem(*place, found, allowed, "choose tests with forces, or leave load_point out")
+    yield InputProblem(*place, found, allowed, "choose tests with forces, or leave load_point out")
 
 
-def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Problem]:
+def _tests(
+    document: YamlDocument, study: JointPoseSensitivity, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Tests must exist, and every specimen must have been measured in one of them."""
     if cohort.motion is None:
         found = f"cohort '{cohort.name}', which has no motion.csv"
         allowed = "a cohort with loads.csv and motion.csv: the study calibrates on motion"
-        yield Problem(*at(document, "cohort"), found, allowed, "choose another cohort")
+        yield InputProblem(*at(document, "cohort"), found, allowed, "choose another cohort")
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
     chosen = cohort.motion[cohort.motion["test"].isin(study.tests or cohort.tests)]
@@ -119,29 +125,29 @@ def _tests(document: Document, study: JointPoseSensitivity, cohort: Cohort) -> I
     if measured.empty:
         tests = one_of(dict.fromkeys(cohort.motion["test"]))
         found = "no motion in any chosen test"
-        yield Problem(*at(document, "tests"), found, tests, "choose a test with motion")
+        yield InputProblem(*at(document, "tests"), found, tests, "choose a test with motion")
         return
     for specimen in cohort.specimen_names:
         if specimen not in set(measured["specimen"]):
             found = f"no motion of specimen '{specimen}' in any chosen test"
             allowed = "motion of every specimen in one chosen test at least"
             remedy = "choose more tests, or leave the specimen out of the cohort"
-            yield Problem(*at(document, "tests"), found, allowed, remedy)
+            yield InputProblem(*at(document, "tests"), found, allowed, remedy)
     yield from _weights(document, study, measured)
 
 
 def _weights(
-    document: Document, study: JointPoseSensitivity, measured: pd.DataFrame
-) -> Iterator[Problem]:
+    document: YamlDocument, study: JointPoseSensitivity, measured: pd.DataFrame
+) -> Iterator[InputProblem]:
     """Terms of what was not measured drop out of the cost; something to fit must remain."""
     weights = study.calibration.weights.in_order()
     known = [c for c in COORDINATE_COLUMNS if measured[c].notna().any()]
     if not any(w > 0 for w, c in zip(weights, COORDINATE_COLUMNS, strict=True) if c in known):
         place = at(document, "calibration.weights")
         found = "no weight on anything that was measured"
-        yield Problem(*place, found, f"a weight on {one_of(known)}", "weigh what was measured")
+        yield InputProblem(*place, found, f"a weight on {one_of(known)}", "weigh what was measured")
     elif AUTO in study.calibration.free:
         found = "auto, and no coordinate was both loaded and measured"
         allowed = f"{one_of(COORDINATES)}, whose stiffness the data tell"
         place = at(document, "calibration.free")
-        yield Problem(*place, found, allowed, "look at loads.csv and motion.csv, or name some")
+        yield InputProblem(*place, found, allowed, "look at loads.csv and motion.csv, or name some")

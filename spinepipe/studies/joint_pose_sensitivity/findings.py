@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
-from spinepipe.report.page.document import Results, judged
+from spinepipe.report.page.document import ResultTables, judged
 from spinepipe.report.words import count, fixed, number, percent, tick
 from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import LOADING_NAMES
 from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import (
@@ -36,7 +36,7 @@ _PERCENT = "\u00a0%"
 """No line ends between a number and its percent sign."""
 
 
-def findings(study: JointPoseSensitivity, results: Results) -> list[str]:
+def findings(study: JointPoseSensitivity, results: ResultTables) -> list[str]:
     """The sentences, without those that the study has no table for."""
     told = (
         _fits(study, results),
@@ -63,7 +63,7 @@ def settling(study: JointPoseSensitivity) -> str:
     )
 
 
-def _fits(study: JointPoseSensitivity, results: Results) -> str:
+def _fits(study: JointPoseSensitivity, results: ResultTables) -> str:
     """How many fits are in the reduced dataset, and why the others are not."""
     rows = results.table("counts")
     if rows.empty or not (rows["part"] == "poses").any():
@@ -82,7 +82,7 @@ def _fits(study: JointPoseSensitivity, results: Results) -> str:
     return f"{kept} are in the reduced dataset: {sums['solved']} ended with a stiffness, {lost}."
 
 
-def _dominant(results: Results) -> str:
+def _dominant(results: ResultTables) -> str:
     """In how many errors pose or stiffness takes more, their 95 % intervals apart.
 
     Of errors with their sign: where sizes are taken an error is folded at zero, and folding makes
@@ -129,7 +129,7 @@ def _together(done: pd.DataFrame) -> str:
     )
 
 
-def _precision(study: JointPoseSensitivity, results: Results) -> str:
+def _precision(study: JointPoseSensitivity, results: ResultTables) -> str:
     """The largest landmark SD that will do, with each stiffness."""
     rows = results.table("required_precision")
     if rows.empty:
@@ -186,7 +186,7 @@ def _too_few(chosen: pd.DataFrame, share: float) -> str:
     )
 
 
-def _methods(results: Results) -> str:
+def _methods(results: ResultTables) -> str:
     """Successful fits of each method, or why methods were not compared."""
     rows = results.table("success_by_method")
     if rows.empty:
@@ -207,7 +207,7 @@ def _methods(results: Results) -> str:
     return f"Successful fits of the same poses by method: {'; '.join(parts)}.{few}"
 
 
-def _bootstraps(study: JointPoseSensitivity, results: Results) -> str:
+def _bootstraps(study: JointPoseSensitivity, results: ResultTables) -> str:
     """Spread of the widest direction by part and loading, then the fits without a stiffness."""
     rows, counts = results.table("summary"), results.table("counts")
     if rows.empty:

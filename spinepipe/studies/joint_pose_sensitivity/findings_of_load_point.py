@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.panels import EVERY_JOINT
 from spinepipe.report.words import AXIS, count, fixed, number, tick
 
@@ -10,7 +10,7 @@ CHANGES = 0.1
 """Share of a stiffness by which it must differ over the load points to be named."""
 
 
-def load_point(results: Results) -> str:
+def load_point(results: ResultTables) -> str:
     """How stiffness hangs on the load point, whether the readings tell it, and its range then."""
     rows = results.table("load_point_effect")
     if rows.empty or rows["stated"].isna().all():

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import AXIS, count, fixed, listed, number, percent
 from spinepipe.status import Status
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
@@ -16,7 +16,7 @@ FEW = 10.0
 """Weights that count for fewer poses than this hang on which poses happened to be drawn."""
 
 
-def posterior(results: Results) -> list[str]:
+def posterior(results: ResultTables) -> list[str]:
     """Sentences of stiffness, landmarks, predicted motion and poses; none without the tables."""
     rows = results.table("posterior")
     if rows.empty:

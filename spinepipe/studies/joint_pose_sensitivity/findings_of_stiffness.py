@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.panels import EVERY_JOINT
 from spinepipe.report.words import AXIS, count, number, percent
 from spinepipe.status import USABLE
@@ -15,7 +15,7 @@ MOSTLY = 0.5
 """Where more fits have an open region, the median value is one that the data do not exclude."""
 
 
-def stiffness(study: JointPoseSensitivity, results: Results) -> str:
+def stiffness(study: JointPoseSensitivity, results: ResultTables) -> str:
     """Median stiffness, with a warning where the data do not hold it."""
     rows = results.table("summary")
     if rows.empty:
@@ -46,7 +46,7 @@ def stiffness(study: JointPoseSensitivity, results: Results) -> str:
     return " ".join(words for words in told if words)
 
 
-def _kept_starts(study: JointPoseSensitivity, results: Results) -> dict[str, str]:
+def _kept_starts(study: JointPoseSensitivity, results: ResultTables) -> dict[str, str]:
     """Coordinates whose stiffness most fits left where it started, and in words how many.
 
     Such a value is the study's own input; a median of it is no result. Values that the data hold
@@ -89,7 +89,7 @@ def _not_held(part: pd.DataFrame, chosen: pd.DataFrame) -> str:
     return f"{told} of fits; lower ends {ends} {first['unit']} (IQR)"
 
 
-def _reduced(results: Results) -> pd.DataFrame:
+def _reduced(results: ResultTables) -> pd.DataFrame:
     """Solved fits of the reduced poses."""
     fitted, success = results.table("calibrations"), results.table("success")
     if fitted.empty:

@@ -20,7 +20,7 @@ from spinepipe.units import MM_PER_M, ROTATIONS
 
 
 @dataclass(frozen=True)
-class Poses:
+class SampledPoses:
     """Sampled joint frames: (specimen, pose) to frames or the reason for none."""
 
     frames: dict[tuple[str, int], tuple[Pose, ...]]
@@ -38,7 +38,7 @@ def study_and_cohort(root: str, name: str) -> tuple[JointPoseSensitivity, Cohort
 
 
 @lru_cache(maxsize=KEPT_SPECIMENS)
-def _poses(where: Stamp) -> Poses:
+def _poses(where: Stamp) -> SampledPoses:
     frame = read_frame(where[0])
     origins = frame[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M
     angles = np.deg2rad(frame[[f"{name}_deg" for name in ROTATIONS]].to_numpy(float))
@@ -60,10 +60,10 @@ def _poses(where: Stamp) -> Poses:
         else:
             placed = Pose(rotation_zxy(*angle), origin)
             frames[key] = (*frames.get(key, ()), placed)
-    return Poses(frames, refused)
+    return SampledPoses(frames, refused)
 
 
-def sampled_poses(path: str) -> Poses:
+def sampled_poses(path: str) -> SampledPoses:
     """Sampled joint frames of a specimen, from the file that `build_models` wrote."""
     return _poses(stamp(path))
 

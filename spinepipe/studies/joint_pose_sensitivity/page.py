@@ -11,7 +11,7 @@ from spinepipe.comparison import papers
 from spinepipe.report.page.document import (
     Document,
     Picture,
-    Results,
+    ResultTables,
     Sortable,
     page_tables,
     sortable,
@@ -109,7 +109,7 @@ FOLDED = (
 _SHAPES = {table.name: table for table in all_declared(__file__)}
 
 
-def document(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Document:
+def document(study: JointPoseSensitivity, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
     return Document(
         question=QUESTION,
@@ -144,7 +144,9 @@ def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
     return told if study.load_point.asked else (*told, point)
 
 
-def caption(picture: Picture, study: JointPoseSensitivity, cohort: Cohort, results: Results) -> str:
+def caption(
+    picture: Picture, study: JointPoseSensitivity, cohort: Cohort, results: ResultTables
+) -> str:
     """A figure's caption for this study and cohort."""
     false = tuple(_false(cohort, results))
     sentences = _SENTENCE_END.split(picture.caption)
@@ -154,7 +156,7 @@ def caption(picture: Picture, study: JointPoseSensitivity, cohort: Cohort, resul
     return " ".join(kept)
 
 
-def _false(cohort: Cohort, results: Results) -> Iterator[str]:
+def _false(cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How the sentences begin that speak of something else than this study shows."""
     if not GOULD_2024A.stands_for(cohort.name):
         yield "For the cohort rebuilt from"
@@ -166,7 +168,7 @@ def _false(cohort: Cohort, results: Results) -> Iterator[str]:
         yield "With few joints and directions," if rows else "With many joints and directions,"
 
 
-def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:
+def shown_tables(study: JointPoseSensitivity, results: ResultTables) -> list[Sortable]:
     """Tables that the study has, as the page shows them; those without rows are left out."""
     found = [
         table

@@ -14,8 +14,8 @@ from scipy.special import ndtri
 
 from spinepipe.calibrate import Fit, fit
 from spinepipe.calibrate.posterior import Mode, Target, between, modes, normal_of
-from spinepipe.calibrate.sampler import Chains, Convergence, convergence, sample
-from spinepipe.calibrate.solvers import AtRest, Seen
+from spinepipe.calibrate.sampler import Convergence, MarkovChains, convergence, sample
+from spinepipe.calibrate.solvers import AtRest, CaseResiduals
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.landmark_frames import displacement
 from spinepipe.designs import specimen_seed
@@ -27,7 +27,7 @@ from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.posterior_rows import (
     PREDICTIONS,
-    Quantity,
+    PosteriorQuantity,
     motion_rows,
     posterior_row,
     prior_row,
@@ -111,7 +111,9 @@ def _start(own: SpecimenPosterior, found: Fit) -> Array:
     return normal_of(*own.bounds, found.x)
 
 
-def _sampled(own: SpecimenPosterior, mode: Mode, chains: Chains, seed: int) -> tuple[Rows, Rows]:
+def _sampled(
+    own: SpecimenPosterior, mode: Mode, chains: MarkovChains, seed: int
+) -> tuple[Rows, Rows]:
     """Rows of the posterior and of the motion it predicts."""
     quantities = list(_quantities(own, mode, chains.z))
     found = convergence([quantity.draws for quantity in quantities])
@@ -135,7 +137,7 @@ def _numbers(found: Convergence) -> list[tuple[float, float, float]]:
     return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
-def _quantities(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[Quantity]:
+def _quantities(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[PosteriorQuantity]:
     """What is told: stiffnesses, landmarks, and where these put the joints."""
     assert mode.point is not None
     top, count, unknowns = mode.point.z, len(own.stiffnesses), own.unknowns
@@ -144,7 +146,7 @@ def _quantities(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[Quanti
     for place, stiffness in enumerate(own.stiffnesses):
         bounds = own.bounds[0][place], own.bounds[1][place]
         found.append(
-            Quantity.stiffness(
+            PosteriorQuantity.stiffness(
                 _where(own, stiffness),
                 z[..., place],
                 (float(top[place]), float(sd[place])),
@@ -155,11 +157,11 @@ def _quantities(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[Quanti
     for number, (mark, axis) in enumerate(product(unknowns.free.tolist(), "xyz")):
         place, scale = count + number, float(own.landmarks.sd[mark] * MM_PER_M)
         names, near = own.landmarks.names[mark], (float(top[place]), float(sd[place]))
-        found.append(Quantity.landmark(names, axis, z[..., place], near, scale))
+        found.append(PosteriorQuantity.landmark(names, axis, z[..., place], near, scale))
     return [*found, *_joints(own, mode, z)]
 
 
-def _joints(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[Quantity]:
+def _joints(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[PosteriorQuantity]:
     """Offset and tilt of each joint that landmarks may move."""
     assert mode.point is not None
     count, names = len(own.stiffnesses), own.alone.model.joints
@@ -178,7 +180,7 @@ def _joints(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[Quantity]:
         near = float(top.by[0, joint, axis]), float(np.sqrt(here @ covariance @ here))
         prior = float(np.linalg.norm(before[joint, axis]))
         own_draws = draws[:, joint, axis].reshape(z.shape[:2])
-        found.append(Quantity.joint(names[joint], axis, own_draws, near, prior))
+        found.append(PosteriorQuantity.joint(names[joint], axis, own_draws, near, prior))
     return found
 
 
@@ -197,10 +199,10 @@ def _motion(own: SpecimenPosterior, z: Array, seed: int) -> Rows:
     problem = own.problem
     cases = [case.case for case in problem.cases]
     solver = AtRest(problem.model, cases, problem.free, problem.scale)
-    seen: list[Seen] = []
+    seen: list[CaseResiduals] = []
     for first in range(0, len(x), TOGETHER):
         found = solver.solve(list(enumerate(x[first : first + TOGETHER])))
-        seen += [one for one in found if isinstance(one, Seen)]
+        seen += [one for one in found if isinstance(one, CaseResiduals)]
     return motion_rows(problem, seen, own.noise, seed) if seen else []
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from spinepipe.calibrate import Problem
-from spinepipe.calibrate.posterior import Noise, between
-from spinepipe.calibrate.solvers import Seen
+from spinepipe.calibrate.posterior import ResidualNoise, between
+from spinepipe.calibrate.solvers import CaseResiduals
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
 from spinepipe.status import Status
@@ -43,7 +43,7 @@ _MIDS = (np.arange(1000) + 0.5) / 1000.0
 
 
 @dataclass(frozen=True)
-class Quantity:
+class PosteriorQuantity:
     """A number that the posterior tells of.
 
     Attributes
@@ -108,7 +108,7 @@ class Quantity:
 
 
 def posterior_row(
-    quantity: Quantity, r_hat: float, ess_bulk: float, ess_tail: float, *, believed: bool
+    quantity: PosteriorQuantity, r_hat: float, ess_bulk: float, ess_tail: float, *, believed: bool
 ) -> dict[str, Any]:
     """What is told of a quantity, but for specimen and status; draws only where ``believed``."""
     draws = quantity.draws.ravel()
@@ -168,7 +168,7 @@ def refused_row(message: str) -> dict[str, Any]:
 
 
 def motion_rows(
-    problem: Problem, seen: Sequence[Seen], noise: Noise, seed: int
+    problem: Problem, seen: Sequence[CaseResiduals], noise: ResidualNoise, seed: int
 ) -> list[dict[str, Any]]:
     """Bands of the motion, and of a new reading of it, beside what was measured."""
     rng = np.random.default_rng(seed)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from spinepipe.calibrate import Evaluator, Fit, Problem
 from spinepipe.calibrate.posterior import (
-    Noise,
+    ResidualNoise,
     Target,
     between,
     noise_of,
@@ -174,7 +174,7 @@ class SpecimenPosterior:
         return np.maximum(low, -reach), np.minimum(high, reach)
 
     @property
-    def noise(self) -> Noise:
+    def noise(self) -> ResidualNoise:
         """Of the residuals, as the study says."""
         return noise_of(self.evaluator, reading_sd(self.cohort), self.scatter)
 

@@ -258,7 +258,7 @@ class Calibration(BaseModel):
     )
 
 
-class Posterior(BaseModel):
+class PosteriorSettings(BaseModel):
     """What the data make likely of stiffness and landmarks together."""
 
     model_config = FORM
@@ -344,8 +344,9 @@ class JointPoseSensitivity(Study):
         default_factory=LoadPoint,
         description="stiffness over load points; left out with one shift each way and no SD",
     )
-    posterior: Posterior = Field(
-        default_factory=Posterior, description="stiffness and landmarks that the data make likely"
+    posterior: PosteriorSettings = Field(
+        default_factory=PosteriorSettings,
+        description="stiffness and landmarks that the data make likely",
     )
     significance: float = Field(
         default=0.05, gt=0, lt=1, description="p-values below this are called significant"

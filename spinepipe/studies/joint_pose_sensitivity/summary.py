@@ -49,7 +49,7 @@ def _best_poses(best: str) -> pd.DataFrame:
 
 
 @dataclass(frozen=True)
-class _Part:
+class _SummaryKey:
     """Where rows of the summary belong."""
 
     part: str
@@ -117,14 +117,14 @@ def _pose_rows(
         }
         for specimen in judged["specimen"].unique():
             own = {name: rows[rows["specimen"] == specimen] for name, rows in chosen.items()}
-            part = _Part("poses", "equilibrium", dataset, str(specimen))
+            part = _SummaryKey("poses", "equilibrium", dataset, str(specimen))
             yield from _stiffness_rows(settings, part, own["calibrations"])
             yield from _error_rows(part, own["errors"], own["sizes"])
             yield from _frame_rows(part, own["poses"])
 
 
 def _stiffness_rows(
-    settings: JointPoseSensitivity, part: _Part, fits: pd.DataFrame
+    settings: JointPoseSensitivity, part: _SummaryKey, fits: pd.DataFrame
 ) -> Iterator[dict[str, Any]]:
     if settings.calibration.grouping == "per_joint":
         fits = fits[fits["joint"] != "*"]  # a refused fit has one row for all joints
@@ -155,7 +155,9 @@ def _regions(fits: pd.DataFrame, name: str) -> dict[str, Any]:
     return {"open_share": float(is_open.mean()), **told}
 
 
-def _error_rows(part: _Part, errors: pd.DataFrame, sizes: pd.DataFrame) -> Iterator[dict[str, Any]]:
+def _error_rows(
+    part: _SummaryKey, errors: pd.DataFrame, sizes: pd.DataFrame
+) -> Iterator[dict[str, Any]]:
     """Rows of what was measured at all."""
     for joint, rows in errors.groupby("joint", sort=False):
         motion = sizes[sizes["joint"] == joint]
@@ -165,7 +167,7 @@ def _error_rows(part: _Part, errors: pd.DataFrame, sizes: pd.DataFrame) -> Itera
                 yield part.row("error", str(joint), name, COORDINATE_UNITS[name], values, size)
 
 
-def _frame_rows(part: _Part, poses: pd.DataFrame) -> Iterator[dict[str, Any]]:
+def _frame_rows(part: _SummaryKey, poses: pd.DataFrame) -> Iterator[dict[str, Any]]:
     for joint, rows in poses.groupby("joint", sort=False):
         for name, axis in zip(TRANSLATIONS, "xyz", strict=True):
             yield part.row("origin", str(joint), name, "mm", rows[f"{axis}_mm"])
@@ -183,7 +185,7 @@ def _bootstrap_rows(
     motion = _own_motion(settings, cohort)
     for specimen, bootstrap, loading in fits[keys[:3]].drop_duplicates().itertuples(index=False):
         for dataset, chosen in (("all", fits), ("reduced", kept)):
-            part = _Part(f"{bootstrap}_bootstrap", str(loading), dataset, str(specimen))
+            part = _SummaryKey(f"{bootstrap}_bootstrap", str(loading), dataset, str(specimen))
             here = chosen[(chosen[keys[:3]] == [specimen, bootstrap, loading]).all(axis=1)]
             yield from _stiffness_rows(settings, part, _by_fit(settings, here, fits))
             yield from _error_rows(part, _named(here), motion[motion["specimen"] == specimen])

@@ -8,7 +8,7 @@ from spinepipe.calibrate.rank import Rank, rank_at_start
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
@@ -20,7 +20,7 @@ KEY = "calibration.free"
 
 def told(
     study: JointPoseSensitivity, cohort: Cohort, root: Path
-) -> tuple[str, tuple[Problem, ...]]:
+) -> tuple[str, tuple[InputProblem, ...]]:
     """In words how many of the free stiffnesses the data tell, and what is warned of.
 
     In the cohort's own joint poses, at the stiffness where fits start.
@@ -53,7 +53,9 @@ def _noise(translation_mm: float, rotation_deg: float) -> Array:
     return noise
 
 
-def _warned(study: JointPoseSensitivity, cohort: Cohort, ranks: dict[str, Rank]) -> list[Problem]:
+def _warned(
+    study: JointPoseSensitivity, cohort: Cohort, ranks: dict[str, Rank]
+) -> list[InputProblem]:
     """One warning for all specimens whose data tell less than is free."""
     short = {
         name: found
@@ -74,7 +76,7 @@ def _warned(study: JointPoseSensitivity, cohort: Cohort, ranks: dict[str, Rank])
     keep = f": {', '.join(silent)} would keep {'its' if len(silent) == 1 else 'their'} start"
     remedy = f"write `free: auto` or leave some out{keep if silent else ''}"
     place = (f"{STUDIES.as_posix()}/{study.study}.yaml", None, KEY)
-    return [Problem(*place, told_words, "as many as the data tell", remedy)]
+    return [InputProblem(*place, told_words, "as many as the data tell", remedy)]
 
 
 def _places(coordinate: int, free: int, joints: int) -> range:

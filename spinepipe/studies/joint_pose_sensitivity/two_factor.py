@@ -10,7 +10,7 @@ import pandas as pd
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
-from spinepipe.sensitivity.shares import Share, Shares, variance_shares
+from spinepipe.sensitivity.shares import VarianceShare, VarianceShares, variance_shares
 from spinepipe.sensitivity.tree import Tree, regression_tree
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
@@ -80,7 +80,9 @@ def _shares(grid: pd.DataFrame, signed: pd.DataFrame) -> Iterator[dict[str, Any]
         }
 
 
-def _by_factor(found: Shares) -> dict[str, tuple[Share | None, Share | None]]:
+def _by_factor(
+    found: VarianceShares,
+) -> dict[str, tuple[VarianceShare | None, VarianceShare | None]]:
     """First order and total of each factor."""
     return {
         "pose": (found.row, found.total_row),
@@ -89,7 +91,7 @@ def _by_factor(found: Shares) -> dict[str, tuple[Share | None, Share | None]]:
     }
 
 
-def _interval(share: Share | None) -> dict[str, float | None]:
+def _interval(share: VarianceShare | None) -> dict[str, float | None]:
     if share is None:
         return {"share": None, "share_low": None, "share_high": None}
     return {"share": share.estimate, "share_low": share.low, "share_high": share.high}

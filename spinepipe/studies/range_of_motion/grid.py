@@ -23,7 +23,7 @@ _MOTION = tuple(f"predicted_{name}" for name in COORDINATE_COLUMNS)
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class MotionGrid:
     """Motion of a whole study.
 
     Attributes
@@ -47,7 +47,7 @@ class Grid:
         return chosen
 
 
-def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> Grid:
+def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> MotionGrid:
     """Rows of the largest loads of ``range_of_motion.parquet``, read some at a time."""
     tests = _tests(study, cohort)
     sizes = (len(cohort.specimen_names), study.n_poses, study.stiffness_sets, len(tests))
@@ -67,7 +67,7 @@ def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> Grid:
     loaded = tuple(
         driven.get(test) or _moves_most(motion[:, :, :, i]) for i, test in enumerate(tests)
     )
-    return Grid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, asked)
+    return MotionGrid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, asked)
 
 
 def _positions(values: pa.Array, names: Sequence[str]) -> NDArray[np.int32]:

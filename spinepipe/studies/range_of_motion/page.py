@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Results, Sortable, sortable
+from spinepipe.report.page.document import Document, ResultTables, Sortable, sortable
 from spinepipe.report.words import count, fixed, percent
 from spinepipe.schema import Table
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
@@ -35,7 +35,7 @@ _FACTORS = {
 }
 
 
-def document(study: RangeOfMotion, cohort: Cohort, results: Results) -> Document:
+def document(study: RangeOfMotion, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
     frames = results.table("frames")
     return Document(
@@ -59,7 +59,7 @@ def left_out(study: RangeOfMotion) -> tuple[str, ...]:
     return tuple(f"{part} ({setting})" for part, setting, drawn in parts if not drawn)
 
 
-def _tables(cohort: Cohort, results: Results) -> Iterator[Sortable]:
+def _tables(cohort: Cohort, results: ResultTables) -> Iterator[Sortable]:
     """Rows of the whole cohort, or of its only specimen; those of each specimen are in the file."""
     chosen = EVERY if len(cohort.specimen_names) > 1 else cohort.specimen_names[0]
     summary, variance = results.table("rom_summary"), results.table("rom_variance")
@@ -76,7 +76,7 @@ def _tables(cohort: Cohort, results: Results) -> Iterator[Sortable]:
         yield sortable(table.name, title, table.about, frame, table.columns)
 
 
-def findings(study: RangeOfMotion, cohort: Cohort, results: Results) -> list[str]:
+def findings(study: RangeOfMotion, cohort: Cohort, results: ResultTables) -> list[str]:
     """The sentences, without those that the tables have nothing for."""
     summary, variance = results.table("rom_summary"), results.table("rom_variance")
     chosen = EVERY if len(cohort.specimen_names) > 1 else cohort.specimen_names[0]

@@ -7,8 +7,8 @@ from pydantic import BaseModel, Field
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.columns import TABLES
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import Problem
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem
 from spinepipe.studies.parts import (
     FORM,
     Damping,
@@ -128,8 +128,8 @@ class RangeOfMotion(Study):
 
 
 def check_range_of_motion(
-    document: Document, study: RangeOfMotion, cohort: Cohort
-) -> Iterator[Problem]:
+    document: YamlDocument, study: RangeOfMotion, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Every way in which a sound study and a sound cohort do not fit.
 
     Parameters
@@ -141,7 +141,7 @@ def check_range_of_motion(
     yield from unknown_levels(document, study.level_stiffness, cohort.joint_names)
 
 
-def _poses(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:
+def _poses(document: YamlDocument, study: RangeOfMotion, cohort: Cohort) -> Iterator[InputProblem]:
     """Sampled frames need to know how uncertain they are."""
     if study.n_poses == 1 or study.pose_sd is not None:
         return
@@ -150,25 +150,25 @@ def _poses(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator
     remedy = "set pose_sd, or set poses: 1"
     if cohort.motion is not None:
         found += f"cohort '{cohort.name}' has motion.csv: its measurement_sd is that of a reading"
-        yield Problem(*at(document, "pose_sd"), found, allowed, remedy)
+        yield InputProblem(*at(document, "pose_sd"), found, allowed, remedy)
     elif cohort.measurement_sd is None:
         found += f"cohort '{cohort.name}' has no measurement_sd"
         remedy = "set pose_sd, give the cohort a measurement_sd, or set poses: 1"
-        yield Problem(*at(document, "pose_sd"), found, allowed, remedy)
+        yield InputProblem(*at(document, "pose_sd"), found, allowed, remedy)
 
 
-def _tests(document: Document, study: RangeOfMotion, cohort: Cohort) -> Iterator[Problem]:
+def _tests(document: YamlDocument, study: RangeOfMotion, cohort: Cohort) -> Iterator[InputProblem]:
     """Either virtual tests or those of loads.csv, which must then be there."""
     if study.virtual_tests is not None:
         if study.tests is not None:
             allowed = "null beside virtual_tests, which name their own tests"
             remedy = "name the tests in virtual_tests.tests, or set virtual_tests: null"
-            yield Problem(*at(document, "tests"), ", ".join(study.tests), allowed, remedy)
+            yield InputProblem(*at(document, "tests"), ", ".join(study.tests), allowed, remedy)
         return
     if cohort.loads is None:
         found = f"null, and cohort '{cohort.name}' has no loads.csv"
         allowed = "virtual tests, or null with a cohort that has loads.csv"
         remedy = "set virtual_tests: {moment_nm: 7.5, tests: [flexion], steps: 10}"
-        yield Problem(*at(document, "virtual_tests"), found, allowed, remedy)
+        yield InputProblem(*at(document, "virtual_tests"), found, allowed, remedy)
         return
     yield from unknown_tests(document, study.tests, cohort.tests)

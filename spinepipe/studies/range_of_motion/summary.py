@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.statistics import Ended
-from spinepipe.studies.range_of_motion.grid import Grid, read_grid
+from spinepipe.statistics import ComputationStatus
+from spinepipe.studies.range_of_motion.grid import MotionGrid, read_grid
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import EVERY, ROM_SUMMARY
 from spinepipe.tables import from_rows, write
@@ -33,7 +33,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     write(from_rows(ROM_SUMMARY, list(summary_rows(grid))), output, made_by)
 
 
-def summary_rows(grid: Grid) -> Iterator[dict[str, Any]]:
+def summary_rows(grid: MotionGrid) -> Iterator[dict[str, Any]]:
     """Rows of each specimen and, where there are several, of all of them together."""
     groups = [(name, slice(at, at + 1)) for at, name in enumerate(grid.specimens)]
     if len(groups) > 1:
@@ -47,12 +47,16 @@ def summary_rows(grid: Grid) -> Iterator[dict[str, Any]]:
                     yield {"specimen": specimen, "test": test, **row}
 
 
-def _test_rows(grid: Grid, motion: Array, loaded: str) -> Iterator[dict[str, Any]]:
+def _test_rows(grid: MotionGrid, motion: Array, loaded: str) -> Iterator[dict[str, Any]]:
     """Rows of one test; motion (runs, J, 6). A run has an equilibrium of all joints or of none."""
     solved = motion[np.isfinite(motion).all(axis=(1, 2))]
     numbers = {"n": len(solved), "n_without": len(motion) - len(solved)}
     found = _quantiles(solved)
-    ended = (Ended.DONE, "") if len(solved) else (Ended.TOO_FEW, "no run has an equilibrium")
+    ended = (
+        (ComputationStatus.DONE, "")
+        if len(solved)
+        else (ComputationStatus.TOO_FEW, "no run has an equilibrium")
+    )
     for joint, name in enumerate(grid.joints):
         for at, coordinate in enumerate(COORDINATES):
             yield {

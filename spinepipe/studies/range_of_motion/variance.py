@@ -10,9 +10,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.words import count
-from spinepipe.sensitivity.shares import Share, nested_shares, variance_shares
-from spinepipe.statistics import Ended
-from spinepipe.studies.range_of_motion.grid import Grid, read_grid
+from spinepipe.sensitivity.shares import VarianceShare, nested_shares, variance_shares
+from spinepipe.statistics import ComputationStatus
+from spinepipe.studies.range_of_motion.grid import MotionGrid, read_grid
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import EVERY, FACTORS, ROM_VARIANCE
 from spinepipe.tables import from_rows, write
@@ -34,7 +34,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     write(from_rows(ROM_VARIANCE, list(variance_rows(grid))), output, made_by)
 
 
-def variance_rows(grid: Grid) -> Iterator[dict[str, Any]]:
+def variance_rows(grid: MotionGrid) -> Iterator[dict[str, Any]]:
     """Rows of each specimen and, where there are several, of the cohort."""
     for number, test in enumerate(grid.tests):
         drawn = grid.loaded_motion(number)[:, 1:, 1:]  # the first pose and set are no draws
@@ -54,7 +54,7 @@ def _complete(motion: Array) -> Array:
     return whole
 
 
-def _own(grid: Grid, motion: Array) -> Iterator[dict[str, Any]]:
+def _own(grid: MotionGrid, motion: Array) -> Iterator[dict[str, Any]]:
     """Rows of one specimen, joint by joint; motion (poses, K, J)."""
     for at, joint in enumerate(grid.joints):
         found = variance_shares(motion[:, :, at], hypercubes=True)
@@ -63,13 +63,13 @@ def _own(grid: Grid, motion: Array) -> Iterator[dict[str, Any]]:
         yield {"joint": joint, **_row(motion[None, :, :, at], ended, parts)}
 
 
-def _all(grid: Grid, motions: list[Array]) -> Iterator[dict[str, Any]]:
+def _all(grid: MotionGrid, motions: list[Array]) -> Iterator[dict[str, Any]]:
     """Rows of the cohort, joint by joint: as many poses of each specimen as all of them have."""
     most = max(len(motion) for motion in motions)
     kept = [motion for motion in motions if len(motion) >= max(1.0, FEWEST_COMPLETE * most)]
     if not kept:
         empty = motions[0][None]
-        ended = (Ended.TOO_FEW, "no pose has an equilibrium with every stiffness set")
+        ended = (ComputationStatus.TOO_FEW, "no pose has an equilibrium with every stiffness set")
         yield from ({"joint": joint, **_row(empty[..., 0], ended, {})} for joint in grid.joints)
         return
     poses = min(len(motion) for motion in kept)
@@ -94,10 +94,12 @@ def _left_out(specimens: int, poses: int) -> str:
     return f"left out for lack of equilibria: {', '.join(parts)}" if parts else ""
 
 
-def _row(values: Array, ended: tuple[Ended, str], parts: dict[str, Share | None]) -> dict[str, Any]:
+def _row(
+    values: Array, ended: tuple[ComputationStatus, str], parts: dict[str, VarianceShare | None]
+) -> dict[str, Any]:
     """Columns of an analysis of values (S, P, K)."""
     specimens, poses, stiffnesses = values.shape
-    done = ended[0] is Ended.DONE
+    done = ended[0] is ComputationStatus.DONE
     shares = {
         f"{name}_{end}": getattr(parts.get(name), field, None)
         for name in FACTORS

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 from spinepipe.studies.places import at
 from spinepipe.studies.scoliosis.curve_angles import curves, main_curve
 from spinepipe.studies.scoliosis.films import (
@@ -44,20 +44,22 @@ SHORTER = 0.97
 """Traction may not leave less than this share of the erect length."""
 
 
-def check_scoliosis(document: Document, study: Scoliosis, cohort: Cohort) -> Iterator[Problem]:
+def check_scoliosis(
+    document: YamlDocument, study: Scoliosis, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Everything that is wrong with the films of a cohort."""
     films = cohort.further.get("films")
     if films is None:
         place = at(document, "cohort")
         found, allowed = "a cohort without films.csv", "a cohort with films of its patients"
-        yield Problem(*place, found, allowed, "add films.csv, or name another cohort")
+        yield InputProblem(*place, found, allowed, "add films.csv, or name another cohort")
         return
     for patient in cohort.specimen_names:
         yield from _patient(cohort, patient, films[films["specimen"] == patient])
 
 
 @dataclass(frozen=True)
-class _Place:
+class _FilmPlace:
     """Where a fault of a film is told."""
 
     file: str
@@ -66,17 +68,17 @@ class _Place:
 
     def problem(
         self, row: int | None, what: str | None, found: str, allowed: str, remedy: str
-    ) -> Problem:
+    ) -> InputProblem:
         named = f"{self.patient}, film {self.position}: {found}"
-        return Problem(self.file, row, what, named, allowed, remedy)
+        return InputProblem(self.file, row, what, named, allowed, remedy)
 
 
-def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Problem]:
+def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[InputProblem]:
     file = f"{cohort.name}/films.csv"
     known = list(dict.fromkeys(rows["position"]))
     shapes: dict[str, Film] = {}
     for position in known:
-        film, place = rows[rows["position"] == position], _Place(file, patient, position)
+        film, place = rows[rows["position"] == position], _FilmPlace(file, patient, position)
         faults = list(_film(cohort, place, film))
         yield from faults
         if not faults:
@@ -87,7 +89,7 @@ def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Probl
         yield from _cobb(cohort, patient, shapes[ERECT])
 
 
-def _cobb(cohort: Cohort, patient: str, erect: Film) -> Iterator[Problem]:
+def _cobb(cohort: Cohort, patient: str, erect: Film) -> Iterator[InputProblem]:
     """Does the Cobb angle that is stated go with the film?"""
     rows = cohort.further.get(PATIENTS.stem)
     if rows is None or not curves(erect):
@@ -100,10 +102,10 @@ def _cobb(cohort: Cohort, patient: str, erect: Film) -> Iterator[Problem]:
             allowed = f"within {FARTHEST_APART_DEG:g} deg of the film"
             place = (f"{cohort.name}/{PATIENTS.file}", int(str(line)), "cobb_deg")
             remedy = "correct it (radians? another patient?), or the tilts of the film"
-            yield Problem(*place, found, allowed, remedy)
+            yield InputProblem(*place, found, allowed, remedy)
 
 
-def _film(cohort: Cohort, place: _Place, rows: pd.DataFrame) -> Iterator[Problem]:
+def _film(cohort: Cohort, place: _FilmPlace, rows: pd.DataFrame) -> Iterator[InputProblem]:
     """Each reading of a film: every vertebra once, all of its numbers, the lowest at nought."""
     for reading in by_reading(rows):
         told = reading[["observer", "repeat"]].iloc[0].dropna()
@@ -130,7 +132,7 @@ def _film(cohort: Cohort, place: _Place, rows: pd.DataFrame) -> Iterator[Problem
             yield from _lowest(cohort, place, reading)
 
 
-def _lowest(cohort: Cohort, place: _Place, reading: pd.DataFrame) -> Iterator[Problem]:
+def _lowest(cohort: Cohort, place: _FilmPlace, reading: pd.DataFrame) -> Iterator[InputProblem]:
     lowest = reading[reading["vertebra"] == cohort.vertebrae[0]]
     numbers = lowest[list(CENTRE)].to_numpy(float)[0]
     if np.abs(numbers).max() > 1e-6:
@@ -145,8 +147,8 @@ def _lowest(cohort: Cohort, place: _Place, reading: pd.DataFrame) -> Iterator[Pr
 
 
 def _tilts(
-    place: _Place, rows: pd.DataFrame, vertebrae: tuple[str, ...], film: Film
-) -> Iterator[Problem]:
+    place: _FilmPlace, rows: pd.DataFrame, vertebrae: tuple[str, ...], film: Film
+) -> Iterator[InputProblem]:
     """Does what is said of tilt go with the line of the centres?"""
     line = _line_of_centres(film)
     given = float(np.abs(film.tilt).max())
@@ -175,7 +177,7 @@ def _line_of_centres(film: Film) -> Array:
     return found
 
 
-def _bends(file: str, patient: str, films: dict[str, Film]) -> Iterator[Problem]:
+def _bends(file: str, patient: str, films: dict[str, Film]) -> Iterator[InputProblem]:
     """Do the films show what their positions say?"""
     if ERECT not in films:
         return
@@ -190,9 +192,9 @@ def _bends(file: str, patient: str, films: dict[str, Film]) -> Iterator[Problem]
         found = f"{patient}: both bending films lean to the other side"
         remedy = "exchange the two positions, or mirror the films (AP for PA)"
         allowed = "right_bending to the right: y and orientation fall"
-        yield Problem(file, None, "position", found, allowed, remedy)
+        yield InputProblem(file, None, "position", found, allowed, remedy)
     for position, lean in leans.items():
-        place = _Place(file, patient, position)
+        place = _FilmPlace(file, patient, position)
         if wrong == [position]:
             found = "the spine leans to the other side than on the erect film"
             remedy = "is the film mirrored (AP for PA), or the other bend?"
@@ -203,18 +205,18 @@ def _bends(file: str, patient: str, films: dict[str, Film]) -> Iterator[Problem]
             yield place.problem(None, "position", found, allowed, "is this the bending film?")
     traction = films.get("traction")
     if traction is not None and traction.up[-1] < SHORTER * erect.up[-1]:
-        place, lengths = _Place(file, patient, "traction"), (traction.up[-1], erect.up[-1])
+        place, lengths = _FilmPlace(file, patient, "traction"), (traction.up[-1], erect.up[-1])
         found = "{:.0f} mm tall, {:.0f} mm erect".format(*(MM_PER_M * one for one in lengths))
         remedy = "is the film scaled, or of another position?"
         yield place.problem(None, "z_mm", found, "traction lengthens a spine", remedy)
 
 
-def _same(file: str, patient: str, films: dict[str, Film]) -> Iterator[Problem]:
+def _same(file: str, patient: str, films: dict[str, Film]) -> Iterator[InputProblem]:
     names = [name for name in (*NEEDED, *HELD_OUT) if name in films]
     for number, one in enumerate(names):
         for other in names[number + 1 :]:
             if _alike(films[one], films[other]):
-                place, found = _Place(file, patient, other), f"the same as film {one}"
+                place, found = _FilmPlace(file, patient, other), f"the same as film {one}"
                 remedy = "replace the one that was entered twice"
                 yield place.problem(None, "position", found, "a film of its own", remedy)
 

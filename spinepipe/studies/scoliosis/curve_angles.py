@@ -23,7 +23,7 @@ LOWEST_PROXIMAL, THORACOLUMBAR = 5, "T12"
 
 
 @dataclass(frozen=True)
-class Curve:
+class SpinalCurve:
     """Numbers of the lower and upper end vertebra and of the apex, counted from below.
 
     Attributes
@@ -70,7 +70,7 @@ def region(apex: str) -> str:
     return "PT" if apex[0] == "C" or int(apex[1:]) <= LOWEST_PROXIMAL else "MT"
 
 
-def curves(erect: Film) -> tuple[Curve, ...]:
+def curves(erect: Film) -> tuple[SpinalCurve, ...]:
     """The curves of a spine, caudal to cranial; adjacent ones share an end vertebra.
 
     Where several are equally tilted between two curves, each curve has the outermost of them.
@@ -82,11 +82,11 @@ def curves(erect: Film) -> tuple[Curve, ...]:
         if upper - lower < 2:
             continue
         side = 1 if erect.tilt[lower] > erect.tilt[upper] else -1
-        found.append(Curve(lower, upper, _apex(erect, lower, upper), side))
+        found.append(SpinalCurve(lower, upper, _apex(erect, lower, upper), side))
     return tuple(found)
 
 
-def main_curve(erect: Film) -> Curve:
+def main_curve(erect: Film) -> SpinalCurve:
     """The curve of the largest Cobb angle."""
     return max(curves(erect), key=lambda curve: curve.cobb(erect))
 

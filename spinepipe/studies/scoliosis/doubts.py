@@ -13,7 +13,7 @@ from spinepipe.cohort.answers import typical
 from spinepipe.plausibility.score import suspect, usual
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.levels import spacing_mm
-from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, warn
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film, by_reading, corners, placed
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -50,7 +50,7 @@ def doubts(cohort: Cohort) -> Iterator[PlausibilityWarning]:
         yield warn(
             cohort,
             fault.warning,
-            Place("films", line, fault.column),
+            TableCell("films", line, fault.column),
             remedy=fault.remedy,
             whose=[name for name, *_ in places],
             number=fault.number,

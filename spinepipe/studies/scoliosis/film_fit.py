@@ -19,19 +19,19 @@ from itertools import islice
 import numpy as np
 from scipy.stats import norm, qmc
 
-from spinepipe.calibrate.descent import Point, Settled
+from spinepipe.calibrate.descent import DescentTolerances, Point
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
-from spinepipe.statics.prescribed import Ask, Held, alone, answered
-from spinepipe.status import Ended, Status
+from spinepipe.statics.prescribed import Ask, PrescribedResult, alone, answered
+from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.held_spine import BENDING, with_laws
-from spinepipe.studies.scoliosis.optima import Limits, Optimum, best, optimum
+from spinepipe.studies.scoliosis.optima import FilmOptimum, Limits, best, optimum
 from spinepipe.studies.scoliosis.personal import Fitting, Patient, Personal
-from spinepipe.studies.scoliosis.population import Known, Population, assumed
-from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, Ends
+from spinepipe.studies.scoliosis.population import PatientPrior, Population, assumed
+from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, EndRotations
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 FARTHEST = 5.0
@@ -41,7 +41,7 @@ BEYOND_THE_FILM = (1.3, 2.0, 4.0)
 """A fit begins with ends at least so many times as far as the rotations of the films: the first of
 these at which the chain has a pose."""
 
-SETTLED = Settled(cost=1e-4, step=1e-4, slope=1e-8, evaluations=100)
+SETTLED = DescentTolerances(cost=1e-4, step=1e-4, slope=1e-8, evaluations=100)
 """A ten-thousandth of a number's logarithm is far within its spread."""
 
 DRAWN_STARTS = 4
@@ -65,7 +65,7 @@ class NoFit(Exception):
 
 
 @dataclass(frozen=True)
-class Told:
+class FilmInformation:
     """What the films say of the numbers near a fit, apart from any population.
 
     Attributes
@@ -76,15 +76,15 @@ class Told:
     matrix: Array
     vector: Array
 
-    def known(self, population: Population) -> Known:
+    def known(self, population: Population) -> PatientPrior:
         """The numbers, where the patient is of a population."""
         covariance = np.linalg.inv(self.matrix + population.precision)
         mean = covariance @ (self.vector + population.precision @ population.mean)
-        return Known(mean.astype(float, copy=False), covariance.astype(float, copy=False))
+        return PatientPrior(mean.astype(float, copy=False), covariance.astype(float, copy=False))
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedFilms:
     """The end of a fit.
 
     Attributes
@@ -99,10 +99,10 @@ class Fitted:
     """
 
     unknowns: Array
-    told: Told
-    known: Known
+    told: FilmInformation
+    known: PatientPrior
     status: Status
-    poses: Mapping[str, Held]
+    poses: Mapping[str, PrescribedResult]
     cost: float
     n_optima: int
 
@@ -117,7 +117,7 @@ class Fitted:
         return float(np.trace(self.known.covariance @ self.told.matrix))
 
 
-def _told(errors: Array, slopes: Array, at: Array) -> Told:
+def _told(errors: Array, slopes: Array, at: Array) -> FilmInformation:
     """What errors and their slopes at a point say of the numbers, wherever the top was."""
     matrix = slopes.T @ slopes + np.diag(np.arange(len(at)) >= len(at) - TOPS)
     vector = matrix @ at - slopes.T @ errors
@@ -126,7 +126,7 @@ def _told(errors: Array, slopes: Array, at: Array) -> Told:
         matrix[-TOPS:, -TOPS:], np.column_stack([matrix[-TOPS:], vector[-TOPS:]])
     )
     whole = np.column_stack([matrix, vector])[:-TOPS] - matrix[:-TOPS, -TOPS:] @ of_top
-    return Told(whole[:, : len(at) - TOPS], whole[:, -1])
+    return FilmInformation(whole[:, : len(at) - TOPS], whole[:, -1])
 
 
 def ends_of(numbers: Array) -> tuple[Array, Array]:
@@ -172,9 +172,9 @@ class FilmFit:
         self.segments = patient.chain.n_joints
         model = self._model(next(self._guesses(assumed(self.segments)))[:-TOPS])
         self.spine = replace(patient.held(model), ask=ask)
-        self.near: dict[str, Held] = {}
+        self.near: dict[str, PrescribedResult] = {}
 
-    def fit(self, population: Population, start: Fitted | None = None) -> Fitted:
+    def fit(self, population: Population, start: FittedFilms | None = None) -> FittedFilms:
         """The likeliest numbers, and what is known of them; from a fit near by, if there is one.
 
         Raises
@@ -215,7 +215,7 @@ class FilmFit:
 
         return found
 
-    def personal(self, fitted: Fitted) -> Personal:
+    def personal(self, fitted: FittedFilms) -> Personal:
         """The model of a fit."""
         found = self._personal(fitted.known, fitted.decided)
         return replace(found, fitting=Fitting(fitted.status, fitted.n_optima))
@@ -223,11 +223,11 @@ class FilmFit:
     def unfitted(self, population: Population) -> Personal:
         """The model of a patient of whom no film was fitted."""
         nothing = np.zeros((len(population.mean),) * 2)
-        known = Told(nothing, nothing[0]).known(population)
+        known = FilmInformation(nothing, nothing[0]).known(population)
         begin = self._beyond_films(known.mean, BEYOND_THE_FILM[-1])
-        return self._personal(Known(begin, known.covariance), 0.0)
+        return self._personal(PatientPrior(begin, known.covariance), 0.0)
 
-    def _personal(self, known: Known, decided: float) -> Personal:
+    def _personal(self, known: PatientPrior, decided: float) -> Personal:
         s = self.segments
         centred = np.eye(s) - 1.0 / s
         ratio, spread = centred @ known.mean[:s], centred @ known.covariance[:s, :s] @ centred
@@ -235,7 +235,7 @@ class FilmFit:
         return Personal(
             self._model(known.mean),
             self.size * np.exp(known.mean[:s]),
-            Ends(*ends_of(known.mean)),
+            EndRotations(*ends_of(known.mean)),
             np.zeros(s, dtype=bool),
             len(known.mean) - 1,  # their common size is no part of the films' answer
             decided,
@@ -257,7 +257,7 @@ class FilmFit:
             film = self.patient.read.films[position]
             top = film.top + self.sd * tops[film_number]
             posed = spine.at(top, self.near.get(position))
-            if posed.held.status is not Ended.CONVERGED:
+            if posed.held.status is not PrescribedStatus.CONVERGED:
                 return None
             self.near[position] = posed.held
             held_by = np.zeros((len(posed.held.q), len(unknowns)))
@@ -303,10 +303,10 @@ class FilmFit:
 def fit_alike(
     fits: Sequence[FilmFit],
     population: Population,
-    before: Sequence[Fitted | None],
+    before: Sequence[FittedFilms | None],
     drawn: int = DRAWN_STARTS,
     seed: int = 0,
-) -> list[Fitted | None]:
+) -> list[FittedFilms | None]:
     """Fits of patients with equally many segments, all starts in lockstep; None without a pose.
 
     Parameters
@@ -314,7 +314,7 @@ def fit_alike(
     before : a fit near by of each, from which alone it begins; None for all starts.
     drawn : starts drawn from the population, with that seed; as many more are their mirror image.
     """
-    begins: list[list[tuple[Sequence[Array], Mapping[str, Held]]]] = [
+    begins: list[list[tuple[Sequence[Array], Mapping[str, PrescribedResult]]]] = [
         [([near.unknowns], near.poses)]
         if near is not None
         else [(one, {}) for one in fit.starts(population, drawn, seed)]
@@ -333,15 +333,15 @@ def _search(
     fit: FilmFit,
     population: Population,
     begin: Sequence[Array],
-    near: Mapping[str, Held],
+    near: Mapping[str, PrescribedResult],
     ask: Ask = alone,
-) -> Optimum | None:
+) -> FilmOptimum | None:
     """The end of a fit from one start."""
     fit = FilmFit(fit.patient, fit.sd, ask)
     return optimum(fit, fit.point(population), begin, near, _limits(population), SETTLED)
 
 
-def _fitted(ends: Sequence[Optimum | None], population: Population) -> Fitted | None:
+def _fitted(ends: Sequence[FilmOptimum | None], population: Population) -> FittedFilms | None:
     """The best end, and what the films say near it."""
     found, n_optima = best(ends, _limits(population)[2])
     if found is None:
@@ -349,7 +349,7 @@ def _fitted(ends: Sequence[Optimum | None], population: Population) -> Fitted | 
     films = len(found.residual) - len(found.x)  # the rest is of the population
     told = _told(found.residual[:films], found.jacobian[:films], found.x)
     known = replace(told.known(population), mean=found.x[:-TOPS])
-    return Fitted(found.x, told, known, found.status, found.poses, found.cost, n_optima)
+    return FittedFilms(found.x, told, known, found.status, found.poses, found.cost, n_optima)
 
 
 def _limits(population: Population) -> Limits:

@@ -10,33 +10,33 @@ from functools import partial
 
 import numpy as np
 
-from spinepipe.calibrate.descent import Point, Settled, descend, once
+from spinepipe.calibrate.descent import DescentTolerances, Point, descend, once
 from spinepipe.calibrate.lockstep import in_lockstep
-from spinepipe.calibrate.profile import Best, Reach, profile_in_turn
+from spinepipe.calibrate.profile import Best, RegionEnds, profile_in_turn
 from spinepipe.effects.contract import Array
 from spinepipe.statics.prescribed import Ask, alone, answered
-from spinepipe.studies.scoliosis.film_fit import FARTHEST, TOPS, FilmFit, Fitted
+from spinepipe.studies.scoliosis.film_fit import FARTHEST, TOPS, FilmFit, FittedFilms
 from spinepipe.studies.scoliosis.population import Population
 
-SETTLED = Settled(cost=1e-3, step=1e-3, slope=1e-6, evaluations=30)
+SETTLED = DescentTolerances(cost=1e-3, step=1e-3, slope=1e-6, evaluations=30)
 """Of a cost of some fifty, a thousandth is a hundredth of what the noise allows."""
 
-ENOUGH = Settled(cost=1e-2, step=1e-2, slope=1e-4, evaluations=6)
+ENOUGH = DescentTolerances(cost=1e-2, step=1e-2, slope=1e-4, evaluations=6)
 """With one ratio held, which is done often: ends move by less than a hundredth."""
 
-OPEN = Reach(None, None, True, True)
+OPEN = RegionEnds(None, None, True, True)
 """Of a segment of which films tell nothing."""
 
 
-def regions(fit: FilmFit, population: Population, fitted: Fitted) -> tuple[Reach, ...]:
+def regions(fit: FilmFit, population: Population, fitted: FittedFilms) -> tuple[RegionEnds, ...]:
     """(S,) 95 % region of each segment's ratio; ends that the films leave open are none."""
     searches = [partial(region, fit, population, fitted, one) for one in range(fit.segments)]
     return tuple(in_lockstep(searches, answered))
 
 
 def region(
-    fit: FilmFit, population: Population, fitted: Fitted, segment: int, ask: Ask = alone
-) -> Reach:
+    fit: FilmFit, population: Population, fitted: FittedFilms, segment: int, ask: Ask = alone
+) -> RegionEnds:
     """95 % region of one segment's ratio."""
     fit = FilmFit(fit.patient, fit.sd, ask)
     fit.near = dict(fitted.poses)
@@ -60,7 +60,7 @@ def region(
         return OPEN
     below, above = bool(seen.open_below[segment]), bool(seen.open_above[segment])
     low, high = float(np.exp(seen.low[segment])), float(np.exp(seen.high[segment]))
-    return Reach(None if below else low, None if above else high, below, above)
+    return RegionEnds(None if below else low, None if above else high, below, above)
 
 
 def by_ratio(segments: int, unknowns: int, segment: int) -> Array:

@@ -5,10 +5,10 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.page.document import Results, judged
+from spinepipe.report.page.document import ResultTables, judged
 from spinepipe.report.words import capital, count, fixed, listed, number, percent, plain
-from spinepipe.status import Ended, Status
-from spinepipe.studies.scoliosis.headline import DECIDING, SIGNIFICANT, Standing, p_of
+from spinepipe.status import PrescribedStatus, Status
+from spinepipe.studies.scoliosis.headline import DECIDING, SIGNIFICANT, ModelRanking, p_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import GROUPS, MEASURES
 from spinepipe.studies.scoliosis.words import IN_WORDS, OF_FILMS, TOLD, in_order
@@ -16,21 +16,21 @@ from spinepipe.studies.scoliosis.words import IN_WORDS, OF_FILMS, TOLD, in_order
 _MOST_PLACES = 6
 _SCALED = 1e-9
 
-Finding = Callable[[Scoliosis, Results], Iterator[str]]
+Finding = Callable[[Scoliosis, ResultTables], Iterator[str]]
 
 
-def findings(study: Scoliosis, results: Results) -> list[str]:
+def findings(study: Scoliosis, results: ResultTables) -> list[str]:
     """The sentences, without those that the study has no table for."""
     told = [sentence for make in MAKERS for sentence in make(study, results)]
     return [sentence.replace(" %", "\u00a0%") for sentence in told]
 
 
-def ended(study: Scoliosis, results: Results) -> Iterator[str]:
+def ended(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Poses that are not as they should be, by how their solve ended."""
     rows = results.table("positions")
     if rows.empty:
         return
-    others = rows[rows["status"] != Ended.CONVERGED.value]
+    others = rows[rows["status"] != PrescribedStatus.CONVERGED.value]
     if others.empty:
         yield f"All {count(len(rows), 'pose')} converged."
         return
@@ -43,7 +43,7 @@ def ended(study: Scoliosis, results: Results) -> Iterator[str]:
 def _pose(row: dict[Any, Any]) -> str:
     """Patient, film and model, and by how much the top misses its place."""
     place = f"{row['specimen']}, {plain(row['position'])}, {IN_WORDS[row['model']]}"
-    if row["status"] != Ended.UNREACHABLE.value:
+    if row["status"] != PrescribedStatus.UNREACHABLE.value:
         return f"{place} ({row['message']})" if row["message"] else place
     missed = f"{number(row['missed_mm'], 2)} mm, {number(row['missed_deg'], 2)}°"
     return f"{place} (misses its place by {missed})"
@@ -54,16 +54,16 @@ def _some(places: list[str]) -> str:
     return "; ".join(places[:_MOST_PLACES]) + (f"; and {more} more" if more > 0 else "")
 
 
-def errors(study: Scoliosis, results: Results) -> Iterator[str]:
+def errors(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Models in the order of their errors of rotations; by the other measures the first one."""
     accuracy, statistics = results.table("accuracy"), results.table("statistics")
     for films in reversed(GROUPS):
-        standing = Standing.of(accuracy, films, DECIDING)
+        standing = ModelRanking.of(accuracy, films, DECIDING)
         if standing.models:
             told = _order(standing, statistics, films, DECIDING)
             yield f"{OF_FILMS[films]}, {MEASURES[DECIDING][1]}, least error first: {told}."
         others = {
-            measure: Standing.of(accuracy, films, measure)
+            measure: ModelRanking.of(accuracy, films, measure)
             for measure in MEASURES
             if measure != DECIDING
         }
@@ -76,7 +76,7 @@ def errors(study: Scoliosis, results: Results) -> Iterator[str]:
             yield f"{OF_FILMS[films]}, the least error otherwise: {'; '.join(firsts)}."
 
 
-def _order(standing: Standing, statistics: pd.DataFrame, films: str, measure: str) -> str:
+def _order(standing: ModelRanking, statistics: pd.DataFrame, films: str, measure: str) -> str:
     best, *_ = standing.models
     told = []
     for model in standing.models:
@@ -86,7 +86,7 @@ def _order(standing: Standing, statistics: pd.DataFrame, films: str, measure: st
     return "; ".join(told)
 
 
-def _first(standing: Standing, statistics: pd.DataFrame, films: str, measure: str) -> str:
+def _first(standing: ModelRanking, statistics: pd.DataFrame, films: str, measure: str) -> str:
     """The first model, and those that are not told apart from it."""
     best, *others = standing.models
     ps = {name: p_of(statistics, films, measure, best, name) for name in others}
@@ -95,11 +95,11 @@ def _first(standing: Standing, statistics: pd.DataFrame, films: str, measure: st
     return f"{IN_WORDS[best]} ({standing.sized(best)}{alike})"
 
 
-def both_ways(study: Scoliosis, results: Results) -> Iterator[str]:
+def both_ways(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """The published tangent beside the linear regions that its paper compares it with."""
     told = []
     for films in GROUPS:
-        standing = Standing.of(results.table("accuracy"), films, "rotation")
+        standing = ModelRanking.of(results.table("accuracy"), films, "rotation")
         if {"tangent", "linear_regions"} <= set(standing.models):
             share = 100.0 * standing.less("tangent", "linear_regions")
             more = f"{number(abs(share), 2)} % {'less' if share > 0.0 else 'more'}"
@@ -111,7 +111,7 @@ def both_ways(study: Scoliosis, results: Results) -> Iterator[str]:
         )
 
 
-def opposite(study: Scoliosis, results: Results) -> Iterator[str]:
+def opposite(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Segments that the films turn the wrong way."""
     rows = results.table("laws")
     if rows.empty:
@@ -137,7 +137,7 @@ def _joints(rows: pd.DataFrame) -> str:
     return _some(words)
 
 
-def constrained(study: Scoliosis, results: Results) -> Iterator[str]:
+def constrained(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Stiffness that the films asked to be less than is allowed."""
     rows = results.table("laws")
     if rows.empty:
@@ -158,7 +158,7 @@ def constrained(study: Scoliosis, results: Results) -> Iterator[str]:
     )
 
 
-def optima(study: Scoliosis, results: Results) -> Iterator[str]:
+def optima(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Fits that depend on where they start, or did not settle."""
     rows = results.table("laws")
     if rows.empty:
@@ -177,7 +177,7 @@ def optima(study: Scoliosis, results: Results) -> Iterator[str]:
             yield f"{len(some)} of {count(len(fits), 'fit')} to films {told}: {_some(places)}."
 
 
-def ratios(study: Scoliosis, results: Results) -> Iterator[str]:
+def ratios(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """What films do not tell, where it comes from, and how much hangs on it."""
     rows = results.table("positions")
     if rows.empty:
@@ -201,7 +201,7 @@ def ratios(study: Scoliosis, results: Results) -> Iterator[str]:
         )
 
 
-def by_films(study: Scoliosis, results: Results) -> Iterator[str]:
+def by_films(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Whose stiffness a fitted one is: the patient's, or that of all."""
     rows = results.table("laws")
     asked = rows[rows["identifiable"].notna()] if len(rows) else rows
@@ -222,7 +222,7 @@ def by_films(study: Scoliosis, results: Results) -> Iterator[str]:
         yield f"At {listed(few)} films tell both ends in fewer than half of the patients."
 
 
-def enlargement(study: Scoliosis, results: Results) -> Iterator[str]:
+def enlargement(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Which enlargement of the published ends has the least error."""
     rows = _varied(results, "enlargement").dropna(subset=["rotation_rmse_deg"])
     told = []
@@ -240,13 +240,13 @@ def enlargement(study: Scoliosis, results: Results) -> Iterator[str]:
         )
 
 
-def _varied(results: Results, what: str) -> pd.DataFrame:
+def _varied(results: ResultTables, what: str) -> pd.DataFrame:
     rows = results.table("variation")
     columns = ["films", "value", "moved_deg", "rotation_rmse_deg"]
     return pd.DataFrame(columns=columns) if rows.empty else rows[rows["varied"] == what]
 
 
-def parameters(study: Scoliosis, results: Results) -> Iterator[str]:
+def parameters(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """How many numbers each model takes from a patient's films."""
     rows = results.table("positions")
     if rows.empty:
@@ -266,7 +266,7 @@ def parameters(study: Scoliosis, results: Results) -> Iterator[str]:
     )
 
 
-def beyond(study: Scoliosis, results: Results) -> Iterator[str]:
+def beyond(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Held-out rotations that the published law has no load for."""
     rows = results.table("displacements")
     if rows.empty:
@@ -281,7 +281,7 @@ def beyond(study: Scoliosis, results: Results) -> Iterator[str]:
         )
 
 
-def sizes(study: Scoliosis, results: Results) -> Iterator[str]:
+def sizes(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """Whether films were brought to one size."""
     rows = results.table("positions")
     if rows.empty:
@@ -303,7 +303,7 @@ def sizes(study: Scoliosis, results: Results) -> Iterator[str]:
     )
 
 
-def beside_the_paper(study: Scoliosis, results: Results) -> Iterator[str]:
+def beside_the_paper(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     """How published quantities were judged."""
     told = judged(results.table("against_jalalian_2017"))
     if told:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.report.words import capital, count, number
-from spinepipe.status import Ended, Status
+from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.errors import REFERENCE
 from spinepipe.studies.scoliosis.words import TOLD
 
@@ -24,11 +24,11 @@ SIGNIFICANT = 0.05
 NOT_PERSONAL = "uniform"
 """The model that takes nothing from a patient's films but their shape."""
 
-NO_POSE = (Ended.UNSTABLE, Ended.NOT_CONVERGED)
+NO_POSE = (PrescribedStatus.UNSTABLE, PrescribedStatus.NOT_CONVERGED)
 
 
 @dataclass(frozen=True)
-class Standing:
+class ModelRanking:
     """Models by their error in a measure on a group of films, the least first.
 
     Attributes
@@ -39,7 +39,7 @@ class Standing:
     rows: pd.DataFrame
 
     @classmethod
-    def of(cls, accuracy: pd.DataFrame, films: str, measure: str) -> "Standing":
+    def of(cls, accuracy: pd.DataFrame, films: str, measure: str) -> "ModelRanking":
         """From the table ``accuracy``, which may have no rows."""
         if accuracy.empty:
             return cls(accuracy)
@@ -73,16 +73,16 @@ class Standing:
         return float(known.iloc[0]) if len(known) else None
 
 
-def headline(results: Results) -> Headline:
+def headline(results: ResultTables) -> Headline:
     """The answer, how sure it is, and what casts doubt on it."""
     accuracy, positions = results.table("accuracy"), results.table("positions")
-    held_out = Standing.of(accuracy, "held_out", DECIDING)
+    held_out = ModelRanking.of(accuracy, "held_out", DECIDING)
     doubts = (
         *_doubts(positions, held_out),
         *_of_fits(results.table("laws"), results.table("population")),
     )
     if not held_out.models:
-        fitted = Standing.of(accuracy, "fitted", DECIDING)
+        fitted = ModelRanking.of(accuracy, "fitted", DECIDING)
         return Headline(_without(positions), _of_fitted(fitted), doubts)
     best, *_ = held_out.models
     tests = results.table("statistics")
@@ -91,7 +91,7 @@ def headline(results: Results) -> Headline:
     return Headline(_answer(held_out, ps), " ".join(part for part in sure if part), doubts)
 
 
-def _compared(standing: Standing) -> list[str]:
+def _compared(standing: ModelRanking) -> list[str]:
     """The models that the first one is held against: the next, and the paper's reference."""
     others = standing.models[1:]
     return [*others[:1], *(name for name in others[1:] if name == REFERENCE)]
@@ -107,7 +107,7 @@ def _without(positions: pd.DataFrame) -> str:
     return "No model has a pose on all held-out films of any patient."
 
 
-def _of_fitted(fitted: Standing) -> str:
+def _of_fitted(fitted: ModelRanking) -> str:
     if not fitted.models:
         return ""
     best = fitted.models[0]
@@ -119,7 +119,7 @@ def _of_fitted(fitted: Standing) -> str:
     )
 
 
-def _answer(held_out: Standing, ps: Mapping[str, float | None]) -> str:
+def _answer(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:
     best, *_ = held_out.models
     p = next(iter(ps.values()), None)
     told = (
@@ -141,13 +141,13 @@ def _answer(held_out: Standing, ps: Mapping[str, float | None]) -> str:
     return answer
 
 
-def _beside(standing: Standing, best: str, other: str, which: str) -> str:
+def _beside(standing: ModelRanking, best: str, other: str, which: str) -> str:
     share = 100.0 * standing.less(best, other)
     less = "as much as" if share <= 0.0 else f"{number(share, 2)} % less than"
     return f"{less} {which}{TOLD[other]} ({standing.sized(other)})"
 
 
-def _sure(held_out: Standing, ps: Mapping[str, float | None]) -> str:
+def _sure(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:
     """Whether the first model differs from those it is held against, over patients."""
     if not ps:
         return ""
@@ -171,7 +171,7 @@ def _verdict(p: float | None) -> str:
     return f"{'significant' if p < SIGNIFICANT else 'not significant'} (p {number(p, 2)})"
 
 
-def above_noise(standing: Standing) -> str:
+def above_noise(standing: ModelRanking) -> str:
     """Whether the least error is more than what reading films makes."""
     best = standing.models[0]
     if standing.noise is None:
@@ -198,7 +198,7 @@ def p_of(statistics: pd.DataFrame, films: str, measure: str, one: str, other: st
     return float(known.iloc[0]) if len(known) else None
 
 
-def _doubts(positions: pd.DataFrame, held_out: Standing) -> list[str]:
+def _doubts(positions: pd.DataFrame, held_out: ModelRanking) -> list[str]:
     """What should be looked at before the answer is believed."""
     if positions.empty:
         return []

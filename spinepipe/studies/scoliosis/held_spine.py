@@ -18,16 +18,16 @@ from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import Body, ScopedEffect, SpineModel
 from spinepipe.statics.prescribed import (
     Ask,
-    Held,
     HeldChain,
-    Place,
+    PrescribedPlace,
+    PrescribedResult,
     Prescription,
     Tilt,
     alone,
     hold_at,
 )
 from spinepipe.studies.scoliosis.films import Film
-from spinepipe.studies.scoliosis.settings import Profile
+from spinepipe.studies.scoliosis.settings import SagittalProfile
 from spinepipe.units import COORDINATES, MM_PER_M
 
 BENDING = COORDINATES.index("right_bending")
@@ -40,7 +40,9 @@ MASS_KG, RADIUS_M = 0.5, 0.03
 """Of a vertebra, which nothing hangs on: spines are held at rest and have no weight."""
 
 
-def geometry(patient: str, joints: Sequence[str], erect: Film, profile: Profile) -> SpineModel:
+def geometry(
+    patient: str, joints: Sequence[str], erect: Film, profile: SagittalProfile
+) -> SpineModel:
     """The chain of a patient, without effects.
 
     Parameters
@@ -99,7 +101,7 @@ class Posed:
     axes : (n, 6) twist of each coordinate: angular, and linear at the origin of ground.
     """
 
-    held: Held
+    held: PrescribedResult
     film: Film
     r: Array
     points: Array
@@ -152,8 +154,8 @@ class HeldSpine:
         top = model.n_joints - 1
         point, line = np.array([0.0, erect.up[-1], erect.right[-1]]), _lines(erect.tilt[-1])
         grips: tuple[Prescription, ...] = (
-            Place(top, point, RIGHT),
-            Place(top, point, UP),
+            PrescribedPlace(top, point, RIGHT),
+            PrescribedPlace(top, point, UP),
             Tilt(top, line, UP, RIGHT),
         )
         if level:
@@ -169,7 +171,7 @@ class HeldSpine:
         """The same spine on other stiffness."""
         return self.with_values(*(scoped.values for scoped in model.effects))
 
-    def at(self, top: Array, start: Held | None = None) -> Posed:
+    def at(self, top: Array, start: PrescribedResult | None = None) -> Posed:
         """The pose with the uppermost vertebra at a place (right, up; m) and tilt (rad)."""
         wanted = np.concatenate([top, np.zeros(len(self.chain.prescriptions) - len(top))])
         held = hold_at(self.chain, wanted, start, self.ask)

@@ -16,7 +16,13 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.progress import Progress
-from spinepipe.studies.scoliosis.film_fit import FilmFit, Fitted, Told, fit_alike, weighed_with
+from spinepipe.studies.scoliosis.film_fit import (
+    FilmFit,
+    FilmInformation,
+    FittedFilms,
+    fit_alike,
+    weighed_with,
+)
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import Population, assumed, learned
 from spinepipe.studies.scoliosis.population_table import Learned, population_rows
@@ -58,7 +64,7 @@ def weights(settings: Scoliosis, cohort: Cohort) -> Array:
 def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) -> Learned:
     """Rounds of fits of all patients, until the population stands still."""
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
-    population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, Fitted]()
+    population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, FittedFilms]()
     rounds = 0
     for _ in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
         rounds += 1
@@ -72,15 +78,18 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) ->
 
 
 def _fits(
-    patients: Mapping[str, Patient], sd: Array, population: Population, before: Mapping[str, Fitted]
-) -> Iterator[tuple[str, Fitted]]:
+    patients: Mapping[str, Patient],
+    sd: Array,
+    population: Population,
+    before: Mapping[str, FittedFilms],
+) -> Iterator[tuple[str, FittedFilms]]:
     """The patients that can be fitted, from the fits before or, without these, from all starts."""
     problems = [FilmFit(patient, sd) for patient in patients.values()]
     found = fit_alike(problems, population, [before.get(name) for name in patients])
     return ((name, one) for name, one in zip(patients, found, strict=True) if one is not None)
 
 
-def _settled(population: Population, patients: list[Told]) -> Population:
+def _settled(population: Population, patients: list[FilmInformation]) -> Population:
     """The population that is likeliest for what the films of all patients say."""
     for _ in range(MOST_STEPS):
         if not patients:

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from spinepipe.status import Ended
+from spinepipe.status import PrescribedStatus
 from spinepipe.studies.scoliosis.held_spine import Posed
 from spinepipe.studies.scoliosis.personal import Patient
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-POSED = (Ended.CONVERGED, Ended.UNREACHABLE)
+POSED = (PrescribedStatus.CONVERGED, PrescribedStatus.UNREACHABLE)
 """How a solve may end whose pose is held against the film."""
 
 MISSES = ("rotation_rmse_deg", "place_rmse_mm", "tilt_rmse_deg")

@@ -11,9 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
-from spinepipe.calibrate.descent import Descent, Point, Settled, descend, once
+from spinepipe.calibrate.descent import Descent, DescentTolerances, Point, descend, once
 from spinepipe.effects.contract import Array
-from spinepipe.statics.prescribed import Held
+from spinepipe.statics.prescribed import PrescribedResult
 from spinepipe.status import Status
 from spinepipe.studies.scoliosis.tangent_laws import Flags
 
@@ -37,7 +37,7 @@ COST_TIE = 1e-3
 class Holder(Protocol):
     """Who holds a spine in its films, from poses near by."""
 
-    near: dict[str, Held]
+    near: dict[str, PrescribedResult]
 
 
 Limits = tuple[Array, Array, Array]
@@ -45,7 +45,7 @@ Limits = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True)
-class Optimum:
+class FilmOptimum:
     """Where one start ended.
 
     Attributes
@@ -57,7 +57,7 @@ class Optimum:
     x: Array
     residual: Array
     jacobian: Array
-    poses: Mapping[str, Held]
+    poses: Mapping[str, PrescribedResult]
     status: Status
     at_bound: Flags
 
@@ -71,10 +71,10 @@ def optimum(
     holder: Holder,
     point: Point,
     begin: Sequence[Array],
-    near: Mapping[str, Held],
+    near: Mapping[str, PrescribedResult],
     limits: Limits,
-    settled: Settled,
-) -> Optimum | None:
+    settled: DescentTolerances,
+) -> FilmOptimum | None:
     """The end of a fit from the first of some unknowns that has poses; None where none has.
 
     Parameters
@@ -106,11 +106,11 @@ def optimum(
     status = Status.CONVERGED_AT_BOUND if at_bound.any() else Status.CONVERGED
     if not ended.arrived or not (led or slope <= STILL_FALLS * float(found[0] @ found[0])):
         status = Status.NOT_CONVERGED
-    return Optimum(ended.x, *found, dict(holder.near), status, at_bound)
+    return FilmOptimum(ended.x, *found, dict(holder.near), status, at_bound)
 
 
 def _ended(
-    point: Point, begin: Sequence[Array], limits: Limits, settled: Settled
+    point: Point, begin: Sequence[Array], limits: Limits, settled: DescentTolerances
 ) -> Descent | None:
     low, high, scale = limits
     for one in begin:
@@ -121,7 +121,7 @@ def _ended(
     return None
 
 
-def best(ends: Sequence[Optimum | None], scale: Array) -> tuple[Optimum | None, int]:
+def best(ends: Sequence[FilmOptimum | None], scale: Array) -> tuple[FilmOptimum | None, int]:
     """The optimum of least cost, the first of those that tie, and how many distinct ones there are.
 
     Ends that are none count where there is no optimum.
@@ -132,7 +132,7 @@ def best(ends: Sequence[Optimum | None], scale: Array) -> tuple[Optimum | None, 
         return None, 0
     least = min(one.cost for one in some or there)
     first = next(one for one in some or there if one.cost <= (1.0 + COST_TIE) * least)
-    distinct: list[Optimum] = []
+    distinct: list[FilmOptimum] = []
     for one in some:
         apart = [np.abs((one.x - other.x) / scale).max() for other in distinct]
         if min(apart, default=np.inf) > SAME_OPTIMUM:

@@ -15,14 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.descent import Settled
-from spinepipe.calibrate.profile import Reach
+from spinepipe.calibrate.descent import DescentTolerances
+from spinepipe.calibrate.profile import RegionEnds
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
-from spinepipe.statics.prescribed import Held
-from spinepipe.status import Ended, Status
-from spinepipe.studies.scoliosis.curve_angles import Curve, curves, lumbar_apex
+from spinepipe.statics.prescribed import PrescribedResult
+from spinepipe.status import PrescribedStatus, Status
+from spinepipe.studies.scoliosis.curve_angles import SpinalCurve, curves, lumbar_apex
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, Film, Read, read_films
 from spinepipe.studies.scoliosis.held_spine import (
     BENDING,
@@ -31,10 +31,10 @@ from spinepipe.studies.scoliosis.held_spine import (
     with_laws,
     with_springs,
 )
-from spinepipe.studies.scoliosis.optima import Optimum, best, optimum
+from spinepipe.studies.scoliosis.optima import FilmOptimum, best, optimum
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
-    Ends,
+    EndRotations,
     Flags,
     Pairs,
     Straight,
@@ -48,7 +48,7 @@ FARTHEST_MULTIPLIER = np.log(10.0)
 START_SHARES = (-0.5, 0.5)
 """Multipliers that a fit starts from, as logarithms over the farthest; and all alike."""
 
-SETTLED = Settled(cost=1e-6, step=1e-4, slope=1e-10, evaluations=50)
+SETTLED = DescentTolerances(cost=1e-6, step=1e-4, slope=1e-10, evaluations=50)
 """Multipliers to a ten-thousandth."""
 
 Regions = NDArray[np.int64]
@@ -86,7 +86,7 @@ class Patient:
         return HeldSpine.of(model, self.erect, self.level)
 
     @cached_property
-    def curves(self) -> tuple[Curve, ...]:
+    def curves(self) -> tuple[SpinalCurve, ...]:
         """Its curves on the erect film, caudal to cranial."""
         return curves(self.erect)
 
@@ -116,12 +116,12 @@ class Personal:
 
     model: SpineModel
     at_rest: Array
-    ends: Ends | None
+    ends: EndRotations | None
     constrained: Flags
     free: int
     decided: float
     ratio_range: Array | None = None
-    by_films: tuple[Reach, ...] | None = None
+    by_films: tuple[RegionEnds, ...] | None = None
     fitting: Fitting | None = None
 
     @property
@@ -237,7 +237,7 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
 
 def region_optimum(
     patient: Patient, shares: Sequence[float] = START_SHARES
-) -> tuple["RegionFit", Optimum | None, int]:
+) -> tuple["RegionFit", FilmOptimum | None, int]:
     """The best of all optima of the multipliers, and how many distinct ones were found.
 
     Parameters
@@ -262,7 +262,7 @@ class RegionFit:
         own = np.eye(int(regions.max()) + 1)[regions]
         self.by_logs = (own - own.mean(axis=0))[:, :-1]  # (S, k - 1) of the segments' logarithms
         self.spine = patient.held(with_springs(patient.chain, patient.springs))
-        self.near: dict[str, Held] = {}
+        self.near: dict[str, PrescribedResult] = {}
 
     def stiffness(self, logs: Array) -> Array:
         """(S,) N m/rad; the geometric mean stays."""
@@ -277,7 +277,7 @@ class RegionFit:
         for position in (RIGHT, LEFT):
             film = patient.read.films[position]
             posed = spine.at(film.top, self.near.get(position))
-            if posed.held.status is not Ended.CONVERGED:
+            if posed.held.status is not PrescribedStatus.CONVERGED:
                 return None
             self.near[position] = posed.held
             q = posed.held.q.reshape(-1, 6)

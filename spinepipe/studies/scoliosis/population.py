@@ -90,14 +90,14 @@ def assumed(segments: int) -> Population:
 
 
 @dataclass(frozen=True)
-class Known:
+class PatientPrior:
     """What is known of a patient: mean (3 S,) and covariance (3 S, 3 S) of its numbers."""
 
     mean: Array
     covariance: Array
 
 
-def learned(before: Population, patients: Sequence[Known]) -> Population:
+def learned(before: Population, patients: Sequence[PatientPrior]) -> Population:
     """The population that patients, known by means of the one before, make likeliest."""
     means = np.array([one.mean for one in patients])
     means[:, : before.segments] -= means[:, : before.segments].mean(axis=1, keepdims=True)
@@ -122,14 +122,14 @@ def _level_means(before: Population, means: Array) -> Array:
     return np.concatenate([ratios, common + kept * (ends - ends.mean())])
 
 
-def _ratio_sd(after: Population, means: Array, patients: Sequence[Known]) -> float:
+def _ratio_sd(after: Population, means: Array, patients: Sequence[PatientPrior]) -> float:
     s = after.segments
     away = ((means - after.mean)[:, :s] ** 2).sum()
     unsure = sum(float(np.trace(one.covariance[:s, :s])) for one in patients)
     return _spread(float(away) + unsure, len(patients) * s, RATIO_SPREAD)
 
 
-def _end_sd(after: Population, means: Array, patients: Sequence[Known]) -> float:
+def _end_sd(after: Population, means: Array, patients: Sequence[PatientPrior]) -> float:
     """Of what the ends of one patient do not share."""
     s, total = after.segments, 0.0
     for mean, one in zip(means, patients, strict=True):

@@ -39,7 +39,7 @@ class Scale(BaseModel):
     )
 
 
-class Profile(BaseModel):
+class SagittalProfile(BaseModel):
     """What films of the coronal plane do not show of a vertebra."""
 
     model_config = FORM
@@ -97,7 +97,9 @@ class Scoliosis(Study):
         default=PublishedStiffness(),
         description="of the rotations to each other: all follow the size of the lateral one",
     )
-    profile: Profile = Field(default=Profile(), description="depth that the films lack")
+    profile: SagittalProfile = Field(
+        default=SagittalProfile(), description="depth that the films lack"
+    )
     top_may_tip: bool = Field(
         default=False,
         description="whether the uppermost vertebra may tip to the front or back while films hold "

@@ -14,7 +14,7 @@ import pandas as pd
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
-from spinepipe.statistics import Outcome, wilcoxon_signed_rank
+from spinepipe.statistics import StatisticalTest, wilcoxon_signed_rank
 from spinepipe.status import joined
 from spinepipe.studies.scoliosis.errors import by_patient, of_group, squares
 from spinepipe.studies.scoliosis.settings import Scoliosis
@@ -48,7 +48,7 @@ def all_tests(
                 yield Tested(f"{group}/{measure}", "*", str(one), str(other), group, outcome)
 
 
-def compared(one: "pd.Series[Any]", other: "pd.Series[Any]", unit: str) -> Outcome:
+def compared(one: "pd.Series[Any]", other: "pd.Series[Any]", unit: str) -> StatisticalTest:
     """The test of two models, with who has the smaller errors and by how much in its message.
 
     Parameters

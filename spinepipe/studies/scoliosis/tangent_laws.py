@@ -62,7 +62,7 @@ class Pairs:
 
 
 @dataclass(frozen=True)
-class Ends:
+class EndRotations:
     """(S,) rad: the rotations that each segment comes near and never has."""
 
     lower: Array
@@ -105,11 +105,11 @@ class Straight:
         return load
 
 
-Shape = Ends | Straight
+Shape = EndRotations | Straight
 """How the moments of segments grow with their rotation, but for a factor of each."""
 
 
-def ends_of(pairs: Pairs, enlargement: float) -> Ends:
+def ends_of(pairs: Pairs, enlargement: float) -> EndRotations:
     """The ends at so many times the rotations of the films.
 
     A segment that turns against a bend has both ends at so many times its larger rotation.
@@ -117,7 +117,7 @@ def ends_of(pairs: Pairs, enlargement: float) -> Ends:
     larger = np.maximum(np.abs(pairs.right), np.abs(pairs.left))
     upper = np.where(pairs.opposite, larger, pairs.right)
     lower = np.where(pairs.opposite, -larger, pairs.left)
-    return Ends(
+    return EndRotations(
         np.minimum(enlargement * lower, -SMALLEST_END),
         np.maximum(enlargement * upper, SMALLEST_END),
     )

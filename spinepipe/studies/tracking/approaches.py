@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.asked import SHAPE, Ask, Sizes, Watched, watched
+from spinepipe.motion.asked import SHAPE, Ask, ResidualScales, Watched, watched
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.passive_elements import PassiveElements
 from spinepipe.motion.points import COUNT
 from spinepipe.motion.posture import postures
 from spinepipe.motion.ratios import RatioSet
-from spinepipe.motion.skeleton import PELVIS, Trial
+from spinepipe.motion.skeleton import PELVIS, MarkerTrial
 from spinepipe.motion.skin import with_sliding_skin
 from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
-from spinepipe.studies.tracking.persons import Person, carrying
+from spinepipe.studies.tracking.persons import TrackedPerson, carrying
 from spinepipe.studies.tracking.settings import (
     CONSTRAINED,
     LEARNT,
@@ -34,7 +34,7 @@ _NEAR_ENOUGH = 25
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class ApproachMotion:
     """A motion as an approach has it.
 
     Attributes
@@ -68,9 +68,9 @@ def source_of(approach: str, kind: str) -> str:
     return LEARNT.get(approach, kind)
 
 
-def sizes_of(scales: Scales) -> Sizes:
+def sizes_of(scales: Scales) -> ResidualScales:
     """The study's scales in SI."""
-    return Sizes(
+    return ResidualScales(
         marker_m=scales.marker_mm / MM_PER_M,
         moment_nm=scales.moment_nm,
         force_n=scales.force_n,
@@ -86,7 +86,7 @@ def sizes_of(scales: Scales) -> Sizes:
     )
 
 
-def seen_in(settings: Tracking, person: Person, trial: Trial) -> Watched:
+def seen_in(settings: Tracking, person: TrackedPerson, trial: MarkerTrial) -> Watched:
     """What is seen of a trial at nodes; one posture, the mean, of a trial that stands."""
     skeleton = carrying(person, trial)
     if trial.kind == "stance":
@@ -94,7 +94,7 @@ def seen_in(settings: Tracking, person: Person, trial: Trial) -> Watched:
     return watched(skeleton, person.markers, trial, settings.intervals)
 
 
-def still(trial: Trial) -> Trial:
+def still(trial: MarkerTrial) -> MarkerTrial:
     """The mean of a trial as its only frame."""
     count = trial.seen.sum(axis=0)
     places = np.where(trial.seen[..., None], trial.places, 0.0).sum(axis=0)
@@ -110,7 +110,7 @@ def law_of(elements: PassiveElements, approach: str, learnt: PassiveLaw | None) 
     return PassiveLaw(elements.a * ends.get(approach, 1.0), elements.b)
 
 
-def unloaded(settings: Tracking, person: Person) -> Array:
+def unloaded(settings: Tracking, person: TrackedPerson) -> Array:
     """(17, 6) m and rad, where passive elements are at rest.
 
     Raises
@@ -132,7 +132,7 @@ def unloaded(settings: Tracking, person: Person) -> Array:
 
 
 def asked_of(
-    settings: Tracking, person: Person, approach: Approach, learnt: PassiveLaw | None = None
+    settings: Tracking, person: TrackedPerson, approach: Approach, learnt: PassiveLaw | None = None
 ) -> Ask:
     """What an approach asks; learnt : passive elements that it takes over."""
     sizes = sizes_of(settings.scales)
@@ -152,7 +152,7 @@ def asked_of(
     )
 
 
-def fitting(settings: Tracking, person: Person) -> Ask:
+def fitting(settings: Tracking, person: TrackedPerson) -> Ask:
     """Elements of all rotations are fitted; those along axes, which no marker tells, stay."""
     ask = asked_of(settings, person, "optk_generic")
     fitted = np.zeros_like(ask.fitted)
@@ -166,7 +166,7 @@ def _rotations_alone() -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     return free
 
 
-def _ranges(settings: Tracking, person: Person) -> tuple[Array, Array]:
+def _ranges(settings: Tracking, person: TrackedPerson) -> tuple[Array, Array]:
     """(18, 6) m and rad, the ends of how far coordinates may go; those of the pelvis anywhere."""
     limits = person.limits.widened(settings.bounds.times)
     low, high = np.full(SHAPE, -np.inf), np.full(SHAPE, np.inf)
@@ -174,7 +174,9 @@ def _ranges(settings: Tracking, person: Person) -> tuple[Array, Array]:
     return low, high
 
 
-def found_by(approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, RatioSet]) -> Found:
+def found_by(
+    approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, RatioSet]
+) -> ApproachMotion:
     """The motion that an approach finds."""
     if approach.startswith(CONSTRAINED):
         chosen = ratios[approach.removeprefix(CONSTRAINED)]
@@ -184,11 +186,11 @@ def found_by(approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, R
     return trajectory(ask, seen)
 
 
-def trajectory(ask: Ask, seen: Watched) -> Found:
+def trajectory(ask: Ask, seen: Watched) -> ApproachMotion:
     """The motion over all its time."""
     seen, begin = begun(ask, seen)
     solved = solve(ask, [seen], [begin])
-    return Found(
+    return ApproachMotion(
         *(ask, seen, seen.grid.at_nodes(solved.coefficients[0]), solved.status, solved.message),
         *(int(ask.free.sum()) * seen.grid.coefficients, solved.steps),
     )
@@ -215,7 +217,7 @@ def _whole(ratios: RatioSet) -> Array:
     return found
 
 
-def _frames(ask: Ask, seen: Watched, ratios: Array | None = None) -> Found:
+def _frames(ask: Ask, seen: Watched, ratios: Array | None = None) -> ApproachMotion:
     """Each frame by itself; how fast it went follows from the curve through the frames."""
     found = postures(ask, seen, ratios)
     grid = seen.grid
@@ -223,7 +225,7 @@ def _frames(ask: Ask, seen: Watched, ratios: Array | None = None) -> Found:
     motion = grid.at_nodes(grid.through(found.q)) if grid.intervals else (found.q, rest, rest)
     lost = len(found.q) - int(np.count_nonzero(found.settled))
     unknowns = int(ask.free.sum()) if ratios is None else ratios.shape[1]
-    return Found(
+    return ApproachMotion(
         *(ask, seen, motion),
         Status.NOT_CONVERGED if lost else Status.CONVERGED,
         f"{lost} of {len(found.q)} frames did not settle" if lost else "",

@@ -9,7 +9,7 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.asked import Watched
 from spinepipe.motion.passive import PassiveLaw
-from spinepipe.motion.trajectory import Solved, solve
+from spinepipe.motion.trajectory import OptimalMotions, solve
 from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import trials_of_law
 from spinepipe.studies.tracking.laws import highest, stiffness_rows, without
@@ -41,7 +41,7 @@ def run(root: str, study: str, specimen: str, law: str, output: str) -> None:
     write(from_rows(STIFFNESS, [known | row for row in rows]), output, made_by)
 
 
-def loads_in(solved: Solved, law: PassiveLaw, seen: Sequence[Watched]) -> Array:
+def loads_in(solved: OptimalMotions, law: PassiveLaw, seen: Sequence[Watched]) -> Array:
     """(17, 6, 2) N and N m, largest passive load of each side in solved motions."""
     motions = [
         one.grid.at_nodes(coefficients)[0][:, 1:]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.skeleton import PELVIS
-from spinepipe.problems import Problem
-from spinepipe.studies.tracking.look import Look, runs
+from spinepipe.problems import InputProblem
+from spinepipe.studies.tracking.look import LoadedTrial, runs
 from spinepipe.units import MM_PER_M
 
 LONGEST_GAP_S = 0.5
@@ -45,7 +45,7 @@ or by hand is worse."""
 SWAY_MM = 2.0
 
 
-def marker_problems(look: Look) -> Iterator[Problem]:
+def marker_problems(look: LoadedTrial) -> Iterator[InputProblem]:
     """Everything that is wrong with markers of a trial whose unit and axes are sound."""
     yield from _gaps(look)
     sides = list(_sides(look))
@@ -57,7 +57,7 @@ def marker_problems(look: Look) -> Iterator[Problem]:
             yield from _clusters(look)
 
 
-def _gaps(look: Look) -> Iterator[Problem]:
+def _gaps(look: LoadedTrial) -> Iterator[InputProblem]:
     times = look.trial.time_s
     allowed = f"gaps of at most {LONGEST_GAP_S:g} s"
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
@@ -75,7 +75,7 @@ def _gaps(look: Look) -> Iterator[Problem]:
                 yield look.in_motion(name, found, allowed, remedy)
 
 
-def _sides(look: Look) -> Iterator[Problem]:
+def _sides(look: LoadedTrial) -> Iterator[InputProblem]:
     """Markers of the pelvis that are on the wrong side of it."""
     right = _rightwards(look)
     if right is None:
@@ -91,7 +91,7 @@ def _sides(look: Look) -> Iterator[Problem]:
             yield look.in_motion(names, found, "the left marker on the left", remedy)
 
 
-def _pairs(look: Look) -> Iterator[tuple[int, int]]:
+def _pairs(look: LoadedTrial) -> Iterator[tuple[int, int]]:
     """Markers of the pelvis that mirror each other: left, right."""
     on_pelvis = np.flatnonzero(look.markers.body == PELVIS)
     for one, other in combinations(on_pelvis.tolist(), 2):
@@ -103,7 +103,7 @@ def _pairs(look: Look) -> Iterator[tuple[int, int]]:
             yield (one, other) if on_left else (other, one)
 
 
-def _rightwards(look: Look) -> Array | None:
+def _rightwards(look: LoadedTrial) -> Array | None:
     """(F, 3) to the right by what is ahead and what is above, nought where these do not tell it.
 
     Exchanging left and right changes neither.
@@ -125,7 +125,7 @@ def _rightwards(look: Look) -> Array | None:
     return np.where(told[:, None], right, 0.0)
 
 
-def _exchanged(look: Look) -> Iterator[Problem]:
+def _exchanged(look: LoadedTrial) -> Iterator[InputProblem]:
     """Pairs of markers that stand in each other's place when they are first seen together.
 
     The line between two markers cannot point backwards: where it does, they are exchanged.
@@ -145,7 +145,7 @@ def _exchanged(look: Look) -> Iterator[Problem]:
         places[list(pair)] = places[list(pair[::-1])]
 
 
-def _early(look: Look) -> int:
+def _early(look: LoadedTrial) -> int:
     """Frames in which a motion begins, a tenth."""
     return max(1, len(look.trial.time_s) // 10)
 
@@ -164,14 +164,14 @@ def _worst_pair(places: Array, model: Array, there: NDArray[np.bool_]) -> tuple[
     return min(first, second), max(first, second)
 
 
-def _told_exchange(look: Look, pair: tuple[int, int], when: str) -> Problem:
+def _told_exchange(look: LoadedTrial, pair: tuple[int, int], when: str) -> InputProblem:
     first, second = (look.markers.names[k] for k in pair)
     allowed = "each marker where the set has it"
     remedy = "exchange the two names there"
     return look.in_motion(f"{first} and {second}", f"exchanged {when}", allowed, remedy)
 
 
-def _exchanged_later(look: Look) -> Iterator[Problem]:
+def _exchanged_later(look: LoadedTrial) -> Iterator[InputProblem]:
     """Markers that land on each other's former place, or farther than anybody moves."""
     times, places = look.trial.time_s, look.trial.places
     before = _seen_before(look.trial.seen)
@@ -205,7 +205,7 @@ def _seen_before(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.concatenate([np.full((1, seen.shape[1]), -1), ever[:-1]])
 
 
-def _clusters(look: Look) -> Iterator[Problem]:
+def _clusters(look: LoadedTrial) -> Iterator[InputProblem]:
     """Clusters whose markers are not as far apart as in the set, or that are not rigid."""
     names, cluster = look.markers.names, look.markers.cluster
     for one, other in combinations(range(len(names)), 2):

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.motion.marker_turns import angles, turns
 from spinepipe.motion.reading import axes_of
-from spinepipe.problems import Problem
+from spinepipe.problems import InputProblem
 from spinepipe.studies.tracking.checks_of_markers import marker_problems
 from spinepipe.studies.tracking.forms import MOVING, STANCE
-from spinepipe.studies.tracking.look import Look
+from spinepipe.studies.tracking.look import LoadedTrial
 from spinepipe.units import DEG_PER_RAD
 
 LIKE_THE_SET = (0.4, 2.5)
@@ -35,7 +35,7 @@ ENOUGH = 3
 _LETTERS = np.array(["x", "y", "z"])
 
 
-def motion_problems(look: Look) -> Iterator[Problem]:
+def motion_problems(look: LoadedTrial) -> Iterator[InputProblem]:
     """Everything that is wrong with a trial; wrong units or axes hide the rest."""
     size = _size(look)
     if size is not None and not LIKE_THE_SET[0] < size < LIKE_THE_SET[1]:
@@ -50,7 +50,7 @@ def motion_problems(look: Look) -> Iterator[Problem]:
         yield from _moved(look)
 
 
-def _size(look: Look) -> float | None:
+def _size(look: LoadedTrial) -> float | None:
     """Spread of the markers in sight over that of the set, at rest; None: fewer than three."""
     frame = int(np.argmax(look.trial.seen.sum(axis=1)))
     seen = look.trial.seen[frame]
@@ -61,7 +61,7 @@ def _size(look: Look) -> float | None:
     return found / wanted if wanted > 0.0 else None
 
 
-def _wrong_size(look: Look, size: float) -> Problem:
+def _wrong_size(look: LoadedTrial, size: float) -> InputProblem:
     nearest = min(MISTAKEN, key=lambda factor: abs(np.log(size / factor)))
     remedy = "check names and units of file and set"
     if LIKE_THE_SET[0] < size / nearest < LIKE_THE_SET[1]:
@@ -72,7 +72,7 @@ def _wrong_size(look: Look, size: float) -> Problem:
     return look.in_motion(None, found, allowed, remedy)
 
 
-def _upright(look: Look) -> Problem | None:
+def _upright(look: LoadedTrial) -> InputProblem | None:
     """What is wrong where the trunk does not stand along ground's y as the trial begins."""
     rotations, told = look.turned
     if not told.any():
@@ -101,7 +101,7 @@ def _better_axes(axes: str, turn: Array) -> str:
     return " ".join(sign + letter for sign, letter in zip(signs, _LETTERS[places], strict=True))
 
 
-def _moved(look: Look) -> Iterator[Problem]:
+def _moved(look: LoadedTrial) -> Iterator[InputProblem]:
     """A motion that is cut off, or has another's name."""
     ranges = turned_deg(look)
     if ranges is None:
@@ -122,7 +122,7 @@ def _moved(look: Look) -> Iterator[Problem]:
         yield look.in_table("kind", found, allowed, f"did you mean '{MOVING[farthest]}'?")
 
 
-def turned_deg(look: Look) -> Array | None:
+def turned_deg(look: LoadedTrial) -> Array | None:
     """(3,) deg, how far the top turns against the bottom, in the order of `MOVING`.
 
     None where markers do not tell how either is turned.
@@ -142,7 +142,7 @@ def turned_deg(look: Look) -> Array | None:
     return found
 
 
-def _group(look: Look, from_top: bool) -> NDArray[np.int64] | None:
+def _group(look: LoadedTrial, from_top: bool) -> NDArray[np.int64] | None:
     """Markers of as few bodies as have enough, from the lowest up or from the highest down."""
     bodies = sorted(set(look.markers.body.tolist()), reverse=from_top)
     for count in range(1, len(bodies) // 2 + 1):

@@ -13,11 +13,11 @@ from spinepipe.motion.points import marker_places
 from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
 from spinepipe.motion.recorded import Recorded
 from spinepipe.motion.skeleton import BODIES, MarkerSet
-from spinepipe.problems import InputError, Problem, Spelling
+from spinepipe.problems import InputError, InputProblem, Spelling
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.checks_of_motion import motion_problems
 from spinepipe.studies.tracking.forms import MARKER_SET, STANCE, TRIALS
-from spinepipe.studies.tracking.look import Look
+from spinepipe.studies.tracking.look import LoadedTrial
 from spinepipe.studies.tracking.persons import (
     Row,
     marker_set,
@@ -33,7 +33,7 @@ LISTED = 4
 """So many names are written out."""
 
 
-def row_problems(cohort: Cohort) -> Iterator[Problem]:
+def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
     """Files and axes in `trials.csv`, and persons without a trial that tells their size."""
     file = f"{cohort.name}/{TRIALS.file}"
     for specimen in cohort.specimen_names:
@@ -44,30 +44,30 @@ def row_problems(cohort: Cohort) -> Iterator[Problem]:
             found = f"no static trial of '{specimen}'"
             allowed = f"a trial of kind {STANCE}, or one marked static"
             remedy = "add it: without it nobody's size is known"
-            yield Problem(file, None, "kind", found, allowed, remedy)
+            yield InputProblem(file, None, "kind", found, allowed, remedy)
 
 
-def _motion(file: str, row: Row) -> Iterator[Problem]:
+def _motion(file: str, row: Row) -> Iterator[InputProblem]:
     if Path(row["file"]).suffix.lower() not in READERS:
         found, allowed = f"'{row['file']}'", f"a file of motion: {', '.join(READERS)}"
-        yield Problem(file, row["line"], "file", found, allowed, "export it as one of these")
+        yield InputProblem(file, row["line"], "file", found, allowed, "export it as one of these")
     if isinstance(row["axes"], str):
         try:
             axes_of(row["axes"])
         except ValueError as error:
             allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
             remedy = "name each axis once, a minus where it points the other way"
-            yield Problem(file, row["line"], "axes", str(error), allowed, remedy)
+            yield InputProblem(file, row["line"], "axes", str(error), allowed, remedy)
 
 
-def _led_out(file: str, row: Row, folder: Path) -> Iterator[Problem]:
+def _led_out(file: str, row: Row, folder: Path) -> Iterator[InputProblem]:
     name = str(row["file"])
     led_out = outside(folder / name, folder, (file, row["line"], "file"), name)
     if led_out is not None:
         yield led_out
 
 
-def recording_problems(cohort: Cohort) -> Iterator[Problem]:
+def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
     """Everything that is wrong with files of motion; tables are sound."""
     for specimen in cohort.specimen_names:
         markers = marker_set(cohort, specimen)
@@ -93,7 +93,7 @@ def _look(
     neutral: Array,
     there: NDArray[np.bool_],
     read: Recorded,
-) -> Look:
+) -> LoadedTrial:
     """The trial with the markers that its file has."""
     kept = np.flatnonzero(there)
     part = MarkerSet(
@@ -104,7 +104,7 @@ def _look(
         tuple(markers.cluster[k] for k in kept),
     )
     axes = row["axes"] if isinstance(row["axes"], str) else DEFAULT_AXES
-    return Look(
+    return LoadedTrial(
         trial_of(row, part, read),
         part,
         neutral[kept],
@@ -116,7 +116,7 @@ def _look(
     )
 
 
-def _names(cohort: Cohort, row: Row, markers: MarkerSet, read: Recorded) -> Iterator[Problem]:
+def _names(cohort: Cohort, row: Row, markers: MarkerSet, read: Recorded) -> Iterator[InputProblem]:
     """Markers of the set that the file lacks; further ones in the file are a remark."""
     spare = [name for name in read.names if name not in markers.names]
     spelling = Spelling(spare, "rename it in the file, or delete it from the set")
@@ -126,4 +126,4 @@ def _names(cohort: Cohort, row: Row, markers: MarkerSet, read: Recorded) -> Iter
                 ", ".join(spare[:LISTED]) + (" ..." if len(spare) > LISTED else "") or "none"
             )
             file = f"{cohort.name}/{row['file']}"
-            yield Problem(file, None, name, "no such marker", allowed, spelling.remedy(name))
+            yield InputProblem(file, None, name, "no such marker", allowed, spelling.remedy(name))

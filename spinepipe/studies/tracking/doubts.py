@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.plausibility.score import suspect, usual
-from spinepipe.plausibility.warnings.warning import Place, PlausibilityWarning, warn
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
 from spinepipe.problems import InputError
 from spinepipe.studies.doubtful_subjects import subject_doubts
 from spinepipe.studies.tracking.forms import MARKER_SET, STANCE, TRIALS
@@ -32,7 +32,7 @@ def _markers(cohort: Cohort, table: pd.DataFrame) -> Iterator[PlausibilityWarnin
     for specimen, rows in table.groupby("specimen", sort=False):
         points = rows[names].to_numpy(float)
         away = float(np.median(np.linalg.norm(points, axis=1)))
-        place = Place(MARKER_SET.stem, rows.index[0], names[0])
+        place = TableCell(MARKER_SET.stem, rows.index[0], names[0])
         on_spine = points[(rows["vertebra"] != cohort.vertebrae[0]).to_numpy()]
         if not usual("markers_away").holds(away):
             unit = suspect("length", away, "markers_away")
@@ -60,7 +60,7 @@ def _times(cohort: Cohort) -> Iterator[PlausibilityWarning]:
             moves = row["kind"] != STANCE
             short = rate > rates.high or (moves and lasts < bends.low)
             if short or rate < rates.low or (moves and lasts > bends.high):
-                place = Place(str(row["file"]), None, "Time")
+                place = TableCell(str(row["file"]), None, "Time")
                 yield warn(
                     cohort,
                     "times_short" if short else "times_long",

@@ -9,9 +9,9 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.measures import rigidity
-from spinepipe.motion.skeleton import MarkerSet, Trial
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
 from spinepipe.studies.tracking.marks import marks_of
-from spinepipe.studies.tracking.persons import Person, person_of, size_of
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of, size_of
 from spinepipe.studies.tracking.remarks import Remark, repairs_of, warnings_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.sizes import Sized, size_rows
@@ -35,7 +35,7 @@ def run(root: str, study: str, specimen: str, clusters: str, remarks: str, sizes
     write(from_rows(SIZES, list(size_rows(specimen, found))), sizes, made_by)
 
 
-def remark_rows(cohort: Cohort, person: Person, found: Sized) -> Iterator[dict[str, Any]]:
+def remark_rows(cohort: Cohort, person: TrackedPerson, found: Sized) -> Iterator[dict[str, Any]]:
     """Rows of table `remarks`: what is so, then what was put right, each once."""
     remarks = [*warnings_of(person), *repairs_of(cohort, person.name)]
     if found.message:
@@ -44,7 +44,7 @@ def remark_rows(cohort: Cohort, person: Person, found: Sized) -> Iterator[dict[s
         yield {"specimen": person.name, "trial": remark.trial, "remark": remark.text}
 
 
-def cluster_rows(specimen: str, markers: MarkerSet, trial: Trial) -> Iterator[dict[str, Any]]:
+def cluster_rows(specimen: str, markers: MarkerSet, trial: MarkerTrial) -> Iterator[dict[str, Any]]:
     """Rows of table `clusters` of a trial, by cluster in the order of the set."""
     for name in dict.fromkeys(cluster for cluster in markers.cluster if cluster):
         own = np.array([cluster == name for cluster in markers.cluster])

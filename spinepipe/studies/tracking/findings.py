@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Results, judged
+from spinepipe.report.page.document import ResultTables, judged
 from spinepipe.report.words import capital, count, listed, number, percent, plain, tick
 from spinepipe.status import Status
 from spinepipe.studies.tracking.findings_of_errors import (
@@ -23,16 +23,16 @@ from spinepipe.studies.tracking.words import in_order, told
 _MOST_PLACES = 4
 VIBRATES = "acceleration_rms_deg_per_s2"
 
-Finding = Callable[[Tracking, Cohort, Results], Iterator[str]]
+Finding = Callable[[Tracking, Cohort, ResultTables], Iterator[str]]
 
 
-def findings(study: Tracking, cohort: Cohort, results: Results) -> list[str]:
+def findings(study: Tracking, cohort: Cohort, results: ResultTables) -> list[str]:
     """The sentences, without those that the study has no table for."""
     found = [sentence for make in MAKERS for sentence in make(study, cohort, results)]
     return [sentence.replace(" %", "\u00a0%") for sentence in found]
 
 
-def ended(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def ended(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Fits that did not settle."""
     fits = results.table("fits")
     if fits.empty:
@@ -60,7 +60,7 @@ def places(rows: pd.DataFrame) -> str:
     return listed(names, _MOST_PLACES)
 
 
-def markers_off(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def markers_off(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Markers that a fit leaves too far off, and the farthest of all."""
     fits = results.table("fits")
     known = fits.dropna(subset=["largest_deviation_mm"]) if len(fits) else fits
@@ -83,7 +83,7 @@ def markers_off(study: Tracking, cohort: Cohort, results: Results) -> Iterator[s
     )
 
 
-def vibrating(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def vibrating(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Approaches whose motions vibrate: joints accelerate more than the study calls one."""
     fits = results.table("fits")
     known = fits.dropna(subset=[VIBRATES]) if len(fits) else fits
@@ -120,7 +120,7 @@ def vibrating_approaches(study: Tracking, fits: pd.DataFrame) -> dict[str, int]:
     return {str(name): int(n) for name, n in counts.items()}
 
 
-def rigid(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def rigid(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Clusters of markers that are not rigid, as markers on a plate have to be."""
     rows = results.table("clusters")
     if rows.empty:
@@ -152,7 +152,7 @@ def rigid(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
     )
 
 
-def sizes(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def sizes(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How large persons are beside the cohort's skeleton, and whether that is used."""
     rows = results.table("sizes")
     if rows.empty:
@@ -173,7 +173,7 @@ def sizes(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
     )
 
 
-def remarks(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def remarks(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How much there is to know of the input."""
     rows = results.table("remarks")
     if len(rows):
@@ -184,7 +184,7 @@ def remarks(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
         )
 
 
-def beside_the_paper(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def beside_the_paper(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How published quantities were judged."""
     said = judged(results.table("against_wang_2021"))
     if said:

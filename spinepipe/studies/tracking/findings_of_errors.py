@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import capital, count, listed, number
 from spinepipe.statistics.outcome import Mean, corrected, mean_of
 from spinepipe.status import Status
@@ -61,7 +61,7 @@ class Paired:
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class ApproachRanking:
     """Errors of a measure by person (rows) and approach (columns), the least mean first.
 
     Attributes
@@ -110,7 +110,7 @@ class Standing:
         return [name for name, p in held if p is None or p >= SIGNIFICANT]
 
 
-def standings(cohort: Cohort, results: Results, measure: str) -> list[Standing]:
+def standings(cohort: Cohort, results: ResultTables, measure: str) -> list[ApproachRanking]:
     """Of motions, then of stances, where a truth is known."""
     errors = results.table("errors")
     if errors.empty:
@@ -126,7 +126,7 @@ def standings(cohort: Cohort, results: Results, measure: str) -> list[Standing]:
     return [one for one in found if one is not None]
 
 
-def _standing(measure: str, words: str, rows: pd.DataFrame) -> Standing | None:
+def _standing(measure: str, words: str, rows: pd.DataFrame) -> ApproachRanking | None:
     if rows.empty:
         return None
     keys = ["specimen", "trial", "approach"]
@@ -140,10 +140,12 @@ def _standing(measure: str, words: str, rows: pd.DataFrame) -> Standing | None:
     }
     order = sorted(means, key=lambda name: means[name])
     lacking = tuple(in_order(set(wide.columns) - set(whole.columns)))
-    return Standing(measure, words, tuple(dict.fromkeys(rows["trial"])), values[order], lacking)
+    return ApproachRanking(
+        measure, words, tuple(dict.fromkeys(rows["trial"])), values[order], lacking
+    )
 
 
-def nearest(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def nearest(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """The least error of each measure, and what cannot be told from it."""
     for measure in SAID:
         for one in standings(cohort, results, measure):
@@ -151,7 +153,7 @@ def nearest(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
             yield f"{said}{_lost(one)}{_unsettled(one, results.table('fits'))}"
 
 
-def _least(one: Standing) -> str:
+def _least(one: ApproachRanking) -> str:
     best = one.approaches[0]
     said = f"the least error has {told(best)}, {one.sized(best)}{between(one, best)}"
     if len(one.approaches) < 2:
@@ -171,13 +173,13 @@ def _least(one: Standing) -> str:
     return f"{said}. Not told from the least ({held}): {names}."
 
 
-def _lost(one: Standing) -> str:
+def _lost(one: ApproachRanking) -> str:
     if not one.lacking:
         return ""
     return f" Left out, as not all motions were found: {listed(map(told, one.lacking))}."
 
 
-def _unsettled(one: Standing, fits: pd.DataFrame) -> str:
+def _unsettled(one: ApproachRanking, fits: pd.DataFrame) -> str:
     """Fits behind the least error that did not settle."""
     if fits.empty:
         return ""
@@ -188,7 +190,7 @@ def _unsettled(one: Standing, fits: pd.DataFrame) -> str:
     return f" Of the fits behind the least error {len(lost)} of {len(own)} did not settle."
 
 
-def between(one: Standing, approach: str) -> str:
+def between(one: ApproachRanking, approach: str) -> str:
     """Interval of a mean error; errors are not negative, whatever Student's interval says."""
     ends = one.mean(approach).interval
     if ends is None or one.n < FEWEST:
@@ -202,7 +204,7 @@ def too_few(n: int) -> str:
     return f"{capital(count(n, 'person'))} cannot tell approaches apart: that takes {FEWEST}."
 
 
-def beside_kinematics(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def beside_kinematics(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Whether dynamics are better than inverse kinematics, without passive elements and with."""
     for first in (ZERO, GENERIC):
         for measure in SAID:
@@ -215,7 +217,7 @@ def beside_kinematics(study: Tracking, cohort: Cohort, results: Results) -> Iter
                 )
 
 
-def compared(one: Standing, first: str, other: str) -> str:
+def compared(one: ApproachRanking, first: str, other: str) -> str:
     """Errors of two approaches, and whether persons tell them apart."""
     verdicts = {
         "smaller": "better",
@@ -233,7 +235,7 @@ def compared(one: Standing, first: str, other: str) -> str:
     return f"{said} (difference {value}, 95 % interval {low} to {high}, {one.n} persons)"
 
 
-def calibrated(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def calibrated(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Whether calibrated passive elements are better or worse than generic ones."""
     for measure in SAID:
         for one in standings(cohort, results, measure):
@@ -242,7 +244,7 @@ def calibrated(study: Tracking, cohort: Cohort, results: Results) -> Iterator[st
                 yield _beside_generic(one, there)
 
 
-def _beside_generic(one: Standing, there: list[str]) -> str:
+def _beside_generic(one: ApproachRanking, there: list[str]) -> str:
     names = {name: short_of(name).removeprefix("dynamics, ") for name in there}
     values = [f"{names[name]} {one.sized(name)}" for name in there]
     said = (
@@ -265,13 +267,13 @@ def _beside_generic(one: Standing, there: list[str]) -> str:
     return f"{said} {' '.join(parts)}"
 
 
-def all_worse(one: Standing, there: list[str]) -> bool:
+def all_worse(one: ApproachRanking, there: list[str]) -> bool:
     """Whether every one of some calibrations has a larger mean error than generic elements."""
     generic = float(one.values[GENERIC].mean())
     return all(float(one.values[name].mean()) > generic for name in there)
 
 
-def worse_words(one: Standing, there: list[str]) -> str:
+def worse_words(one: ApproachRanking, there: list[str]) -> str:
     """Whether calibration makes the mean error larger or smaller."""
     worse = [name for name in there if all_worse(one, [name])]
     if len(worse) == len(there):
@@ -281,7 +283,7 @@ def worse_words(one: Standing, there: list[str]) -> str:
     return f"On average {len(worse)} of {len(there)} calibrations make it worse."
 
 
-def close_to_markers(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def close_to_markers(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Whether the approach that is closest to the markers is nearest the truth as well."""
     fits = results.table("fits")
     for one in standings(cohort, results, SAID[0])[:1]:

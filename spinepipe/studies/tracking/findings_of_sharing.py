@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import capital, count, fixed, listed, plain
 from spinepipe.studies.tracking.findings_of_errors import FEWEST
 from spinepipe.studies.tracking.settings import CONSTRAINED, Tracking
@@ -16,7 +16,7 @@ PREFERRED = ("optk_generic", "optk_from_both", "optk_calibrated")
 """Whose shares are told: of the first that there is, else of the first approach of the table."""
 
 
-def shares(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def shares(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """The joint that does most in each trial, and whether persons agree."""
     rows = _window(results.table("sharing"))
     if rows.empty:
@@ -80,7 +80,7 @@ def _beyond(rows: pd.DataFrame) -> Iterator[str]:
     )
 
 
-def likeness(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def likeness(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How alike persons share a motion; where that is not defined it is said."""
     rows = _window(results.table("similarity"))
     if rows.empty:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import AXIS, capital, count, listed, number, percent, plain, tick
 from spinepipe.status import Status
 from spinepipe.studies.tracking.settings import Tracking
@@ -28,7 +28,7 @@ _THIS_MODEL = (
 _MOST_PLACES = 9
 
 
-def profiles(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def profiles(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """What profiles say, each verdict in plain words."""
     rows = results.table("profiles")
     if rows.empty:
@@ -59,7 +59,7 @@ def profiles(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]
         yield f"Profiles with fits that did not settle: {_places(lost)}."
 
 
-def closed(results: Results) -> tuple[int, int]:
+def closed(results: ResultTables) -> tuple[int, int]:
     """How many profiles tell a stiffness, of how many of which some fit settled."""
     rows = results.table("profiles")
     if rows.empty:
@@ -67,7 +67,7 @@ def closed(results: Results) -> tuple[int, int]:
     return int((rows["verdict"] == "told").sum()), int(rows["best_ratio"].notna().sum())
 
 
-def profiled(results: Results) -> list[str]:
+def profiled(results: ResultTables) -> list[str]:
     """Persons whose markers were asked."""
     return [str(name) for name in dict.fromkeys(results.table("profiles")["specimen"])]
 
@@ -124,7 +124,7 @@ def _at_end(rows: pd.DataFrame, points: pd.DataFrame) -> "pd.Series[bool]":
     return (beside["best_ratio"] == beside["min"]) | (beside["best_ratio"] == beside["max"])
 
 
-def calibrations(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def calibrations(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """What calibration makes of generic stiffness, and what it is worth."""
     rows = results.table("stiffness")
     if rows.empty:
@@ -149,7 +149,7 @@ def calibrations(study: Tracking, cohort: Cohort, results: Results) -> Iterator[
     yield from _between_laws(known)
 
 
-def _worth(results: Results) -> str:
+def _worth(results: ResultTables) -> str:
     """Whether such a number is knowledge."""
     sure, asked = closed(results)
     if not asked:
@@ -182,7 +182,7 @@ def _between_laws(known: pd.DataFrame) -> Iterator[str]:
         )
 
 
-def weights(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def weights(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Whether the weight of loads is a good one, where the truth is known."""
     rows = results.table("weights")
     if rows.empty:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.report.words import capital, count, listed
 from spinepipe.status import Status
 from spinepipe.studies.tracking.findings import vibrating_approaches
@@ -18,7 +18,7 @@ from spinepipe.studies.tracking.findings_of_errors import (
     GENERIC,
     IK,
     SAID,
-    Standing,
+    ApproachRanking,
     all_worse,
     between,
     compared,
@@ -36,7 +36,7 @@ NO_TRUTH = (
 )
 
 
-def headline(study: Tracking, cohort: Cohort, results: Results) -> Headline:
+def headline(study: Tracking, cohort: Cohort, results: ResultTables) -> Headline:
     """The answer, how sure it is, and what casts doubt on it."""
     doubts = tuple(_doubts(study, cohort, results))
     fits = results.table("fits")
@@ -54,7 +54,7 @@ def _whole(parts: Sequence[str]) -> str:
     return " ".join(part for part in parts if part)
 
 
-def _answer(one: Standing) -> str:
+def _answer(one: ApproachRanking) -> str:
     best = one.approaches[0]
     off = f"{one.sized(best)}{between(one, best)}"
     where = f"{MEASURES[one.measure][1]} {one.words}"
@@ -81,7 +81,7 @@ def _answer(one: Standing) -> str:
     )
 
 
-def _stiffness(results: Results) -> str:
+def _stiffness(results: ResultTables) -> str:
     """What profiles say, of whom they were made."""
     sure, asked = closed(results)
     if not asked:
@@ -94,7 +94,7 @@ def _stiffness(results: Results) -> str:
     return f"Markers tell the stiffness of {whose} in {sure} of {count(asked, 'profile')}."
 
 
-def _sure(one: Standing) -> str:
+def _sure(one: ApproachRanking) -> str:
     """What a difference between approaches was held against."""
     if one.n < FEWEST:
         return too_few(one.n)
@@ -120,14 +120,14 @@ def _spread(fits: pd.DataFrame) -> str:
     )
 
 
-def _dynamics(one: Standing) -> str:
+def _dynamics(one: ApproachRanking) -> str:
     """Dynamics with generic passive elements beside inverse kinematics."""
     if not {GENERIC, IK} <= set(one.approaches):
         return ""
     return f"{capital(told(GENERIC))} beside {told(IK)}: {compared(one, GENERIC, IK)}."
 
 
-def _angles(cohort: Cohort, results: Results, found: Standing) -> str:
+def _angles(cohort: Cohort, results: ResultTables, found: ApproachRanking) -> str:
     """The least error of the other measure over the same motions."""
     same = [one for one in standings(cohort, results, SAID[1]) if one.words == found.words]
     if not same:
@@ -140,7 +140,7 @@ def _angles(cohort: Cohort, results: Results, found: Standing) -> str:
     )
 
 
-def _doubts(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
+def _doubts(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """What should be looked at before the answer is believed."""
     fits = results.table("fits")
     if fits.empty:
@@ -164,7 +164,7 @@ def _doubts(study: Tracking, cohort: Cohort, results: Results) -> Iterator[str]:
     yield from _worse(cohort, results)
 
 
-def _worse(cohort: Cohort, results: Results) -> Iterator[str]:
+def _worse(cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Measures whose mean error is larger with every calibration than without."""
     parts, where = [], ""
     for measure in SAID:

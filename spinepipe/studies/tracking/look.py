@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.marker_turns import turns
-from spinepipe.motion.skeleton import MarkerSet, Trial
-from spinepipe.problems import Problem
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
+from spinepipe.problems import InputProblem
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class LoadedTrial:
     """A trial as it is checked.
 
     Attributes
@@ -26,7 +26,7 @@ class Look:
     first : number of the trial's first frame in the file.
     """
 
-    trial: Trial
+    trial: MarkerTrial
     markers: MarkerSet
     neutral: Array
     axes: str
@@ -50,13 +50,13 @@ class Look:
             f"({times[begin]:.3f} to {times[end]:.3f} s)"
         )
 
-    def in_motion(self, marker: str | None, found: str, allowed: str, remedy: str) -> Problem:
+    def in_motion(self, marker: str | None, found: str, allowed: str, remedy: str) -> InputProblem:
         """A problem of the file of motion."""
-        return Problem(self.file, None, marker, found, allowed, remedy)
+        return InputProblem(self.file, None, marker, found, allowed, remedy)
 
-    def in_table(self, column: str, found: str, allowed: str, remedy: str) -> Problem:
+    def in_table(self, column: str, found: str, allowed: str, remedy: str) -> InputProblem:
         """A problem of the trial's row."""
-        return Problem(self.trials, self.line, column, found, allowed, remedy)
+        return InputProblem(self.trials, self.line, column, found, allowed, remedy)
 
 
 def runs(where: NDArray[np.bool_]) -> Sequence[tuple[int, int]]:

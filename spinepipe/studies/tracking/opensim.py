@@ -17,7 +17,7 @@ from spinepipe.studies.exports import refuse
 from spinepipe.studies.kind import Wanted
 from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.moved import motions
-from spinepipe.studies.tracking.persons import Person, person_of
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
@@ -48,7 +48,7 @@ def motion_text(name: str, tracked: str) -> str:
     return mot(name, np.zeros(0), np.zeros((0, len(BODIES), len(COORDINATES))))
 
 
-def document(person: Person) -> str:
+def document(person: TrackedPerson) -> str:
     """OpenSim's model of a person."""
     markers = replace(person.markers, names=usable(person.markers.names))
     (name,) = usable((person.name,))

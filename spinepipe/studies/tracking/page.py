@@ -5,7 +5,7 @@ from spinepipe.comparison import papers
 from spinepipe.report.page.document import (
     Document,
     Headline,
-    Results,
+    ResultTables,
     Sortable,
     page_tables,
 )
@@ -70,7 +70,7 @@ Fits that did not settle stand first that way, as `converged` is the first of al
 """
 
 
-def document(study: Tracking, cohort: Cohort, results: Results) -> Document:
+def document(study: Tracking, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
     found = headline(study, cohort, results)
     return Document(
@@ -90,7 +90,7 @@ def _joined(words: str) -> str:
     return words.replace(" %", "\u00a0%")
 
 
-def shown_tables(results: Results) -> list[Sortable]:
+def shown_tables(results: ResultTables) -> list[Sortable]:
     """Tables that the study has; those without rows are left out."""
     found: list[Sortable] = []
     for shape, title in _TITLES.items():
@@ -102,7 +102,7 @@ def shown_tables(results: Results) -> list[Sortable]:
     return found
 
 
-def left_out(study: Tracking, results: Results) -> tuple[str, ...]:
+def left_out(study: Tracking, results: ResultTables) -> tuple[str, ...]:
     """What there is nothing of, each with the reason."""
     parts = []
     if results.table("errors").empty:

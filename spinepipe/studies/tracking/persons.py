@@ -33,15 +33,15 @@ from spinepipe.motion.skeleton import (
     BODIES,
     PELVIS,
     MarkerSet,
+    MarkerTrial,
     Masses,
     Skeleton,
-    Trial,
     skeleton_of,
 )
 from spinepipe.motion.slices import slice_inertias
 from spinepipe.muscles.masses import ahead_cm, slice_percents
 from spinepipe.muscles.subject import REFERENCE, Subject
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.forms import BOUNDS, PASSIVE, RATIOS, STANCE, TRIALS
 from spinepipe.studies.tracking.settings import Scaling
@@ -62,7 +62,7 @@ Row = Mapping[Any, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Person:
+class TrackedPerson:
     """Who was tracked.
 
     Attributes
@@ -79,14 +79,16 @@ class Person:
     subject: Subject
     skeleton: Skeleton
     markers: MarkerSet
-    trials: tuple[Trial, ...]
+    trials: tuple[MarkerTrial, ...]
     passive: PassiveElements
     limits: Bounds
     centres: Array
     static: str | None
 
 
-def person_of(cohort: Cohort, specimen: str, folder: Path, scaling: Scaling = "none") -> Person:
+def person_of(
+    cohort: Cohort, specimen: str, folder: Path, scaling: Scaling = "none"
+) -> TrackedPerson:
     """A person and what was recorded.
 
     Parameters
@@ -105,13 +107,13 @@ def person_of(cohort: Cohort, specimen: str, folder: Path, scaling: Scaling = "n
     return told if fit is None else as_large(told, fit.factors)
 
 
-def size_of(person: Person) -> Sized:
+def size_of(person: TrackedPerson) -> Sized:
     """How large a person is beside the skeleton, by the static trial."""
     trial = next((trial for trial in person.trials if trial.name == person.static), None)
     return sized_by(person.skeleton, person.markers, trial)
 
 
-def as_large(person: Person, factors: Array) -> Person:
+def as_large(person: TrackedPerson, factors: Array) -> TrackedPerson:
     """A person, parts (3,) of the skeleton so many times as large; what bodies weigh stays."""
     kg = float(person.skeleton.masses.kg.sum())
     skeleton, markers = scaled(person.skeleton, person.markers, factors, kg)
@@ -119,12 +121,12 @@ def as_large(person: Person, factors: Array) -> Person:
     return replace(person, skeleton=skeleton, markers=markers, centres=centres)
 
 
-def _as_told(cohort: Cohort, specimen: str, folder: Path) -> Person:
+def _as_told(cohort: Cohort, specimen: str, folder: Path) -> TrackedPerson:
     """The same as large as the cohort has it."""
     subject = subject_of(cohort, specimen)
     skeleton = skeleton_in(cohort, specimen, subject)
     markers = marker_set(cohort, specimen)
-    return Person(
+    return TrackedPerson(
         specimen,
         subject,
         skeleton,
@@ -140,7 +142,7 @@ def _as_told(cohort: Cohort, specimen: str, folder: Path) -> Person:
     )
 
 
-def carrying(person: Person, trial: Trial) -> Skeleton:
+def carrying(person: TrackedPerson, trial: MarkerTrial) -> Skeleton:
     """The skeleton, head and arms hung on T1 where the trial has them."""
     arms = next(name for name in ARMS if name == trial.arms)
     return Skeleton(person.skeleton.steps, hung(person.skeleton, arms, person.subject))
@@ -196,10 +198,10 @@ def recording(row: Row, cohort: str, folder: Path) -> Recorded:
         (problem,) = error.problems
         found = f"{problem.found} in {name}"
         at = (f"{cohort}/{TRIALS.file}", row["line"], "start_s" if error.late else "end_s")
-        raise InputError([Problem(*at, found, problem.allowed, problem.remedy)]) from error
+        raise InputError([InputProblem(*at, found, problem.allowed, problem.remedy)]) from error
 
 
-def trial_of(row: Row, markers: MarkerSet, recorded: Recorded) -> Trial:
+def trial_of(row: Row, markers: MarkerSet, recorded: Recorded) -> MarkerTrial:
     """The trial of a row; markers of the set that the file lacks are never seen."""
     n = len(recorded.time_s)
     places, seen = np.zeros((n, len(markers), 3)), np.zeros((n, len(markers)), dtype=bool)
@@ -208,7 +210,7 @@ def trial_of(row: Row, markers: MarkerSet, recorded: Recorded) -> Trial:
             there = recorded.names.index(name)
             places[:, k], seen[:, k] = recorded.places[:, there], recorded.seen[:, there]
     name, kind, arms = (str(row[key]) for key in ("trial", "kind", "arms"))
-    return Trial(name, kind, recorded.time_s, places, seen, arms)
+    return MarkerTrial(name, kind, recorded.time_s, places, seen, arms)
 
 
 def marker_set(cohort: Cohort, specimen: str) -> MarkerSet:

@@ -20,7 +20,7 @@ from spinepipe.motion.trajectory import solve
 from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import BOTH
 from spinepipe.studies.tracking.marks import marks_of
-from spinepipe.studies.tracking.persons import Person, person_of
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import LIMIT, PROFILE_POINTS, PROFILES
 from spinepipe.tables import from_rows, write
@@ -60,7 +60,7 @@ def run(
 
 
 def _costs(
-    settings: Tracking, person: Person, region: str, coordinate: str, ratios: Array
+    settings: Tracking, person: TrackedPerson, region: str, coordinate: str, ratios: Array
 ) -> tuple[Array, str]:
     """(R,) least cost with each ratio, infinite where the fit did not settle."""
     coarse = settings.model_copy(update={"intervals": settings.profiles.intervals})

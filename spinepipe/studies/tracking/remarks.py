@@ -9,7 +9,7 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.studies.tracking.look import runs
-from spinepipe.studies.tracking.persons import Person, marker_set, recording, trial_rows
+from spinepipe.studies.tracking.persons import TrackedPerson, marker_set, recording, trial_rows
 
 LONGEST_CHAIN = 5
 """Levels in a row without a marker between them; motion cannot be shared out among more."""
@@ -23,12 +23,12 @@ class Remark:
     text: str
 
 
-def warnings_of(person: Person) -> tuple[Remark, ...]:
+def warnings_of(person: TrackedPerson) -> tuple[Remark, ...]:
     """Levels that markers do not tell apart, and gaps that are filled by what is around them."""
     return (*_chains(person), *_filled(person))
 
 
-def _chains(person: Person) -> Iterator[Remark]:
+def _chains(person: TrackedPerson) -> Iterator[Remark]:
     """Runs of levels between bodies with markers, and beyond the last of them."""
     marked = sorted(set(person.markers.body.tolist()))
     ends = [*marked, len(BODIES) - 1]
@@ -41,7 +41,7 @@ def _chains(person: Person) -> Iterator[Remark]:
             )
 
 
-def _filled(person: Person) -> Iterator[Remark]:
+def _filled(person: TrackedPerson) -> Iterator[Remark]:
     for trial in person.trials:
         gaps = [len(runs(~seen)) for seen in trial.seen.T]
         if any(gaps):

@@ -7,9 +7,9 @@ import numpy as np
 
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import PELVIS
-from spinepipe.motion.terms import Loads, Markers
+from spinepipe.motion.terms import Markers, MuscleDemand
 from spinepipe.status import Status
-from spinepipe.studies.tracking.approaches import Found
+from spinepipe.studies.tracking.approaches import ApproachMotion
 from spinepipe.studies.tracking.moved import IN_ORDER
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import FITS, MARKER_OFF
@@ -20,7 +20,7 @@ Row = dict[str, Any]
 _TURNS = slice(3, 6)
 
 
-def motion_rows(found: Found) -> Iterator[Row]:
+def motion_rows(found: ApproachMotion) -> Iterator[Row]:
     """All joints and the pelvis at all nodes."""
     times = found.watched.grid.times_s
     shown = found.q * BORDER_PER_SI
@@ -40,7 +40,7 @@ def failed_row(message: str) -> Row:
     return blank | {"status": Status.NOT_CONVERGED, "message": message, "frames": 0}
 
 
-def fit_row(settings: Tracking, found: Found, spent_s: float) -> Row:
+def fit_row(settings: Tracking, found: ApproachMotion, spent_s: float) -> Row:
     """How a fit ended, and what it left."""
     apart = deviations(found)
     largest = float(apart.max())
@@ -65,7 +65,7 @@ def fit_row(settings: Tracking, found: Found, spent_s: float) -> Row:
     }
 
 
-def deviations(found: Found) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def deviations(found: ApproachMotion) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """(S,) mm of model from measured markers, of all that were seen."""
     seen = found.watched
     at = marker_places(seen.skeleton, seen.markers, found.q)
@@ -73,7 +73,7 @@ def deviations(found: Found) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.asarray(apart[seen.weight > 0.0], dtype=float)
 
 
-def _farthest(found: Found) -> str:
+def _farthest(found: ApproachMotion) -> str:
     seen = found.watched
     at = marker_places(seen.skeleton, seen.markers, found.q)
     apart = np.linalg.norm(at - seen.places, axis=-1) * (seen.weight > 0.0)
@@ -82,11 +82,11 @@ def _farthest(found: Found) -> str:
     return f"{seen.markers.names[marker]} is farthest off, at {time_s:.2f} s"
 
 
-def _loads(found: Found) -> tuple[float | None, float | None]:
+def _loads(found: ApproachMotion) -> tuple[float | None, float | None]:
     """What loads cost, and their RMS in N m; None where nobody asks for them."""
     if not found.ask.loads:
         return None, None
-    loads = Loads.of(found.watched, found.ask)
+    loads = MuscleDemand.of(found.watched, found.ask)
     active = loads.active(found.ask.passive, found.motion)
     cost = _squares(loads.residuals(found.ask.passive, found.motion))
     return cost, _rms(active[:, :, _TURNS])

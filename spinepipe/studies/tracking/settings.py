@@ -112,7 +112,7 @@ class Scales(BaseModel):
     shape_sd: float = Field(default=0.35, gt=0, le=5, description="of the logarithm of its B")
 
 
-class Bounds(BaseModel):
+class JointLimits(BaseModel):
     """How far joints may go."""
 
     model_config = FORM
@@ -166,7 +166,7 @@ class Tracking(Study):
         "standing, as the static trial's markers are. Markers cannot tell it from weight",
     )
     scales: Scales = Field(default=Scales(), description="what counts as much as what")
-    bounds: Bounds = Field(default=Bounds(), description="ranges of joints")
+    bounds: JointLimits = Field(default=JointLimits(), description="ranges of joints")
     largest_deviation_mm: float = Field(
         default=40.0, gt=0, le=1000, description="of a marker; beyond it a status says so"
     )

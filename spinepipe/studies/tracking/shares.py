@@ -25,7 +25,7 @@ _TRIFLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Shares:
+class MotionShares:
     """Shares over a cycle, from 0 at the first frame to 1 at the last.
 
     Attributes
@@ -44,7 +44,7 @@ class Shares:
         return (self.cycle >= low - _TRIFLE) & (self.cycle <= high + _TRIFLE)
 
 
-def shares_of(moved: Moved, kind: str, instants: int | None = None) -> Shares | None:
+def shares_of(moved: Moved, kind: str, instants: int | None = None) -> MotionShares | None:
     """Shares of a motion, at its frames or at so many instants; None where nothing is moved.
 
     Parameters
@@ -60,4 +60,4 @@ def shares_of(moved: Moved, kind: str, instants: int | None = None) -> Shares | 
     total = turned.sum(axis=1)
     enough = np.abs(total) >= LEAST_RAD
     share = np.where(enough[:, None], turned / np.where(enough, total, 1.0)[:, None], 0.0)
-    return Shares((times - first) / (last - first), share, enough)
+    return MotionShares((times - first) / (last - first), share, enough)

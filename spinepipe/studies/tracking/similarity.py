@@ -16,7 +16,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics.waveforms import MultipleCorrelation, multiple_correlation
 from spinepipe.studies.tracking.moved import kinds_of_trials, motions
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.shares import INSTANTS, Shares, shares_of
+from spinepipe.studies.tracking.shares import INSTANTS, MotionShares, shares_of
 from spinepipe.studies.tracking.tables import SIMILARITY, WINDOWS
 from spinepipe.tables import from_rows, read_frames, write
 
@@ -35,7 +35,7 @@ def similarity_rows(
     tracked: pd.DataFrame, kinds: Mapping[tuple[str, str], str]
 ) -> Iterator[dict[str, Any]]:
     """Rows by trial, approach and window, over the persons that did it."""
-    groups: dict[tuple[str, str], list[Shares]] = {}
+    groups: dict[tuple[str, str], list[MotionShares]] = {}
     for moved in motions(tracked):
         shares = shares_of(moved, kinds[moved.specimen, moved.trial], INSTANTS)
         if shares is not None:
@@ -55,7 +55,7 @@ def similarity_rows(
 
 
 def alike(
-    persons: Sequence[Shares], window: tuple[float, float]
+    persons: Sequence[MotionShares], window: tuple[float, float]
 ) -> tuple[MultipleCorrelation, str]:
     """Coefficient over persons, and what was left out of it.
 

@@ -7,8 +7,8 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.scaling import SEGMENTS, Fit, fitted
-from spinepipe.motion.skeleton import MarkerSet, Skeleton, Trial
+from spinepipe.motion.scaling import SEGMENTS, ScalingFit, fitted
+from spinepipe.motion.skeleton import MarkerSet, MarkerTrial, Skeleton
 from spinepipe.studies.tracking.tables import NO_STATIC, NOT_TOLD, TOLD
 
 AS_IT_IS = "the cohort's skeleton is taken as it is"
@@ -24,12 +24,12 @@ class Sized:
         say why.
     """
 
-    fit: Fit | None
+    fit: ScalingFit | None
     status: str
     message: str = ""
 
 
-def sized_by(skeleton: Skeleton, markers: MarkerSet, static: Trial | None) -> Sized:
+def sized_by(skeleton: Skeleton, markers: MarkerSet, static: MarkerTrial | None) -> Sized:
     """How large a person is.
 
     Parameters

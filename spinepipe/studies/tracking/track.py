@@ -9,11 +9,17 @@ import numpy as np
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.passive import PassiveLaw
-from spinepipe.studies.tracking.approaches import Found, asked_of, found_by, learns, seen_in
+from spinepipe.studies.tracking.approaches import (
+    ApproachMotion,
+    asked_of,
+    found_by,
+    learns,
+    seen_in,
+)
 from spinepipe.studies.tracking.drawn import drawn_rows
 from spinepipe.studies.tracking.laws import law_in
 from spinepipe.studies.tracking.marks import marks_of
-from spinepipe.studies.tracking.persons import Person, person_of, ratio_sets
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of, ratio_sets
 from spinepipe.studies.tracking.rows import Row, failed_row, fit_row, motion_rows
 from spinepipe.studies.tracking.settings import Approach, Tracking
 from spinepipe.studies.tracking.tables import DRAWN, FITS, TRACKED
@@ -53,12 +59,12 @@ def run(
 
 def _found(
     settings: Tracking,
-    person: Person,
+    person: TrackedPerson,
     trial: str,
     approach: Approach,
     learnt: PassiveLaw | None,
     ratios: Mapping[str, Any],
-) -> tuple[Found | None, str]:
+) -> tuple[ApproachMotion | None, str]:
     """The motion, or why there is none."""
     if learns(approach) and learnt is None:
         return None, "no passive elements were calibrated"

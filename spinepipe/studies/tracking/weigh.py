@@ -8,12 +8,12 @@ import numpy as np
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.skeleton import Trial
-from spinepipe.studies.tracking.approaches import Found, asked_of, found_by, seen_in
+from spinepipe.motion.skeleton import MarkerTrial
+from spinepipe.studies.tracking.approaches import ApproachMotion, asked_of, found_by, seen_in
 from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.moved import Moved
 from spinepipe.studies.tracking.off_truth import Bones, errors_of
-from spinepipe.studies.tracking.persons import Person, person_of
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of
 from spinepipe.studies.tracking.rows import Row, failed_row, fit_row
 from spinepipe.studies.tracking.settings import Approach, Tracking
 from spinepipe.studies.tracking.tables import WEIGHTS
@@ -42,7 +42,9 @@ def run(root: str, study: str, specimen: str, output: str) -> None:
     write(from_rows(WEIGHTS, rows), output, made_by)
 
 
-def weighed(settings: Tracking, person: Person, trial: Trial, truth: Truth | None) -> Iterator[Row]:
+def weighed(
+    settings: Tracking, person: TrackedPerson, trial: MarkerTrial, truth: Truth | None
+) -> Iterator[Row]:
     """Rows of a trial by ratio."""
     seen, ask = seen_in(settings, person, trial), asked_of(settings, person, APPROACH)
     for ratio in sorted(settings.trade_off):
@@ -59,7 +61,7 @@ def weighed(settings: Tracking, person: Person, trial: Trial, truth: Truth | Non
 
 
 def _errors(
-    person: Person, trial: str, found: Found, truth: Truth | None
+    person: TrackedPerson, trial: str, found: ApproachMotion, truth: Truth | None
 ) -> dict[str, float | None]:
     """Mean errors where the truth is known."""
     sizes: dict[str, float | None] = dict.fromkeys(MEASURED)

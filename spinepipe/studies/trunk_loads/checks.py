@@ -8,10 +8,10 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.documents.inside import outside
 from spinepipe.documents.names import name_fault
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
 from spinepipe.muscles.regressions import PACKAGED
-from spinepipe.problems import InputError, Problem, did_you_mean, one_of
+from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.studies.places import at, unknown_names
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
 from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
@@ -24,14 +24,16 @@ _FIRST_ROW = 2
 """Line of a file below its header."""
 
 
-def check_trunk(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
+def check_trunk(
+    document: YamlDocument, study: TrunkLoads, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Everything that is wrong with the subjects, tasks and muscles of a cohort."""
     further = cohort.further
     for form in (SUBJECTS, TASKS):
         if form.stem not in further:
             found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
             remedy = f"add {form.file}, or name another cohort"
-            yield Problem(*at(document, "cohort"), found, allowed, remedy)
+            yield InputProblem(*at(document, "cohort"), found, allowed, remedy)
     if "subjects" in further:
         yield from subject_problems(cohort, further["subjects"])
     if "tasks" in further:
@@ -47,31 +49,31 @@ def check_trunk(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterat
 
 
 def check_source(
-    document: Document, study: TrunkLoads, cohort: Cohort, _root: Path
-) -> Iterator[Problem]:
+    document: YamlDocument, study: TrunkLoads, cohort: Cohort, _root: Path
+) -> Iterator[InputProblem]:
     """Refuse a study whose geometry and muscles cannot be read or make no trunk."""
     place = at(document, "geometry")
     try:
         source_of(study, cohort)
     except NoSource as error:
         allowed = f"{PACKAGE} in version {VERSION}"
-        yield Problem(*place, error.found, allowed, f"{REMEDY}, or write geometry: cohort")
+        yield InputProblem(*place, error.found, allowed, f"{REMEDY}, or write geometry: cohort")
     except ValueError as error:
         allowed = "a trunk from S1 to T1 with its muscles"
-        yield Problem(*place, str(error), allowed, f"complete the files of {cohort.name}")
+        yield InputProblem(*place, str(error), allowed, f"complete the files of {cohort.name}")
 
 
-def _without_geometry(document: Document, cohort: Cohort) -> Iterator[Problem]:
+def _without_geometry(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
     """Files that a cohort must have which brings its own geometry."""
     there = {name: name in cohort.further for name in (MUSCLES.stem, MUSCLE_PARAMETERS.stem)}
     there["joints"] = cohort.joints is not None
     for name in [name for name, is_there in there.items() if not is_there]:
         found = f"cohort, and {cohort.name} has no {name}.csv"
         remedy = f"add {name}.csv, or write geometry: myo_sim"
-        yield Problem(*at(document, "geometry"), found, f"a cohort with {name}.csv", remedy)
+        yield InputProblem(*at(document, "geometry"), found, f"a cohort with {name}.csv", remedy)
 
 
-def _several_trunks(cohort: Cohort) -> Iterator[Problem]:
+def _several_trunks(cohort: Cohort) -> Iterator[InputProblem]:
     """Joints that differ between specimens: one trunk is read, and scaled to every person."""
     if cohort.joints is None:
         return
@@ -85,10 +87,14 @@ def _several_trunks(cohort: Cohort) -> Iterator[Problem]:
             line = _FIRST_ROW + list(cohort.joints["specimen"]).index(name)
             found, allowed = f"joints of {name} that are not those of {first}", "one trunk"
             remedy = f"the trunk is scaled to each person: repeat the joints of {first}"
-            yield Problem(f"{cohort.name}/joints.csv", line, "specimen", found, allowed, remedy)
+            yield InputProblem(
+                f"{cohort.name}/joints.csv", line, "specimen", found, allowed, remedy
+            )
 
 
-def _regressions(document: Document, study: TrunkLoads, cohort: Cohort) -> Iterator[Problem]:
+def _regressions(
+    document: YamlDocument, study: TrunkLoads, cohort: Cohort
+) -> Iterator[InputProblem]:
     """Faults of a table of the user's own, which lies in the cohort's folder."""
     name, folder = study.regressions, cohort.folder
     led_out = outside(folder / name, folder, at(document, "regressions"), name)
@@ -99,7 +105,7 @@ def _regressions(document: Document, study: TrunkLoads, cohort: Cohort) -> Itera
         found = f"'{name}', which is no file of {cohort.name}"
         remedy = "correct the name, or add the file to the cohort's folder"
         allowed = f"{', '.join(PACKAGED)}, or a CSV file of the cohort"
-        yield Problem(*at(document, "regressions"), found, allowed, remedy)
+        yield InputProblem(*at(document, "regressions"), found, allowed, remedy)
         return
     try:
         regressions_of(study, cohort.folder)
@@ -116,8 +122,8 @@ def _tallest(subjects: pd.DataFrame | None) -> float | None:
 
 
 def _named(
-    document: Document, study: TrunkLoads, cohort: Cohort, tasks: list[str]
-) -> Iterator[Problem]:
+    document: YamlDocument, study: TrunkLoads, cohort: Cohort, tasks: list[str]
+) -> Iterator[InputProblem]:
     """Tasks and persons that the study names."""
     lists = {
         "drawn_tasks": study.drawn_tasks,
@@ -134,4 +140,4 @@ def _named(
         name = study.volunteer.specimen
         place = at(document, "volunteer.specimen")
         remedy = did_you_mean(name, known, "name a person of specimens.csv")
-        yield Problem(*place, f"unknown specimen '{name}'", one_of(known), remedy)
+        yield InputProblem(*place, f"unknown specimen '{name}'", one_of(known), remedy)

@@ -8,7 +8,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.folder import PELVIS, SHEATH, in_ground
 from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES
-from spinepipe.problems import Problem, Spelling
+from spinepipe.problems import InputProblem, Spelling
 from spinepipe.units import MM_PER_M
 
 CARRIERS = tuple(dict.fromkeys((*BODIES, *reversed(SLICES))))
@@ -18,7 +18,7 @@ PLACES = (*CARRIERS, *PELVIS, SHEATH)
 """Bodies that a point of a muscle may belong to, where the cohort tells of no others."""
 
 
-def muscle_problems(cohort: Cohort) -> Iterator[Problem]:
+def muscle_problems(cohort: Cohort) -> Iterator[InputProblem]:
     """Everything that is wrong with muscles.csv, muscle_parameters.csv, body_frames.csv and columns
     of levels."""
     name, further = cohort.name, cohort.further
@@ -43,19 +43,21 @@ def _frames_of_owner(cohort: Cohort) -> pd.DataFrame | None:
     return frames[frames["specimen"] == cohort.joints["specimen"].iloc[0]]
 
 
-def _frames(file: str, rows: pd.DataFrame, has_owner: bool) -> Iterator[Problem]:
+def _frames(file: str, rows: pd.DataFrame, has_owner: bool) -> Iterator[InputProblem]:
     """Bodies of anybody that move with nothing known; no rows of whose muscles are taken."""
     if not has_owner:
         found, allowed = "no row of the first specimen of joints.csv", "a frame for each body"
-        yield Problem(file, None, "specimen", found, allowed, "add its rows, or delete the file")
+        yield InputProblem(
+            file, None, "specimen", found, allowed, "add its rows, or delete the file"
+        )
     as_written = {name.casefold(): name for name in CARRIERS}
     for line, body in rows["body"].items():
         if body not in CARRIERS and (meant := as_written.get(str(body).casefold())):
             place, found = (file, int(str(line)), "body"), f"unknown body '{body}'"
-            yield Problem(*place, found, f"'{meant}', as elsewhere", f"write '{meant}'")
+            yield InputProblem(*place, found, f"'{meant}', as elsewhere", f"write '{meant}'")
 
 
-def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Iterator[Problem]:
+def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Iterator[InputProblem]:
     known = PLACES if frames is None else tuple(frames["body"])
     otherwise = "ribs, arms and head belong to T11, or add body_frames.csv with their frames"
     if frames is not None:
@@ -63,12 +65,12 @@ def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Itera
     bodies = Spelling(known, otherwise)
     for line, body in rows["body"][~rows["body"].isin(known)].items():
         place, found = (file, int(str(line)), "body"), f"unknown body '{body}'"
-        yield Problem(*place, found, bodies.allowed, bodies.remedy(str(body)))
+        yield InputProblem(*place, found, bodies.allowed, bodies.remedy(str(body)))
 
 
 def _sides(
     file: str, points: pd.DataFrame, muscles: pd.DataFrame, frames: pd.DataFrame | None
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     """Sides most of whose muscles lie on the other one; single ones are mirrored with a remark."""
     side = dict(zip(muscles["muscle"], muscles["side"], strict=True))
     if frames is not None:
@@ -83,7 +85,7 @@ def _sides(
     if len(most) == len(SIDES):
         found, allowed = "most muscles on the other side of the body", "z to the right"
         remedy = "change the sign of z: the axes are x forwards, y up, z to the right"
-        yield Problem(file, None, "z_mm", found, allowed, remedy)
+        yield InputProblem(file, None, "z_mm", found, allowed, remedy)
         return
     for one in most:
         first = points.index[points["muscle"] == wrong[one][0]][0]
@@ -93,7 +95,7 @@ def _sides(
         )
         allowed = "z above 0 on the right, below 0 on the left"
         remedy = "not mirrored, or mirrored twice? change the sign of their z, or their side"
-        yield Problem(file, int(str(first)), "z_mm", found, allowed, remedy)
+        yield InputProblem(file, int(str(first)), "z_mm", found, allowed, remedy)
 
 
 def _right_of_midline(points: pd.DataFrame, frames: pd.DataFrame | None) -> "pd.Series[float]":
@@ -108,8 +110,8 @@ def _wrong(right_m: float, called: str | None, side: str) -> bool:
     return called == side and (right_m < 0.0 if side == "right" else right_m > 0.0)
 
 
-def _levels(file: str, column: "pd.Series[str]") -> Iterator[Problem]:
+def _levels(file: str, column: "pd.Series[str]") -> Iterator[InputProblem]:
     levels = Spelling((*LEVELS, *SLICES), "a joint is named upper vertebra first")
     for line, name in column[~column.isin(levels.known)].items():
         place, found = (file, int(str(line)), "level"), f"unknown level '{name}'"
-        yield Problem(*place, found, levels.allowed, levels.remedy(str(name)))
+        yield InputProblem(*place, found, levels.allowed, levels.remedy(str(name)))

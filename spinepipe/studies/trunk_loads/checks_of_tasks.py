@@ -9,7 +9,7 @@ import pandas as pd
 from spinepipe.facts import number
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import BODIES
-from spinepipe.problems import Problem, one_of
+from spinepipe.problems import InputProblem, one_of
 from spinepipe.studies.trunk_loads.forms import (
     FORCE,
     HANDS,
@@ -49,9 +49,9 @@ class _Row:
     line: int
     cells: Row
 
-    def problem(self, column: str | None, found: str, allowed: str, remedy: str) -> Problem:
+    def problem(self, column: str | None, found: str, allowed: str, remedy: str) -> InputProblem:
         named = f"task {self.cells['task']}: {found}"
-        return Problem(self.file, self.line, column, named, allowed, remedy)
+        return InputProblem(self.file, self.line, column, named, allowed, remedy)
 
     def given(self, column: str) -> bool:
         return not pd.isna(self.cells[column])
@@ -67,7 +67,7 @@ class _Row:
 
 def task_problems(
     file: str, rows: pd.DataFrame, tallest_m: float | None, means: TrunkAngle
-) -> Iterator[Problem]:
+) -> Iterator[InputProblem]:
     """Everything that is wrong with tasks; the reader sees to it that names occur once.
 
     Parameters
@@ -87,7 +87,7 @@ def task_problems(
         yield from _again(row, first)
 
 
-def _posture(row: _Row, means: TrunkAngle) -> Iterator[Problem]:
+def _posture(row: _Row, means: TrunkAngle) -> Iterator[InputProblem]:
     told = [turn(what, axis) for what in ("trunk", *BODIES) for axis in ROTATIONS]
     if not any(row.given(name) for name in (*told, *(turn("pelvis", axis) for axis in ROTATIONS))):
         allowed = "a rotation of the trunk, or of every body"
@@ -106,7 +106,7 @@ def _posture(row: _Row, means: TrunkAngle) -> Iterator[Problem]:
             yield from _bend(row, pelvis, means)
 
 
-def _sums(row: _Row, axis: str) -> Iterator[Problem]:
+def _sums(row: _Row, axis: str) -> Iterator[InputProblem]:
     """Rotations of all bodies beside those of the trunk and the pelvis."""
     for what, body in (("trunk", BODIES[-1]), ("pelvis", BODIES[0])):
         column, said = turn(what, axis), row.number(turn(what, axis))
@@ -117,7 +117,7 @@ def _sums(row: _Row, axis: str) -> Iterator[Problem]:
             yield row.problem(column, found, f"{by_body:g}, to {SAME_DEG:g} deg", remedy)
 
 
-def _bend(row: _Row, pelvis: bool, means: TrunkAngle) -> Iterator[Problem]:
+def _bend(row: _Row, pelvis: bool, means: TrunkAngle) -> Iterator[InputProblem]:
     """Bending forwards and backwards."""
     column = turn("trunk", "extension")
     trunk = row.number(column)
@@ -136,14 +136,16 @@ def _bend(row: _Row, pelvis: bool, means: TrunkAngle) -> Iterator[Problem]:
         yield row.problem(turn("pelvis", "extension"), found, allowed, remedy)
 
 
-def _load(row: _Row) -> Iterator[Problem]:
+def _load(row: _Row) -> Iterator[InputProblem]:
     kg = row.number("hand_load_kg")
     if kg > HEAVIEST_KG:
         remedy = f"is it in N? write {kg / 9.80665:.1f}"
         yield row.problem("hand_load_kg", f"{kg:g} kg", f"{HEAVIEST_KG:g} at most", remedy)
 
 
-def _place_of_hands(row: _Row, means: TrunkAngle, tallest_m: float | None) -> Iterator[Problem]:
+def _place_of_hands(
+    row: _Row, means: TrunkAngle, tallest_m: float | None
+) -> Iterator[InputProblem]:
     if not row.given(HANDS[0]):  # all three or none, says the form
         return
     place = np.array([row.number(name) for name in HANDS])
@@ -162,7 +164,7 @@ def _place_of_hands(row: _Row, means: TrunkAngle, tallest_m: float | None) -> It
             yield row.problem(farthest, found, f"{REACH_M:g} m at most, an arm's reach", remedy)
 
 
-def _push(row: _Row) -> Iterator[Problem]:
+def _push(row: _Row) -> Iterator[InputProblem]:
     pushes = [name for name in (*PUSH_N, *PUSH_NM) if row.number(name) != 0.0]
     if pushes and not row.given(PUSHED):
         allowed, remedy = one_of(TASKS.column(PUSHED).allowed), "write the vertebra that is pushed"
@@ -174,7 +176,7 @@ def _push(row: _Row) -> Iterator[Problem]:
         yield row.problem("applied_as", found, allowed, "write the moment, or empty the cell")
 
 
-def _muscles(row: _Row) -> Iterator[Problem]:
+def _muscles(row: _Row) -> Iterator[InputProblem]:
     stress = row.number("largest_stress_mpa")
     if row.given("largest_stress_mpa") and not 0.0 < stress <= LARGEST_STRESS_MPA:
         remedy = "correct it, or leave it empty for 0.6"
@@ -192,7 +194,7 @@ def _muscles(row: _Row) -> Iterator[Problem]:
         yield row.problem("tone_percent", "tone stated and no percentage", "0 to 100", remedy)
 
 
-def _again(row: _Row, first: dict[tuple[Hashable, ...], str]) -> Iterator[Problem]:
+def _again(row: _Row, first: dict[tuple[Hashable, ...], str]) -> Iterator[InputProblem]:
     """Another row that says the same under another name."""
     name = str(row.cells["task"])
     said = tuple(

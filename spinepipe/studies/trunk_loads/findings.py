@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Results, judged
+from spinepipe.report.page.document import ResultTables, judged
 from spinepipe.report.words import capital, count, fixed, listed, number, percent, plain
 from spinepipe.studies.trunk_loads.findings_of_loads import (
     by_level,
@@ -40,16 +40,16 @@ _MOST_SHARE = 1.1
 _NEAR_LIMIT = 0.8
 """Tasks that take more of the strength than this are named."""
 
-Finding = Callable[[TrunkLoads, Cohort, Results], Iterator[str]]
+Finding = Callable[[TrunkLoads, Cohort, ResultTables], Iterator[str]]
 
 
-def findings(study: TrunkLoads, cohort: Cohort, results: Results) -> list[str]:
+def findings(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> list[str]:
     """The sentences, without those that the study has no table for."""
     told = [sentence for make in MAKERS for sentence in make(study, cohort, results)]
     return [sentence.replace(" %", "\u00a0%") for sentence in told]
 
 
-def ended(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def ended(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Tasks that did not settle or cannot be held, by how they ended."""
     rows = results.table("tasks")
     if rows.empty:
@@ -76,7 +76,7 @@ def _places(rows: pd.DataFrame) -> str:
     return "; ".join(words[:_MOST_PLACES]) + (f"; and {more} more" if more > 0 else "")
 
 
-def outside(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def outside(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Pressures outside the range of Eq 6."""
     known = filled(sound_rows(results, "tasks"), "inside_eq_6")
     if known.empty:
@@ -92,7 +92,7 @@ def outside(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     )
 
 
-def slack(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def slack(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """The largest moment that no muscle holds, in tasks that settled."""
     rows = filled(sound_rows(results, "tasks"), "largest_slack_nm")
     if rows.empty:
@@ -105,7 +105,7 @@ def slack(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
     )
 
 
-def agreement(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def agreement(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Computed beside measured pressures, tier by tier, each goal reached or missed."""
     for row in results.table("agreement").to_dict("records"):
         name = f"{capital(plain(row['tier']))} ({TIERS[row['tier']]})"
@@ -133,7 +133,7 @@ def _goal(row: dict[Any, Any]) -> str:
     return f"The goal is not reached: {missed(row)}."
 
 
-def unsettled(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def unsettled(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Pressures that count although their forces did not settle."""
     rows = results.table("pressures")
     if rows.empty:
@@ -153,7 +153,7 @@ def unsettled(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[s
             yield f"Tasks with a measured pressure that {words}: {'; '.join(told)}."
 
 
-def uncounted(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def uncounted(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Tasks whose measured pressure does not count, with both pressures."""
     rows = results.table("pressures")
     if rows.empty:
@@ -170,7 +170,7 @@ def uncounted(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[s
         )
 
 
-def tuned(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def tuned(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Numbers that were fitted, and whether they end at a bound."""
     rows = results.table("tuning")
     if rows.empty:
@@ -219,7 +219,7 @@ def _unit(row: dict[Any, Any]) -> str:
     return f" {row['unit']}" if row["unit"] else ""
 
 
-def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def drivers(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """What the pressure of every sampled task hangs on."""
     rows = results.table("intervals")
     if rows.empty:
@@ -250,7 +250,7 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     yield f"{failed} of {count(n, 'sample')} ({percent(failed, n)}) did not hold and are left out."
 
 
-def strength(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def strength(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How much of the strength tasks take."""
     known = filled(sound_rows(results, "tasks"), "strength_used")
     if known.empty:
@@ -265,7 +265,7 @@ def strength(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[st
     )
 
 
-def stability(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def stability(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Whether the spine stands when pushed a little, and what co-activation that takes."""
     rows = sound_rows(results, "tasks")
     known = filled(rows, "stable")
@@ -289,7 +289,7 @@ def stability(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[s
         yield f"Least activation of all muscles that makes a posture stable: {listed(told)}."
 
 
-def beside_the_paper(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def beside_the_paper(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How published quantities were judged."""
     told = judged(results.table("against_ghezelbash_2016"))
     if told:

@@ -6,10 +6,10 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.fascicles import GLOBAL_EXTENSORS
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import count, listed, number, plain
 from spinepipe.studies.trunk_loads.chosen import bends, grouped, of_person
-from spinepipe.studies.trunk_loads.headline import COMPRESSION, Answer, Row, answer_of
+from spinepipe.studies.trunk_loads.headline import COMPRESSION, AnsweredTask, Row, answer_of
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import SIMPLIFIED, newton, sound
 
@@ -21,7 +21,7 @@ _LOADS = {
 }
 
 
-def sound_rows(results: Results, table: str) -> pd.DataFrame:
+def sound_rows(results: ResultTables, table: str) -> pd.DataFrame:
     """Rows of a table whose forces settled and hold the task; none where it is absent."""
     rows = results.table(table)
     return rows if rows.empty else rows[sound(rows)]
@@ -37,7 +37,7 @@ def most(rows: pd.DataFrame, column: str) -> Row:
     return max(rows.to_dict("records"), key=lambda row: float(row[column]))
 
 
-def largest(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def largest(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """The largest of each load over all persons and tasks."""
     rows = sound_rows(results, "tasks")
     told = []
@@ -52,7 +52,7 @@ def largest(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
         yield f"The largest loads of tasks that settled: {'; '.join(told)}."
 
 
-def by_level(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def by_level(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Which level of the task of the headline carries most."""
     found = answer_of(study, cohort, results)
     rows = filled(_of_answer(found, results.table("levels")), "compression_n")
@@ -69,7 +69,7 @@ def by_level(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[st
     )
 
 
-def muscles(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def muscles(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Which muscles hold the task of the headline."""
     found = answer_of(study, cohort, results)
     rows = filled(_of_answer(found, results.table("muscles")), "force_n")
@@ -85,7 +85,7 @@ def muscles(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     )
 
 
-def relaxation(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def relaxation(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """What is left of the extensors' active force in the deepest bend, person by person."""
     tasks, rows = results.table("tasks"), results.table("muscles")
     if tasks.empty or rows.empty:
@@ -117,7 +117,7 @@ def _active(muscles_: pd.DataFrame, course: pd.DataFrame) -> "pd.Series[float]":
     return active.groupby(rows["task"].map(angle)).sum().sort_index()
 
 
-def persons(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def persons(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How far persons differ in the task in which they differ most."""
     rows = sound_rows(results, "tasks")
     if rows.empty or rows["specimen"].nunique() < 2:
@@ -135,7 +135,7 @@ def persons(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     )
 
 
-def simplified(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def simplified(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """What each simplification costs at most."""
     rows = results.table("simplified")
     if rows.empty:
@@ -164,7 +164,7 @@ def _signed(value: float) -> str:
     return f"{'+' if value > 0.0 else ''}{number(value, 2)} %"
 
 
-def upright(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str]:
+def upright(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """What finding the upright posture does to the moments of the joints."""
     rows = results.table("upright")
     columns = ["moment_before_nm", "moment_after_nm"]
@@ -181,7 +181,7 @@ def upright(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[str
     )
 
 
-def _of_answer(found: Answer | None, rows: pd.DataFrame) -> pd.DataFrame:
+def _of_answer(found: AnsweredTask | None, rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of the task of the headline."""
     if found is None or rows.empty:
         return pd.DataFrame()

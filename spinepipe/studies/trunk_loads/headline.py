@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.report.words import capital, count, fixed, listed, number, plain
 from spinepipe.studies.trunk_loads.chosen import of_person, relaxed, shown_person
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
@@ -33,7 +33,7 @@ Row = dict[Any, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class AnsweredTask:
     """The task that the answer is of.
 
     Attributes
@@ -51,7 +51,7 @@ class Answer:
         return plain(str(self.task["task"]))
 
 
-def answer_of(study: TrunkLoads, cohort: Cohort, results: Results) -> Answer | None:
+def answer_of(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> AnsweredTask | None:
     """The task that stands for the others, None where no task has sound forces."""
     tasks = results.table("tasks")
     if tasks.empty:
@@ -74,10 +74,10 @@ def answer_of(study: TrunkLoads, cohort: Cohort, results: Results) -> Answer | N
     still = relaxed(own, cohort)
     others = own[(own["task"] == still) & (own["task"] != best["task"])]
     rows = others.to_dict("records")
-    return Answer(best.to_dict(), rows[0] if rows else None)
+    return AnsweredTask(best.to_dict(), rows[0] if rows else None)
 
 
-def headline(study: TrunkLoads, cohort: Cohort, results: Results) -> Headline:
+def headline(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Headline:
     """The answer, how sure it is, and what casts doubt on it."""
     found = answer_of(study, cohort, results)
     doubts = tuple(_doubts(results, found))
@@ -89,7 +89,7 @@ def headline(study: TrunkLoads, cohort: Cohort, results: Results) -> Headline:
     return Headline(_words(found, results), " ".join(part for part in sure if part), doubts)
 
 
-def interval(results: Results, row: Row, quantity: str) -> tuple[float, float] | None:
+def interval(results: ResultTables, row: Row, quantity: str) -> tuple[float, float] | None:
     """Middle 95 % of the samples of a quantity of a task; None where it is not known."""
     rows = results.table("intervals")
     if rows.empty:
@@ -111,7 +111,7 @@ class Driver:
     high: float
 
 
-def leading(results: Results, row: Row, quantity: str = PRESSURE) -> list[Driver]:
+def leading(results: ResultTables, row: Row, quantity: str = PRESSURE) -> list[Driver]:
     """Factors of a quantity of a task with their total indices, the largest first."""
     rows = results.table("drivers")
     if rows.empty:
@@ -135,7 +135,7 @@ def spread_words(drivers: Sequence[Driver]) -> str:
     return f"{part} of that spread comes of {factor(first.factor)}"
 
 
-def _words(found: Answer, results: Results) -> str:
+def _words(found: AnsweredTask, results: ResultTables) -> str:
     row = found.task
     ends = interval(results, row, COMPRESSION)
     between = f" ({newton(ends[0])} to {newton(ends[1])})" if ends else ""
@@ -154,7 +154,7 @@ def _words(found: Answer, results: Results) -> str:
     return f"{told}."
 
 
-def _sampled(found: Answer, results: Results) -> str:
+def _sampled(found: AnsweredTask, results: ResultTables) -> str:
     rows = results.table("intervals")
     if interval(results, found.task, COMPRESSION) is None:
         return "How far this can be trusted is not known: the task was not sampled."
@@ -168,7 +168,7 @@ def _sampled(found: Answer, results: Results) -> str:
     )
 
 
-def _beside_measured(results: Results) -> str:
+def _beside_measured(results: ResultTables) -> str:
     """What agreement with measured pressures says of the untuned answer."""
     rows = results.table("agreement")
     if rows.empty:
@@ -183,7 +183,7 @@ def _beside_measured(results: Results) -> str:
     )
 
 
-def _doubts(results: Results, found: Answer | None) -> list[str]:
+def _doubts(results: ResultTables, found: AnsweredTask | None) -> list[str]:
     """What should be looked at before the answer is believed."""
     tasks = results.table("tasks")
     doubts = []
@@ -213,7 +213,7 @@ def _names(rows: pd.DataFrame) -> list[str]:
     return [plain(str(name)) for name in dict.fromkeys(rows["task"])]
 
 
-def missed_goals(results: Results) -> str:
+def missed_goals(results: ResultTables) -> str:
     """Goals of agreement that are missed, and by how much; nothing where none is."""
     rows = results.table("agreement")
     if rows.empty:

@@ -22,7 +22,7 @@ from spinepipe.muscles.trunk import BODIES
 from spinepipe.progress import Progress
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.trunk_loads.persons import (
-    Standing,
+    UprightPerson,
     how_of,
     regressions_of,
     source_of,
@@ -30,8 +30,8 @@ from spinepipe.studies.trunk_loads.persons import (
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import (
-    Outcome,
     Row,
+    TaskOutcome,
     iteration_rows,
     level_rows,
     muscle_rows,
@@ -103,16 +103,18 @@ def rows_of(
     return found
 
 
-def outcome_of(settings: TrunkLoads, person: Person, task: Task) -> Outcome:
+def outcome_of(settings: TrunkLoads, person: Person, task: Task) -> TaskOutcome:
     """What becomes of a task."""
     how, gain = how_of(settings, twice=True), settings.solving.stiffness_gain
     try:
         return _outcome(settings, person, task, how, gain)
     except ValueError as why:
-        return Outcome(person, task, None, str(why))
+        return TaskOutcome(person, task, None, str(why))
 
 
-def _outcome(settings: TrunkLoads, person: Person, task: Task, how: How, gain: float) -> Outcome:
+def _outcome(
+    settings: TrunkLoads, person: Person, task: Task, how: How, gain: float
+) -> TaskOutcome:
     message, tone = "", task.tone_share if task.tone == "stated" else 0.0
     found = None
     if task.tone == "stable":
@@ -122,7 +124,7 @@ def _outcome(settings: TrunkLoads, person: Person, task: Task, how: How, gain: f
     found = found or held(person, task, how, tone)
     stable = smallest_eigenvalue(person, found, gain) >= 0.0
     asked = settings.solving.strength
-    return Outcome(
+    return TaskOutcome(
         person,
         task,
         found,
@@ -134,7 +136,7 @@ def _outcome(settings: TrunkLoads, person: Person, task: Task, how: How, gain: f
     )
 
 
-def _upright(stood: Standing) -> Iterator[Row]:
+def _upright(stood: UprightPerson) -> Iterator[Row]:
     found = stood.upright
     for number, body in enumerate(BODIES):
         below = number - 1

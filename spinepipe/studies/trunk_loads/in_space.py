@@ -50,7 +50,7 @@ _WIDTH_MM, _AROUND_MM, _MARGIN_MM, _LARGEST = 135.0, 22.0, 12.0, 0.4
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class DrawnTask:
     """One task of one person, as it is drawn.
 
     Attributes
@@ -89,7 +89,7 @@ def trunk_in_space(cohort: Cohort, paths: pd.DataFrame, levels: pd.DataFrame) ->
     )
 
 
-def held_tasks(cohort: Cohort, paths: pd.DataFrame, levels: pd.DataFrame) -> Iterator[Held]:
+def held_tasks(cohort: Cohort, paths: pd.DataFrame, levels: pd.DataFrame) -> Iterator[DrawnTask]:
     """Every person and task of the table paths."""
     several = paths["specimen"].nunique() > 1
     asked = cohort.further.get("tasks", pd.DataFrame())
@@ -97,7 +97,7 @@ def held_tasks(cohort: Cohort, paths: pd.DataFrame, levels: pd.DataFrame) -> Ite
         own = levels[(levels["specimen"] == person) & (levels["task"] == task)]
         name = f"{plain(str(task))}, {person}" if several else plain(str(task))
         told = asked[asked["task"] == task] if len(asked) else asked
-        yield Held(name, rows, own.dropna(subset=_XYZ), *_load(told))
+        yield DrawnTask(name, rows, own.dropna(subset=_XYZ), *_load(told))
 
 
 def _load(asked: pd.DataFrame) -> tuple[float, tuple[float, float, float] | None]:
@@ -112,7 +112,7 @@ def _load(asked: pd.DataFrame) -> tuple[float, tuple[float, float, float] | None
     return kg, (x, y, z)
 
 
-def _scene(one: Held, top: float) -> Any:
+def _scene(one: DrawnTask, top: float) -> Any:
     parts = [*_muscles(one.paths), *_spine(one.levels), *_hands(one)]
     axes = {
         f"{letter}axis": light_axis(letter, title)
@@ -175,7 +175,7 @@ def _spine(levels: pd.DataFrame) -> Iterator[Any]:
     )
 
 
-def _hands(one: Held) -> Iterator[Any]:
+def _hands(one: DrawnTask) -> Iterator[Any]:
     if one.load_mm is None:
         return
     x, y, z = one.load_mm
@@ -205,13 +205,13 @@ def _caption(first: str, shown: int, every: int) -> str:
     )
 
 
-def still(one: Held, top: float) -> bytes:
+def still(one: DrawnTask, top: float) -> bytes:
     """A task from the right and from behind, for paper."""
     with style():
         return picture(still_figure(one, top), "svg")
 
 
-def still_figure(one: Held, top: float) -> Figure:
+def still_figure(one: DrawnTask, top: float) -> Figure:
     """The same as a figure; the most stressed fascicles in front."""
     figure, axes = _views(one)
     shades = LinearSegmentedColormap.from_list("stress", COLORS)
@@ -239,7 +239,7 @@ def still_figure(one: Held, top: float) -> Figure:
     return figure
 
 
-def _views(one: Held) -> tuple[Figure, list[Axes]]:
+def _views(one: DrawnTask) -> tuple[Figure, list[Axes]]:
     """Two panels as wide as what they show, so that both have one scale."""
     load = [] if one.load_mm is None else [one.load_mm]
     points = np.vstack([one.paths[_XYZ], one.levels[_XYZ], *(np.array([at]) for at in load)])

@@ -16,7 +16,7 @@ SAME_DEG = 0.5
 
 
 @dataclass(frozen=True)
-class Beside:
+class PairedPressure:
     """A measured pressure beside a task, MPa: the mean where series differ."""
 
     task: str
@@ -26,13 +26,13 @@ class Beside:
     counted: bool
 
 
-def beside_tasks(tasks: Mapping[str, Task]) -> tuple[Beside, ...]:
+def beside_tasks(tasks: Mapping[str, Task]) -> tuple[PairedPressure, ...]:
     """Measured pressures of those tasks that have one."""
     found = (_beside(name, task) for name, task in tasks.items())
     return tuple(one for one in found if one is not None)
 
 
-def _beside(name: str, task: Task) -> Beside | None:
+def _beside(name: str, task: Task) -> PairedPressure | None:
     rows = [row for row in measured_pressures() if row.task == task.number and row.value]
     if task.number is None or task.number == 7:
         return None
@@ -45,7 +45,7 @@ def _beside(name: str, task: Task) -> Beside | None:
     source = "; ".join(dict.fromkeys(row.source for row in rows))
     mean = float(np.mean([row.value for row in rows if row.value is not None]))
     counted = task.number in COUNTED and status == "confirmed"
-    return Beside(name, mean, status, source, counted)
+    return PairedPressure(name, mean, status, source, counted)
 
 
 def _same_bend(row: MeasuredPressure, task: Task) -> bool:

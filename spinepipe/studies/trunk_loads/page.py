@@ -5,7 +5,7 @@ from spinepipe.comparison import papers
 from spinepipe.report.page.document import (
     Document,
     Headline,
-    Results,
+    ResultTables,
     Sortable,
     page_tables,
 )
@@ -60,7 +60,7 @@ READ = (*(table.name for table in _TITLES), PATHS.name)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def document(study: TrunkLoads, cohort: Cohort, results: Results) -> Document:
+def document(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
     found = headline(study, cohort, results)
     return Document(
@@ -83,7 +83,7 @@ def _joined(words: str) -> str:
     return words.replace(" %", "\u00a0%")
 
 
-def shown_tables(results: Results) -> list[Sortable]:
+def shown_tables(results: ResultTables) -> list[Sortable]:
     """Tables that the study has; those without rows are left out."""
     return [
         table

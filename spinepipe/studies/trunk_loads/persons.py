@@ -13,14 +13,14 @@ from spinepipe.effects.contract import Array
 from spinepipe.muscles.beam import Stiffening, stiffening, t11t12_beside_t12l1
 from spinepipe.muscles.diaphragm import diaphragm_area
 from spinepipe.muscles.fascicles import Source
-from spinepipe.muscles.folder import Tables, source_of_folder
+from spinepipe.muscles.folder import SpecimenTables, source_of_folder
 from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, JointLaws
 from spinepipe.muscles.masses import masses_of
 from spinepipe.muscles.myo_sim import origin_of_myo_sim, source_of_myo_sim
 from spinepipe.muscles.passive_muscle import PassiveMuscle
 from spinepipe.muscles.paths import Lines, Standoff
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.pose import Chain
+from spinepipe.muscles.pose import JointCentres
 from spinepipe.muscles.regressions import Regressions, packaged, read_regressions
 from spinepipe.muscles.scaling import Choices, scaled
 from spinepipe.muscles.settle import How
@@ -57,7 +57,7 @@ Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class UprightPerson:
     """A person, and how upright was found."""
 
     person: Person
@@ -74,7 +74,7 @@ def source_of(settings: TrunkLoads, cohort: Cohort) -> Source:
     owner = cohort.joints["specimen"].iloc[0]
     return source_of_folder(
         cohort.name,
-        Tables(
+        SpecimenTables(
             tables["muscles"],
             tables["muscle_parameters"],
             cohort.joints[cohort.joints["specimen"] == owner],
@@ -139,7 +139,7 @@ def standing(
     values: Values = NOMINAL,
     wrapping: bool = True,
     stood: Upright | None = None,
-) -> Standing:
+) -> UprightPerson:
     """A person at their size, standing upright.
 
     How someone stands does not depend on what we know about their discs: where values are varied,
@@ -159,7 +159,7 @@ def standing(
     wrap, passive = settings.wrapping, settings.passive
     person = Person(
         who,
-        Chain.of(trunk, passive.joints_behind_mm / MM_PER_M),
+        JointCentres.of(trunk, passive.joints_behind_mm / MM_PER_M),
         Lines.of(trunk, Standoff(wrap.depth, wrap.least_mm / MM_PER_M), wrapping),
         laws_of(settings, source, stiffening(who, REFERENCE, regressions), values),
         PassiveMuscle(
@@ -176,7 +176,7 @@ def standing(
     )
     start = np.array(settings.upright_start_deg) / DEG_PER_RAD
     found = upright(person, start, REACH_RAD) if stood is None else stood
-    return Standing(person.standing(found.turned), found)
+    return UprightPerson(person.standing(found.turned), found)
 
 
 def laws_of(settings: TrunkLoads, source: Trunk, size: Stiffening, values: Values) -> JointLaws:

@@ -17,7 +17,7 @@ from spinepipe.studies.trunk_loads.persons import (
     standing,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
-from spinepipe.studies.trunk_loads.rows import Outcome, Row, task_row
+from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, task_row
 from spinepipe.studies.trunk_loads.sampling import drawn, of_batch
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.source_marks import marks_of
@@ -59,9 +59,9 @@ def rows_of(
             task = changed_task(tasks[name], values)
             try:
                 found = held(person, task, how)
-                outcome = Outcome(person, task, found, found.message)
+                outcome = TaskOutcome(person, task, found, found.message)
             except ValueError as why:
-                outcome = Outcome(person, task, None, str(why))
+                outcome = TaskOutcome(person, task, None, str(why))
             told = task_row(outcome)
             yield {
                 "specimen": specimen,

@@ -11,7 +11,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.muscles.disc_pressure import DiscPressure, disc_pressure
 from spinepipe.muscles.masses import ARM
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import L4L5, Held
+from spinepipe.muscles.settle import L4L5, SolvedTask
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.status import Balanced
@@ -26,7 +26,7 @@ _MPA = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class TaskOutcome:
     """A task of a person, and what became of it.
 
     Attributes
@@ -38,7 +38,7 @@ class Outcome:
 
     person: Person
     task: Task
-    held: Held | None
+    held: SolvedTask | None
     message: str
     tone: float | None = None
     stable: bool | None = None
@@ -60,7 +60,7 @@ class Outcome:
         return disc_pressure(float(self.held.compression[L4L5]), area, flexion)
 
 
-def task_row(outcome: Outcome) -> Row:
+def task_row(outcome: TaskOutcome) -> Row:
     """The row of table tasks."""
     person, task, held = outcome.person, outcome.task, outcome.held
     turned = DEG_PER_RAD * (task.turned - (0.0 if task.from_upright else person.upright))
@@ -85,7 +85,7 @@ def task_row(outcome: Outcome) -> Row:
     return row | (_loads(outcome, held) if held is not None else {})
 
 
-def _loads(outcome: Outcome, held: Held) -> Row:
+def _loads(outcome: TaskOutcome, held: SolvedTask) -> Row:
     pressure = outcome.pressure
     assert pressure is not None
     muscles = outcome.person.lines.trunk.muscles
@@ -106,7 +106,7 @@ def _loads(outcome: Outcome, held: Held) -> Row:
     }
 
 
-def level_rows(outcome: Outcome) -> Iterator[Row]:
+def level_rows(outcome: TaskOutcome) -> Iterator[Row]:
     """Rows of table levels."""
     held = outcome.held
     for level, name in enumerate(LEVELS):
@@ -134,7 +134,7 @@ def level_rows(outcome: Outcome) -> Iterator[Row]:
         yield row
 
 
-def muscle_rows(outcome: Outcome) -> Iterator[Row]:
+def muscle_rows(outcome: TaskOutcome) -> Iterator[Row]:
     """Rows of table muscles."""
     muscles, held = outcome.person.lines.trunk.muscles, outcome.held
     for k, name in enumerate(muscles.names):
@@ -161,7 +161,7 @@ def muscle_rows(outcome: Outcome) -> Iterator[Row]:
         yield row
 
 
-def path_rows(outcome: Outcome) -> Iterator[Row]:
+def path_rows(outcome: TaskOutcome) -> Iterator[Row]:
     """Rows of table paths; none where the task could not be posed."""
     muscles, held = outcome.person.lines.trunk.muscles, outcome.held
     if held is None:
@@ -175,7 +175,7 @@ def path_rows(outcome: Outcome) -> Iterator[Row]:
             yield known | {"point": point, "x_mm": x, "y_mm": y, "z_mm": z, "stress_mpa": stress}
 
 
-def iteration_rows(outcome: Outcome) -> Iterator[Row]:
+def iteration_rows(outcome: TaskOutcome) -> Iterator[Row]:
     """Rows of table iterations."""
     for number, one in enumerate(outcome.held.rounds if outcome.held else ()):
         yield {

@@ -120,7 +120,7 @@ class Solving(BaseModel):
     )
 
 
-class Spread(BaseModel):
+class InputSpread(BaseModel):
     """How far one input may be off: mean and SD of a normal distribution."""
 
     model_config = FORM
@@ -133,18 +133,18 @@ class Uncertain(BaseModel):
 
     model_config = FORM
 
-    factors: dict[Factor, Spread] = Field(
+    factors: dict[Factor, InputSpread] = Field(
         default={
-            "height_cm": Spread(sd=1.0),
-            "bmi": Spread(sd=0.5),
-            "hand_anterior_mm": Spread(sd=50.0),
-            "pelvis_extension_deg": Spread(sd=4.0),
-            "trunk_extension_deg": Spread(sd=2.0),
-            "disc_area": Spread(sd=0.1),
-            "pcsa": Spread(sd=0.15),
-            "passive_rotation": Spread(sd=0.25),
-            "passive_muscle": Spread(sd=0.3),
-            "largest_stress_mpa": Spread(sd=0.1),
+            "height_cm": InputSpread(sd=1.0),
+            "bmi": InputSpread(sd=0.5),
+            "hand_anterior_mm": InputSpread(sd=50.0),
+            "pelvis_extension_deg": InputSpread(sd=4.0),
+            "trunk_extension_deg": InputSpread(sd=2.0),
+            "disc_area": InputSpread(sd=0.1),
+            "pcsa": InputSpread(sd=0.15),
+            "passive_rotation": InputSpread(sd=0.25),
+            "passive_muscle": InputSpread(sd=0.3),
+            "largest_stress_mpa": InputSpread(sd=0.1),
         },
         description="inputs that are drawn, with their spread",
     )
@@ -159,7 +159,7 @@ class Uncertain(BaseModel):
     seed: int = Field(default=1, ge=0, description="seed of the design")
 
 
-class Volunteer(BaseModel):
+class VolunteerSettings(BaseModel):
     """The person whose pressures were measured, and what may be fitted to them."""
 
     model_config = FORM
@@ -211,7 +211,7 @@ class TrunkLoads(Study):
         default=(), description="tasks whose muscles are drawn in 3-D; none named: the first"
     )
     uncertain: Uncertain = Field(default=Uncertain(), description="samples of persons and models")
-    volunteer: Volunteer | None = Field(
+    volunteer: VolunteerSettings | None = Field(
         default=None, description="the person whose pressures were measured"
     )
     simplified_tasks: EachOnce[str] = Field(

@@ -9,12 +9,12 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import Held, How, acted_on, held
+from spinepipe.muscles.settle import How, SolvedTask, acted_on, held
 from spinepipe.muscles.task import Task
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
 from spinepipe.studies.trunk_loads.postures import read_tasks
-from spinepipe.studies.trunk_loads.rows import Outcome, Row, task_row
+from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, task_row
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.source_marks import marks_of
 from spinepipe.studies.trunk_loads.tables import SIMPLIFICATIONS, SIMPLIFIED
@@ -66,15 +66,15 @@ def _how(how: How, simplification: str) -> How:
     return replace(how, **changed.get(simplification, {}))
 
 
-def _outcome(person: Person, task: Task, how: How) -> Outcome:
+def _outcome(person: Person, task: Task, how: How) -> TaskOutcome:
     try:
         found = held(person, task, how)
     except ValueError as why:
-        return Outcome(person, task, None, str(why))
-    return Outcome(person, task, found, found.message)
+        return TaskOutcome(person, task, None, str(why))
+    return TaskOutcome(person, task, found, found.message)
 
 
-def imbalance(person: Person, task: Task, found: Held | None) -> float | None:
+def imbalance(person: Person, task: Task, found: SolvedTask | None) -> float | None:
     """N m, largest moment out of balance when forces act on the whole model, where it comes to."""
     if found is None:
         return None

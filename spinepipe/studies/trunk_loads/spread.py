@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.sensitivity.global_indices.estimates import Index, Settings
+from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
 from spinepipe.sensitivity.global_indices.indices import indices
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.rows import Row
@@ -100,7 +100,7 @@ def _drivers(settings: TrunkLoads, who: str, task: str, rows: pd.DataFrame) -> I
             yield row
 
 
-def _told(index: Index, number: int) -> Row:
+def _told(index: SensitivityIndex, number: int) -> Row:
     word = _WORDS[index.index]
     ends = ("", index.estimate), ("_low", index.low), ("_high", index.high)
     return {f"{word}{end}": values.tolist()[number] for end, values in ends}

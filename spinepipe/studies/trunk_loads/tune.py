@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t
 
-from spinepipe.calibrate.descent import Point, Settled, descend, once
+from spinepipe.calibrate.descent import DescentTolerances, Point, descend, once
 from spinepipe.calibrate.profile import LEVEL, Best, Profile, profile_in_turn
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
@@ -23,7 +23,7 @@ from spinepipe.muscles.upright import Upright
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
 from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.trunk_loads.measured import Beside, beside_tasks
+from spinepipe.studies.trunk_loads.measured import PairedPressure, beside_tasks
 from spinepipe.studies.trunk_loads.persons import (
     NOMINAL,
     changed_task,
@@ -33,7 +33,7 @@ from spinepipe.studies.trunk_loads.persons import (
     standing,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
-from spinepipe.studies.trunk_loads.rows import Outcome, Row
+from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.source_marks import marks_of
 from spinepipe.studies.trunk_loads.tables import AGREEMENT, PRESSURES, REGION, TUNING
@@ -56,7 +56,7 @@ RANGE = {
 }
 """What each number may be: lowest, highest, size of a first step, unit."""
 
-SETTLED = Settled(cost=1e-3, step=3e-3, slope=1e-8, evaluations=25)
+SETTLED = DescentTolerances(cost=1e-3, step=3e-3, slope=1e-8, evaluations=25)
 _DIFFERENCE = 0.02
 """Share of a first step by which slopes are taken."""
 
@@ -93,7 +93,7 @@ class Volunteer:
     cohort: Cohort
     source: Trunk
     tasks: Mapping[str, Task]
-    beside: tuple[Beside, ...]
+    beside: tuple[PairedPressure, ...]
     stood: Upright
     _known: dict[tuple[float, ...], dict[str, Computed]] = field(default_factory=dict)
 
@@ -104,7 +104,7 @@ class Volunteer:
         return self.settings.volunteer.specimen
 
     def computed(
-        self, values: Mapping[str, float], wanted: Sequence[Beside] | None = None
+        self, values: Mapping[str, float], wanted: Sequence[PairedPressure] | None = None
     ) -> dict[str, Computed]:
         """Pressures of the wanted tasks, by default of all beside which one was measured."""
         asked = [one.task for one in (self.beside if wanted is None else wanted)]
@@ -114,12 +114,12 @@ class Volunteer:
             known.update(self._computed(values, missing))
         return {task: known[task] for task in asked}
 
-    def misfit(self, values: Mapping[str, float], wanted: Sequence[Beside]) -> float:
+    def misfit(self, values: Mapping[str, float], wanted: Sequence[PairedPressure]) -> float:
         """MPa^2, sum of the squares of errors; infinite where there are none."""
         off = self.errors(values, wanted)
         return inf if off is None else float(off @ off)
 
-    def errors(self, values: Mapping[str, float], wanted: Sequence[Beside]) -> Array | None:
+    def errors(self, values: Mapping[str, float], wanted: Sequence[PairedPressure]) -> Array | None:
         """Errors, MPa; None where a task has no pressure, or is held nominally and is no more.
 
         Values that leave the muscles without an answer do not agree with anybody's pressures.
@@ -143,9 +143,9 @@ class Volunteer:
         for name in names:
             task = changed_task(self.tasks[name], values)
             try:
-                outcome = Outcome(person, task, held(person, task, how), "")
+                outcome = TaskOutcome(person, task, held(person, task, how), "")
             except ValueError:
-                outcome = Outcome(person, task, None, "")
+                outcome = TaskOutcome(person, task, None, "")
             pressure = outcome.pressure
             told = None if pressure is None else 1e-6 * float(pressure.pa)
             yield name, (told, outcome.status.value)
@@ -188,7 +188,7 @@ def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
 
 
 def fitted_widely(
-    who: Volunteer, names: Sequence[str], counted: Sequence[Beside]
+    who: Volunteer, names: Sequence[str], counted: Sequence[PairedPressure]
 ) -> tuple[Array, NDArray[np.bool_]]:
     """As `fitted`, from what is nominal and from a step off it in all directions.
 
@@ -204,7 +204,7 @@ def fitted_widely(
 
 
 def fitted(
-    who: Volunteer, names: Sequence[str], counted: Sequence[Beside], start: Array
+    who: Volunteer, names: Sequence[str], counted: Sequence[PairedPressure], start: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Values (P,) of the named numbers with the least squares of errors, and whether at a bound."""
     low, high, step = _ranges(names)
@@ -217,7 +217,7 @@ def fitted(
 
 
 def regions(
-    who: Volunteer, names: Sequence[str], counted: Sequence[Beside], best: Array
+    who: Volunteer, names: Sequence[str], counted: Sequence[PairedPressure], best: Array
 ) -> Profile | None:
     """How far each fitted number may go by what the others leave, with one scatter of all errors.
 
@@ -247,7 +247,7 @@ def _ranges(names: Sequence[str]) -> tuple[Array, Array, Array]:
     return low, high, step
 
 
-def _errors(who: Volunteer, names: Sequence[str], counted: Sequence[Beside]) -> Point:
+def _errors(who: Volunteer, names: Sequence[str], counted: Sequence[PairedPressure]) -> Point:
     """Errors of the counted tasks, MPa, and their slopes by the named numbers."""
     _, high, step = _ranges(names)
 

@@ -23,12 +23,12 @@ from spinepipe.effects import register, registry
 from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import write_marked
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness.page import HELD_OUT_ERROR, NOT_HELD_OUT, document
 from spinepipe.studies.cohort_stiffness.problem import SEEN
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 TRUTH = {"a": A, "b": 0.8 * A, "c": 1.5 * A}
@@ -279,7 +279,9 @@ def test_a_file_of_bushings_alone_changes_nothing(tmp_path: Path) -> None:
 def test_the_report_says_what_was_not_held_out(tmp_path: Path) -> None:
     def captions(**more: object) -> dict[str, str]:
         study, cohort = studies.check(tmp_path, STUDY)
-        found = document(study.model_copy(update=more), cohort, Results(Tables({}), {}, pictures))
+        found = document(
+            study.model_copy(update=more), cohort, ResultTables(StudyTables({}), {}, pictures)
+        )
         return {picture.name: picture.caption for picture in found.pictures}
 
     stiffening(tmp_path, FOR_ALL)

@@ -23,7 +23,7 @@ from spinepipe.studies.cohort_stiffness.figures.held_out_error import motion_err
 from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios
 from spinepipe.studies.cohort_stiffness.figures.range_of_motion import compared
 from spinepipe.studies.cohort_stiffness.kind import KIND, OF_JOBS
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 DRAW = drawings("cohort_stiffness")
 LONG = tuple(f"vertebra_number_{n}" for n in range(6))
@@ -159,7 +159,7 @@ def test_what_the_data_do_not_hold_is_hollow_and_what_is_missing_crossed() -> No
     assert "no stiffness" in words(figure)
 
 
-def map_of(size: Size, tables: Tables) -> Figure:
+def map_of(size: Size, tables: StudyTables) -> Figure:
     """The map of errors."""
     with style():
         return error_map_figure(study_of(size), cohort_of(size), tables)

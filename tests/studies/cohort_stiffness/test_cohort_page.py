@@ -14,7 +14,7 @@ from study_cases import STUDY, project
 from study_cases import Size as OtherSize
 
 from spinepipe.jobs import draw, report
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.studies.cohort_stiffness.kind import KIND
 from spinepipe.studies.cohort_stiffness.page import READ, document, left_out, shown_tables
 from spinepipe.studies.cohort_stiffness.page_findings import findings
@@ -32,13 +32,13 @@ SIZES = {
 }
 
 
-def results(size: Size, **changed: pd.DataFrame) -> Results:
+def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
     """Made-up results with a picture."""
     tables = tables_of(size, **changed)
     metadata = {name: {"seed": "7", "code_digest": name} for name in tables}
     title = KIND.figure("error_map").title
     picture = Picture.of("error_map", title, PICTURE, "What it shows.")
-    return Results(tables, metadata, {"error_map": picture})
+    return ResultTables(tables, metadata, {"error_map": picture})
 
 
 def page_of(size: Size) -> str:

@@ -11,7 +11,7 @@ import pytest
 from chain_cases import DEGREES, MOMENT_OF, STUDY, Chains
 
 from spinepipe.documents.names import ALLOWED
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
@@ -24,7 +24,7 @@ def chains(study: str = "", **choices: object) -> Chains:
     return Chains({"a": A, "b": A}, study=study, **choices)  # type: ignore[arg-type]
 
 
-def complaints(made: Chains, root: Path) -> tuple[Problem, ...]:
+def complaints(made: Chains, root: Path) -> tuple[InputProblem, ...]:
     made.write(root)
     with pytest.raises(InputError) as caught:
         studies.check(root, STUDY)

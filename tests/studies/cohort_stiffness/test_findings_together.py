@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, Claim, Row
+from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, CohortClaim, Row
 from spinepipe.studies.cohort_stiffness.findings import put_in, together
 
 SIGNIFICANCE = 0.05
@@ -17,7 +17,7 @@ def row(
     message: str = "told",
     p_no: float | None = None,
 ) -> Row:
-    return Claim("name", "Statement.", "quantity", "deg").row(
+    return CohortClaim("name", "Statement.", "quantity", "deg").row(
         holds, message, 1.0, None, p, specimens, p_no
     )
 
@@ -96,7 +96,7 @@ def test_a_no_by_size_alone_has_no_p_to_correct() -> None:
 
 
 def test_what_is_not_asked_stays_so_with_few_specimens() -> None:
-    claim = Claim("name", "Statement.", "quantity", "deg")
+    claim = CohortClaim("name", "Statement.", "quantity", "deg")
     (found,) = judged(claim.not_asked("neither was computed"), specimens=1)
     assert (found["holds"], found["message"]) == ("not_asked", "neither was computed")
 
@@ -115,6 +115,6 @@ def test_what_was_put_into_a_made_up_cohort_is_no_finding(
     finding: str, holds: str, told: str
 ) -> None:
     """What the method makes of it may be one: load cases must not differ where truth is linear."""
-    found = put_in(Claim(finding, "Statement.", "quantity", "").row(holds, "told", 1.0))
+    found = put_in(CohortClaim(finding, "Statement.", "quantity", "").row(holds, "told", 1.0))
     assert found["holds"] == told
     assert ("made up" in found["message"]) == (told == "circular")

@@ -25,7 +25,7 @@ from displaced_cases import (
 from scipy import stats
 
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.cohort_stiffness.page_nuisances import nuisances, orders
 from spinepipe.studies.cohort_stiffness.representations import FITTED, NUISANCE, finest
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
@@ -245,7 +245,7 @@ def ranked(values: dict[str, float], specimens: int = 5) -> pd.DataFrame:
 
 def sentence(values: dict[str, float], specimens: int = 5) -> str:
     settings = CohortStiffness(study="s", kind="cohort_stiffness", cohort="c")
-    results = Results({"ranking": ranked(values, specimens)}, {}, {})
+    results = ResultTables({"ranking": ranked(values, specimens)}, {}, {})
     return " ".join(nuisances(settings, results))
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search import inquiry as inquiries
 from spinepipe.studies.discrepancy.search import search as searches
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Rules, Stage
+from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Rules, SearchStage
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened
 
@@ -43,7 +43,7 @@ class At:
 
 
 def form(name: str, coordinate: str = "extension") -> Form:
-    return Form(Variant(name, (("coordinate", coordinate),)), Spread.SHARED)
+    return Form(Variant(name, (("coordinate", coordinate),)), PlaceSpread.SHARED)
 
 
 def refitted(name: str, log_evidence: float, gain: float, coordinate: str = "extension") -> Refit:
@@ -55,7 +55,7 @@ def rules(most_effects: int = 3) -> Rules:
 
 
 def admitted(there: Sequence[str], *tried: Refit, most_effects: int = 3) -> str | None:
-    stage = Stage("1", Screen((), NEEDED, 50), tried, False)
+    stage = SearchStage("1", Screen((), NEEDED, 50), tried, False)
     inquiry: Any = SimpleNamespace(rules=rules(most_effects))
     current: Any = At(tuple(there))
     found = searches._admitted(current, stage, inquiry, BASE_AT)
@@ -103,7 +103,7 @@ def test_a_search_is_hopeless_where_the_generic_basis_has_that_many_times_the_ev
         own: Any = SimpleNamespace(log_evidence=900.0, at=at)
         best = refitted("a", 10.0, 0.0)
         assert searches._hopeless(best, number, own, rules()) is hopeless
-        everywhere = replace(best, form=Form(Variant("load_offset", ()), Spread.SHARED))
+        everywhere = replace(best, form=Form(Variant("load_offset", ()), PlaceSpread.SHARED))
         whole: Any = SimpleNamespace(log_evidence=evidence, at=dict.fromkeys((), at["extension"]))
         assert searches._hopeless(everywhere, number, whole, rules()) is hopeless
 
@@ -115,14 +115,14 @@ class Enters:
         self.names, self.rules, self.looked = list(names), rules(9), list[tuple[str, ...]]()
         self.of_lack = lack
 
-    def stage(self, current: At) -> Stage:
+    def stage(self, current: At) -> SearchStage:
         self.looked.append(current.names)
         tried = ()
         if self.names:
             one = refitted(self.names.pop(0), 10.0, EXCESS)
             fit: Any = SimpleNamespace(names=(*current.names, one.name))
             tried = (replace(one, fit=fit),)
-        return Stage("", Screen((), NEEDED, 1), tried, False)
+        return SearchStage("", Screen((), NEEDED, 1), tried, False)
 
     def lack(self, current: At) -> Any:
         one = SimpleNamespace(log_evidence=self.of_lack)
@@ -256,7 +256,7 @@ def test_effects_alone_are_looked_for_ever_further_from_where_all_stand(
     runs = Runs(0.0, [False] * failures + [True] * (failures < 5))
     asked = inquiry(runs, monkeypatch)
     ratio = Variant("level_dependence", (("coordinate", "extension"),))
-    one = Supposed(Form(ratio, Spread.SHARED), np.array([16.0]))
+    one = Supposed(Form(ratio, PlaceSpread.SHARED), np.array([16.0]))
 
     def suppose(self: Any, supposed: tuple[Supposed, ...]) -> Any:
         (only,) = supposed

@@ -13,7 +13,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.cohort.specimen import spine_model
 from spinepipe.model.file import ModelFile, effects_for
-from spinepipe.studies.discrepancy.job import Results, searched
+from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
 from spinepipe.studies.discrepancy.search.base import DAMPING
 from spinepipe.studies.discrepancy.search.beyond import tabulated
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
@@ -22,7 +22,7 @@ from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
 from spinepipe.studies.discrepancy.search.prediction import Simulated
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Answer, plain_data, verdict_of
+from spinepipe.studies.discrepancy.verdict import Conclusion, plain_data, verdict_of
 from spinepipe.studies.discrepancy.verdict_unnamed import Tabulated
 from spinepipe.units import ROTATIONS
 
@@ -89,7 +89,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def results(root: Path) -> Results:
+def results(root: Path) -> DiscrepancyResults:
     study = Discrepancy.model_validate(
         {
             "study": "probe",
@@ -105,7 +105,7 @@ def results(root: Path) -> Results:
 
 
 @pytest.mark.slow
-def test_the_table_has_the_law_point_by_point(results: Results) -> None:
+def test_the_table_has_the_law_point_by_point(results: DiscrepancyResults) -> None:
     """Load over motion is k q + c q^2 to both sides, as far as straight pieces can say."""
     rows = results.rows["tabulated"]
     assert {(row["coordinate"], row["over"]) for row in rows} == {("extension", "extension")}
@@ -125,9 +125,9 @@ def test_the_table_has_the_law_point_by_point(results: Results) -> None:
 
 
 @pytest.mark.slow
-def test_the_verdict_hands_over_a_formula_and_no_name(results: Results) -> None:
+def test_the_verdict_hands_over_a_formula_and_no_name(results: DiscrepancyResults) -> None:
     verdict = results.verdict
-    assert verdict.verdict is Answer.UNKNOWN
+    assert verdict.verdict is Conclusion.UNKNOWN
     assert verdict.effects == ()
     assert verdict.unknown is not None
     told = verdict.unknown.formula
@@ -141,7 +141,9 @@ def test_the_verdict_hands_over_a_formula_and_no_name(results: Results) -> None:
 
 
 @pytest.mark.slow
-def test_the_model_file_carries_the_table_and_the_gap_shrinks(root: Path, results: Results) -> None:
+def test_the_model_file_carries_the_table_and_the_gap_shrinks(
+    root: Path, results: DiscrepancyResults
+) -> None:
     """The file, solved afresh, against the readings themselves."""
     verdict, file = results.verdict, results.model_with_effects
     assert verdict.tabulated is not None

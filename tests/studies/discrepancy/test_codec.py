@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as of_numpy
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.registry import create, registered
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect
@@ -67,14 +67,14 @@ LEAVES = (
     | st.integers()
     | st.floats()
     | st.text()
-    | st.sampled_from(list(Spread))
+    | st.sampled_from(list(PlaceSpread))
     | arrays()
     | arrays().map(lambda one: one.ravel()[:1].sum())
     | st.frozensets(st.text())
     | CASES
     | st.builds(Repeats, CASES, arrays())
 )
-KEYS = st.text() | st.integers() | st.tuples(st.integers(), st.sampled_from(list(Spread)))
+KEYS = st.text() | st.integers() | st.tuples(st.integers(), st.sampled_from(list(PlaceSpread)))
 VALUES = st.recursive(
     LEAVES,
     lambda inner: (

@@ -9,8 +9,13 @@ from search_cases import exponential, grounds_of, one_sided, readings
 from spring_chain_cases import Yield
 
 from spinepipe.calibrate.profile import NORMAL_95
-from spinepipe.effects import Spread
-from spinepipe.studies.discrepancy.curve_numbers import Reach, field_number_rows, reaches, unit_of
+from spinepipe.effects import PlaceSpread
+from spinepipe.studies.discrepancy.curve_numbers import (
+    LoadRange,
+    field_number_rows,
+    reaches,
+    unit_of,
+)
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.model_files import covariance
@@ -20,14 +25,14 @@ RATE = 9.0
 LAWS: dict[str, Yield] = {"flexion": exponential(RATE)}
 STIFFENING = Form(
     Variant("nonlinear_stiffening", (("coordinate", "extension"), ("shape", "exponential"))),
-    Spread.SHARED,
+    PlaceSpread.SHARED,
 )
 ASYMMETRY = Form(
-    Variant("flexion_extension_asymmetry", (("coordinate", "extension"),)), Spread.SHARED
+    Variant("flexion_extension_asymmetry", (("coordinate", "extension"),)), PlaceSpread.SHARED
 )
 COUPLING = Form(
     Variant("bending_rotation_coupling", (("pair", ("right_bending", "left_rotation")),)),
-    Spread.SHARED,
+    PlaceSpread.SHARED,
 )
 
 Found = dict[tuple[str, ...], dict[str, Any]]
@@ -45,9 +50,9 @@ def fits(form: Form, truth: str) -> tuple[JointFit, JointFit]:
     return grounds.fit, fit
 
 
-def loads(fit: JointFit, low: float, high: float) -> dict[tuple[str, str], Reach]:
+def loads(fit: JointFit, low: float, high: float) -> dict[tuple[str, str], LoadRange]:
     joints = next(iter(fit.models.values())).joints
-    return {(joint, "extension"): Reach(low, high) for joint in joints}
+    return {(joint, "extension"): LoadRange(low, high) for joint in joints}
 
 
 def read(
@@ -141,8 +146,8 @@ def test_loads_are_those_listed_or_measured_on_a_rig() -> None:
         {"joint": "L4L5", "coordinate": "anterior", "unit": "N", "load": 0.0, "measured": -80.0},
     ]
     assert reaches(rows) == {
-        ("L4L5", "extension"): Reach(0.0, 5.0),
-        ("L4L5", "anterior"): Reach(-80.0, 0.0),
+        ("L4L5", "extension"): LoadRange(0.0, 5.0),
+        ("L4L5", "anterior"): LoadRange(-80.0, 0.0),
     }
 
 

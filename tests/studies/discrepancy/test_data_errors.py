@@ -14,7 +14,7 @@ from spinepipe.cohort import read
 from spinepipe.model import LoadStep
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
 from spinepipe.studies.discrepancy.search.base import base_model, base_parameters
-from spinepipe.studies.discrepancy.search.grounds import Grounds, Start, laid
+from spinepipe.studies.discrepancy.search.grounds import BaselineModels, Grounds, laid
 from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.inquiry import look
 from spinepipe.studies.discrepancy.search.noise import Noise
@@ -268,7 +268,7 @@ def grounds_of_folder(place: Path) -> Grounds:
     stiffness = np.array([1.5e5, 1.9e6, 1.35e5, *chains.STIFFNESS])
     models = {one.specimen: base_model(cohort, one, stiffness, None) for one in given}
     base = {name: base_parameters(m, "per_specimen", ROTATIONS) for name, m in models.items()}
-    return laid(given, noise(), NuisancePriors(), Start(models, base, 100.0), at_once)
+    return laid(given, noise(), NuisancePriors(), BaselineModels(models, base, 100.0), at_once)
 
 
 def test_an_exchange_that_stiffness_can_hide_is_not_reported() -> None:

@@ -14,7 +14,7 @@ from scipy.stats import multivariate_normal, ncx2, norm
 from spring_chain_cases import SD, readings
 from sweeps import sweep
 
-from spinepipe.effects import Spread, registered
+from spinepipe.effects import PlaceSpread, registered
 from spinepipe.model import SpineModel
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
@@ -22,7 +22,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     STRENGTH_SDS,
     Form,
     Hypothesis,
-    Member,
+    HypothesisMember,
     Supposed,
     Trials,
     Unknown,
@@ -36,8 +36,8 @@ from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.projected import (
     EVERY_TEST,
-    Column,
     Linearised,
+    VariantColumn,
     columns_of,
     drawn,
     linearised,
@@ -47,8 +47,8 @@ from spinepipe.studies.discrepancy.search.projected import (
 from spinepipe.studies.discrepancy.search.refit import laplace
 from spinepipe.studies.discrepancy.search.screen import (
     SIZES,
+    EffectColumns,
     Group,
-    Index,
     Screen,
     exceeded,
     screened,
@@ -133,7 +133,7 @@ def made_up_fit(jacobians: dict[str, Array], members: dict[str, tuple[int, ...]]
     count = 1 + max(max(numbers) for numbers in members.values())
     nothing = cast(SpineModel, None)
     hypothesis = Hypothesis(
-        {name: Member(nothing, (), numbers) for name, numbers in members.items()},
+        {name: HypothesisMember(nothing, (), numbers) for name, numbers in members.items()},
         tuple(unknown(None, 3.0) for _ in range(count)),
         (),
     )
@@ -157,9 +157,9 @@ def left_of(columns: Array, taken: Array) -> Array:
     return columns - taken @ np.linalg.lstsq(taken, columns)[0]
 
 
-@sweep("spread", [Spread.SHARED, Spread.BY_JOINT, Spread.EACH])
+@sweep("spread", [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.EACH])
 @sweep("shared", [0, 1, 2])
-def test_products_are_those_of_dense_projections(spread: Spread, shared: int) -> None:
+def test_products_are_those_of_dense_projections(spread: PlaceSpread, shared: int) -> None:
     """Two specimens with two unknowns of their own and some that they share; three joints."""
     rng = np.random.default_rng(4)
     common = tuple(range(4, 4 + shared))
@@ -168,18 +168,18 @@ def test_products_are_those_of_dense_projections(spread: Spread, shared: int) ->
     fit = made_up_fit(jacobians, members)
     signatures = {name: rng.normal(size=(30, 3)) for name in members}
     problem = problem_of(fit, signatures, 5)
-    columns = [Column(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(3)]
+    columns = [VariantColumn(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(3)]
     form = Form(LAXITY, spread)
-    one = summed(Index(columns), problem, form, (), list(members), ())
+    one = summed(EffectColumns(columns), problem, form, (), list(members), ())
 
     a, b = jacobians["a"], jacobians["b"]
     own = block_diag(a[:, :2], b[:, shared:])
     taken = np.column_stack([own, np.vstack([a[:, 2:], b[:, :shared]])])
     stacked = np.vstack([signatures["a"], signatures["b"]])
     dense = {
-        Spread.SHARED: stacked.sum(axis=1, keepdims=True),
-        Spread.BY_JOINT: stacked,
-        Spread.EACH: block_diag(signatures["a"], signatures["b"]),
+        PlaceSpread.SHARED: stacked.sum(axis=1, keepdims=True),
+        PlaceSpread.BY_JOINT: stacked,
+        PlaceSpread.EACH: block_diag(signatures["a"], signatures["b"]),
     }[spread]
     left = left_of(dense, taken)
     residual = -np.concatenate([fit.residuals["a"], fit.residuals["b"]])
@@ -201,11 +201,11 @@ def test_evidence_of_many_forms_at_once_is_that_of_each() -> None:
     forms = tuple(
         Form(variant, spread, joint, specimen)
         for variant in variants
-        for spread in (Spread.SHARED, Spread.BY_JOINT, Spread.EACH)
+        for spread in (PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.EACH)
         for joint, specimen in places
     )
     trials = Trials("made up", tuple(variants), forms)
-    index = Index(columns_of(trials, 2, ()))
+    index = EffectColumns(columns_of(trials, 2, ()))
     signatures = {name: rng.normal(size=(60, len(index.columns))) for name in members}
     problem = problem_of(fit, signatures, 3)
     whole = screened(trials, index, problem, tuple(members), ())
@@ -233,9 +233,9 @@ def test_draws_of_the_null_have_the_covariance_of_the_products() -> None:
     fit = made_up_fit({name: rng.normal(size=(40, 2)) for name in members}, members)
     signatures = {name: rng.normal(size=(40, 2)) for name in members}
     problem = problem_of(fit, signatures, 20000)
-    columns = [Column(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(2)]
-    form = Form(LAXITY, Spread.BY_JOINT)
-    one = summed(Index(columns), problem, form, (), list(members), ())
+    columns = [VariantColumn(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(2)]
+    form = Form(LAXITY, PlaceSpread.BY_JOINT)
+    one = summed(EffectColumns(columns), problem, form, (), list(members), ())
     found = np.cov(one.moments[:, 1:])
     np.testing.assert_allclose(found, one.gram, atol=5.0 * np.sqrt(2.0 / 20000) * one.gram.max())
     np.testing.assert_allclose(one.moments[:, 1:].mean(axis=1), 0.0, atol=5.0 * np.sqrt(80 / 20000))
@@ -265,9 +265,9 @@ def linear_problem(variant: Variant, size: float) -> tuple[JointFit, float, Arra
     x = np.linalg.lstsq(whole, y)[0]
     off = y - base @ np.linalg.lstsq(base, y)[0]
     on = y - whole @ x
-    form = Form(variant, Spread.SHARED)
+    form = Form(variant, PlaceSpread.SHARED)
     unknowns = (unknown(None, 3.0), unknown(None, 3.0), unknown(0, STRENGTH_SDS * scale, True))
-    member = Member(cast(SpineModel, None), (), (0, 1, 2))
+    member = HypothesisMember(cast(SpineModel, None), (), (0, 1, 2))
     supposed = (Supposed(form, np.zeros(1)),)
     hypothesis = Hypothesis({"a": member}, unknowns, supposed)
     bound = np.zeros(3, dtype=bool)

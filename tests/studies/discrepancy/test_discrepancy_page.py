@@ -31,7 +31,7 @@ from sweeps import sweep
 
 from spinepipe.jobs import draw, report
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.style import picture, style
 from spinepipe.studies.discrepancy.figures.gap_map import worst_places
 from spinepipe.studies.discrepancy.findings import (
@@ -44,11 +44,11 @@ from spinepipe.studies.discrepancy.findings import (
 from spinepipe.studies.discrepancy.kind import KIND, DiscrepancyFiles
 from spinepipe.studies.discrepancy.page import document, left_out, shown_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.verdict import Answer, Verdict, plain_data, verdict_of
+from spinepipe.studies.discrepancy.verdict import Conclusion, Verdict, plain_data, verdict_of
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import general
 from spinepipe.studies.read import check
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 ROOT = Path(__file__).resolve().parents[3]
 NOWHERE = pd.DataFrame()
@@ -60,9 +60,9 @@ def study_of(root: Path) -> Any:
     return check(root, STUDY)
 
 
-def rows_of(made: Mapping[str, pd.DataFrame]) -> Results:
+def rows_of(made: Mapping[str, pd.DataFrame]) -> ResultTables:
     """Results of these tables alone."""
-    return Results(Tables(made), {}, {})
+    return ResultTables(StudyTables(made), {}, {})
 
 
 def drawn(name: str, root: Path, answer: str, **changed: pd.DataFrame) -> Figure:
@@ -210,7 +210,7 @@ def test_two_effects_and_a_set_beside_a_name() -> None:
 
 
 def test_keys_that_are_not_there_are_not_needed() -> None:
-    for answer in Answer:
+    for answer in Conclusion:
         bare = verdict_of({"cohort": "c", "verdict": answer.value})
         assert headline(bare, NOWHERE)
         assert how_sure(bare) == ""
@@ -290,7 +290,7 @@ def test_the_page_opens_with_the_verdict(answer: str, root: Path) -> None:
     study, cohort = study_of(root)
     svg = "<svg xmlns='http://www.w3.org/2000/svg'/>"
     pictures = {one.name: Picture.of(one.name, one.title, svg, "Words.") for one in KIND.figures}
-    found = Results(tables(VERDICTS[answer], frames(answer), root), {}, pictures)
+    found = ResultTables(tables(VERDICTS[answer], frames(answer), root), {}, pictures)
     page = document(study, cohort, found).html(study, cohort)
     assert page == document(study, cohort, found).html(study, cohort)
     assert f'<p class="headline">{HEADLINES[answer]}</p>' in page

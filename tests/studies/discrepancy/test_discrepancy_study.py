@@ -9,11 +9,11 @@ import pytest
 from chain_cases import DEGREES, STUDY, Chains
 from sweeps import sweep
 
-from spinepipe.effects import Spread, Trial, registry
+from spinepipe.effects import PlaceSpread, TriedValues, registry
 from spinepipe.jobs.digest import settings_of
 from spinepipe.jobs.expected import Expected
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
 from spinepipe.studies.discrepancy.checks import effects_to_try
 from spinepipe.studies.discrepancy.kind import KIND, DiscrepancyFiles
@@ -27,7 +27,7 @@ BASE = "base: {stiffness: per_specimen}\n"
 class Slack:
     """Stands for an effect that may be tried."""
 
-    trial: ClassVar[Trial] = Trial(({},), (Spread.SHARED,), "any test")
+    trial: ClassVar[TriedValues] = TriedValues(({},), (PlaceSpread.SHARED,), "any test")
 
 
 @pytest.fixture(autouse=True)
@@ -49,7 +49,7 @@ def write(made: Chains, root: Path, study: str = BASE) -> None:
     (root / FILE).write_text(head + study)
 
 
-def complaints(root: Path) -> tuple[Problem, ...]:
+def complaints(root: Path) -> tuple[InputProblem, ...]:
     with pytest.raises(InputError) as caught:
         studies.check(root, STUDY)
     return caught.value.problems

@@ -12,7 +12,7 @@ from test_discrepancy_page import drawn, said
 
 from spinepipe.studies.discrepancy.figures.evidence_by_round import (
     MOST_ROUNDS,
-    Round,
+    EvidenceRound,
     chosen,
     rounds,
 )
@@ -151,7 +151,7 @@ def test_the_matrix_has_every_effect_with_evidence(many: int, root: Path) -> Non
 def test_of_many_rounds_those_that_led_to_something_are_shown() -> None:
     empty = pd.DataFrame()
     many = [
-        Round(str(n), (), (), False, empty, {"creep": "entered"} if n in (13, 17) else {})
+        EvidenceRound(str(n), (), (), False, empty, {"creep": "entered"} if n in (13, 17) else {})
         for n in range(20)
     ]
     kept = [int(one.stage) for one in chosen(many)]

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search.examination import examined
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Trials, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Stage
+from spinepipe.studies.discrepancy.search.inquiry import Inquiry, SearchStage
 from spinepipe.studies.discrepancy.search.refit import Refit, preferred
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, Tried
 
@@ -23,7 +23,7 @@ NAMES = ("neutral_zone", "nonlinear_stiffening", "facet_contact")
 
 def supposed(name: str) -> Supposed:
     variant = Variant(name, (("coordinate", "extension"),))
-    return Supposed(Form(variant, Spread.SHARED), variant.off((0.0,) * len(variant.shapes)))
+    return Supposed(Form(variant, PlaceSpread.SHARED), variant.off((0.0,) * len(variant.shapes)))
 
 
 def on_screen(name: str, log_evidence: float) -> Tried:
@@ -60,14 +60,14 @@ class Says:
     )
 
     @property
-    def first(self) -> Stage:
+    def first(self) -> SearchStage:
         return self.stage(Place(()))
 
     def beside(self, current: Place, others: tuple[Supposed, ...]) -> Place | None:
         names = tuple(one.form.name for one in others)
         return None if names in self.no_fit else Place(names)
 
-    def stage(self, place: Place, in_place_of: str = "") -> Stage:
+    def stage(self, place: Place, in_place_of: str = "") -> SearchStage:
         self.asked.append(place.names)
         evidence = self.evidence.get(place.names, {})
         tried = tuple(self._refit(place, name) for name in evidence)
@@ -75,7 +75,7 @@ class Says:
             Screened(n, evidence.get(n, 0.0), np.zeros(1), (on_screen(n, evidence.get(n, 0.0)),))
             for n in sorted(NAMES, key=lambda name: -evidence.get(name, 0.0))
         )
-        return Stage("", Screen(effects, NEEDED, 100), tried, bool(in_place_of))
+        return SearchStage("", Screen(effects, NEEDED, 100), tried, bool(in_place_of))
 
     def refit(self, place: Place, one: Supposed) -> Refit:
         return self._refit(place, one.form.name)

@@ -8,21 +8,23 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search import examination
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Rival, Stage
+from spinepipe.studies.discrepancy.search.inquiry import Rival, SearchStage
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, Tried
 
 MARGIN, NEEDED = 3.0, 5.0
 
 
-def form(name: str, spread: Spread = Spread.SHARED, coordinate: str = "extension") -> Form:
+def form(
+    name: str, spread: PlaceSpread = PlaceSpread.SHARED, coordinate: str = "extension"
+) -> Form:
     return Form(Variant(name, (("coordinate", coordinate),)), spread)
 
 
 def refitted(
-    name: str, log_evidence: float, unknowns: int = 1, spread: Spread = Spread.SHARED
+    name: str, log_evidence: float, unknowns: int = 1, spread: PlaceSpread = PlaceSpread.SHARED
 ) -> Any:
     return SimpleNamespace(
         name=name,
@@ -43,7 +45,7 @@ def test_a_form_gives_way_to_a_clearly_better_one_of_its_effect(
     lead: float, gives_way: bool
 ) -> None:
     """By three, whatever the margin between effects is."""
-    own, other = refitted("a", 40.0), refitted("a", 40.0 + lead, 3, Spread.EACH)
+    own, other = refitted("a", 40.0), refitted("a", 40.0 + lead, 3, PlaceSpread.EACH)
     for margin in (0.5, 9.0):
         found = examination._better(OWN, own, [own, other], margin)
         assert found is (other if gives_way else None)
@@ -52,7 +54,7 @@ def test_a_form_gives_way_to_a_clearly_better_one_of_its_effect(
 @sweep("lead, gives_way", [(5.99, False), (6.01, True)])
 def test_another_effect_must_be_ahead_of_the_best_form(lead: float, gives_way: bool) -> None:
     """The plainest form stands, three behind the best of its effect; the margin comes on top."""
-    own, best = refitted("a", 40.0), refitted("a", 43.0, 3, Spread.EACH)
+    own, best = refitted("a", 40.0), refitted("a", 43.0, 3, PlaceSpread.EACH)
     other = refitted("b", 40.0 + lead)
     assert examination._better(OWN, own, [own, best, other], MARGIN) is (
         other if gives_way else None
@@ -62,7 +64,7 @@ def test_another_effect_must_be_ahead_of_the_best_form(lead: float, gives_way: b
 def test_the_best_form_counts_for_three_more_than_the_plainest_at_most() -> None:
     own = refitted("a", 40.0)
     for best, counted in ((39.0, 40.0), (42.0, 42.0), (50.0, 43.0)):
-        tried = [refitted("a", best, 3, Spread.EACH), refitted("b", 90.0)]
+        tried = [refitted("a", best, 3, PlaceSpread.EACH), refitted("b", 90.0)]
         assert examination._of_effect(own, tried) == counted
 
 
@@ -87,7 +89,12 @@ def test_a_rival_is_kept_once_by_its_smallest_margin_nearest_first() -> None:
 
 def test_rivals_have_the_evidence_of_their_best_refit_or_of_the_screen() -> None:
     own = refitted("a", 40.0)
-    tried = [own, refitted("b", 30.0), refitted("b", 35.0, 3, Spread.EACH), refitted("c", -np.inf)]
+    tried = [
+        own,
+        refitted("b", 30.0),
+        refitted("b", 35.0, 3, PlaceSpread.EACH),
+        refitted("c", -np.inf),
+    ]
     effects = [
         Screened(name, evidence, np.zeros(1), (Tried(form(name), (), (), 0.0, np.zeros(0), 0.0),))
         for name, evidence in (("a", 44.0), ("b", 99.0), ("c", 20.0), ("d", 12.0))
@@ -106,9 +113,9 @@ class Asked:
         self.tried, self.places = tried, list[tuple[Any, str]]()
         self.rules = SimpleNamespace(margin=MARGIN, trials=[Trials(name, (), ()) for name in names])
 
-    def stage(self, grounds: Any, in_place_of: str) -> Stage:
+    def stage(self, grounds: Any, in_place_of: str) -> SearchStage:
         self.places.append((grounds.there, in_place_of))
-        return Stage("", Screen((), NEEDED, 1), self.tried, True)
+        return SearchStage("", Screen((), NEEDED, 1), self.tried, True)
 
 
 def grounds(there: Any = None) -> Any:
@@ -119,15 +126,15 @@ def two(inquiry: Asked, own: Any, *tried: Any) -> Any:
     return examination._two_simpler(grounds(), own, tried, inquiry)  # type: ignore[arg-type]
 
 
-MANY = refitted("a", 40.0, 6, Spread.EACH)
+MANY = refitted("a", 40.0, 6, PlaceSpread.EACH)
 
 
 def test_two_plain_effects_stand_for_one_of_many_unknowns() -> None:
     inquiry = Asked(refitted("c", 12.0), refitted("d", 15.0), MANY)
     found = two(inquiry, MANY, MANY, refitted("b", 30.0), refitted("e", 29.0))
-    assert inquiry.places == [(("b", Spread.SHARED), "a, beside b")]
+    assert inquiry.places == [(("b", PlaceSpread.SHARED), "a, beside b")]
     assert found.forms == (form("b"), form("d"))
-    assert found.grounds.there == ("d", Spread.SHARED)
+    assert found.grounds.there == ("d", PlaceSpread.SHARED)
     assert found.lead == pytest.approx(5.0)
 
 
@@ -162,7 +169,11 @@ def test_together_they_are_no_more_than_the_margin_behind(second: float, found: 
 
 
 def over(
-    spread: Spread, name: str = "a", coordinate: str = "extension", plain: float = 30.0, **more: Any
+    spread: PlaceSpread,
+    name: str = "a",
+    coordinate: str = "extension",
+    plain: float = 30.0,
+    **more: Any,
 ) -> tuple[float | None, list[Any]]:
     inquiry: Any = Asked(**more)
     asked: list[Any] = []
@@ -177,20 +188,20 @@ def over(
     return examination._over_stiffness(grounds(), own, inquiry), asked
 
 
-@sweep("spread", [Spread.BY_JOINT, Spread.EACH])
-def test_many_strengths_are_held_against_a_stiffness_of_each_joint(spread: Spread) -> None:
+@sweep("spread", [PlaceSpread.BY_JOINT, PlaceSpread.EACH])
+def test_many_strengths_are_held_against_a_stiffness_of_each_joint(spread: PlaceSpread) -> None:
     """That starts a hundredth above off."""
     ahead, (one,) = over(spread)
     assert ahead == 10.0
-    assert (one.form.name, one.form.spread) == ("level_dependence", Spread.EACH)
+    assert (one.form.name, one.form.spread) == ("level_dependence", PlaceSpread.EACH)
     assert one.form.variant.acts_on == ("extension",)
     assert one.start == pytest.approx([np.exp(0.01)])
 
 
 def test_few_strengths_and_stiffness_itself_are_held_against_nothing() -> None:
-    assert over(Spread.SHARED) == (None, [])
-    assert over(Spread.BY_SPECIMEN) == (None, [])
-    assert over(Spread.EACH, "level_dependence") == (None, [])
-    assert over(Spread.EACH, names=("b",)) == (None, [])
-    assert over(Spread.EACH, coordinate="all") == (None, [])
-    assert over(Spread.EACH, plain=-np.inf)[0] is None
+    assert over(PlaceSpread.SHARED) == (None, [])
+    assert over(PlaceSpread.BY_SPECIMEN) == (None, [])
+    assert over(PlaceSpread.EACH, "level_dependence") == (None, [])
+    assert over(PlaceSpread.EACH, names=("b",)) == (None, [])
+    assert over(PlaceSpread.EACH, coordinate="all") == (None, [])
+    assert over(PlaceSpread.EACH, plain=-np.inf)[0] is None

@@ -251,7 +251,7 @@ def test_nuisances_are_taken_again_until_the_base_stays_within_a_tenth(
     monkeypatch.setattr(grounded, "with_nuisances", lambda plain, moved: moved)
     monkeypatch.setattr(grounded, "hypothesis", lambda models, *_: models)
     noise: Any = SimpleNamespace(source=grounded.REPEATS, zeroed=False)
-    start = grounded.Start({}, {}, 9.0)
+    start = grounded.BaselineModels({}, {}, 9.0)
     one: Any = SimpleNamespace(specimen="a", cases=())
     found = grounded.laid([one], noise, None, start, None)  # type: ignore[arg-type]
     assert len(asked) == 1 + fitted

@@ -10,7 +10,7 @@ from search_cases import JOINTS, Array
 from sweeps import sweep
 
 from spinepipe.cohort.specimen import cables
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.model import ScopedEffect
 from spinepipe.model.file import effects_for, read_model, write_model
 from spinepipe.statics import moved
@@ -18,7 +18,7 @@ from spinepipe.studies.discrepancy.search.base import base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (
     Form,
     Hypothesis,
-    Member,
+    HypothesisMember,
     Supposed,
     Unknown,
     Variant,
@@ -55,28 +55,28 @@ def motion(model: object) -> Array:
     return np.concatenate(simulated.at(np.zeros(0)).readings)
 
 
-def one(variant: Variant, spread: Spread, *place: object) -> Supposed:
+def one(variant: Variant, spread: PlaceSpread, *place: object) -> Supposed:
     start = variant.off((0.0,) * len(variant.shapes))
     return Supposed(Form(variant, spread, *place), start)  # type: ignore[arg-type]
 
 
 SUPPOSED = {
     "nothing": (),
-    "shared": (one(ASYMMETRY, Spread.SHARED),),
-    "by specimen": (one(ASYMMETRY, Spread.BY_SPECIMEN),),
-    "by joint": (one(ASYMMETRY, Spread.BY_JOINT),),
-    "each": (one(ASYMMETRY, Spread.EACH),),
-    "one joint": (one(ASYMMETRY, Spread.ONE_JOINT, 1),),
-    "one joint of the first": (one(LAXITY, Spread.ONE, 1, "a"),),
-    "one joint of the last": (one(LAXITY, Spread.ONE, 2, "b"),),
-    "by test": (one(OFFSET, Spread.BY_TEST),),
-    "shared load": (one(OFFSET, Spread.SHARED),),
+    "shared": (one(ASYMMETRY, PlaceSpread.SHARED),),
+    "by specimen": (one(ASYMMETRY, PlaceSpread.BY_SPECIMEN),),
+    "by joint": (one(ASYMMETRY, PlaceSpread.BY_JOINT),),
+    "each": (one(ASYMMETRY, PlaceSpread.EACH),),
+    "one joint": (one(ASYMMETRY, PlaceSpread.ONE_JOINT, 1),),
+    "one joint of the first": (one(LAXITY, PlaceSpread.ONE, 1, "a"),),
+    "one joint of the last": (one(LAXITY, PlaceSpread.ONE, 2, "b"),),
+    "by test": (one(OFFSET, PlaceSpread.BY_TEST),),
+    "shared load": (one(OFFSET, PlaceSpread.SHARED),),
     "several": (
-        one(LAXITY, Spread.ONE, 0, "b"),
-        one(OFFSET, Spread.BY_TEST),
-        one(OFFSET, Spread.SHARED),
-        one(LAXITY, Spread.ONE, 1, "a"),
-        one(Variant("facet_contact", ()), Spread.EACH),
+        one(LAXITY, PlaceSpread.ONE, 0, "b"),
+        one(OFFSET, PlaceSpread.BY_TEST),
+        one(OFFSET, PlaceSpread.SHARED),
+        one(LAXITY, PlaceSpread.ONE, 1, "a"),
+        one(Variant("facet_contact", ()), PlaceSpread.EACH),
     ),
 }
 
@@ -96,7 +96,7 @@ def test_files_read_back_move_as_the_fit_does(name: str, tmp_path: Path) -> None
 
 
 def test_a_base_may_have_an_effect_in_one_specimen_alone(tmp_path: Path) -> None:
-    fit = fitted(one(OFFSET, Spread.SHARED))
+    fit = fitted(one(OFFSET, PlaceSpread.SHARED))
     model = fit.models["b"]
     lax = ScopedEffect(LAXITY.create(), (1,), np.array([[0.4]]))
     bushing, *behind = model.effects
@@ -111,7 +111,7 @@ def test_a_base_may_have_an_effect_in_one_specimen_alone(tmp_path: Path) -> None
 
 def test_follower_loads_of_the_cohort_are_left_out_of_the_file(tmp_path: Path) -> None:
     """They come between base and what is supposed; whoever reads the file has the cohort."""
-    fit = fitted(one(OFFSET, Spread.SHARED))
+    fit = fitted(one(OFFSET, PlaceSpread.SHARED))
     pressed = {
         name: model.with_effects(
             (model.effects[0], *cables({"flexion": 100.0}, model.n_joints), *model.effects[1:])
@@ -127,11 +127,13 @@ def test_follower_loads_of_the_cohort_are_left_out_of_the_file(tmp_path: Path) -
 
 
 def test_specimens_differ_where_the_fit_says_so() -> None:
-    file = model_file(fitted(one(ASYMMETRY, Spread.EACH)), "m", "chains")
+    file = model_file(fitted(one(ASYMMETRY, PlaceSpread.EACH)), "m", "chains")
     rows = {(row.specimen, row.joint): row.parameters for row in file.effects[1].values}
     assert set(rows) == {(s, j) for s in NAMES for j in chains.JOINTS[:JOINTS]}
     assert len({row["asymmetry"] for row in rows.values()}) == 2 * JOINTS
-    (shared,) = model_file(fitted(one(ASYMMETRY, Spread.SHARED)), "m", "chains").effects[1].values
+    (shared,) = (
+        model_file(fitted(one(ASYMMETRY, PlaceSpread.SHARED)), "m", "chains").effects[1].values
+    )
     assert (shared.specimen, shared.joint) == ("*", "*")
 
 
@@ -143,8 +145,8 @@ def fit_of(variant: Variant, column: int, start: float, move: float, at_bound: b
     values = np.array([p.default for p in variant.create().parameters])
     values[column] = start
     u = Unknown("", 0, column, ("a", "L4L5"), True, -9.0, 9.0, 0.0, 1.0)
-    supposed = (Supposed(Form(variant, Spread.ONE, 1, "a"), values),)
-    member = Member(chains.model("a", chains.STIFFNESS), (), (0,))
+    supposed = (Supposed(Form(variant, PlaceSpread.ONE, 1, "a"), values),)
+    member = HypothesisMember(chains.model("a", chains.STIFFNESS), (), (0,))
     started = Hypothesis({"a": member}, (u,), supposed)
     bound = np.array([at_bound])
     return JointFit(started, np.array([move]), {}, 1.0, {}, {}, {}, {}, bound, "")

@@ -18,7 +18,7 @@ from spinepipe.studies.discrepancy.proof.folds import (
     SPECIMEN,
     TEST,
     Fold,
-    Part,
+    FoldFit,
     folds_by_test,
     step_fold,
 )
@@ -85,7 +85,7 @@ def told(errors: Mapping[str, Array], kind: str) -> tuple[Array, FoldModels]:
         of_test = {"a": (one.reshape(4, 1, 1),)}
         setattr(models, name, SimpleNamespace(standard_errors=lambda part, of=of_test: of))
     steps = {"a": (np.array([True, True, False, True]),)}
-    part = Part({}, steps)
+    part = FoldFit({}, steps)
     return models._scored(Fold("f", kind, (part,)), part)["a"][0].ravel(), models
 
 
@@ -117,12 +117,12 @@ def two() -> Grounds:
     return grounds(read({"a": 40.0, "b": 60.0}, TESTS, zone=False))
 
 
-def everything(at: Grounds) -> Part:
+def everything(at: Grounds) -> FoldFit:
     steps = {
         name: tuple(np.full(len(case.steps), True) for case in one.cases)
         for name, one in at.readings.items()
     }
-    return Part(steps, steps)
+    return FoldFit(steps, steps)
 
 
 def test_a_fit_to_everything_ends_where_the_full_fit_did(two: Grounds) -> None:

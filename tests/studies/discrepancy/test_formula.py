@@ -16,8 +16,13 @@ from spinepipe.statics import FreeParameter
 from spinepipe.studies.discrepancy.search.formula import formula, text_of
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, tell_time, term_columns
-from spinepipe.studies.discrepancy.search.prediction import Solved
-from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, Candidate, Problem, _Part
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
+from spinepipe.studies.discrepancy.search.pursuit import (
+    EVERYWHERE,
+    PursuitProblem,
+    TermAtPlace,
+    _WhitenedColumns,
+)
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 from spinepipe.units import ROTATIONS
 
@@ -152,7 +157,7 @@ def test_columns_are_sensitivities_to_the_effect(coordinate: str, words: str) ->
     idle = ScopedEffect(term.variant.create(), (1,), np.zeros((1, 1)))
     full = model.with_effects((*model.effects, idle))
     free = FreeParameter("", len(model.effects), 0, (0,), False)
-    expected = np.concatenate(Solved(model, given, False).by(full, [free]))[..., 0]
+    expected = np.concatenate(SolvedSpecimen(model, given, False).by(full, [free]))[..., 0]
     size = np.abs(expected).max()
     np.testing.assert_allclose(column(coordinate, words, 1), expected, rtol=0, atol=1e-9 * size)
 
@@ -161,7 +166,7 @@ def test_the_joint_above_moves_as_its_neighbour_says() -> None:
     """Upright springs in pure moments: a load on a joint turns that joint alone, by load / k."""
     at, name, column = columns_at(2)
     model, given = at.fit.models[name], at.readings[name].cases
-    poses = np.concatenate(Solved(model, given, False).poses)
+    poses = np.concatenate(SolvedSpecimen(model, given, False).poses)
     k = model.effects[0].values[0, 3]
     moved = column("extension", "extension of the joint above", 0)
     np.testing.assert_allclose(moved[:, 0, 3], -poses[:, 1, 3] / k, rtol=1e-6, atol=1e-12)
@@ -181,7 +186,7 @@ def test_time_tells_rates_where_it_goes_on() -> None:
 # The pursuit, on columns of random numbers
 
 
-def made_up(seed: int, weights: Mapping[Candidate, float], draws: int = 300) -> Problem:
+def made_up(seed: int, weights: Mapping[TermAtPlace, float], draws: int = 300) -> PursuitProblem:
     """Two specimens, two joints, five terms; readings are candidates' columns, and noise."""
     rng = np.random.default_rng(seed)
     terms = tuple(LawTerm("extension", "load", f"t{n}", (0, n, 0, 0)) for n in range(5))
@@ -189,17 +194,17 @@ def made_up(seed: int, weights: Mapping[Candidate, float], draws: int = 300) -> 
     for _ in range(2):
         each = rng.normal(size=(60, 5, 2))
         whole = np.concatenate([each.sum(axis=-1, keepdims=True), each], axis=-1).reshape(60, 15)
-        parts.append(_Part(whole, np.sum(whole**2, axis=0)))
+        parts.append(_WhitenedColumns(whole, np.sum(whole**2, axis=0)))
     shared = np.linalg.qr(rng.normal(size=(120, 3))).Q
     errors = rng.normal(size=(120, 1 + draws))
-    bare = Problem(terms, 2, tuple(parts), (0, 60, 120), shared, errors, 117.0)
+    bare = PursuitProblem(terms, 2, tuple(parts), (0, 60, 120), shared, errors, 117.0)
     for candidate, weight in weights.items():
         errors[:, 0] += weight * bare.column(candidate)
     errors = errors - shared @ (shared.T @ errors)
-    return Problem(terms, 2, tuple(parts), (0, 60, 120), shared, errors, 117.0)
+    return PursuitProblem(terms, 2, tuple(parts), (0, 60, 120), shared, errors, 117.0)
 
 
-ALL, ONE = Candidate(1, EVERYWHERE, EVERYWHERE), Candidate(3, 1, 0)
+ALL, ONE = TermAtPlace(1, EVERYWHERE, EVERYWHERE), TermAtPlace(3, 1, 0)
 
 
 def test_what_is_above_the_noise_is_of_the_data_alone() -> None:
@@ -214,7 +219,7 @@ def test_drops_of_chi2_are_those_of_least_squares() -> None:
     problem = made_up(1, {ALL: 1.0, ONE: 1.0})
     ranked = problem.ranked([ALL], FALSE_ALARM)
 
-    def chi2(*there: Candidate) -> float:
+    def chi2(*there: TermAtPlace) -> float:
         columns = np.column_stack([problem.shared, *(problem.column(one) for one in there)])
         return float(np.linalg.lstsq(columns, problem.errors[:, 0])[1][0])
 
@@ -247,7 +252,7 @@ def test_noise_alone_passes_as_seldom_as_is_allowed() -> None:
     problem = made_up(9, {}, draws=800)
     for draw in range(1, 401):
         errors = np.column_stack([problem.errors[:, draw], problem.errors[:, 401:]])
-        one = Problem(
+        one = PursuitProblem(
             problem.terms, 2, problem.parts, problem.rows, problem.shared, errors, problem.freedom
         )
         ranked = one.ranked([], FALSE_ALARM)

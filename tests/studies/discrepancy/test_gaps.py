@@ -9,7 +9,7 @@ from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import law_terms
-from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, Place, _spread, places, worst
+from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, GapPlace, _spread, places, worst
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 
@@ -40,8 +40,12 @@ def test_gaps_are_pooled_by_each_place_once() -> None:
 def test_the_worst_places_are_those_above_the_noise_largest_first() -> None:
     by = "joint x coordinate x test"
     clear, clearer = Gap(300.0, 100.0, 100), Gap(400.0, 100.0, 100)
-    made = [Place(by, {}, clear), Place(by, {}, Gap(101.0, 100.0, 100)), Place(by, {}, clearer)]
-    made.append(Place("joint", {}, Gap(900.0, 100.0, 100)))
+    made = [
+        GapPlace(by, {}, clear),
+        GapPlace(by, {}, Gap(101.0, 100.0, 100)),
+        GapPlace(by, {}, clearer),
+    ]
+    made.append(GapPlace("joint", {}, Gap(900.0, 100.0, 100)))
     assert [one.gap for one in worst(made, 5)] == [clearer, clear]
     assert [one.gap for one in worst(made, 1)] == [clearer]
 
@@ -63,13 +67,15 @@ def test_values_are_spread_over_what_was_read_test_by_test() -> None:
 # Terms of a law
 
 
-def state(joints: int, timed: bool) -> law_terms._State:
+def state(joints: int, timed: bool) -> law_terms._TestState:
     rng = np.random.default_rng(20005)
     q, rate, load = rng.normal(size=(3, 4, joints, 6))
-    return law_terms._State(q, rate if timed else None, rng.integers(-1, 2, q.shape) * 1.0, load)
+    return law_terms._TestState(
+        q, rate if timed else None, rng.integers(-1, 2, q.shape) * 1.0, load
+    )
 
 
-def said(words: str, name: str, at: law_terms._State) -> Array:
+def said(words: str, name: str, at: law_terms._TestState) -> Array:
     """(T, J) what words say: products and powers of motions by their names, and single words."""
     own = COORDINATES.index(name)
     word = name.replace("_", " ")

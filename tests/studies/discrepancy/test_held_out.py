@@ -19,7 +19,7 @@ from held_out_cases import (
 from scipy.spatial.transform import Rotation
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.proof import fold_models
 from spinepipe.studies.discrepancy.proof.held_out import (
@@ -128,8 +128,10 @@ def test_a_left_out_specimen_has_the_others_zone_and_its_own_stiffness() -> None
     assert other.with_effects.rms < 1.15
 
 
-@sweep("spread", [Spread.BY_SPECIMEN, Spread.EACH])
-def test_strengths_of_a_left_out_specimen_start_where_the_full_fit_has_them(spread: Spread) -> None:
+@sweep("spread", [PlaceSpread.BY_SPECIMEN, PlaceSpread.EACH])
+def test_strengths_of_a_left_out_specimen_start_where_the_full_fit_has_them(
+    spread: PlaceSpread,
+) -> None:
     # not where the other specimens leave them: switched off, at a bound, and there to stay
     readings = read({"a": 40.0, "b": 60.0}, ("flexion", "bending"), zone=True)
     search = found(grounds(readings), True, spread)

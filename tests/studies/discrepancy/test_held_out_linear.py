@@ -9,8 +9,8 @@ from held_out_cases import cases, noise, noisy, serial
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.proof.fold_linear import LinearFolds, LinearModel, Tangent
 from spinepipe.studies.discrepancy.proof.folds import (
-    Chosen,
-    Part,
+    ChosenSteps,
+    FoldFit,
     folds_by_specimen,
     folds_by_test,
     step_fold,
@@ -101,8 +101,10 @@ def explicit(
     return moved, np.linalg.inv(inside)
 
 
-def check(model: LinearModel, readings: dict[str, SpecimenReadings], part: Part, x: Array) -> None:
-    placed = LinearFolds(model, Chosen(readings, noise())).placed(part)
+def check(
+    model: LinearModel, readings: dict[str, SpecimenReadings], part: FoldFit, x: Array
+) -> None:
+    placed = LinearFolds(model, ChosenSteps(readings, noise())).placed(part)
     assert set(placed.motion) == set(part.scored)
     for name in part.scored:
         one = model.members[name]
@@ -117,7 +119,7 @@ def check(model: LinearModel, readings: dict[str, SpecimenReadings], part: Part,
 
 
 def trained(
-    model: LinearModel, readings: dict[str, SpecimenReadings], part: Part
+    model: LinearModel, readings: dict[str, SpecimenReadings], part: FoldFit
 ) -> dict[str, Dense]:
     return {
         name: Dense(one, readings[name], part.training[name]) for name, one in model.members.items()
@@ -164,7 +166,7 @@ def test_standard_errors_and_open_nuisances_are_those_of_the_training() -> None:
     dense = trained(model, readings, part)
     every, none = np.arange(len(model.mean)), np.zeros(len(model.mean))
     _, covariance = explicit(model, dense, every, none, with_nuisances=False)
-    folds = LinearFolds(model, Chosen(readings, noise()))
+    folds = LinearFolds(model, ChosenSteps(readings, noise()))
     for name, one in model.members.items():
         own = covariance[np.ix_(one.numbers, one.numbers)]
         se = np.sqrt(np.einsum("tjkm,mn,tjkn->tjk", one.by_x[0], own, one.by_x[0]))

@@ -7,7 +7,7 @@ from held_out_cases import JOINTS, MOMENTS_NM, SD, found, grounds, read
 from spinepipe.statics import moved
 from spinepipe.studies.discrepancy.proof.fold_linear import surrogate, tangent
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
-from spinepipe.studies.discrepancy.search.prediction import Simulated, Solved
+from spinepipe.studies.discrepancy.search.prediction import Simulated, SolvedSpecimen
 
 STEPS = len(MOMENTS_NM)
 
@@ -41,7 +41,7 @@ def test_nuisances_of_the_tangent_have_the_covariance_of_their_priors() -> None:
     )
     # linearised at the fit before nuisances were allowed for: 1e-4 away
     cases = readings[0].cases
-    solved = Solved(base.fit.models["a"], cases, False)
+    solved = SolvedSpecimen(base.fit.models["a"], cases, False)
     moved_by = nuisance_signatures(solved, priors)
     given = np.concatenate([one[..., 3:, :].reshape(-1, one.shape[-1]) for one in moved_by])
     assert columns @ columns.T == pytest.approx(given @ given.T, rel=1e-3, abs=(1e-2 * SD) ** 2)

@@ -7,7 +7,7 @@ import pytest
 import spring_chain_cases as chains
 from sweeps import sweep
 
-from spinepipe.effects import Parameter, Spread, registered
+from spinepipe.effects import Parameter, PlaceSpread, registered
 from spinepipe.model import SpineModel
 from spinepipe.statics import free_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (
@@ -58,8 +58,8 @@ def test_what_acts_on_nothing_that_was_read_is_not_tried() -> None:
         assert all(pair <= set(ROTATIONS) or not pair & set(ROTATIONS) for pair in pairs)
 
 
-def places(specimens: str) -> dict[Spread, list[tuple[int | None, str | None]]]:
-    found: dict[Spread, list[tuple[int | None, str | None]]] = {}
+def places(specimens: str) -> dict[PlaceSpread, list[tuple[int | None, str | None]]]:
+    found: dict[PlaceSpread, list[tuple[int | None, str | None]]] = {}
     for form in only("neutral_zone", ("extension",), specimens).forms:
         if form.variant == ZONE:
             found.setdefault(form.spread, []).append((form.joint, form.specimen))
@@ -68,22 +68,22 @@ def places(specimens: str) -> dict[Spread, list[tuple[int | None, str | None]]]:
 
 def test_each_way_to_differ_is_tried_at_each_place() -> None:
     everywhere, joints = [(None, None)], range(JOINTS)
-    whole = (Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH)
+    whole = (PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN, PlaceSpread.EACH)
     assert places("ab") == {
         **dict.fromkeys(whole, everywhere),
-        Spread.ONE_JOINT: [(joint, None) for joint in joints],
-        Spread.ONE: [(joint, specimen) for specimen in "ab" for joint in joints],
+        PlaceSpread.ONE_JOINT: [(joint, None) for joint in joints],
+        PlaceSpread.ONE: [(joint, specimen) for specimen in "ab" for joint in joints],
     }
 
 
 def test_of_one_specimen_no_other_differs() -> None:
     assert places("a") == {
-        Spread.SHARED: [(None, None)],
-        Spread.BY_JOINT: [(None, None)],
-        Spread.ONE_JOINT: [(joint, None) for joint in range(JOINTS)],
+        PlaceSpread.SHARED: [(None, None)],
+        PlaceSpread.BY_JOINT: [(None, None)],
+        PlaceSpread.ONE_JOINT: [(joint, None) for joint in range(JOINTS)],
     }
     (spread,) = {form.spread for form in only("local_laxity", specimens="a").forms}
-    assert spread is Spread.ONE_JOINT
+    assert spread is PlaceSpread.ONE_JOINT
 
 
 def test_shares_of_an_effect_are_equal_by_variant_way_and_place() -> None:
@@ -91,9 +91,9 @@ def test_shares_of_an_effect_are_equal_by_variant_way_and_place() -> None:
     shares = {form: np.exp(tried.log_share(form)) for form in tried.forms}
     assert sum(shares.values()) == pytest.approx(1.0)
     ways = len(tried.variants) * 6
-    assert shares[Form(ZONE, Spread.SHARED)] == pytest.approx(1.0 / ways)
-    assert shares[Form(ZONE, Spread.ONE_JOINT, 1)] == pytest.approx(1.0 / (3 * ways))
-    assert shares[Form(ZONE, Spread.ONE, 2, "b")] == pytest.approx(1.0 / (6 * ways))
+    assert shares[Form(ZONE, PlaceSpread.SHARED)] == pytest.approx(1.0 / ways)
+    assert shares[Form(ZONE, PlaceSpread.ONE_JOINT, 1)] == pytest.approx(1.0 / (3 * ways))
+    assert shares[Form(ZONE, PlaceSpread.ONE, 2, "b")] == pytest.approx(1.0 / (6 * ways))
 
 
 # Shapes
@@ -167,13 +167,13 @@ def test_base_stiffness_is_open_within_a_factor() -> None:
 @sweep(
     "form, expected",
     [
-        (Form(ZONE, Spread.SHARED), [()]),
-        (Form(ZONE, Spread.BY_JOINT), [("L5S1",), ("L4L5",), ("L3L4",)]),
-        (Form(ZONE, Spread.BY_SPECIMEN), [("a",), ("b",)]),
-        (Form(ZONE, Spread.EACH), [(s, j) for s in "ab" for j in ("L5S1", "L4L5", "L3L4")]),
-        (Form(ZONE, Spread.ONE_JOINT, 1), [("L4L5",)]),
-        (Form(ZONE, Spread.ONE, 2, "b"), [("b", "L3L4")]),
-        (Form(OFFSET, Spread.BY_TEST), [("flexion",), ("bending",)]),
+        (Form(ZONE, PlaceSpread.SHARED), [()]),
+        (Form(ZONE, PlaceSpread.BY_JOINT), [("L5S1",), ("L4L5",), ("L3L4",)]),
+        (Form(ZONE, PlaceSpread.BY_SPECIMEN), [("a",), ("b",)]),
+        (Form(ZONE, PlaceSpread.EACH), [(s, j) for s in "ab" for j in ("L5S1", "L4L5", "L3L4")]),
+        (Form(ZONE, PlaceSpread.ONE_JOINT, 1), [("L4L5",)]),
+        (Form(ZONE, PlaceSpread.ONE, 2, "b"), [("b", "L3L4")]),
+        (Form(OFFSET, PlaceSpread.BY_TEST), [("flexion",), ("bending",)]),
     ],
 )
 def test_strengths_are_of_their_places(form: Form, expected: list[tuple[str, ...]]) -> None:
@@ -185,7 +185,7 @@ def test_strengths_are_of_their_places(form: Form, expected: list[tuple[str, ...
 
 
 def test_shapes_are_the_same_at_all_places() -> None:
-    found = supposed(Form(ZONE, Spread.EACH))
+    found = supposed(Form(ZONE, PlaceSpread.EACH))
     shapes = [one for one in of_effects(found) if not one.is_strength]
     assert [one.column for one in shapes] == [1, 2]
     for one in shapes:
@@ -197,7 +197,7 @@ def test_shapes_are_the_same_at_all_places() -> None:
 
 
 def test_an_effect_of_one_place_stands_in_its_specimen_alone() -> None:
-    found = supposed(Form(ZONE, Spread.ONE, 2, "b"))
+    found = supposed(Form(ZONE, PlaceSpread.ONE, 2, "b"))
     assert effects_in(found, "a") == ["linear_bushing"]
     assert len(found.members["a"].numbers) == 1
     scoped = found.members["b"].model.effects[1]
@@ -205,7 +205,7 @@ def test_an_effect_of_one_place_stands_in_its_specimen_alone() -> None:
 
 
 def test_what_differs_by_test_acts_once_in_each() -> None:
-    for member in supposed(Form(OFFSET, Spread.BY_TEST)).members.values():
+    for member in supposed(Form(OFFSET, PlaceSpread.BY_TEST)).members.values():
         scoped = member.model.effects[1:]
         assert [one.tests for one in scoped] == [("flexion",), ("bending",)]
         assert [one.values.shape for one in scoped] == [(1, 3)] * 2
@@ -216,7 +216,7 @@ def test_what_differs_by_test_acts_once_in_each() -> None:
 def test_moves_are_bounded_as_declared_and_have_the_declared_prior(variant: Variant) -> None:
     """Of strengths five times as wide, about off; of shapes about the default."""
     start = {p.name: float(np.clip(0.7, p.low, p.high)) for p in variant.create().parameters}
-    for one in of_effects(supposed(Form(variant, Spread.SHARED), start=start)):
+    for one in of_effects(supposed(Form(variant, PlaceSpread.SHARED), start=start)):
         p = variant.create().parameters[one.column]
         assert one.is_strength == (p.off is not None)
         assert one.sd == pytest.approx(p.prior_scale * (5.0 if one.is_strength else 1.0))
@@ -230,7 +230,7 @@ def test_moves_are_bounded_as_declared_and_have_the_declared_prior(variant: Vari
 
 
 def test_effects_are_numbered_as_they_are_supposed() -> None:
-    found = supposed(Form(ZONE, Spread.SHARED), Form(LAXITY, Spread.ONE, 0, "a"))
+    found = supposed(Form(ZONE, PlaceSpread.SHARED), Form(LAXITY, PlaceSpread.ONE, 0, "a"))
     assert [one.supposed for one in found.unknowns].count(1) == 1
     assert effects_in(found, "a") == ["linear_bushing", "neutral_zone", "local_laxity"]
     assert effects_in(found, "b") == ["linear_bushing", "neutral_zone"]

@@ -12,7 +12,7 @@ from sweeps import sweep
 from spinepipe.studies.discrepancy.imperfection_rows import imperfection_rows, told_imperfections
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.imperfections import (
-    Place,
+    NuisancePlace,
     TakenUp,
     _mean,
     in_common,
@@ -119,7 +119,7 @@ def test_random_centres_are_told_with_honest_errors_and_are_nothing_in_common():
 def test_random_errors_are_seldom_called_common():
     """Estimates of random errors as readings tell them: N(0, I - covariance)."""
     places = [
-        Place(s, "joint_centre", axis, j, "*", PRIOR_M, "m")
+        NuisancePlace(s, "joint_centre", axis, j, "*", PRIOR_M, "m")
         for s in "abcd"
         for j in "xyz"
         for axis in AXES
@@ -142,7 +142,7 @@ def test_a_mean_is_that_of_generalised_least_squares(seed: int) -> None:
     told = np.eye(count) - covariance  # of a mean of one, and the covariance of random sizes
     shift = 0.8 * (seed > 0)
     size = told @ (shift + np.linalg.cholesky(np.linalg.inv(told)) @ rng.normal(size=count))
-    at = Place("*", "joint_centre", "anterior", "x", "*", PRIOR_M, "m")
+    at = NuisancePlace("*", "joint_centre", "anterior", "x", "*", PRIOR_M, "m")
     ones = told @ np.ones(count)
     weights = np.linalg.solve(told, ones) / (ones @ np.linalg.solve(told, ones))
     mean = weights @ size
@@ -160,7 +160,7 @@ def test_a_mean_is_that_of_generalised_least_squares(seed: int) -> None:
 
 
 def test_of_readings_that_say_too_little_there_is_no_mean() -> None:
-    at = Place("*", "joint_centre", "anterior", "x", "*", PRIOR_M, "m")
+    at = NuisancePlace("*", "joint_centre", "anterior", "x", "*", PRIOR_M, "m")
     assert _mean(at, np.zeros(3), np.eye(3)) is None
     assert _mean(at, np.zeros(3), np.diag([0.0, 1.0, 1.0])) is None
     assert _mean(at, np.zeros(3), np.diag([0.0, 0.0, 1.0])) is not None

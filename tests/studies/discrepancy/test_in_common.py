@@ -14,21 +14,21 @@ from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.imperfections import (
     Imperfection,
     InCommon,
-    Place,
+    NuisancePlace,
     TakenUp,
     _mean,
     in_common,
 )
 
-CENTRE = Place("a", "joint_centre", "anterior", "x", "*", 2e-3, "m")
-GAIN = Place("a", "load_gain", "gain", "*", "flexion", 0.02, "1")
+CENTRE = NuisancePlace("a", "joint_centre", "anterior", "x", "*", 2e-3, "m")
+GAIN = NuisancePlace("a", "load_gain", "gain", "*", "flexion", 0.02, "1")
 
 
-def centres(specimens: str, joints: str) -> list[Place]:
+def centres(specimens: str, joints: str) -> list[NuisancePlace]:
     return [replace(CENTRE, specimen=s, joint=j) for s, j in product(specimens, joints)]
 
 
-def grouped(places: list[Place]) -> dict[tuple[str, str, str], list[int]]:
+def grouped(places: list[NuisancePlace]) -> dict[tuple[str, str, str], list[int]]:
     """By specimen, joint and test."""
     found = imperfections._groups(places)
     return {(at.specimen, at.joint, at.test): numbers.tolist() for at, numbers in found.items()}

@@ -9,7 +9,7 @@ import spring_chain_cases as chains
 from sweeps import sweep
 from test_discrepancy_core import made_up_fit, problem_of
 
-from spinepipe.effects import Spread, create
+from spinepipe.effects import PlaceSpread, create
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.search import lack_of_fit as basis
@@ -160,7 +160,7 @@ def test_joints_without_bushings_count_as_of_one() -> None:
 
 
 @sweep("spread", basis.SPREADS)
-def test_the_evidence_of_a_family_is_that_of_its_columns_summed(spread: Spread) -> None:
+def test_the_evidence_of_a_family_is_that_of_its_columns_summed(spread: PlaceSpread) -> None:
     """Two numbers at three joints each, and another family that is none of its business."""
     rng = np.random.default_rng(20001)
     members = {"a": (0, 2), "b": (2, 1)}
@@ -172,10 +172,10 @@ def test_the_evidence_of_a_family_is_that_of_its_columns_summed(spread: Spread) 
     found = basis._part(problem, terms, "own", "extension", spread)
 
     a, b = (signatures[name][:, 1:] for name in members)
-    if spread is Spread.SHARED:
+    if spread is PlaceSpread.SHARED:
         a, b = (one.reshape(50, 2, 3).sum(axis=-1) for one in (a, b))
     none = np.zeros_like(a)
-    dense = np.block([[a, none], [none, b]]) if spread is Spread.EACH else np.vstack([a, b])
+    dense = np.block([[a, none], [none, b]]) if spread is PlaceSpread.EACH else np.vstack([a, b])
     taken = np.zeros((100, 3))
     taken[:50, [0, 2]], taken[50:, [2, 1]] = fit.jacobians["a"], fit.jacobians["b"]
     left = dense - taken @ np.linalg.lstsq(taken, dense)[0]
@@ -189,28 +189,28 @@ def test_the_evidence_of_a_family_is_that_of_its_columns_summed(spread: Spread) 
     assert (found.family, found.coordinate, found.spread) == ("own", "extension", spread)
 
 
-def part(family: str, coordinate: str, spread: Spread, *ratios: float) -> Any:
-    return basis._Part(family, coordinate, spread, np.log(ratios), 10.0 * ratios[0])
+def part(family: str, coordinate: str, spread: PlaceSpread, *ratios: float) -> Any:
+    return basis._SpecimenResiduals(family, coordinate, spread, np.log(ratios), 10.0 * ratios[0])
 
 
 def test_evidence_is_averaged_over_families_and_ways_to_differ() -> None:
     parts = [
-        part("own", "extension", Spread.SHARED, 8.0, 1.0, 2.0),
-        part("own", "extension", Spread.EACH, 2.0, 1.0, 4.0),
-        part("drift", "extension", Spread.SHARED, 9.0, 1.0, 0.5),
-        part("drift", "extension", Spread.EACH, 1.0, 1.0, 1.5),
+        part("own", "extension", PlaceSpread.SHARED, 8.0, 1.0, 2.0),
+        part("own", "extension", PlaceSpread.EACH, 2.0, 1.0, 4.0),
+        part("drift", "extension", PlaceSpread.SHARED, 9.0, 1.0, 0.5),
+        part("drift", "extension", PlaceSpread.EACH, 1.0, 1.0, 1.5),
     ]
     lack = basis._lack(parts)
     assert np.exp(lack.log_evidence) == pytest.approx(20.0 / 4.0)
     np.testing.assert_allclose(np.exp(lack.null), [1.0, 2.0])
-    assert (lack.family, lack.spread, lack.explained) == ("drift", Spread.SHARED, 90.0)
+    assert (lack.family, lack.spread, lack.explained) == ("drift", PlaceSpread.SHARED, 90.0)
     assert {name: np.exp(one) for name, one in lack.by_family.items()} == pytest.approx(
         {"own": 10.0 / 4.0, "drift": 10.0 / 4.0}
     )
 
 
 def test_a_shape_is_told_in_words() -> None:
-    lack = Lack(0.0, np.zeros(0), "cross", "right_bending", Spread.SHARED, 0.0, {})
+    lack = Lack(0.0, np.zeros(0), "cross", "right_bending", PlaceSpread.SHARED, 0.0, {})
     assert lack.shape == "load in right bending over the joint's other motions, shared"
 
 
@@ -231,7 +231,7 @@ def test_one_specimen_differs_from_no_other(
         assert np.exp(one.log_evidence) == pytest.approx(ratio[name])
         assert one.coordinate == name
     monkeypatch.setattr(
-        basis, "_part", lambda _p, _t, f, c, s: part(f, c, s, 4.0 if s is Spread.EACH else 1.0)
+        basis, "_part", lambda _p, _t, f, c, s: part(f, c, s, 4.0 if s is PlaceSpread.EACH else 1.0)
     )
     each = basis.lack_of_fit(grounds, tuple(ratio), 1, 0)
     assert np.exp(each.log_evidence) == pytest.approx(1.0 if len(specimens) == 1 else 2.0)

@@ -21,10 +21,10 @@ from sweeps import sweep
 
 from spinepipe.studies.discrepancy.advice_rows import advice_csv, advice_rows
 from spinepipe.studies.discrepancy.design.advice import ADVISED, TELLS_NOTHING, advice
-from spinepipe.studies.discrepancy.design.expected import Rows, Sums, noncentrality
+from spinepipe.studies.discrepancy.design.expected import ExpectedReadings, Sums, noncentrality
 from spinepipe.studies.discrepancy.design.extra_tests import bench
 from spinepipe.studies.discrepancy.design.next_test import left_apart, offers
-from spinepipe.studies.discrepancy.design.patterns import Fitted
+from spinepipe.studies.discrepancy.design.patterns import RivalFits
 from spinepipe.studies.discrepancy.design.plans import Planned, at_times
 from spinepipe.studies.discrepancy.design.runs import runs
 from spinepipe.studies.discrepancy.search.hypothesis import trials
@@ -33,7 +33,7 @@ from spinepipe.studies.discrepancy.search.outcome import outcome
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.tables import NEXT_TESTS
-from spinepipe.studies.discrepancy.verdict import Answer
+from spinepipe.studies.discrepancy.verdict import Conclusion
 from spinepipe.tables import from_rows
 from spinepipe.units import ROTATIONS
 
@@ -78,7 +78,7 @@ def test_an_advised_run_tells_about_what_was_promised(rival, words, case):
     promised, told = [], []
     for seed in range(3):
         grounds, true, other = pair(seed, rival)
-        pattern = Fitted(grounds, other.fit, true.fit)
+        pattern = RivalFits(grounds, other.fit, true.fit)
         now, then = (left_apart(pattern, bench(grounds, None), one) for one in (None, words))
         promised.append(0.5 * (then - now))
         before = true.log_evidence - other.log_evidence
@@ -89,7 +89,7 @@ def test_an_advised_run_tells_about_what_was_promised(rival, words, case):
 
 def test_the_best_run_is_the_one_in_which_the_models_part():
     grounds, true, other = pair(0, "facet_contact")
-    found = offers([Fitted(grounds, other.fit, true.fit)], bench(grounds, None))
+    found = offers([RivalFits(grounds, other.fit, true.fit)], bench(grounds, None))
     gains = {one.words: one.gain for one in found}
     assert found[0].words == TURNED_ROUND
     assert gains[TURNED_ROUND] > 10.0 * gains["flexion: once more"] > 0.0
@@ -102,10 +102,10 @@ def test_what_stays_between_two_models_is_a_least_squares_problem():
     """Readings, priors of nuisances and of unknowns as rows of one matrix, each with SD one."""
     rng = np.random.default_rng(0)
     keys = [("kind", "c", joint, "*") for joint in range(5)]
-    old = Rows(
+    old = ExpectedReadings(
         rng.normal(size=30), rng.normal(size=(30, 3)), rng.normal(size=(30, 4)), tuple(keys[:4])
     )
-    new = Rows(
+    new = ExpectedReadings(
         rng.normal(size=12), rng.normal(size=(12, 3)), rng.normal(size=(12, 3)), tuple(keys[2:])
     )
     sds = np.array([0.5, 3.0, 2.0])
@@ -166,7 +166,7 @@ def test_a_set_gets_a_test_that_tells_its_names_apart():
     )
     found = search(grounds, rules, at_once)
     ended = outcome(found, MARGIN)
-    assert ended.verdict is Answer.SET
+    assert ended.verdict is Conclusion.SET
     told = advice(found, ended, rules, bench(grounds, None), at_once)
     (best,) = [one for one in told if one.status == ADVISED]
     assert set(best.subject.split(" or ")) == set(effects)

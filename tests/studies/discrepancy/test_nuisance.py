@@ -14,7 +14,7 @@ from spinepipe.studies.discrepancy.search.nuisance import (
     nuisance_labels,
     nuisance_signatures,
 )
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 FORCE = 100.0
@@ -29,11 +29,11 @@ def shear(force: float = FORCE, moment: float = 0.0) -> LoadCase:
     return LoadCase("shear", 1, (LoadStep(0, ()), LoadStep(1, (wrench,))))
 
 
-def solved(case: LoadCase) -> Solved:
+def solved(case: LoadCase) -> SolvedSpecimen:
     """One joint at the origin with the stiffnesses above, no weight."""
     model = chains.model("a", STIFFNESS[0, 3:], joints=1)
     bushing = model.effects[0]
-    return Solved(
+    return SolvedSpecimen(
         model.with_effects((type(bushing)(bushing.effect, (0,), STIFFNESS),)), [case], False
     )
 

@@ -8,15 +8,20 @@ from typing import Any, cast
 import numpy as np
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut, Margin
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Stage, Standing
+from spinepipe.studies.discrepancy.search.inquiry import (
+    Rival,
+    SearchResult,
+    SearchStage,
+    SelectedTerm,
+)
 from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, LackOfFit
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
-from spinepipe.studies.discrepancy.verdict import Answer, Candidate, SuspectedError
+from spinepipe.studies.discrepancy.verdict import Candidate, Conclusion, SuspectedError
 from spinepipe.studies.discrepancy.verdict_found import near_alone
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
@@ -32,24 +37,24 @@ def stands(
     over_stiffness: float | None = None,
     coordinate: str = "extension",
     rivals_known: bool = True,
-) -> Standing:
+) -> SelectedTerm:
     variant = Variant(name, (("coordinate", coordinate),))
-    supposed = Supposed(Form(variant, Spread.SHARED), np.zeros(1))
+    supposed = Supposed(Form(variant, PlaceSpread.SHARED), np.zeros(1))
     behind = tuple(Rival(*one) for one in rivals)
-    return Standing(
+    return SelectedTerm(
         supposed, log_evidence, alone, 100.0, behind, over_stiffness, rivals_known=rivals_known
     )
 
 
 def ended(
-    *standing: Standing,
+    *standing: SelectedTerm,
     gain: float = 100.0,
     lack: float = -2.0,
     generic_threshold: float = 2.0,
     left: Gap | None = None,
     elsewhere: float = -2.0,
     neighbours: float = -2.0,
-) -> Found:
+) -> SearchResult:
     """A search whose effects lower chi2 by ``gain``, with the generic basis' evidence behind.
 
     All of it in extension; ``elsewhere`` is the basis' evidence in right bending; ``neighbours``
@@ -62,7 +67,7 @@ def ended(
     def of(evidence: float, coordinate: str) -> Lack:
         beside = neighbours if coordinate == "extension" else -2.0
         shapes = {"own": evidence, "neighbour": beside, "drift": -2.0}
-        return Lack(evidence, np.zeros(1), "own", coordinate, Spread.SHARED, 0.0, shapes)
+        return Lack(evidence, np.zeros(1), "own", coordinate, PlaceSpread.SHARED, 0.0, shapes)
 
     at = {"extension": of(lack, "extension"), "right_bending": of(elsewhere, "right_bending")}
     whole = max(at.values(), key=lambda one: one.log_evidence)
@@ -70,7 +75,7 @@ def ended(
     gap, none = left or Gap(400.0, 400.0, 420), Gap(10.0, 10.0, 10)
     of_base = Gap(gap.chi2 + gain, gap.dof, gap.readings)
     thresholds = dict.fromkeys(at, generic_threshold)
-    return Found(
+    return SearchResult(
         base=grounds(500.0),
         final=grounds(500.0 - gain),
         standing=standing,
@@ -86,7 +91,7 @@ def ended(
     )
 
 
-def first_look(standing: Sequence[Standing]) -> Stage:
+def first_look(standing: Sequence[SelectedTerm]) -> SearchStage:
     """Each effect on the screen with what it has alone."""
     effects = [
         SimpleNamespace(
@@ -95,7 +100,7 @@ def first_look(standing: Sequence[Standing]) -> Stage:
         )
         for one in standing
     ]
-    return cast(Stage, SimpleNamespace(screen=SimpleNamespace(effects=effects)))
+    return cast(SearchStage, SimpleNamespace(screen=SimpleNamespace(effects=effects)))
 
 
 def proof(over_base: float | None) -> HeldOut:
@@ -103,13 +108,13 @@ def proof(over_base: float | None) -> HeldOut:
     return HeldOut((), {}, None, None, None, 0.0, margin, None)
 
 
-def says(found: Found, **more: Any) -> tuple[str, str]:
+def says(found: SearchResult, **more: Any) -> tuple[str, str]:
     result = outcome(found, MARGIN, **more)
     return result.verdict.value, result.why
 
 
 def assert_unknown(result: Outcome, *words: str) -> None:
-    assert (result.verdict, result.named, result.tied) == (Answer.UNKNOWN, (), ())
+    assert (result.verdict, result.named, result.tied) == (Conclusion.UNKNOWN, (), ())
     for word in words:
         assert word in result.why
 
@@ -118,7 +123,7 @@ ERROR = SuspectedError("specimen b, L3L4", "sign flipped", "slope -1")
 
 
 @sweep("found", [ended(stands()), ended(), ended(lack=50.0)])
-def test_data_that_look_wrong_come_before_everything(found: Found) -> None:
+def test_data_that_look_wrong_come_before_everything(found: SearchResult) -> None:
     result = outcome(found, MARGIN, proof(50.0), [ERROR])
     assert_unknown(result, "sign flipped (specimen b, L3L4)", "the data look wrong")
 
@@ -179,7 +184,7 @@ def test_a_small_prop_takes_no_name_from_what_explains_nearly_all() -> None:
     prop = stands("load_offset", log_evidence=40.0, alone=1.0)
     sure = replace(stands(), gain=1000.0)
     result = outcome(ended(sure, prop, gain=1100.0), MARGIN)
-    assert (result.verdict, result.named) == (Answer.PART, (sure,))
+    assert (result.verdict, result.named) == (Conclusion.PART, (sure,))
     assert_unknown(outcome(ended(replace(sure, gain=890.0), prop, gain=990.0), MARGIN), "imitate")
 
 
@@ -275,7 +280,7 @@ def test_what_stays_elsewhere_does_not_silence_an_effect() -> None:
     """Right bending is unexplained: the effect in extension is there, and not all."""
     found = ended(stands(), elsewhere=60.0)
     result = outcome(found, MARGIN)
-    assert (result.verdict, result.named) == (Answer.PART, found.standing)
+    assert (result.verdict, result.named) == (Conclusion.PART, found.standing)
     assert "right bending" in result.left[0]
     assert_unknown(outcome(ended(stands(), lack=60.0), MARGIN), "stays in extension")
 
@@ -296,7 +301,7 @@ def test_without_rivals_there_is_no_name() -> None:
     assert_unknown(outcome(ended(unknown), MARGIN), "its rivals are not known")
     sure = stands()
     result = outcome(ended(sure, unknown), MARGIN)
-    assert (result.verdict, result.named) == (Answer.PART, (sure,))
+    assert (result.verdict, result.named) == (Conclusion.PART, (sure,))
 
 
 def test_what_closes_less_than_half_of_the_held_out_gap_is_a_part() -> None:
@@ -316,7 +321,7 @@ def test_ties_come_after_what_is_unexplained_or_unproven() -> None:
 def test_rivals_within_the_margin_make_a_set() -> None:
     rivals = [("hysteresis", -0.5), ("load_offset", 2.9), ("marker_bias", 3.0)]
     result = outcome(ended(stands(rivals=rivals)), MARGIN)
-    assert (result.verdict, result.named) == (Answer.SET, ())
+    assert (result.verdict, result.named) == (Conclusion.SET, ())
     assert result.tied == ("creep", "hysteresis", "load_offset")
     assert "creep, hysteresis or load_offset" in result.why
 
@@ -325,14 +330,14 @@ def test_what_was_not_recorded_excludes_no_rival() -> None:
     """Without times creep is never fitted: evidence for friction is none against creep."""
     friction = stands("hysteresis", rivals=[("creep", 40.0)])
     result = outcome(ended(friction), MARGIN, not_excluded={"hysteresis": ("creep",)})
-    assert (result.verdict, result.tied) == (Answer.SET, ("hysteresis", "creep"))
+    assert (result.verdict, result.tied) == (Conclusion.SET, ("hysteresis", "creep"))
     assert says(ended(friction))[0] == "NAMED"
 
 
 def test_beside_a_tie_what_is_sure_is_named() -> None:
     sure = stands("local_laxity")
     result = outcome(ended(stands(rivals=[("hysteresis", 1.0)]), sure), MARGIN)
-    assert (result.verdict, result.named) == (Answer.SET, (sure,))
+    assert (result.verdict, result.named) == (Conclusion.SET, (sure,))
     assert result.tied == ("creep", "hysteresis")
 
 
@@ -340,7 +345,7 @@ def test_effects_that_stand_beside_one_another_are_no_ties() -> None:
     one = stands("creep", rivals=[("hysteresis", 1.0), ("load_offset", 9.0)])
     other = stands("hysteresis", rivals=[("creep", 0.5)])
     result = outcome(ended(one, other), MARGIN)
-    assert (result.verdict, result.named, result.tied) == (Answer.NAMED, (one, other), ())
+    assert (result.verdict, result.named, result.tied) == (Conclusion.NAMED, (one, other), ())
     assert result.why.startswith("creep and hysteresis: ")
 
 
@@ -351,7 +356,7 @@ def test_an_effect_on_another_coordinate_is_still_a_rival_here() -> None:
         "facet_contact", rivals=[("nonlinear_stiffening", 0.5)], coordinate="right_bending"
     )
     result = outcome(ended(sure, here), MARGIN)
-    assert (result.verdict, result.named) == (Answer.SET, (sure,))
+    assert (result.verdict, result.named) == (Conclusion.SET, (sure,))
     assert result.tied == ("facet_contact", "nonlinear_stiffening")
 
 
@@ -363,7 +368,7 @@ def test_an_effect_in_two_coordinates_has_one_name() -> None:
 
 def test_without_evidence_for_anything_nothing_is_missing() -> None:
     result = outcome(ended(), MARGIN)
-    assert (result.verdict, result.named, result.tied) == (Answer.NULL, (), ())
+    assert (result.verdict, result.named, result.tied) == (Conclusion.NULL, (), ())
     assert "no effect" in result.why
 
 
@@ -382,11 +387,11 @@ def test_without_evidence_for_anything_nothing_is_missing() -> None:
     ],
 )
 def test_why_there_is_no_name_is_told_to_programs_too(
-    found: Found, more: dict[str, Any], reason: Reason | None
+    found: SearchResult, more: dict[str, Any], reason: Reason | None
 ) -> None:
     result = outcome(found, MARGIN, **more)
     assert result.reason is reason
-    assert (result.verdict is Answer.UNKNOWN) == (reason is not None)
+    assert (result.verdict is Conclusion.UNKNOWN) == (reason is not None)
 
 
 @sweep(

@@ -13,8 +13,8 @@ from spinepipe.studies.discrepancy.search import prediction
 from spinepipe.studies.discrepancy.search.prediction import (
     NoEquilibrium,
     Predicted,
-    Solved,
-    Subject,
+    PredictedSpecimen,
+    SolvedSpecimen,
     Together,
     recorded,
 )
@@ -29,7 +29,7 @@ def together() -> Together:
     """Two specimens, an unknown of the first: the logarithm of its stiffness in extension."""
     free = {"a": FREE, "b": ()}
     subjects = {
-        name: Subject(chain(name, k), cases(("extension",)), free[name])
+        name: PredictedSpecimen(chain(name, k), cases(("extension",)), free[name])
         for name, k in STIFFNESS.items()
     }
     return Together(subjects, False)
@@ -66,7 +66,7 @@ def test_what_does_not_stand_is_led_to_by_nothing() -> None:
     model = chain("a", 40.0)
     heavy = tuple(replace(body, mass=30.0) for body in model.bodies)
     model = replace(model, bodies=heavy, gravity=np.array([0.0, -9.81, 0.0]))
-    together = Together({"a": Subject(model, cases(("extension",)), FREE)}, False)
+    together = Together({"a": PredictedSpecimen(model, cases(("extension",)), FREE)}, False)
     found = together.at({"a": np.zeros(1)})
     assert together.leads_to({"a": np.zeros(1)}, found)
     assert not together.leads_to({"a": np.array([-2.0])}, found)
@@ -99,7 +99,7 @@ def test_the_next_poses_are_looked_for_along_the_slope(together: Together) -> No
 
 def test_first_poses_are_looked_for_near_those_that_are_told() -> None:
     near = [np.full((6, JOINTS * 6), 0.25), np.full((6, JOINTS * 6), 0.5)]
-    subjects = {"a": Subject(chain("a", 40.0), cases(("extension", "bending")), ())}
+    subjects = {"a": PredictedSpecimen(chain("a", 40.0), cases(("extension", "bending")), ())}
     told = Together(subjects, False, {"a": near})._guess(np.zeros((1, 0)))
     assert told is not None
     assert told.shape == (12, JOINTS, 6)
@@ -120,7 +120,7 @@ def test_the_engine_of_record_is_asked_beside(monkeypatch: pytest.MonkeyPatch) -
         recorded(model, given)
     ((_, _, (poses,), within),) = asked
     assert within == 1e-7
-    expected = Solved(model, given, False).poses[0].reshape(6, -1)
+    expected = SolvedSpecimen(model, given, False).poses[0].reshape(6, -1)
     assert poses == pytest.approx(expected)
 
 
@@ -129,7 +129,9 @@ def test_zeroed_readings_begin_with_nought() -> None:
     (case,) = cases(("extension",))
     back = replace(case, steps=case.steps[:1:-1])
     plain, zeroed = (
-        Together({"a": Subject(chain("a", 40.0), (back,), FREE)}, z).at({"a": np.zeros(1)})["a"]
+        Together({"a": PredictedSpecimen(chain("a", 40.0), (back,), FREE)}, z).at(
+            {"a": np.zeros(1)}
+        )["a"]
         for z in (False, True)
     )
     assert np.abs(plain.readings[0][0]).max() > 0.01
@@ -141,7 +143,7 @@ def test_zeroed_readings_begin_with_nought() -> None:
 def test_a_load_that_holds_moves_the_other_way() -> None:
     """A moment of 1 N m that holds a joint besides its spring turns it back by 1 / k."""
     model, given = chain("a", 40.0), cases(("extension", "bending"))
-    solved = Solved(model, given, False)
+    solved = SolvedSpecimen(model, given, False)
     loads = [np.zeros((6, JOINTS, 6, 1)) for _ in given]
     loads[1][3, 0, 4, 0] = 1.0
     first, second = solved.by_loads(loads)
@@ -151,7 +153,9 @@ def test_a_load_that_holds_moves_the_other_way() -> None:
 
 
 def test_joints_hold_what_is_put_on_them() -> None:
-    extension, bending = Solved(chain("a", 40.0), cases(("extension", "bending")), False).held
+    extension, bending = SolvedSpecimen(
+        chain("a", 40.0), cases(("extension", "bending")), False
+    ).held
     for joint in range(JOINTS):
         assert extension[:, joint, EXTENSION] == pytest.approx(MOMENTS_NM, abs=1e-6)
         assert bending[:, joint, 4] == pytest.approx(MOMENTS_NM, abs=1e-6)

@@ -11,7 +11,7 @@ from test_held_out import row
 from test_held_out_linear import linear_model
 
 from spinepipe.studies.discrepancy.proof import held_out
-from spinepipe.studies.discrepancy.proof.fold_linear import Placed, _bounded, lengthened
+from spinepipe.studies.discrepancy.proof.fold_linear import FoldPrediction, _bounded, lengthened
 from spinepipe.studies.discrepancy.proof.fold_models import Predictions
 from spinepipe.studies.discrepancy.proof.folds import (
     SPECIMEN,
@@ -22,7 +22,7 @@ from spinepipe.studies.discrepancy.proof.folds import (
     only,
     step_fold,
 )
-from spinepipe.studies.discrepancy.proof.formula_folds import Chosen, with_terms
+from spinepipe.studies.discrepancy.proof.formula_folds import ChosenTerm, with_terms
 from spinepipe.studies.discrepancy.proof.held_out import HeldOutMotion, fill, together
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.whitening import Whitening
@@ -119,7 +119,7 @@ def test_a_reading_is_entered_by_the_first_fold_that_predicts_it() -> None:
     sheet = HeldOutMotion((np.full(shape, -1),), (nan.copy(),), (nan.copy(),))
 
     def predicted(scored: list[bool], base: float, effects: float) -> Predictions:
-        placed = [Placed({"a": (np.full(shape, v),)}, {}) for v in (base, effects)]
+        placed = [FoldPrediction({"a": (np.full(shape, v),)}, {}) for v in (base, effects)]
         return Predictions({"a": (np.array(scored).reshape(shape),)}, *placed, None, 0.0)
 
     fill({"a": sheet}, 0, predicted([True, False], 1.0, 2.0))
@@ -139,8 +139,8 @@ def test_models_differ_by_what_both_predict_and_nuisances_are_part_of_it() -> No
     """Noise of SD one half: residuals count twice, squares four times."""
     shape = (1, 1, 2)
     motion = np.array([1.0, 2.0]).reshape(shape)
-    base = Placed({"a": (motion,)}, {"a": (0.5 * motion,)})
-    other = Placed({"a": (motion + 1.0,)}, {"a": (0.0 * motion,)})
+    base = FoldPrediction({"a": (motion,)}, {"a": (0.5 * motion,)})
+    other = FoldPrediction({"a": (motion + 1.0,)}, {"a": (0.0 * motion,)})
     chosen: Any = SimpleNamespace(
         mean=lambda name, test: np.full(shape, 4.0),
         whitening=lambda name, test, there: SimpleNamespace(noise_only=whitened),
@@ -217,7 +217,7 @@ def test_terms_move_readings_by_their_prior_sd_where_they_are() -> None:
     moved = {
         name: tuple(np.ones(c.shape[:3]) for c in one.by_x) for name, one in plain.members.items()
     }
-    terms = [Chosen({"b": moved["b"]}, 3.0), Chosen(moved, 5.0)]
+    terms = [ChosenTerm({"b": moved["b"]}, 3.0), ChosenTerm(moved, 5.0)]
     found = with_terms(plain, terms)
     known = len(plain.mean)
     for name, numbers, sizes in (("a", [known + 1], [5.0]), ("b", [known, known + 1], [3.0, 5.0])):

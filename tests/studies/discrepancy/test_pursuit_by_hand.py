@@ -9,7 +9,7 @@ from test_formula import ALL, ONE, made_up
 
 from spinepipe.studies.discrepancy.search import pursuit
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, TermColumns
-from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, Problem
+from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, PursuitProblem
 
 SQUARE = LawTerm("extension", "load", "extension^2", (0, 2, 0, 0), ("extension", "extension"))
 
@@ -31,9 +31,9 @@ def test_a_term_that_keeps_a_ten_thousandth_beside_the_rest_is_one(
 ) -> None:
     """A column of length one, whose square lies so much across what is taken out."""
     column = np.array([[np.sqrt(1.0 - left)], [np.sqrt(left)]])
-    part = pursuit._Part(column, np.ones(1))
+    part = pursuit._WhitenedColumns(column, np.ones(1))
     shared, errors = np.array([[1.0], [0.0]]), np.array([[0.0, 0.0], [3.0, 1.0]])
-    problem = Problem((SQUARE,), 1, (part,), (0, 2), shared, errors, 1.0)
+    problem = PursuitProblem((SQUARE,), 1, (part,), (0, 2), shared, errors, 1.0)
     values, drops = problem._drops(shared, errors)
     assert drops[0] == pytest.approx([9.0, 1.0] if is_term else [0.0, 0.0])
     assert values[0] == pytest.approx(3.0 / np.sqrt(left) if is_term else 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search import refit as refits_of
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Trials, Variant
 from spinepipe.studies.discrepancy.search.refit import (
@@ -43,7 +43,7 @@ def tried(
 def of(name: str, *evidence: float) -> Screened:
     """An effect whose variants, one for each evidence, act on different coordinates."""
     forms = [
-        tried(Form(variant(name, f"c{number}"), Spread.SHARED), one)
+        tried(Form(variant(name, f"c{number}"), PlaceSpread.SHARED), one)
         for number, one in enumerate(evidence)
     ]
     return Screened(name, max(evidence), np.zeros(1), tuple(forms))
@@ -78,8 +78,10 @@ def test_an_effect_may_trail_by_three_quarters_and_six(best: float, least: float
 
 
 def test_the_form_of_equal_values_is_refitted_beside_the_best_of_its_variant() -> None:
-    each, shared, joint = (Form(ZONE, s) for s in (Spread.EACH, Spread.SHARED, Spread.BY_JOINT))
-    other = Form(variant("neutral_zone", "right_bending"), Spread.SHARED)
+    each, shared, joint = (
+        Form(ZONE, s) for s in (PlaceSpread.EACH, PlaceSpread.SHARED, PlaceSpread.BY_JOINT)
+    )
+    other = Form(variant("neutral_zone", "right_bending"), PlaceSpread.SHARED)
     first = tried(each, 50.0), tried(joint, 45.0), tried(other, 42.0)
     for evidence, expected in ((40.0, [each, other, shared]), (6.0, [each, other])):
         forms = (*first, tried(shared, evidence))
@@ -93,14 +95,14 @@ def test_the_form_of_equal_values_is_refitted_beside_the_best_of_its_variant() -
 def test_a_fit_starts_at_the_mean_strength_and_the_shapes_of_the_screen() -> None:
     """Ratio of stiffness 1 when off, 0.5 less for a prior SD; the width one SD of its logarithm."""
     _, width, sharpness = ZONE.create().parameters
-    found = started(tried(Form(ZONE, Spread.BY_JOINT), 0.0, [-0.6, -1.0], [0, 0], (1.0, 0.0)))
+    found = started(tried(Form(ZONE, PlaceSpread.BY_JOINT), 0.0, [-0.6, -1.0], [0, 0], (1.0, 0.0)))
     expected = [1.0 - 0.8 * 0.5, width.default * np.exp(0.7), sharpness.default]
     assert found.start == pytest.approx(expected)
 
 
 def test_strengths_of_several_columns_start_each_at_its_own() -> None:
     estimate, columns = [1.0, -2.0, 0.5, 2.0, -4.0, 0.7], [0, 1, 2, 0, 1, 2]
-    found = started(tried(Form(OFFSET, Spread.BY_SPECIMEN), 0.0, estimate, columns))
+    found = started(tried(Form(OFFSET, PlaceSpread.BY_SPECIMEN), 0.0, estimate, columns))
     scales = np.array([p.prior_scale for p in OFFSET.create().parameters])
     assert found.start == pytest.approx(np.array([1.5, -3.0, 0.6]) * scales)
 
@@ -125,21 +127,21 @@ def test_a_strength_starts_on_its_side_and_inside_its_bounds(
     of_variant: Variant, sds: float, value: float
 ) -> None:
     """A fraction has SD 0.3 from 0 to 0.95, a ratio 0.5 in its logarithm from 0.01 to 100."""
-    found = started(tried(Form(of_variant, Spread.SHARED), 0.0, [sds], [0]))
+    found = started(tried(Form(of_variant, PlaceSpread.SHARED), 0.0, [sds], [0]))
     assert found.start[0] == pytest.approx(value, rel=1e-9)
 
 
 def test_a_moment_starts_off_both_its_bounds_by_a_fiftieth_of_its_prior_sd() -> None:
     """0.3 N m, of 10 N m to either side: a thousandth of the whole way is 0.02 N m."""
     for sds, value in ((90.0, 9.994), (-90.0, -9.994)):
-        found = started(tried(Form(OFFSET, Spread.SHARED), 0.0, [sds] * 3, [0, 1, 2]))
+        found = started(tried(Form(OFFSET, PlaceSpread.SHARED), 0.0, [sds] * 3, [0, 1, 2]))
         assert found.start == pytest.approx([value] * 3)
 
 
 def test_weaker_is_a_share_of_the_way_from_off() -> None:
     """Of a ratio the share of its logarithm; shapes stay."""
-    ratio = Supposed(Form(LEVELS, Spread.SHARED), np.array([4.0]))
-    zone = Supposed(Form(ZONE, Spread.SHARED), np.array([0.2, 0.03, 9.0]))
+    ratio = Supposed(Form(LEVELS, PlaceSpread.SHARED), np.array([4.0]))
+    zone = Supposed(Form(ZONE, PlaceSpread.SHARED), np.array([0.2, 0.03, 9.0]))
     assert weaker(ratio, 0.5).start == pytest.approx([2.0])
     assert weaker(zone, 0.25).start == pytest.approx([0.8, 0.03, 9.0])
     assert weaker(zone, 1.0).start == pytest.approx(zone.start)
@@ -154,8 +156,8 @@ def fit_of(moves: Sequence[tuple[int, int, float]], *supposed: Supposed) -> Any:
 
 
 def test_what_stands_starts_again_where_it_ended() -> None:
-    zone = Supposed(Form(ZONE, Spread.BY_JOINT), np.array([0.6, 0.02, 9.0]))
-    levels = Supposed(Form(LEVELS, Spread.SHARED), np.array([2.0]))
+    zone = Supposed(Form(ZONE, PlaceSpread.BY_JOINT), np.array([0.6, 0.02, 9.0]))
+    levels = Supposed(Form(LEVELS, PlaceSpread.SHARED), np.array([2.0]))
     moves = [(0, 0, -0.1), (0, 0, -0.3), (0, 1, np.log(2.0)), (1, 0, np.log(1.5))]
     first, second = standing(fit_of(moves, zone, levels))
     assert first.start == pytest.approx([0.4, 0.04, 9.0])  # the mean of two places
@@ -179,7 +181,7 @@ class Fits:
 
 
 def test_a_form_adds_the_unknowns_of_its_own() -> None:
-    form = Form(ZONE, Spread.SHARED)
+    form = Form(ZONE, PlaceSpread.SHARED)
     fit = fit_of([(0, 0, 0.0), (1, 0, 0.0), (1, 1, 0.0), (2, 0, 0.0)], *[None] * 2)  # type: ignore[list-item]
     assert Refit(form, fit, 0.0, 0.0).unknowns == 2  # of the last, the second
 
@@ -187,7 +189,7 @@ def test_a_form_adds_the_unknowns_of_its_own() -> None:
 def refit_with(fits: Fits, monkeypatch: pytest.MonkeyPatch, degenerate: bool = False) -> Any:
     monkeypatch.setattr(refits_of, "_degenerate", lambda fit, number: degenerate)
     monkeypatch.setattr(refits_of, "laplace", lambda fit, number, gain: 0.5 * gain)
-    form = Form(LEVELS, Spread.SHARED)
+    form = Form(LEVELS, PlaceSpread.SHARED)
     before = fit_of([])
     before.chi2, before.poses = 100.0, None
     grounds: Any = SimpleNamespace(fit=before, setting=None, suppose=lambda supposed: supposed)
@@ -214,21 +216,21 @@ def test_without_a_fit_there_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_the_two_that_lead_are_refitted_with_equal_values_too() -> None:
     """Where the screen has that form and it was not tried yet."""
-    spreads = Spread.EACH, Spread.BY_JOINT, Spread.SHARED
+    spreads = PlaceSpread.EACH, PlaceSpread.BY_JOINT, PlaceSpread.SHARED
     effects = [
         Screened(v.effect, 9.0, np.zeros(1), tuple(tried(Form(v, s)) for s in spreads))
         for v in (ZONE, LEVELS, LAXITY)
     ]
     screen = Screen(tuple(effects), 5.0, 1)
 
-    def found(v: Variant, log_evidence: float, spread: Spread = Spread.EACH) -> Any:
+    def found(v: Variant, log_evidence: float, spread: PlaceSpread = PlaceSpread.EACH) -> Any:
         start = Supposed(Form(v, spread), v.off((0.0,) * len(v.shapes)))
         fit = fit_of([(0, 0, -0.25)], start)
         return SimpleNamespace(name=v.effect, form=start.form, log_evidence=log_evidence, fit=fit)
 
     ranked = [found(LAXITY, 5.0), found(LEVELS, 7.0), found(ZONE, 8.0)]
     simple = list(refits_of._simpler(ranked, screen, ()))
-    assert [one.form for one in simple] == [Form(v, Spread.SHARED) for v in (ZONE, LEVELS)]
+    assert [one.form for one in simple] == [Form(v, PlaceSpread.SHARED) for v in (ZONE, LEVELS)]
     assert simple[0].start[0] == pytest.approx(0.75)  # from where the other form ended
-    known = [found(ZONE, 8.0), found(ZONE, 3.0, Spread.SHARED), found(LEVELS, -np.inf)]
+    known = [found(ZONE, 8.0), found(ZONE, 3.0, PlaceSpread.SHARED), found(LEVELS, -np.inf)]
     assert list(refits_of._simpler(known, screen, ())) == []

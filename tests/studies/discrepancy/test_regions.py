@@ -12,15 +12,15 @@ import pytest
 import spring_chain_cases as chains
 from spring_chain_cases import SD, Array
 
-from spinepipe.calibrate.profile import NEAR, Reach
-from spinepipe.effects import Spread
+from spinepipe.calibrate.profile import NEAR, RegionEnds
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search.base import base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant, hypothesis
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.model_files import standard_errors
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
-from spinepipe.studies.discrepancy.search.regions import Estimated, estimated, region
+from spinepipe.studies.discrepancy.search.regions import ValueWithRegion, estimated, region
 from spinepipe.studies.discrepancy.search.whitening import whitening
 from spinepipe.studies.discrepancy.verdict import REPEATS
 from spinepipe.units import DEG_PER_RAD, ROTATIONS
@@ -68,12 +68,12 @@ def fitted(
     return fit, setting
 
 
-def by_name(found: Sequence[Estimated]) -> dict[str, Estimated]:
+def by_name(found: Sequence[ValueWithRegion]) -> dict[str, ValueWithRegion]:
     return {one.name: one for one in found}
 
 
 def lax(joint: int) -> Supposed:
-    return Supposed(Form(LAXITY, Spread.ONE_JOINT, joint), np.array([0.3]))
+    return Supposed(Form(LAXITY, PlaceSpread.ONE_JOINT, joint), np.array([0.3]))
 
 
 def loosened(fraction: float, joint: int) -> Turned:
@@ -116,7 +116,7 @@ def test_with_the_base_fitted_along_it_is_fiellers() -> None:
 def test_where_all_is_straight_it_is_the_interval_of_the_standard_error() -> None:
     given = read(lambda _, moments: moments / K + 0.02)
     start = np.zeros(len(BIAS.create().parameters))
-    fit, setting = fitted(given, Supposed(Form(BIAS, Spread.SHARED), start))
+    fit, setting = fitted(given, Supposed(Form(BIAS, PlaceSpread.SHARED), start))
     mean = float(np.nanmean(given.tests[0].mean[..., EXTENSION] - (LEVELS / K)[:, None]))
     way = Z * SD / np.sqrt(CYCLES * len(LEVELS) * JOINTS)
     every = by_name(estimated(fit, setting, 0))
@@ -132,7 +132,7 @@ def zoned(width: float, ratio: float) -> Supposed:
     values = ZONE.off((0.0,) * len(ZONE.shapes))
     names = [p.name for p in ZONE.create().parameters]
     values[names.index("width")], values[names.index("stiffness_ratio")] = width, ratio
-    return Supposed(Form(ZONE, Spread.SHARED), values)
+    return Supposed(Form(ZONE, PlaceSpread.SHARED), values)
 
 
 def local(fit: JointFit, name: str) -> float:
@@ -185,7 +185,7 @@ def test_a_contact_as_rigid_as_a_wall_has_no_upper_end() -> None:
     values = CONTACT.off((0.0,) * len(CONTACT.shapes))
     names = [p.name for p in CONTACT.create().parameters]
     values[names.index("gap")], values[names.index("stiffness")] = 0.9 * gap, 500.0
-    fit, setting = fitted(given, Supposed(Form(CONTACT, Spread.SHARED), values))
+    fit, setting = fitted(given, Supposed(Form(CONTACT, PlaceSpread.SHARED), values))
     stiffness = by_name(estimated(fit, setting, 0))["stiffness"]
     assert np.isfinite(local(fit, "stiffness"))
     assert (stiffness.high, stiffness.open_above) == (None, True)
@@ -211,4 +211,4 @@ def test_a_region_that_holds_a_bound_is_open_there() -> None:
 
 def test_nothing_is_known_of_a_fit_that_is_none() -> None:
     fit, setting = fitted(read(loosened(0.4, 1)), lax(1))
-    assert region(replace(fit, residuals={}), setting, 0) == Reach(None, None, True, True)
+    assert region(replace(fit, residuals={}), setting, 0) == RegionEnds(None, None, True, True)

@@ -12,8 +12,8 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import InputError, Problem
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
 from spinepipe.studies.discrepancy.checks import check_discrepancy
 from spinepipe.studies.discrepancy.rows import _as_load, _rig
@@ -28,7 +28,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
 from spinepipe.studies.discrepancy.search.regions import estimated
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Answer
+from spinepipe.studies.discrepancy.verdict import Conclusion
 
 STEPS_MM = np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 1.4, 0.6])
 STIFFNESS, FORCE_SD, MOTION_SD = 6e4, 1.0, 0.02
@@ -147,7 +147,7 @@ def test_rows_of_a_rig_are_loads(tmp_path: Path) -> None:
 
 def test_sds_of_loads_and_motion_stand_together(tmp_path: Path) -> None:
     cohort, _ = written(tmp_path, 0.0)
-    document = Document("config/studies/rig.yaml", {}, {})
+    document = YamlDocument("config/studies/rig.yaml", {}, {})
     assert list(check_discrepancy(document, STUDY, cohort)) == []
     own = STUDY.model_copy(update={"measurement_sd": cohort.measurement_sd})
     (problem,) = check_discrepancy(document, own, cohort)
@@ -163,7 +163,7 @@ def test_kinds_that_know_no_rig_refuse_the_cohort(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError) as caught:
         studies.check(tmp_path, "bent")
-    told: list[Problem] = [p for p in caught.value.problems if "supports.csv" in p.found]
+    told: list[InputProblem] = [p for p in caught.value.problems if "supports.csv" in p.found]
     assert len(told) == 1
     assert "discrepancy" in told[0].allowed
 
@@ -179,7 +179,7 @@ def searched(folder: Path, growth_per_mm2: float) -> Investigation:
 def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) -> None:
     """With the growth that made the forces, 0.15 per mm2, in its interval."""
     found = searched(tmp_path, 0.15)
-    assert found.ended.verdict is Answer.NAMED
+    assert found.ended.verdict is Conclusion.NAMED
     (standing,) = found.ended.named
     assert standing.name == "nonlinear_stiffening"
     assert dict(standing.supposed.form.variant.options)["coordinate"] == "anterior"
@@ -191,4 +191,4 @@ def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) ->
 
 
 def test_a_machine_that_measures_a_straight_line_shows_nothing(tmp_path: Path) -> None:
-    assert searched(tmp_path, 0.0).ended.verdict is Answer.NULL
+    assert searched(tmp_path, 0.0).ended.verdict is Conclusion.NULL

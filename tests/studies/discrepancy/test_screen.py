@@ -7,12 +7,12 @@ import pytest
 from scipy.stats import gumbel_r
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant
 from spinepipe.studies.discrepancy.search.projected import columns_of
 from spinepipe.studies.discrepancy.search.screen import (
+    EffectColumns,
     Group,
-    Index,
     Screened,
     exceeded,
     screen,
@@ -27,7 +27,7 @@ LAXITY = Variant("local_laxity", (("coordinate", "extension"),))
 def strengths(*forms: Form) -> list[set[tuple[str, int | None, str, int]]]:
     """Of each strength of the first form, all it sums: specimen, joint, test, column of values."""
     form = forms[0]
-    index = Index(columns_of(Trials("", (form.variant,), forms), 2, TESTS))
+    index = EffectColumns(columns_of(Trials("", (form.variant,), forms), 2, TESTS))
     places, values = index.places(form, (), ("a", "b"), TESTS)
     found: list[set[tuple[str, int | None, str, int]]] = [set() for _ in values]
     for specimen, columns, owners in places:
@@ -39,7 +39,7 @@ def strengths(*forms: Form) -> list[set[tuple[str, int | None, str, int]]]:
 
 
 def test_what_differs_by_test_has_strengths_of_each_test_for_all_specimens() -> None:
-    found = strengths(Form(OFFSET, Spread.BY_TEST), Form(OFFSET, Spread.SHARED))
+    found = strengths(Form(OFFSET, PlaceSpread.BY_TEST), Form(OFFSET, PlaceSpread.SHARED))
     expected = [
         {("a", None, test, axis), ("b", None, test, axis)} for axis in range(3) for test in TESTS
     ]
@@ -48,19 +48,19 @@ def test_what_differs_by_test_has_strengths_of_each_test_for_all_specimens() -> 
 
 
 def test_what_is_shared_has_one_strength_of_all_tests() -> None:
-    found = strengths(Form(OFFSET, Spread.SHARED), Form(OFFSET, Spread.BY_TEST))
+    found = strengths(Form(OFFSET, PlaceSpread.SHARED), Form(OFFSET, PlaceSpread.BY_TEST))
     assert found == [{("a", None, "*", axis), ("b", None, "*", axis)} for axis in range(3)]
 
 
 @sweep(
     "form, expected",
     [
-        (Form(LAXITY, Spread.SHARED), [["a0", "a1", "b0", "b1"]]),
-        (Form(LAXITY, Spread.BY_JOINT), [["a0", "b0"], ["a1", "b1"]]),
-        (Form(LAXITY, Spread.BY_SPECIMEN), [["a0", "a1"], ["b0", "b1"]]),
-        (Form(LAXITY, Spread.EACH), [["a0"], ["a1"], ["b0"], ["b1"]]),
-        (Form(LAXITY, Spread.ONE_JOINT, 1), [["a1", "b1"]]),
-        (Form(LAXITY, Spread.ONE, 0, "b"), [["b0"]]),
+        (Form(LAXITY, PlaceSpread.SHARED), [["a0", "a1", "b0", "b1"]]),
+        (Form(LAXITY, PlaceSpread.BY_JOINT), [["a0", "b0"], ["a1", "b1"]]),
+        (Form(LAXITY, PlaceSpread.BY_SPECIMEN), [["a0", "a1"], ["b0", "b1"]]),
+        (Form(LAXITY, PlaceSpread.EACH), [["a0"], ["a1"], ["b0"], ["b1"]]),
+        (Form(LAXITY, PlaceSpread.ONE_JOINT, 1), [["a1", "b1"]]),
+        (Form(LAXITY, PlaceSpread.ONE, 0, "b"), [["b0"]]),
     ],
 )
 def test_each_way_to_differ_sums_its_places(form: Form, expected: list[list[str]]) -> None:
@@ -69,7 +69,7 @@ def test_each_way_to_differ_sums_its_places(form: Form, expected: list[list[str]
 
 
 def test_columns_by_test_are_made_only_where_a_form_asks() -> None:
-    shared, by_test = (Form(OFFSET, spread) for spread in (Spread.SHARED, Spread.BY_TEST))
+    shared, by_test = (Form(OFFSET, spread) for spread in (PlaceSpread.SHARED, PlaceSpread.BY_TEST))
     assert len(columns_of(Trials("", (OFFSET,), (shared,)), 2, TESTS)) == 3
     assert len(columns_of(Trials("", (OFFSET,), (shared, by_test)), 2, TESTS)) == 3 * 3
 
@@ -83,7 +83,9 @@ def test_bounds_tell_the_side_of_a_strength() -> None:
     """A fraction is lost from nothing on, a softer zone goes up to one, a ratio goes both ways."""
     stiffer = Variant("level_dependence", (("coordinate", "extension"),))
     zone = Variant("neutral_zone", (("coordinate", "extension"),))
-    found = [sides(Form(v, Spread.SHARED), v.strengths).tolist() for v in (LAXITY, zone, stiffer)]
+    found = [
+        sides(Form(v, PlaceSpread.SHARED), v.strengths).tolist() for v in (LAXITY, zone, stiffer)
+    ]
     assert found == [[1.0], [-1.0], [0.0]]
 
 

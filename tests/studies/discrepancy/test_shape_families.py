@@ -13,11 +13,11 @@ from search_cases import Array, searched
 from sweeps import sweep
 from test_fitted_model_files import fitted, one
 
-from spinepipe.effects import Spread, create, registered
+from spinepipe.effects import PlaceSpread, create, registered
 from spinepipe.model.file import EffectEntry, ModelFile, Values, effects_for
 from spinepipe.studies.discrepancy.search.hypothesis import Variant, shape_grid, trials
 from spinepipe.studies.discrepancy.search.refit import _degenerate
-from spinepipe.studies.discrepancy.verdict import Answer
+from spinepipe.studies.discrepancy.verdict import Conclusion
 from spinepipe.units import COORDINATES, ROTATIONS
 
 
@@ -69,7 +69,7 @@ def test_pairs_are_tried_where_each_kind_is_read() -> None:
 
 def test_an_end_of_a_family_is_a_form_of_its_own() -> None:
     """A stop without a gap is no stop; a linear one is."""
-    stop = one(Variant("facet_contact", ()), Spread.SHARED)
+    stop = one(Variant("facet_contact", ()), PlaceSpread.SHARED)
     fit = fitted(stop)
     columns = {p.name: c for c, p in enumerate(stop.form.variant.create().parameters)}
     for name, refused in (("gap", True), ("exponent", False), ("stiffness", False)):
@@ -157,7 +157,7 @@ def sliders(joint: int, moments: Array, k: float) -> Array:
 def test_another_formula_of_the_same_physics_has_its_name(law, levels, name: str) -> None:
     given = chains.readings(2, {"flexion": law}, ("a", "b"), levels=levels, joints=3)
     result = searched(given, effects=FEW)
-    assert result.ended.verdict is Answer.NAMED
+    assert result.ended.verdict is Conclusion.NAMED
     assert [effect.name for effect in result.ended.named] == [name]
     assert result.found.base_gap.gap > 1.0
     assert result.found.final_gap.gap < 0.5

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from test_formula import ALL
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import formula as formulas
-from spinepipe.studies.discrepancy.search.formula import _State, _Term
+from spinepipe.studies.discrepancy.search.formula import _FormulaState, _Term
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, TermColumns
-from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, Candidate, Ranked
+from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, Ranked, TermAtPlace
 
 TESTS, STEPS, JOINTS, TERMS = 2, 3, 2, 3
 SQUARE = LawTerm("extension", "load", "extension^2", (0, 2, 0, 0), ("extension", "extension"))
@@ -36,7 +36,7 @@ def test_a_term_has_the_columns_of_its_places_and_the_largest_of_their_sizes() -
     state: Any = SimpleNamespace(columns=made)
     for term in range(TERMS):
         for joint, specimen in ((0, 0), (1, 1), (1, EVERYWHERE), (EVERYWHERE, 0), (-1, -1)):
-            found = formulas._chosen(state, Candidate(term, joint, specimen))
+            found = formulas._chosen(state, TermAtPlace(term, joint, specimen))
             names = "ab" if specimen == EVERYWHERE else "ab"[specimen]
             joints = range(JOINTS) if joint == EVERYWHERE else [joint]
             assert set(found.moved) == set(names)
@@ -53,14 +53,14 @@ def test_a_form_is_of_the_place_of_its_candidate() -> None:
     variant = SQUARE.variant
     assert variant is not None
 
-    def form(joint: int, specimen: int) -> tuple[Spread, int | None, str | None]:
-        found = formulas._form(variant, Candidate(0, joint, specimen), ("a", "b"))
+    def form(joint: int, specimen: int) -> tuple[PlaceSpread, int | None, str | None]:
+        found = formulas._form(variant, TermAtPlace(0, joint, specimen), ("a", "b"))
         return found.spread, found.joint, found.specimen
 
-    assert form(EVERYWHERE, EVERYWHERE) == (Spread.SHARED, None, None)
-    assert form(EVERYWHERE, 1) == (Spread.SHARED, None, "b")
-    assert form(0, EVERYWHERE) == (Spread.ONE_JOINT, 0, None)
-    assert form(1, 0) == (Spread.ONE, 1, "a")
+    assert form(EVERYWHERE, EVERYWHERE) == (PlaceSpread.SHARED, None, None)
+    assert form(EVERYWHERE, 1) == (PlaceSpread.SHARED, None, "b")
+    assert form(0, EVERYWHERE) == (PlaceSpread.ONE_JOINT, 0, None)
+    assert form(1, 0) == (PlaceSpread.ONE, 1, "a")
 
 
 # Which law of those that lead is taken
@@ -68,7 +68,7 @@ def test_a_form_is_of_the_place_of_its_candidate() -> None:
 
 def ranked(drops: Sequence[float], values: Sequence[float] | None = None) -> Ranked:
     """Terms 0, 1 ... in the order in which they lead."""
-    best = tuple(Candidate(term, EVERYWHERE, EVERYWHERE) for term in range(len(drops)))
+    best = tuple(TermAtPlace(term, EVERYWHERE, EVERYWHERE) for term in range(len(drops)))
     return Ranked(best, tuple(drops), tuple(values or [1.0] * len(drops)), 0.0)
 
 
@@ -196,7 +196,7 @@ def test_a_law_has_a_fit_that_is_better_and_ends_at_no_bound(
     fit = SimpleNamespace(chi2=100.0, poses=None)
     grounds: Any = SimpleNamespace(fit=fit, setting=None, suppose=lambda supposed: supposed)
     grounds.at = lambda fit: fit
-    one = formulas.Supposed(formulas.Form(variant, Spread.SHARED), np.array([8.0]))
+    one = formulas.Supposed(formulas.Form(variant, PlaceSpread.SHARED), np.array([8.0]))
     at = formulas._fit_with(grounds, one)
     assert (at is not None) is found
     assert ends.starts == pytest.approx([8.0, 4.0, 1.6][:fits])
@@ -294,10 +294,10 @@ def test_a_term_is_told_with_its_value_in_units_of_tables() -> None:
     grounds: Any = SimpleNamespace(fit=fit, readings={"a": None, "b": None})
     problem: Any = SimpleNamespace(fitted=lambda linear: (np.array([4e6]), np.array([2e6])))
     terms = (
-        _Term(law, Candidate(0, 1, 1), None, 0.25),
-        _Term(RATE, Candidate(1, EVERYWHERE, EVERYWHERE), 0, 0.5),
+        _Term(law, TermAtPlace(0, 1, 1), None, 0.25),
+        _Term(RATE, TermAtPlace(1, EVERYWHERE, EVERYWHERE), 0, 0.5),
     )
-    first, second = formulas._told(_State(grounds, {}, problem, terms))
+    first, second = formulas._told(_FormulaState(grounds, {}, problem, terms))
     assert (first.specimen, first.joint, first.coordinate) == ("b", "L4L5", "anterior")
     assert (first.coefficient, first.sd, first.explained) == pytest.approx((4.0, 2.0, 0.25))
     assert (second.specimen, second.joint) == ("*", "*")

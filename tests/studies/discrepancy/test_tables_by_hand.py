@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search import beyond as tables
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Variant
 from spinepipe.studies.discrepancy.search.lack_of_fit import Lack
@@ -38,7 +38,7 @@ def grounds(specimens: Mapping[str, Any] | None = None, joints: int = 2, **fit: 
 
 
 def lack(evidence: float, null: Sequence[float], family: str = "own", **more: Any) -> Lack:
-    spread = more.get("spread", Spread.SHARED)
+    spread = more.get("spread", PlaceSpread.SHARED)
     return Lack(evidence, np.array(null), family, "extension", spread, 0.0, {})
 
 
@@ -61,20 +61,25 @@ def test_a_table_is_tried_where_the_generic_basis_is_evident_over_the_own_motion
 @sweep(
     "spread, joints, specimens, expected",
     [
-        (Spread.SHARED, 2, "a", [Spread.SHARED]),
-        (Spread.SHARED, 2, "ab", [Spread.SHARED, Spread.BY_SPECIMEN]),
-        (Spread.BY_JOINT, 2, "ab", [Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN]),
-        (Spread.BY_JOINT, 1, "ab", [Spread.SHARED, Spread.BY_SPECIMEN]),
+        (PlaceSpread.SHARED, 2, "a", [PlaceSpread.SHARED]),
+        (PlaceSpread.SHARED, 2, "ab", [PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN]),
         (
-            Spread.EACH,
+            PlaceSpread.BY_JOINT,
             2,
             "ab",
-            [Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH],
+            [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN],
+        ),
+        (PlaceSpread.BY_JOINT, 1, "ab", [PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN]),
+        (
+            PlaceSpread.EACH,
+            2,
+            "ab",
+            [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN, PlaceSpread.EACH],
         ),
     ],
 )
 def test_a_table_differs_where_there_is_something_that_can(
-    spread: Spread, joints: int, specimens: str, expected: list[Spread]
+    spread: PlaceSpread, joints: int, specimens: str, expected: list[PlaceSpread]
 ) -> None:
     at = grounds({name: readings(0.1) for name in specimens}, joints)
     found = forms(lack(90.0, np.zeros(500), spread=spread), at=at)
@@ -87,20 +92,22 @@ def term(joint: str, specimen: str, *of: str) -> Any:
 
 
 def test_a_term_of_a_formula_is_tabulated_at_its_place_over_each_of_its_motions() -> None:
-    def place(*of: Any) -> list[tuple[str, Spread, int | None, str | None]]:
+    def place(*of: Any) -> list[tuple[str, PlaceSpread, int | None, str | None]]:
         return [
             (str(dict(one.variant.options)["over"]), one.spread, one.joint, one.specimen)
             for one in forms(None, *of)
         ]
 
     assert place(term("*", "*", "extension", "extension")) == [
-        (tables.ITSELF, Spread.SHARED, None, None)
+        (tables.ITSELF, PlaceSpread.SHARED, None, None)
     ]
-    assert place(term("L4L5", "*", "extension")) == [(tables.ITSELF, Spread.ONE_JOINT, 1, None)]
-    assert place(term("L5S1", "b", "extension")) == [(tables.ITSELF, Spread.ONE, 0, "b")]
+    assert place(term("L4L5", "*", "extension")) == [
+        (tables.ITSELF, PlaceSpread.ONE_JOINT, 1, None)
+    ]
+    assert place(term("L5S1", "b", "extension")) == [(tables.ITSELF, PlaceSpread.ONE, 0, "b")]
     assert place(term("*", "a", "right_bending")) == [
-        ("right_bending", Spread.SHARED, None, "a"),
-        (tables.ITSELF, Spread.SHARED, None, "a"),
+        ("right_bending", PlaceSpread.SHARED, None, "a"),
+        (tables.ITSELF, PlaceSpread.SHARED, None, "a"),
     ]
     assert place(term("*", "*")) == []  # neither a rate nor a drift is a table
 
@@ -121,7 +128,9 @@ def test_a_table_goes_as_far_as_all_specimens_move() -> None:
 # Which
 
 
-def form(coordinate: str = "extension", spread: Spread = Spread.SHARED, **place: Any) -> Form:
+def form(
+    coordinate: str = "extension", spread: PlaceSpread = PlaceSpread.SHARED, **place: Any
+) -> Form:
     options = (("coordinate", coordinate), ("over", tables.ITSELF), ("reach", 0.2))
     return Form(Variant("tabulated_law", options), spread, **place)
 
@@ -165,7 +174,7 @@ def test_three_tables_at_most_enter_one_for_each_law(
     laws = [
         form(f"c{number}", spread)
         for number in range(4)
-        for spread in (Spread.SHARED, Spread.ONE_JOINT)
+        for spread in (PlaceSpread.SHARED, PlaceSpread.ONE_JOINT)
     ]
     asked: list[int] = []
 
@@ -214,10 +223,10 @@ def test_without_evidence_or_fit_a_table_is_not_worth_it(monkeypatch: pytest.Mon
 def test_where_a_table_is_is_told_in_words() -> None:
     at = grounds()
     assert tables._where(at, form("right_bending")) == "right bending at every joint"
-    one = form(spread=Spread.ONE, joint=1, specimen="b")
+    one = form(spread=PlaceSpread.ONE, joint=1, specimen="b")
     assert tables._where(at, one) == "extension at L4L5 of b"
-    each = form(spread=Spread.EACH)
-    assert tables._where(at, each) == f"extension at every joint, {Spread.EACH.value}"
+    each = form(spread=PlaceSpread.EACH)
+    assert tables._where(at, each) == f"extension at every joint, {PlaceSpread.EACH.value}"
     options = (("coordinate", "extension"), ("over", "left_rotation"), ("reach", 0.2))
-    other = Form(Variant("tabulated_law", options), Spread.SHARED)
+    other = Form(Variant("tabulated_law", options), PlaceSpread.SHARED)
     assert tables._where(at, other) == "extension over left rotation at every joint"

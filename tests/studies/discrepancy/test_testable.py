@@ -17,10 +17,10 @@ from testable_cases import (
     tried_in,
 )
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.design import extra_tests
 from spinepipe.studies.discrepancy.design.extra_tests import MENU
-from spinepipe.studies.discrepancy.design.seen import Design, candidates, seen_in
+from spinepipe.studies.discrepancy.design.seen import CohortSignatures, candidates, seen_in
 from spinepipe.studies.discrepancy.design.testable import Detectable, judgements
 from spinepipe.studies.discrepancy.design.told_apart import (
     Confusion,
@@ -74,7 +74,7 @@ def test_an_offset_explains_what_a_constant_does_of_an_absolute_value():
     tried = (ASYMMETRY, only("load_offset"))
     of = {"a": seen_in(grounds, "a", tried)}
     found = judgements(tried, of, 1, grounds.tests, NEEDED, 0)
-    pairs = confusions(Design(candidates(tried, 1, grounds.tests), of), found, 3.0)
+    pairs = confusions(CohortSignatures(candidates(tried, 1, grounds.tests), of), found, 3.0)
     share = {(one.effect, one.other): one.share for one in pairs}
     assert share["flexion_extension_asymmetry", "load_offset"] == pytest.approx(expected, abs=2e-3)
     about_z = (1.0 / STIFFNESS[3]) ** 2 / np.sum(1.0 / STIFFNESS[3:] ** 2)
@@ -125,7 +125,7 @@ def test_a_laxity_is_looked_for_in_one_place():
     grounds = grounds_of(specimens=2)
     found = judged(grounds, ["local_laxity"])["local_laxity"]
     assert found.testable
-    assert found.best.form.spread is Spread.ONE
+    assert found.best.form.spread is PlaceSpread.ONE
 
 
 def test_a_test_that_shows_an_effect_clearly_goes_before_one_that_hardly_does(monkeypatch):

@@ -14,7 +14,7 @@ from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.outcome import outcome
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Answer
+from spinepipe.studies.discrepancy.verdict import Conclusion
 from spinepipe.units import COORDINATES
 
 NEEDED = 5.0
@@ -61,7 +61,7 @@ def test_a_null_says_what_would_have_to_be_known_better():
     rules = Rules(all_trials(), COORDINATES, 0.01, 50, 3.0, 3, 0)
     found = search(grounds, rules, at_once)
     ended = outcome(found, 3.0)
-    assert ended.verdict is Answer.NULL
+    assert ended.verdict is Conclusion.NULL
     told = advice(found, ended, rules, bench(grounds, None), at_once)
     (best,) = [one for one in told if one.status == ADVISED]
     assert best.subject == "joint_centre_offset"

@@ -10,7 +10,7 @@ from sweeps import sweep
 
 from spinepipe.effects import create
 from spinepipe.studies.discrepancy.quantities import estimate, quantity
-from spinepipe.studies.discrepancy.verdict import Estimate, Missing, Scope
+from spinepipe.studies.discrepancy.verdict import Estimate, Missing, VerdictScope
 from spinepipe.studies.discrepancy.words import (
     called,
     general,
@@ -23,7 +23,7 @@ from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M
 
 
 def missing(name: str, *coordinates: str, **variant: Any) -> Missing:
-    scope = Scope(("C6C7",), coordinates or ("*",), ("*",))
+    scope = VerdictScope(("C6C7",), coordinates or ("*",), ("*",))
     return Missing(name, "joint law", scope, variant, "shared", (), 10.0, ())
 
 

@@ -12,9 +12,9 @@ from cohort_cases import Change, add, both, cell, joints, line, swap, text, with
 from scipy import stats
 from sweeps import sweep
 
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.sensitivity.global_indices.design import DUMMY
-from spinepipe.sensitivity.global_indices.estimates import INDICES, Known
+from spinepipe.sensitivity.global_indices.estimates import INDICES, IndexStatus
 from spinepipe.studies import read as studies
 from spinepipe.studies.global_sensitivity import change as varied
 from spinepipe.studies.global_sensitivity import settings as study_file
@@ -60,7 +60,7 @@ def sound(root: Path, study: str = STUDY, *changes: Change) -> GlobalSensitivity
     return found
 
 
-def complaints(root: Path, study: str, *changes: Change) -> tuple[Problem, ...]:
+def complaints(root: Path, study: str, *changes: Change) -> tuple[InputProblem, ...]:
     """What checking the study complains about."""
     with pytest.raises(InputError) as caught:
         studies.check(project(root, study, *changes), "probe")
@@ -143,18 +143,18 @@ def test_spreads_are_those_of_the_file(tmp_path: Path) -> None:
 def test_changes_name_places_and_axes(tmp_path: Path) -> None:
     of = varied.Of
     assert sound(tmp_path).changes == (
-        varied.Change(of.STIFFNESS, ("L3L4",), 3),
-        varied.Change(of.LANDMARK, ("L3",), 0, "left_pedicle_base"),
-        varied.Change(of.LANDMARK, ("L3",), 2, "right_pedicle_base"),
-        varied.Change(of.JOINT_CENTRE, ("L2L3",), 0),
-        varied.Change(of.JOINT_AXES, (), 2),
-        varied.Change(of.LOAD_POINT, (), 0),
-        varied.Change(of.LOAD_DIRECTION, (), 2),
-        varied.Change(of.LOAD_SIZE),
-        varied.Change(of.MASS, ("L2",)),
-        varied.Change(of.CENTRE_OF_MASS, (), 1),
-        varied.Change(of.DAMPING),
-        varied.Change(of.NOTHING),
+        varied.FactorChange(of.STIFFNESS, ("L3L4",), 3),
+        varied.FactorChange(of.LANDMARK, ("L3",), 0, "left_pedicle_base"),
+        varied.FactorChange(of.LANDMARK, ("L3",), 2, "right_pedicle_base"),
+        varied.FactorChange(of.JOINT_CENTRE, ("L2L3",), 0),
+        varied.FactorChange(of.JOINT_AXES, (), 2),
+        varied.FactorChange(of.LOAD_POINT, (), 0),
+        varied.FactorChange(of.LOAD_DIRECTION, (), 2),
+        varied.FactorChange(of.LOAD_SIZE),
+        varied.FactorChange(of.MASS, ("L2",)),
+        varied.FactorChange(of.CENTRE_OF_MASS, (), 1),
+        varied.FactorChange(of.DAMPING),
+        varied.FactorChange(of.NOTHING),
     )
 
 
@@ -379,4 +379,4 @@ def test_tables_know_every_index_and_every_end_of_an_analysis() -> None:
     index = INDEX_TABLE.column("index")
     assert set(index.allowed) == {name for names in INDICES.values() for name in names}
     assert tuple(one.partition(": ")[0] for one in index.meaning.split("; ")) == index.allowed
-    assert set(INDEX_TABLE.column("status").allowed) == set(Known)
+    assert set(INDEX_TABLE.column("status").allowed) == set(IndexStatus)

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from sweeps import sweep
 
 from spinepipe.cohort import Cohort, read
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.style import picture, style
 from spinepipe.schema import Table
 from spinepipe.studies.global_sensitivity.figures.panels import (
@@ -43,7 +43,7 @@ from spinepipe.studies.global_sensitivity.loaded import loaded
 from spinepipe.studies.global_sensitivity.page import document, shown_tables
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CONVERGENCE, DESIGN, INDICES, RESPONSES
-from spinepipe.tables import Tables, from_rows
+from spinepipe.tables import StudyTables, from_rows
 
 Rows = list[dict[str, Any]]
 
@@ -214,12 +214,12 @@ def study(method: str = "sobol", **more: Any) -> GlobalSensitivity:
 
 def drawn(name: str, cohort: Cohort, **tables: pd.DataFrame) -> Figure:
     with style():
-        return DRAW[name](study(), cohort, Tables(tables))
+        return DRAW[name](study(), cohort, StudyTables(tables))
 
 
 def test_every_figure_becomes_a_picture(cohort: Cohort) -> None:
     found, (responses, design) = indices(kinds=MOTION), runs(100)
-    tables = Tables(
+    tables = StudyTables(
         {
             "indices": found,
             "convergence": convergence(found),
@@ -552,12 +552,12 @@ def test_joints_with_leaders_of_their_own_are_told_apart(cohort: Cohort) -> None
 
 @sweep("method", LEFT_OUT)
 def test_failed_runs_are_told_with_the_rule(cohort: Cohort, method: str) -> None:
-    found = Results(Tables({"indices": indices(method, failed=3, kinds=MOTION)}), {}, {})
+    found = ResultTables(StudyTables({"indices": indices(method, failed=3, kinds=MOTION)}), {}, {})
     sure = opening(study(method), cohort, found).how_sure
     assert "at most 3 failed" in sure
     assert LEFT_OUT[method] in sure
     assert "3\u2009036 runs or more" in sure
-    none = Results(Tables({"indices": indices(method, kinds=MOTION)}), {}, {})
+    none = ResultTables(StudyTables({"indices": indices(method, kinds=MOTION)}), {}, {})
     assert "none failed" in opening(study(method), cohort, none).how_sure
 
 
@@ -576,11 +576,13 @@ def test_outputs_without_an_index_are_told(cohort: Cohort) -> None:
     lost = (found["output"] == "joint_load") & (found["test"] == "flexion")
     found.loc[lost, ["status", "message"]] = ["too_many_failed", "far too many"]
     found.loc[lost, "estimate"] = np.nan
-    (warning,) = opening(study(), cohort, Results(Tables({"indices": found}), {}, {})).warnings
+    (warning,) = opening(
+        study(), cohort, ResultTables(StudyTables({"indices": found}), {}, {})
+    ).warnings
     assert warning.startswith("6 of 24 outputs have no index")
     assert "far too many" in warning
     constant = found.assign(status=found["status"].replace("too_many_failed", "constant"))
-    results = Results(Tables({"indices": constant}), {}, {})
+    results = ResultTables(StudyTables({"indices": constant}), {}, {})
     assert opening(study(), cohort, results).warnings == ()
     assert any("vary with no factor" in words for words in findings(study(), cohort, results))
 
@@ -597,11 +599,11 @@ def test_interactions_above_their_noise_are_told(cohort: Cohort) -> None:
         noise_floor=0.1,
         above_floor=True,
     )
-    both = Results(Tables({"indices": pd.concat([found, pair])}), {}, {})
+    both = ResultTables(StudyTables({"indices": pd.concat([found, pair])}), {}, {})
     words = " ".join(findings(study(), cohort, both))
     assert "(S2): load size with mass 0.20 [0.15 to 0.25]." in words
-    hidden = Results(
-        Tables({"indices": pd.concat([found, pair.assign(above_floor=False)])}), {}, {}
+    hidden = ResultTables(
+        StudyTables({"indices": pd.concat([found, pair.assign(above_floor=False)])}), {}, {}
     )
     assert "no interaction of two factors" in " ".join(findings(study(), cohort, hidden))
     names = [shown.title for shown in shown_tables(cohort, both)]
@@ -613,9 +615,9 @@ def test_a_design_too_small_for_any_index_still_has_a_page(cohort: Cohort) -> No
     none = indices().assign(
         status="too_few", message="2 base samples", estimate=np.nan, ci_low=np.nan, ci_high=np.nan
     )
-    tables = Tables({"indices": none, "convergence": convergence(none)})
-    assert shown_tables(cohort, Results(tables, {}, {})) == []
-    page = document(study(), cohort, Results(tables, {}, {})).html(study(), cohort)
+    tables = StudyTables({"indices": none, "convergence": convergence(none)})
+    assert shown_tables(cohort, ResultTables(tables, {}, {})) == []
+    page = document(study(), cohort, ResultTables(tables, {}, {})).html(study(), cohort)
     assert "2 base samples" in page
 
 
@@ -626,10 +628,10 @@ def test_the_page_opens_with_the_answer_and_fetches_nothing(cohort: Cohort) -> N
         figure.name: Picture.of(figure.name, figure.title, svg, f"caption of {figure.name}")
         for figure in KIND.figures
     }
-    tables = Tables({"indices": found, "convergence": convergence(found)})
+    tables = StudyTables({"indices": found, "convergence": convergence(found)})
 
     def page_of(asked: GlobalSensitivity) -> str:
-        return document(asked, cohort, Results(tables, {}, pictures)).html(asked, cohort)
+        return document(asked, cohort, ResultTables(tables, {}, pictures)).html(asked, cohort)
 
     page = page_of(study(dummy=True))
     assert '<p class="headline">Motion and joint load' not in page, "each output by its name"

@@ -13,9 +13,9 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames, landmarks
 from spinepipe.frames import FRAME_LANDMARKS, joint_pose, transform_of
-from spinepipe.studies.global_sensitivity.change import Change, Of
+from spinepipe.studies.global_sensitivity.change import FactorChange, Of
 from spinepipe.studies.global_sensitivity.many_frames import many_joint_frames, one_joint_frame
-from spinepipe.studies.global_sensitivity.start import Start, asked_tests, start_of
+from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, asked_tests, start_of
 from spinepipe.studies.global_sensitivity.vary import Varied, vary
 
 STIFFNESS = np.array([24600.0, 110000.0, 13500.0, 37.0, 64.0, 268.0])
@@ -34,19 +34,19 @@ def cohort(tmp_path: Path) -> Cohort:
     return cohorts.read(write(tmp_path / "small", TURNED_LANDMARKS))
 
 
-def start(cohort: Cohort, all_steps: bool = False) -> Start:
+def start(cohort: Cohort, all_steps: bool = False) -> DescribedSpecimen:
     """Specimen a in all its tests."""
     return start_of(cohort, "a", STIFFNESS, DAMPING, cohort.tests, all_steps)
 
 
-def one(cohort: Cohort, *changes: tuple[Change, float]) -> Varied:
+def one(cohort: Cohort, *changes: tuple[FactorChange, float]) -> Varied:
     """One sample of some factors with their values."""
     whats, values = zip(*changes, strict=True)
     return vary(start(cohort, all_steps=True), whats, np.array([values]))
 
 
 def test_without_factors_spines_are_the_cohorts_own(cohort: Cohort) -> None:
-    varied = vary(start(cohort), (Change(Of.NOTHING),), np.linspace(0.0, 1.0, 3)[:, None])
+    varied = vary(start(cohort), (FactorChange(Of.NOTHING),), np.linspace(0.0, 1.0, 3)[:, None])
     own = joint_frames(cohort, "a")
     for i in range(3):
         model = varied.spines.model(i)
@@ -60,7 +60,7 @@ def test_without_factors_spines_are_the_cohorts_own(cohort: Cohort) -> None:
 
 
 def test_a_moved_landmark_makes_the_frames_that_joint_pose_makes(cohort: Cohort) -> None:
-    change = Change(Of.LANDMARK, ("L3",), 2, "superior_endplate_centre")
+    change = FactorChange(Of.LANDMARK, ("L3",), 2, "superior_endplate_centre")
     varied = one(cohort, (change, 0.004))
     points = landmarks(cohort, "a")
     at = points["L3"]["superior_endplate_centre"]
@@ -72,7 +72,7 @@ def test_a_moved_landmark_makes_the_frames_that_joint_pose_makes(cohort: Cohort)
 
 
 def test_a_moved_endplate_moves_the_joint_above_by_half(cohort: Cohort) -> None:
-    change = Change(Of.LANDMARK, ("L3",), 0, "superior_endplate_centre")
+    change = FactorChange(Of.LANDMARK, ("L3",), 0, "superior_endplate_centre")
     origins = one(cohort, (change, 0.004)).spines.origins[0]
     own = [frame.origin for frame in joint_frames(cohort, "a")]
     np.testing.assert_allclose(origins[0], own[0], rtol=0, atol=1e-17)
@@ -81,7 +81,7 @@ def test_a_moved_endplate_moves_the_joint_above_by_half(cohort: Cohort) -> None:
 
 def test_poses_that_are_given_stay_when_landmarks_move(tmp_path: Path) -> None:
     given = both(TURNED_LANDMARKS, text("joints.csv", joints()))
-    change = Change(Of.LANDMARK, ("L3",), 0, "superior_endplate_centre")
+    change = FactorChange(Of.LANDMARK, ("L3",), 0, "superior_endplate_centre")
     cohort = cohorts.read(write(tmp_path / "small", given))
     moved = one(cohort, (change, 0.004)).spines
     np.testing.assert_array_equal(moved.origins[0], [[0.0, 0.005, 0.0], [0.0, 0.041, 0.0]])
@@ -117,7 +117,7 @@ def test_one_joint_frame_reads_the_landmarks_by_their_names() -> None:
 
 def test_landmarks_that_define_no_frame_refuse_their_sample_alone(cohort: Cohort) -> None:
     # specimen a's L3: pedicle bases at z -15 and 14 mm; 29 mm bring the left one onto the other
-    change = Change(Of.LANDMARK, ("L3",), 2, "left_pedicle_base")
+    change = FactorChange(Of.LANDMARK, ("L3",), 2, "left_pedicle_base")
     values = np.array([[0.001], [0.029], [0.002]])
     varied = vary(start(cohort), (change,), values)
     assert list(varied.refused) == [1]
@@ -129,14 +129,17 @@ def test_landmarks_that_define_no_frame_refuse_their_sample_alone(cohort: Cohort
 
 
 def test_stiffness_out_of_bounds_refuses_its_sample_alone(cohort: Cohort) -> None:
-    change = Change(Of.STIFFNESS, ("L2L3",), 3)
+    change = FactorChange(Of.STIFFNESS, ("L2L3",), 3)
     varied = vary(start(cohort), (change,), np.array([[1.0], [1e7]]))
     assert varied.kept.tolist() == [0]
     assert "joint L2L3: extension_nm_per_rad is 3.7e+08 N m/rad" in varied.refused[1]
 
 
 def test_frames_move_along_and_turn_about_their_own_axes(cohort: Cohort) -> None:
-    centre, axes = Change(Of.JOINT_CENTRE, ("L2L3",), 1), Change(Of.JOINT_AXES, ("L2L3",), 2)
+    centre, axes = (
+        FactorChange(Of.JOINT_CENTRE, ("L2L3",), 1),
+        FactorChange(Of.JOINT_AXES, ("L2L3",), 2),
+    )
     moved = one(cohort, (centre, 0.003), (axes, 0.2)).spines.model(0).frames
     own = joint_frames(cohort, "a")
     assert not np.allclose(own[1].rotation, np.eye(3), atol=1e-3)
@@ -147,8 +150,8 @@ def test_frames_move_along_and_turn_about_their_own_axes(cohort: Cohort) -> None
 
 
 def test_landmarks_are_moved_before_the_frames_they_make(cohort: Cohort) -> None:
-    landmark = Change(Of.LANDMARK, ("L3",), 2, "superior_endplate_centre")
-    centre = Change(Of.JOINT_CENTRE, (), 0)
+    landmark = FactorChange(Of.LANDMARK, ("L3",), 2, "superior_endplate_centre")
+    centre = FactorChange(Of.JOINT_CENTRE, (), 0)
     both_ways = [
         one(cohort, *order)
         for order in (
@@ -163,7 +166,7 @@ def test_landmarks_are_moved_before_the_frames_they_make(cohort: Cohort) -> None
 
 
 def test_stiffness_of_one_coordinate_and_several_factors_of_it(cohort: Cohort) -> None:
-    every, upper = Change(Of.STIFFNESS, (), 3), Change(Of.STIFFNESS, ("L2L3",), 3)
+    every, upper = FactorChange(Of.STIFFNESS, (), 3), FactorChange(Of.STIFFNESS, ("L2L3",), 3)
     values = one(cohort, (every, 2.0), (upper, 5.0)).spines.values[0][0]
     expected = np.tile(STIFFNESS, (2, 1))
     expected[:, 3] = [2.0 * 37.0, 10.0 * 37.0]
@@ -171,7 +174,7 @@ def test_stiffness_of_one_coordinate_and_several_factors_of_it(cohort: Cohort) -
 
 
 def test_doubled_masses_double_inertias_and_leave_centres(cohort: Cohort) -> None:
-    twice = one(cohort, (Change(Of.MASS, ("L2",)), 2.0)).spines.model(0).bodies
+    twice = one(cohort, (FactorChange(Of.MASS, ("L2",)), 2.0)).spines.model(0).bodies
     assert [body.mass for body in twice] == [0.06, 0.12]
     np.testing.assert_array_equal(twice[0].inertia, np.diag([2e-5, 3e-5, 2e-5]))
     np.testing.assert_array_equal(twice[1].inertia, np.diag([4e-5, 6e-5, 4e-5]))
@@ -179,27 +182,27 @@ def test_doubled_masses_double_inertias_and_leave_centres(cohort: Cohort) -> Non
 
 
 def test_a_centre_of_mass_moves_and_loads_stay(cohort: Cohort) -> None:
-    varied = one(cohort, (Change(Of.CENTRE_OF_MASS, ("L2",), 0), 0.01))
+    varied = one(cohort, (FactorChange(Of.CENTRE_OF_MASS, ("L2",), 0), 0.01))
     np.testing.assert_array_equal(varied.spines.coms[0], [[0, 0.023, 0], [0.01, 0.059, 0]])
     # step 0 names no point: it is the cohort's own centre of mass
     np.testing.assert_array_equal(varied.cases[0].points[0, 0, 0], [0.0, 0.059, 0.0])
 
 
 def test_damping_is_scaled(cohort: Cohort) -> None:
-    damping = one(cohort, (Change(Of.DAMPING), 3.0)).spines.damping[0]
+    damping = one(cohort, (FactorChange(Of.DAMPING), 3.0)).spines.damping[0]
     np.testing.assert_array_equal(damping, np.tile(3.0 * DAMPING, (2, 1)))
 
 
 def test_a_load_turned_by_a_right_angle(cohort: Cohort) -> None:
     # 100 N downwards with 2 N m about -z; about +x, y turns to z and z to -y
-    turned = one(cohort, (Change(Of.LOAD_DIRECTION, axis=0), np.pi / 2.0)).cases[0]
+    turned = one(cohort, (FactorChange(Of.LOAD_DIRECTION, axis=0), np.pi / 2.0)).cases[0]
     np.testing.assert_allclose(turned.forces[0, 2, 0], [0.0, 0.0, -100.0], atol=1e-13)
     np.testing.assert_allclose(turned.moments[0, 2, 0], [0.0, 2.0, 0.0], atol=1e-13)
     np.testing.assert_array_equal(turned.points[0, 2, 0], [0.015, 0.072, 0.0])
 
 
 def test_turns_about_two_axes_are_one_rotation_vector(cohort: Cohort) -> None:
-    x, z = Change(Of.LOAD_DIRECTION, axis=0), Change(Of.LOAD_DIRECTION, axis=2)
+    x, z = FactorChange(Of.LOAD_DIRECTION, axis=0), FactorChange(Of.LOAD_DIRECTION, axis=2)
     one_way = one(cohort, (x, 0.3), (z, 0.2)).cases[0]
     np.testing.assert_array_equal(one(cohort, (z, 0.2), (x, 0.3)).cases[0].forces, one_way.forces)
     expected = Rotation.from_rotvec([0.3, 0.0, 0.2]).apply([0.0, -100.0, 0.0])
@@ -207,7 +210,7 @@ def test_turns_about_two_axes_are_one_rotation_vector(cohort: Cohort) -> None:
 
 
 def test_size_and_point_of_loads(cohort: Cohort) -> None:
-    size, point = Change(Of.LOAD_SIZE), Change(Of.LOAD_POINT, axis=2)
+    size, point = FactorChange(Of.LOAD_SIZE), FactorChange(Of.LOAD_POINT, axis=2)
     case = one(cohort, (size, 1.5), (point, -0.005)).cases[0].case(0)
     assert [step.step for step in case.steps] == [0, 1, 2]
     (wrench,) = case.steps[2].wrenches
@@ -219,16 +222,16 @@ def test_size_and_point_of_loads(cohort: Cohort) -> None:
 def test_numbers_of_nobodys_loads_stay_zero(tmp_path: Path) -> None:
     second = add("loads.csv", "*,flexion,2,L3,0,-10,0,0,0,0,5,20,0,2")
     cohort = cohorts.read(write(tmp_path / "small", second))
-    moved = one(cohort, (Change(Of.LOAD_POINT, axis=0), 0.001)).cases[0]
+    moved = one(cohort, (FactorChange(Of.LOAD_POINT, axis=0), 0.001)).cases[0]
     np.testing.assert_array_equal(moved.points[0, 1, 1], np.zeros(3))
     np.testing.assert_allclose(moved.points[0, 2, 1], [0.006, 0.02, 0.0], rtol=1e-15)
 
 
 def test_samples_are_the_same_alone_and_together(cohort: Cohort) -> None:
     changes = (
-        Change(Of.LANDMARK, ("L3",), 1, "right_pedicle_base"),
-        Change(Of.JOINT_AXES, (), 0),
-        Change(Of.LOAD_DIRECTION, axis=2),
+        FactorChange(Of.LANDMARK, ("L3",), 1, "right_pedicle_base"),
+        FactorChange(Of.JOINT_AXES, (), 0),
+        FactorChange(Of.LOAD_DIRECTION, axis=2),
     )
     values = np.random.default_rng(5).normal(0.0, 0.002, (40, 3))
     whole = vary(start(cohort), changes, values)

@@ -20,7 +20,7 @@ from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.study import Study
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 COHORTS = Path(__file__).resolve().parents[3] / "config" / "cohorts"
 
@@ -90,7 +90,7 @@ def test_joint_pose_figures_of_a_cohort_of_the_other_paper(name: str, tmp_path: 
     folder = results(project(tmp_path, size), size)
     identification(folder, size)
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
-    tables = Tables.read([folder / f"{table}.parquet" for table in FIGURES[name]])
+    tables = StudyTables.read([folder / f"{table}.parquet" for table in FIGURES[name]])
     with style():
         alone, other = (
             picture(drawing(name)(study, one, tables), "svg")

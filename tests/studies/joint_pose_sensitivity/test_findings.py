@@ -10,13 +10,13 @@ import pytest
 from study_cases import STUDY, Size, project
 from sweeps import sweep
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.joint_pose_sensitivity.findings import findings
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import left_out, shown_tables
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import LOWER_ENDS
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 NAN = float("nan")
 
@@ -29,8 +29,8 @@ def study(tmp_path: Path) -> JointPoseSensitivity:
 
 def told(study: JointPoseSensitivity, tables: Mapping[str, list[dict[str, Any]]]) -> str:
     """All findings as one text, with plain spaces."""
-    frames = Tables({name: pd.DataFrame(rows) for name, rows in tables.items()})
-    return " ".join(findings(study, Results(frames, {}, {}))).replace("\u00a0", " ")
+    frames = StudyTables({name: pd.DataFrame(rows) for name, rows in tables.items()})
+    return " ".join(findings(study, ResultTables(frames, {}, {}))).replace("\u00a0", " ")
 
 
 def summary(n: int, iqr: float, part: str, loading: str, **more: Any) -> dict[str, Any]:
@@ -301,8 +301,8 @@ def test_trees_that_could_not_be_grown_have_a_row_that_says_why(
         }
         for name in ("p1", "p2")
     ]
-    frames = Tables({"importance": pd.DataFrame(rows)})
-    (table,) = shown_tables(study, Results(frames, {}, {}))
+    frames = StudyTables({"importance": pd.DataFrame(rows)})
+    (table,) = shown_tables(study, ResultTables(frames, {}, {}))
     (row,) = table.rows
     assert [head.name for head in table.heads] == ["joint", "coordinate", "n", "message"]
     assert row[-1].text == "18 rows; at least 20"

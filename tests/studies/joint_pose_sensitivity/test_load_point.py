@@ -16,9 +16,9 @@ from study_cases import STUDY, TABLES, Size, project
 from sweeps import sweep
 
 from papers.engine import claims_of, judge
-from papers.run import Run
+from papers.run import StudyRun
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.style import style
 from spinepipe.studies.joint_pose_sensitivity.figures.load_point import load_point_figure
 from spinepipe.studies.joint_pose_sensitivity.findings_of_load_point import load_point
@@ -27,7 +27,7 @@ from spinepipe.studies.joint_pose_sensitivity.load_point_effect import effect
 from spinepipe.studies.joint_pose_sensitivity.over_load_point import allowed
 from spinepipe.studies.joint_pose_sensitivity.settings import LoadPoint
 from spinepipe.studies.read import check
-from spinepipe.tables import Tables, from_rows
+from spinepipe.tables import StudyTables, from_rows
 
 NAN = float("nan")
 FINE = tuple(float(x) for x in np.arange(-4.0, 4.01, 0.25))
@@ -219,7 +219,7 @@ def row(**more: Any) -> dict[str, Any]:
 
 def told(*rows: dict[str, Any]) -> str:
     frame = pd.DataFrame(list(rows))
-    return load_point(Results(Tables({"load_point_effect": frame}), {}, {}))
+    return load_point(ResultTables(StudyTables({"load_point_effect": frame}), {}, {}))
 
 
 def test_finding_says_what_a_mm_is_worth_and_that_motion_does_not_tell() -> None:
@@ -259,7 +259,7 @@ def test_figure_has_a_panel_for_each_stiffness_and_one_for_the_cost(
     effects = pd.DataFrame([row(specimen=name) for name in specimens])
     tables = {"stiffness_over_load_point": fits, "load_point_effect": effects}
     with style():
-        figure = load_point_figure(study, cohort, Tables(tables))
+        figure = load_point_figure(study, cohort, StudyTables(tables))
         figure.canvas.draw()
         shown = [axis for axis in figure.axes if axis.get_visible()]
         assert [axis.get_title("left")[-4:] for axis in shown] == ["sion", "Cost"]
@@ -268,14 +268,14 @@ def test_figure_has_a_panel_for_each_stiffness_and_one_for_the_cost(
         nothing = load_point_figure(
             study,
             cohort,
-            Tables({**tables, "stiffness_over_load_point": fits.assign(status="unstable")}),
+            StudyTables({**tables, "stiffness_over_load_point": fits.assign(status="unstable")}),
         )
     assert "No stiffness was found" in nothing.texts[0].get_text()
 
 
 def claim(name: str, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
     (found,) = [one for one in claims_of("gould_2024a") if one.id == name]
-    return judge(found, Run(tables))
+    return judge(found, StudyRun(tables))
 
 
 def test_lowering_of_the_load_by_hand() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.joint_pose_sensitivity import poses, posterior
 from spinepipe.studies.joint_pose_sensitivity.figures.posterior import posterior_figure
 from spinepipe.studies.joint_pose_sensitivity.findings_of_posterior import posterior as sentences
@@ -98,7 +98,7 @@ def test_a_pose_weighs_as_its_evidence(found: tuple[Path, dict[str, pd.DataFrame
 @pytest.mark.full
 def test_what_is_told_follows_the_tables(found: tuple[Path, dict[str, pd.DataFrame]]) -> None:
     root, tables = found
-    told = " ".join(sentences(Results(tables, {}, {})))
+    told = " ".join(sentences(ResultTables(tables, {}, {})))
     assert "No posterior" not in told
     assert "flexion–extension" in told
     settings, cohort = study_and_cohort(str(root), "felt")
@@ -114,6 +114,6 @@ def test_chains_too_short_tell_no_numbers(tmp_path: Path) -> None:
     assert drawn[["mean", "median", "low", "high", "prior_dominated"]].isna().all(axis=None)
     assert drawn["laplace_mean"].notna().all()
     assert motion[["median", "inside"]].isna().all(axis=None)
-    told = sentences(Results(tables, {}, {}))
+    told = sentences(ResultTables(tables, {}, {}))
     assert told[0].startswith("No posterior is told of p (")
     assert "median" not in " ".join(told)

@@ -17,7 +17,7 @@ from sweeps import sweep
 from spinepipe.cohort import Cohort
 from spinepipe.frames import Pose
 from spinepipe.jobs import report
-from spinepipe.report.page.document import Picture, Results, sortable
+from spinepipe.report.page.document import Picture, ResultTables, sortable
 from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from spinepipe.report.specimen import view_of
 from spinepipe.schema import Column
@@ -25,7 +25,7 @@ from spinepipe.studies.joint_pose_sensitivity.findings import findings
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import document, folded, in_full
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.tables import Tables, read_frame
+from spinepipe.tables import StudyTables, read_frame
 
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"><!-- &amp; --></svg>'
 VOID = {"meta", "link", "img", "input", "br", "hr"}
@@ -87,7 +87,7 @@ def made(root: Path, size: Size) -> tuple[str, list[Path]]:
     return (folder / "report.html").read_text(encoding="utf-8"), files
 
 
-def html(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> str:
+def html(study: JointPoseSensitivity, cohort: Cohort, results: ResultTables) -> str:
     """The page of a study."""
     return document(study, cohort, results).html(study, cohort)
 
@@ -197,8 +197,8 @@ def test_precision_is_told_of_the_one_kind_of_motion_that_was_measured(tmp_path:
     study, _ = study_and_cohort(str(root), STUDY)
     row = {"specimen": "a", "stiffness": "calibrated", "motion": "rotation", "message": ""}
     row |= {"n": 100, "sd_mm": 1.25, "sd_low_mm": 1.0, "sd_high_mm": 1.5}
-    tables = Tables({"required_precision": pd.DataFrame([row])})
-    (told,) = findings(study, Results(tables, {}, {}))
+    tables = StudyTables({"required_precision": pd.DataFrame([row])})
+    (told,) = findings(study, ResultTables(tables, {}, {}))
     assert "to stay below 1°, the SD" in told
     assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in told
 
@@ -225,8 +225,8 @@ def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
     against = read_frame(write_table(folder, "against_gould_2024a", rows))
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
     poses = read_frame(folder / "poses.parquet")
-    tables = Tables({"poses": poses, "against_gould_2024a": against})
-    found = Page(html(study, cohort, Results(tables, {}, {})))
+    tables = StudyTables({"poses": poses, "against_gould_2024a": against})
+    found = Page(html(study, cohort, ResultTables(tables, {}, {})))
     (told,) = found.text("li")
     assert "Of 6 published quantities that are evidence ours are inside the paper's range" in told
     assert "for 3 and outside for 2; 1 are not computed. Of the 3 inside, 3 lie in a" in told
@@ -250,7 +250,7 @@ def test_a_study_of_few_tables_has_a_page(tmp_path: Path) -> None:
     size = SIZES["one specimen"]
     folder = results(project(tmp_path, size), size)
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
-    few = Results(Tables.read([folder / "poses.parquet"]), {}, {})
+    few = ResultTables(StudyTables.read([folder / "poses.parquet"]), {}, {})
     found = Page(html(study, cohort, few))
     assert "There are no findings: no table has a result." in found.text("p")
 
@@ -281,11 +281,11 @@ def test_odd_names_are_text_and_nothing_else(tmp_path: Path) -> None:
     folder = results(project(tmp_path, size), size)
     files = identification(folder, size)
     study, cohort = study_and_cohort(str(tmp_path), STUDY)
-    read = Tables.read([*files, folder / "poses.parquet"])
-    tables = Tables({n: frame.replace({"specimen": {"a": ODD}}) for n, frame in read.items()})
+    read = StudyTables.read([*files, folder / "poses.parquet"])
+    tables = StudyTables({n: frame.replace({"specimen": {"a": ODD}}) for n, frame in read.items()})
     metadata = {"counts": {"seed": ODD}}
     pictures = {ODD: Picture.of(ODD, ODD, PICTURE, ODD)}
-    text = html(study, odd(cohort), Results(tables, metadata, pictures))
+    text = html(study, odd(cohort), ResultTables(tables, metadata, pictures))
     found = Page(text)
     assert f"({1} specimen: {ODD};" in " ".join(" ".join(found.text("p")).split())
     assert len(found.all("b")) == 1, "only the title of the one figure"

@@ -13,7 +13,7 @@ from study_cases import STUDY, Size, project, results
 from sweeps import sweep
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.page.scene import scenes
 from spinepipe.report.panels import across_of, log_ticks
 from spinepipe.report.specimen import view_of
@@ -32,11 +32,11 @@ from spinepipe.studies.joint_pose_sensitivity.figures.success import success_fig
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import caption
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 FOUR = ("anterior", "superior", "extension", "right_bending")
 CAPTIONS = Path(agreement.__file__).parent
-Study = tuple[JointPoseSensitivity, Cohort, Tables]
+Study = tuple[JointPoseSensitivity, Cohort, StudyTables]
 
 
 def made(root: Path, size: Size) -> Study:
@@ -44,7 +44,7 @@ def made(root: Path, size: Size) -> Study:
     folder = results(project(root, size), size)
     identification(folder, size)
     study, cohort = study_and_cohort(str(root), STUDY)
-    return study, cohort, Tables.read(list(folder.glob("*.parquet")))
+    return study, cohort, StudyTables.read(list(folder.glob("*.parquet")))
 
 
 def panels(figure: Figure) -> list[Axes]:
@@ -239,7 +239,7 @@ def told(name: str, study: Study, **tables: pd.DataFrame) -> str:
     """A figure's caption on the page."""
     text = (CAPTIONS / f"{name}.rst").read_text(encoding="utf-8")
     picture = Picture(name, name, "", " ".join(text.split()))
-    return caption(picture, *study[:2], Results(Tables({**study[2], **tables}), {}, {}))
+    return caption(picture, *study[:2], ResultTables(StudyTables({**study[2], **tables}), {}, {}))
 
 
 def test_captions_speak_of_the_paper_only_beside_its_cohort(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from grid_cases import JOINTS, STUDY, made_up, table_of
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Results
+from spinepipe.report.page.document import ResultTables
 from spinepipe.report.style import picture, style
 from spinepipe.studies.range_of_motion import draw as sample_frames
 from spinepipe.studies.range_of_motion.figures.motion import levels_figure, variance_figure
@@ -23,13 +23,13 @@ from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.summary import summary_rows
 from spinepipe.studies.range_of_motion.variance import variance_rows
 from spinepipe.studies.read import check
-from spinepipe.tables import Tables, read_frame
+from spinepipe.tables import StudyTables, read_frame
 
 Size = tuple[int, int, int]
 Lost = tuple[tuple[int, int, int], ...]
 
 
-def results(root: Path, size: Size, lost: Lost = ()) -> tuple[RangeOfMotion, Cohort, Results]:
+def results(root: Path, size: Size, lost: Lost = ()) -> tuple[RangeOfMotion, Cohort, ResultTables]:
     """Tables of a study of made-up numbers."""
     project = made_up(root, size)
     path, _ = table_of(root, size, lost)
@@ -40,10 +40,10 @@ def results(root: Path, size: Size, lost: Lost = ()) -> tuple[RangeOfMotion, Coh
         "rom_summary": pd.DataFrame(summary_rows(grid)),
         "rom_variance": pd.DataFrame(variance_rows(grid)),
     }
-    return study, cohort, Results(Tables(tables), {}, {})
+    return study, cohort, ResultTables(StudyTables(tables), {}, {})
 
 
-def page_of(study: RangeOfMotion, cohort: Cohort, found: Results) -> str:
+def page_of(study: RangeOfMotion, cohort: Cohort, found: ResultTables) -> str:
     """The whole report."""
     return document(study, cohort, found).html(study, cohort)
 
@@ -154,7 +154,7 @@ def test_most_is_more_than_half_at_every_joint(
 ) -> None:
     study, cohort, found = results(tmp_path, (3, 5, 4))
     tables = {**found.tables, "rom_variance": variance_of(stiffness)}
-    told = findings(study, cohort, replace(found, tables=Tables(tables)))
+    told = findings(study, cohort, replace(found, tables=StudyTables(tables)))
     assert f"Left bending: {says}" in [line.replace("\u00a0", " ") for line in told]
 
 
@@ -181,7 +181,7 @@ def test_the_segment_is_shown_with_the_loads_that_were_applied(
     tables = {**found.tables, "frames": pd.concat(parts, ignore_index=True)}
     study = study if virtual else study.model_copy(update={"virtual_tests": None})
     cohort = check(tmp_path, STUDY)[1]
-    page = page_of(study, cohort, replace(found, tables=Tables(tables)))
+    page = page_of(study, cohort, replace(found, tables=StudyTables(tables)))
     text = page.split('<script type="application/json"')[0]
     assert re.findall(r'data-group="(\w+)"', text) == ["own", "sampled", *["loads"] * (not virtual)]
     assert ("Arrows end where" in text) != virtual

@@ -13,7 +13,7 @@ from scoliosis_cases import write_shipped
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputError
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import CENTRE, FILMS, PATIENTS
@@ -38,7 +38,7 @@ def told(folder: Path, sound: Path, change: Callable[[pd.DataFrame], pd.DataFram
     for file in ("cohort.yaml", "specimens.csv", "patients.csv"):
         (folder / file).write_bytes((sound / file).read_bytes())
     change(pd.read_csv(sound / "films.csv")).to_csv(folder / "films.csv", index=False)
-    document = Document("s.yaml", {"cohort": "ais"}, {})
+    document = YamlDocument("s.yaml", {"cohort": "ais"}, {})
     try:
         cohort = cohorts.read(folder, (FILMS, PATIENTS))
     except InputError as error:
@@ -176,6 +176,6 @@ def test_neutral_and_traction_may_be_missing(tmp_path: Path, sound: Path) -> Non
 def test_a_cohort_without_films_is_refused(sound: Path) -> None:
     cohort = cohorts.read(sound, (FILMS, PATIENTS))
     bare = type(cohort)(**{**vars(cohort), "further": {}})
-    document = Document("s.yaml", {"cohort": "ais"}, {"cohort": 3})
+    document = YamlDocument("s.yaml", {"cohort": "ais"}, {"cohort": 3})
     (problem,) = check_scoliosis(document, STUDY, bare)
     assert "films.csv" in problem.found

@@ -14,16 +14,16 @@ import pytest
 from scoliosis_cases import SHIPPED, write_shipped
 
 from spinepipe import cohort as cohorts
-from spinepipe.calibrate.descent import Settled
+from spinepipe.calibrate.descent import DescentTolerances
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress
-from spinepipe.statics.prescribed import Held, _Problem, alone, hold_at
-from spinepipe.status import Ended, Status
+from spinepipe.statics.prescribed import PrescribedResult, _Problem, alone, hold_at
+from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis import learn as learning
 from spinepipe.studies.scoliosis.film_fit import TOPS, FilmFit, fit_alike, laws_of, weighed_with
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT
-from spinepipe.studies.scoliosis.optima import Optimum, best, optimum
+from spinepipe.studies.scoliosis.optima import FilmOptimum, best, optimum
 from spinepipe.studies.scoliosis.personal import linear_regions, patient_of, region_optimum
 from spinepipe.studies.scoliosis.personalise import UNSETTLED, rows_of
 from spinepipe.studies.scoliosis.population import Population, assumed
@@ -58,12 +58,14 @@ def cost_from_neutral(fit: FilmFit, population: Population, unknowns: Array) -> 
     return float(found[0] @ found[0])
 
 
-def held_off_the_path(fit: FilmFit, numbers: Array) -> tuple[Held, Held]:
+def held_off_the_path(fit: FilmFit, numbers: Array) -> tuple[PrescribedResult, PrescribedResult]:
     """Poses in right bending: Newton's with all at once from neutral, and that of the path."""
     laws = laws_of(numbers, fit.size)
     spine = fit.spine.with_values(fit.spine.chain.values[0], laws)
     wanted = np.append(fit.patient.read.films[RIGHT].top, 0.0)
-    rest = Held(np.zeros(6 * SEGMENTS), np.zeros(4), wanted, Ended.CONVERGED, "", 0)
+    rest = PrescribedResult(
+        np.zeros(6 * SEGMENTS), np.zeros(4), wanted, PrescribedStatus.CONVERGED, "", 0
+    )
     at_once = _Problem(spine.chain, alone).newton(rest, wanted, 0.0)
     assert at_once is not None
     return at_once, hold_at(spine.chain, wanted)
@@ -74,7 +76,7 @@ def test_the_pose_is_the_end_of_the_way_and_not_where_one_long_step_lands(cohort
     fit = fit_of(cohort, "p14")
     numbers = list(fit._guesses(assumed(SEGMENTS)))[2][:-TOPS]
     at_once, found = held_off_the_path(fit, numbers)
-    assert at_once.status is found.status is Ended.CONVERGED
+    assert at_once.status is found.status is PrescribedStatus.CONVERGED
     assert np.abs(at_once.q - found.q).max() > np.deg2rad(2.0)
     chain = fit.spine.with_values(fit.spine.chain.values[0], laws_of(numbers, fit.size)).chain
     wanted, first = np.append(fit.patient.read.films[RIGHT].top, 0.0), chain.reached(0.0 * found.q)
@@ -196,18 +198,22 @@ def test_a_population_that_still_moves_says_so(
             assert all(UNSETTLED in row["message"] for row in made["positions"])
 
 
-CLOSE = Settled(cost=1e-15, step=1e-9, slope=1e-15, evaluations=200)
+CLOSE = DescentTolerances(cost=1e-15, step=1e-9, slope=1e-15, evaluations=200)
 
 
 class Line:
     """A spine without films: where its one number is beyond 1 it stands on another path."""
 
     def __init__(self) -> None:
-        self.near: dict[str, Held] = {}
+        self.near: dict[str, PrescribedResult] = {}
 
     def point(self, x: Array) -> tuple[Array, Array] | None:
         side = 1.0 if x[0] > 1.0 and not self.near else -1.0  # from near, the pose of before stays
-        self.near = {"film": Held(side * np.ones(6), np.zeros(1), x, Ended.CONVERGED, "", 0)}
+        self.near = {
+            "film": PrescribedResult(
+                side * np.ones(6), np.zeros(1), x, PrescribedStatus.CONVERGED, "", 0
+            )
+        }
         residual = np.array([x[0] - 2.0 if side < 0.0 else x[0] - 1.0 + 3.0])
         return residual, np.ones((1, 1))
 
@@ -224,9 +230,9 @@ def test_a_fit_that_ends_where_poses_leave_for_another_path_has_not_converged() 
 
 
 def test_ends_that_tie_or_are_near_count_once_and_the_first_is_taken() -> None:
-    def end(x: float, cost: float, status: Status = Status.CONVERGED) -> Optimum:
+    def end(x: float, cost: float, status: Status = Status.CONVERGED) -> FilmOptimum:
         root, at = np.array([np.sqrt(cost)]), np.array([x])
-        return Optimum(at, root, np.ones((1, 1)), {}, status, np.zeros(1, dtype=bool))
+        return FilmOptimum(at, root, np.ones((1, 1)), {}, status, np.zeros(1, dtype=bool))
 
     lost = end(9.0, 0.5, Status.NOT_CONVERGED)
     ends = [end(0.0, 1.0005), None, end(0.05, 1.0), end(3.0, 2.0), lost]

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
-from spinepipe.status import Ended
+from spinepipe.status import PrescribedStatus
 from spinepipe.studies.scoliosis import reading_noise as noise_of
-from spinepipe.studies.scoliosis.curve_angles import Curve, curves, lumbar_apex
+from spinepipe.studies.scoliosis.curve_angles import SpinalCurve, curves, lumbar_apex
 from spinepipe.studies.scoliosis.films import (
     CORNERS,
     FILMS,
@@ -47,21 +47,21 @@ ROOF = film((0, 0, 40), (1, 1, 10), (1.5, 2, -5), (0, 2, -30))
 
 def test_ferguson_s_angle_is_that_of_the_lines_to_the_apex() -> None:
     """From (0, 0) to (1, 1) the line leans 45 deg to the right, from there to (0, 2) 45 back."""
-    curve = Curve(lower=0, upper=3, apex=1, side=1)
+    curve = SpinalCurve(lower=0, upper=3, apex=1, side=1)
     assert np.rad2deg(curve.ferguson(ROOF)) == pytest.approx(90.0)
     assert np.rad2deg(curve.cobb(ROOF)) == pytest.approx(70.0)
-    left = Curve(0, 3, 1, -1)
+    left = SpinalCurve(0, 3, 1, -1)
     assert left.ferguson(ROOF) == -curve.ferguson(ROOF)
     assert left.cobb(ROOF) == -curve.cobb(ROOF)
 
 
 def test_the_apex_is_farthest_from_the_line_between_the_ends() -> None:
     """Of the line from (0, 0) to (0, 2): 1 and 1.5 away, whichever is higher."""
-    assert curves(ROOF) == (Curve(0, 3, 2, 1),)
+    assert curves(ROOF) == (SpinalCurve(0, 3, 2, 1),)
     lower_bulge = film((0, 0, 40), (1.5, 1, 10), (1.0, 2, -5), (0, 2, -30))
-    assert curves(lower_bulge) == (Curve(0, 3, 1, 1),)
+    assert curves(lower_bulge) == (SpinalCurve(0, 3, 1, 1),)
     slanting = film((0, 0, 40), (0.2, 3, 10), (3, 3.5, -5), (4, 4, -30))  # the line at 45 deg
-    assert curves(slanting) == (Curve(0, 3, 1, 1),)
+    assert curves(slanting) == (SpinalCurve(0, 3, 1, 1),)
 
 
 def tilted(*tilts: float) -> Film:
@@ -252,12 +252,16 @@ def test_what_no_film_shows_is_refused_by_the_reader() -> None:
     assert required == {"specimen", "position", "vertebra"}
 
 
-def posed(status: Ended, shown: Film, r: list[float]) -> Any:
+def posed(status: PrescribedStatus, shown: Film, r: list[float]) -> Any:
     return SimpleNamespace(held=SimpleNamespace(status=status), film=shown, r=np.deg2rad(r))
 
 
-@sweep("status", [Ended.CONVERGED, Ended.UNREACHABLE, Ended.UNSTABLE])
-def test_a_pose_misses_a_film_by_root_mean_squares_above_the_lowest(status: Ended) -> None:
+@sweep(
+    "status", [PrescribedStatus.CONVERGED, PrescribedStatus.UNREACHABLE, PrescribedStatus.UNSTABLE]
+)
+def test_a_pose_misses_a_film_by_root_mean_squares_above_the_lowest(
+    status: PrescribedStatus,
+) -> None:
     """Two vertebrae above the lowest: places off by 5 mm and nothing, tilts by 3 and 4 deg; both
     segments turn by 1 and 7 deg less than on the film."""
     read = film((0, 0, 0), (0.1, 1, 2), (0.2, 2, 4))
@@ -266,7 +270,7 @@ def test_a_pose_misses_a_film_by_root_mean_squares_above_the_lowest(status: Ende
     nothing: dict[str, Any] = {}
     whole = Read({"erect": erect, "neutral": read}, nothing, nothing, np.full(3, np.nan), nothing)
     found = miss_of(SimpleNamespace(read=whole), "neutral", posed(status, shown, [1.0, -5.0]))
-    if status is Ended.UNSTABLE:
+    if status is PrescribedStatus.UNSTABLE:
         assert set(found.values()) == {None}
         return
     assert found["place_rmse_mm"] == pytest.approx(5.0 / np.sqrt(2.0))

@@ -9,10 +9,10 @@ import pandas as pd
 from scoliosis_cases import Size, paired_test, study_of, tables_of
 from sweeps import sweep
 
-from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.studies.scoliosis.findings import both_ways, findings
 from spinepipe.studies.scoliosis.headline import (
-    Standing,
+    ModelRanking,
     _answer,
     _compared,
     above_noise,
@@ -26,12 +26,12 @@ SIZE = Size()
 
 def told(size: Size = SIZE, **changed: pd.DataFrame) -> str:
     """All findings, plain spaces before percent signs."""
-    made = Results(tables_of(size, **changed), {}, {})
+    made = ResultTables(tables_of(size, **changed), {}, {})
     return "\n".join(findings(study_of(size), made)).replace("\u00a0", " ")
 
 
 def answer(size: Size = SIZE, **changed: pd.DataFrame) -> Headline:
-    return headline(Results(tables_of(size, **changed), {}, {}))
+    return headline(ResultTables(tables_of(size, **changed), {}, {}))
 
 
 def of_pair(p: float, measure: str = "rotation") -> pd.DataFrame:
@@ -50,7 +50,7 @@ def test_five_per_cent_is_not_significant(p: float, significant: bool) -> None:
     assert (alike in told(statistics=of_pair(p, "place"))) is not significant
 
 
-def standing(errors: dict[str, float], noise: float | None) -> Standing:
+def standing(errors: dict[str, float], noise: float | None) -> ModelRanking:
     rows = [
         {
             "films": "held_out",
@@ -63,7 +63,7 @@ def standing(errors: dict[str, float], noise: float | None) -> Standing:
         }
         for model, rmse in errors.items()
     ]
-    return Standing.of(pd.DataFrame(rows), "held_out", "rotation")
+    return ModelRanking.of(pd.DataFrame(rows), "held_out", "rotation")
 
 
 @sweep(
@@ -88,8 +88,8 @@ def test_models_are_ordered_by_error_and_held_against_one_another() -> None:
     assert found.noise is None
     assert (found.error("c"), found.sized("c")) == (2.0, "2.00°")
     assert found.less("b", "c") == 0.5
-    assert Standing.of(pd.DataFrame(), "held_out", "rotation").models == []
-    assert Standing.of(pd.DataFrame(), "held_out", "rotation").noise is None
+    assert ModelRanking.of(pd.DataFrame(), "held_out", "rotation").models == []
+    assert ModelRanking.of(pd.DataFrame(), "held_out", "rotation").noise is None
 
 
 def compared(**errors: float) -> str:
@@ -215,7 +215,7 @@ def test_the_tangent_beside_linear_regions_as_good_better_and_worse(
     error: float, words: str
 ) -> None:
     held_out = standing({"tangent": error, "linear_regions": 0.6}, None).rows
-    made = Results({"accuracy": held_out.assign(films="fitted")}, {}, {})
+    made = ResultTables({"accuracy": held_out.assign(films="fitted")}, {}, {})
     (sentence,) = both_ways(study_of(SIZE), made)
     assert words in sentence
 
@@ -226,5 +226,5 @@ def test_held_out_errors_come_before_those_of_fitted_films() -> None:
 
 
 def test_without_tables_nothing_is_said() -> None:
-    empty: Any = Results({}, {}, {})
+    empty: Any = ResultTables({}, {}, {})
     assert findings(study_of(SIZE), empty) == []

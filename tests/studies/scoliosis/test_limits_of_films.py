@@ -18,7 +18,7 @@ from spinepipe.studies.scoliosis import checks, doubts
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film
 
 LEVELS = ("L4", "L3", "L2", "L1")
-PLACE = checks._Place("ais/films.csv", "p1", "erect")
+PLACE = checks._FilmPlace("ais/films.csv", "p1", "erect")
 COHORT: Any = SimpleNamespace(vertebrae=LEVELS, name="ais", further={})
 
 

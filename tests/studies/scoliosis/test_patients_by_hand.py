@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 from sweeps import sweep
 
-from spinepipe.calibrate.profile import Reach
-from spinepipe.status import Ended, Status
+from spinepipe.calibrate.profile import RegionEnds
+from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis import personal, personalise
-from spinepipe.studies.scoliosis.curve_angles import Curve
+from spinepipe.studies.scoliosis.curve_angles import SpinalCurve
 from spinepipe.studies.scoliosis.films import Film
 from spinepipe.studies.scoliosis.held_spine import BENDING, geometry, with_laws, with_springs
 from spinepipe.studies.scoliosis.personal import (
@@ -26,9 +26,9 @@ from spinepipe.studies.scoliosis.personal import (
     geometric_mean,
     size_of,
 )
-from spinepipe.studies.scoliosis.settings import Profile, Scoliosis
+from spinepipe.studies.scoliosis.settings import SagittalProfile, Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
-    Ends,
+    EndRotations,
     Pairs,
     Straight,
     characterise,
@@ -53,7 +53,7 @@ def test_arms_reach_from_joints_to_the_line_of_the_pull() -> None:
 
 
 def test_chains_have_joints_at_the_back_of_endplates() -> None:
-    profile = Profile(endplate_depth_mm=30.0, endplate_share=0.25)
+    profile = SagittalProfile(endplate_depth_mm=30.0, endplate_share=0.25)
     chain = geometry("p1", ("a", "b"), FILM, profile)
     places = np.array([frame.origin for frame in chain.frames])
     np.testing.assert_allclose(places, [[-0.015, 0.010, 0.0075], [-0.015, 0.050, 0.0325]])
@@ -69,7 +69,7 @@ def test_chains_have_joints_at_the_back_of_endplates() -> None:
 
 
 def test_a_tangent_takes_the_place_of_the_lateral_spring_but_for_a_millionth() -> None:
-    chain = geometry("p1", ("a", "b"), FILM, Profile())
+    chain = geometry("p1", ("a", "b"), FILM, SagittalProfile())
     springs = np.tile(np.arange(1.0, 7.0), (2, 1))
     laws = np.tile([50.0, -0.1, 0.2], (2, 1))
     model = with_laws(chain, springs, laws)
@@ -167,7 +167,7 @@ def test_forces_differ_by_thirty_times_at_most(ratio: float, found: float) -> No
 
 
 def test_regions_of_segments_change_at_the_ends_between_curves() -> None:
-    every = (Curve(0, 2, 1, 1), Curve(2, 5, 3, -1), Curve(5, 7, 6, 1))
+    every = (SpinalCurve(0, 2, 1, 1), SpinalCurve(2, 5, 3, -1), SpinalCurve(5, 7, 6, 1))
     patient: Any = SimpleNamespace(curves=every, chain=SimpleNamespace(n_joints=8))
     assert personal._regions(patient).tolist() == [0, 0, 1, 1, 1, 2, 2, 2]
     patient.curves = every[:1]
@@ -214,7 +214,7 @@ class Fit:
 def test_films_are_asked_of_ratios_where_the_study_wants_it(
     regions: bool, arrived: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    reach = (Reach(0.5, 2.0, False, False),) * 2
+    reach = (RegionEnds(0.5, 2.0, False, False),) * 2
     monkeypatch.setattr(personalise, "population_of", lambda rows: (None, None))
     monkeypatch.setattr(personalise, "FilmFit", Fit)
     monkeypatch.setattr(personalise, "regions", lambda *_: reach)
@@ -230,7 +230,7 @@ TABLE: Any = pd.DataFrame({"status": ["converged"]})
 """A population's table, of which nobody here looks at more."""
 
 
-def person(by_films: tuple[Reach, ...] | None, **more: Any) -> Personal:
+def person(by_films: tuple[RegionEnds, ...] | None, **more: Any) -> Personal:
     nothing: Any = None
     return Personal(
         nothing,
@@ -249,9 +249,9 @@ def test_rows_of_laws_tell_ratios_ends_and_what_films_leave_open() -> None:
         chain=SimpleNamespace(joints=("a", "b")),
         pairs=SimpleNamespace(opposite=np.array([True, False])),
     )
-    ends = Ends(np.deg2rad([-5.0, -6.0]), np.deg2rad([7.0, 8.0]))
+    ends = EndRotations(np.deg2rad([-5.0, -6.0]), np.deg2rad([7.0, 8.0]))
     reach = np.array([[0.2, 0.3], [0.8, 3.0]])
-    sides = (Reach(0.4, None, False, True), Reach(1.5, 2.5, False, False))
+    sides = (RegionEnds(0.4, None, False, True), RegionEnds(1.5, 2.5, False, False))
     one, other = personalise._laws(patient, person(sides, ends=ends, reach=reach))
     assert (one["joint"], one["at_rest_nm_per_rad"]) == ("a", 50.0)
     assert (one["ratio"], other["ratio"]) == pytest.approx((0.5, 2.0))
@@ -265,12 +265,12 @@ def test_rows_of_laws_tell_ratios_ends_and_what_films_leave_open() -> None:
     bare, _ = personalise._laws(patient, person(None))
     empty = ("ratio_low", "ratio_high", "lower_end_deg", "upper_end_deg", "films_low")
     assert {bare[name] for name in (*empty, "open_below", "identifiable")} == {None}
-    below, _ = personalise._laws(patient, person((Reach(None, 2.0, True, False),) * 2))
+    below, _ = personalise._laws(patient, person((RegionEnds(None, 2.0, True, False),) * 2))
     assert below["identifiable"] is False
 
 
-@sweep("status", [Ended.CONVERGED, Ended.UNSTABLE])
-def test_rows_of_a_pose_are_in_mm_and_degrees(status: Ended) -> None:
+@sweep("status", [PrescribedStatus.CONVERGED, PrescribedStatus.UNSTABLE])
+def test_rows_of_a_pose_are_in_mm_and_degrees(status: PrescribedStatus) -> None:
     """Missed by 3 and 4 mm and -2 deg; the film's spine is twice as long as erect."""
     erect = Film(np.zeros(3), np.array([0.0, 0.04, 0.08]), np.zeros(3))
     films = {"erect": erect, "neutral": erect.scaled(2.0)}
@@ -279,7 +279,7 @@ def test_rows_of_a_pose_are_in_mm_and_degrees(status: Ended) -> None:
     patient: Any = SimpleNamespace(
         read=read,
         pairs=pairs,
-        curves=(Curve(0, 2, 1, 1), Curve(0, 2, 1, -1)),
+        curves=(SpinalCurve(0, 2, 1, 1), SpinalCurve(0, 2, 1, -1)),
         chain=SimpleNamespace(joints=("a", "b")),
     )
     shown = Film(np.array([0.0, 0.003, 0.0]), np.array([0.0, 0.084, 0.16]), np.deg2rad([1, 3, -3]))
@@ -290,7 +290,7 @@ def test_rows_of_a_pose_are_in_mm_and_degrees(status: Ended) -> None:
     row = personalise._position(patient, "neutral", posed)
     assert (row["missed_mm"], row["missed_deg"]) == pytest.approx((5.0, 2.0))
     assert (row["chord_ratio"], row["film_scale"]) == (2.0, 1.1)
-    there = status is Ended.CONVERGED
+    there = status is PrescribedStatus.CONVERGED
     pushes = [row[name] for name in personalise.PUSHES]
     assert pushes == ([0.0, 1.0, 2.0, 3.0] if there else [None] * 4)
     films["neutral"] = Film(*(erect.scaled(2.0).rows[:2]), np.deg2rad([0.0, 3.0, 1.0]))

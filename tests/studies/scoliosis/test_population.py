@@ -14,7 +14,7 @@ from spinepipe.studies.scoliosis.population import (
     LEVEL_RATIO_SPREAD,
     PATIENT_SPREAD,
     RATIO_SPREAD,
-    Known,
+    PatientPrior,
     Population,
     assumed,
     learned,
@@ -58,7 +58,7 @@ def test_patients_who_are_known_exactly_give_their_population_back() -> None:
     nothing = np.zeros((3 * SEGMENTS,) * 2)
     found = assumed(SEGMENTS)
     for _ in range(20):
-        found = learned(found, [Known(one, nothing) for one in drawn])
+        found = learned(found, [PatientPrior(one, nothing) for one in drawn])
     # 2,000 patients: means to 0.3 / sqrt(2000), five times that; spreads to a few percent
     np.testing.assert_allclose(found.mean, truth.mean, atol=0.035)
     # ratios are told about their mean, which takes one of their freedoms
@@ -72,7 +72,7 @@ def test_few_patients_draw_levels_as_normal_priors_let_them() -> None:
     rng = np.random.default_rng(7)
     means = before.mean + rng.normal(0.0, 0.4, (count, 3 * SEGMENTS))
     nothing = np.zeros((3 * SEGMENTS, 3 * SEGMENTS))
-    found = learned(before, [Known(mean, nothing) for mean in means]).mean
+    found = learned(before, [PatientPrior(mean, nothing) for mean in means]).mean
 
     def between(prior: float, sd: float, seen: np.ndarray, variance: float) -> np.ndarray:
         return (prior / sd**2 + seen / variance) / (1.0 / sd**2 + 1.0 / variance)
@@ -89,7 +89,7 @@ def test_few_patients_draw_levels_as_normal_priors_let_them() -> None:
 
 def test_patients_of_whom_nothing_is_known_change_no_spread() -> None:
     before = assumed(SEGMENTS)
-    unknown = Known(before.mean, np.linalg.inv(before.precision))
+    unknown = PatientPrior(before.mean, np.linalg.inv(before.precision))
     after = learned(before, [unknown] * 50)
     np.testing.assert_allclose(after.mean, before.mean, atol=1e-12)
     np.testing.assert_allclose(after.ratio_sd, RATIO_SPREAD, rtol=1e-9)

@@ -17,15 +17,15 @@ from spinepipe.studies.scoliosis import learn as learning
 from spinepipe.studies.scoliosis.film_fit import (
     TOPS,
     FilmFit,
-    Fitted,
-    Told,
+    FilmInformation,
+    FittedFilms,
     _told,
     ends_of,
     laws_of,
     weighed_with,
 )
 from spinepipe.studies.scoliosis.film_regions import _of_films, _usual, by_ratio
-from spinepipe.studies.scoliosis.population import Known, Population, assumed, learned
+from spinepipe.studies.scoliosis.population import PatientPrior, Population, assumed, learned
 from spinepipe.studies.scoliosis.population_table import Learned, population_rows
 
 SILENT = Progress(lambda line: None)
@@ -48,7 +48,7 @@ def test_what_is_assumed_of_segments_before_any_film() -> None:
 def test_assumptions_count_as_thirty_segments() -> None:
     """One patient of four segments who is just as the mean has it, known exactly."""
     usual = assumed(4)
-    found = learned(usual, [Known(usual.mean, np.zeros((12, 12)))])
+    found = learned(usual, [PatientPrior(usual.mean, np.zeros((12, 12)))])
     assert found.ratio_sd == pytest.approx(0.40 * np.sqrt(30.0 / (30.0 + 4.0)))
     assert found.end_sd == pytest.approx(0.35 * np.sqrt(30.0 / (30.0 + 2.0 * 4.0 - 1.0)))
 
@@ -57,7 +57,7 @@ def test_levels_and_the_common_end_are_drawn_to_what_is_assumed() -> None:
     """SDs of levels of 0.30 and 0.15 and of the common end of 0.25, as for one patient."""
     usual = Population(assumed(2).mean, 0.3, 0.15)
     mean = usual.mean + np.array([0.2, -0.2, *(0.5, 0.1, 0.1, 0.1)])
-    found = learned(usual, [Known(mean, np.zeros((6, 6)))]).mean - usual.mean
+    found = learned(usual, [PatientPrior(mean, np.zeros((6, 6)))]).mean - usual.mean
     np.testing.assert_allclose(found[:2], [0.1, -0.1])  # 0.3^2 / (0.3^2 + 0.3^2)
     common = 0.2 * 0.25**2 / (0.25**2 + 0.15**2 + 0.15**2 / 4.0)
     np.testing.assert_allclose(found[2:], common + np.array([0.15, -0.05, -0.05, -0.05]))
@@ -158,11 +158,13 @@ def test_what_films_say_of_numbers_is_told_whatever_the_top_was() -> None:
 def test_a_patient_of_a_population_is_between_the_films_and_the_population() -> None:
     """As precise as both together; and by how many numbers the films decided."""
     population = assumed(1)
-    told = Told(3.0 * population.precision, 3.0 * population.precision @ (population.mean + 1.0))
+    told = FilmInformation(
+        3.0 * population.precision, 3.0 * population.precision @ (population.mean + 1.0)
+    )
     known = told.known(population)
     np.testing.assert_allclose(known.mean, population.mean + 0.75)
     np.testing.assert_allclose(known.covariance, np.linalg.inv(population.precision) / 4.0)
-    fitted = Fitted(np.zeros(9), told, known, Status.CONVERGED, {}, 0.0, 1)
+    fitted = FittedFilms(np.zeros(9), told, known, Status.CONVERGED, {}, 0.0, 1)
     assert fitted.decided == pytest.approx(3.0 * 0.75)
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 from scoliosis_cases import ERRORS, Size, paired_test, study_of, tables_of
 from sweeps import sweep
 
-from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.findings import findings
 from spinepipe.studies.scoliosis.headline import headline
@@ -17,9 +17,9 @@ from spinepipe.studies.scoliosis.headline import headline
 PAIR = ("tangent_fitted", "tangent")
 
 
-def results(size: Size, **changed: pd.DataFrame) -> Results:
+def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
     """Made-up results; accuracy follows what is changed."""
-    return Results(tables_of(size, **changed), {}, {})
+    return ResultTables(tables_of(size, **changed), {}, {})
 
 
 def answer(size: Size, **changed: pd.DataFrame) -> Headline:

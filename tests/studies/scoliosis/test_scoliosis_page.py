@@ -18,7 +18,7 @@ from study_cases import project
 from sweeps import sweep
 
 from spinepipe.jobs import draw, report
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.kind import KIND
 from spinepipe.studies.scoliosis.page import READ, document, left_out, shown_tables
@@ -33,13 +33,13 @@ SIZES = {
 """Each page is made once, and looked at by all tests."""
 
 
-def results(size: Size, **changed: pd.DataFrame) -> Results:
+def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
     """Made-up results with a picture."""
     tables = tables_of(size) | changed
     title = KIND.figure("film_overlay").title
     picture = Picture.of("film_overlay", title, PICTURE, "What it shows.")
     metadata = {name: {"seed": "7", "code_digest": name} for name in tables}
-    return Results(tables, metadata, {"film_overlay": picture})
+    return ResultTables(tables, metadata, {"film_overlay": picture})
 
 
 @cache

@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from tracked_cohort import BODIES, NAME, RATE, Motion, Spoil, write
 
 from spinepipe import cohort as cohorts
-from spinepipe.documents.yaml_text import Document
-from spinepipe.problems import InputError, Problem
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
 from spinepipe.studies.tracking.forms import FORMS
@@ -20,7 +20,7 @@ from spinepipe.studies.tracking.persons import person_of
 from spinepipe.studies.tracking.remarks import Remark, repairs_of, warnings_of
 from spinepipe.studies.tracking.settings import Tracking
 
-DOCUMENT = Document("s.yaml", {}, {})
+DOCUMENT = YamlDocument("s.yaml", {}, {})
 TRIALS, MARKERS, PEOPLE = "trials.csv", "marker_set.csv", "subjects.csv"
 STANCE, FLEXION, BENDING = 2, 3, 4
 """Lines of the trials."""
@@ -43,7 +43,7 @@ def asked(**settings: object) -> Tracking:
 
 def told(
     folder: Path, *changes: Change, spoilt: tuple[Spoil, ...] = (), **settings: object
-) -> list[Problem]:
+) -> list[InputProblem]:
     """What is said by the reader, or else by the checks of tables and of files of motion."""
     try:
         cohort = cohorts.read(write(folder, *changes, spoilt=spoilt), (SUBJECTS, *FORMS))

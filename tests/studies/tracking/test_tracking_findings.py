@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from tracking_table_cases import ERROR, Size, cohort_of, study_of, tables_of
 
-from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.studies.tracking.findings import findings
 from spinepipe.studies.tracking.findings_of_errors import standings
 from spinepipe.studies.tracking.headline import headline
@@ -19,12 +19,16 @@ LEAST = "optk_generic"
 
 def answer(size: Size, **changed: pd.DataFrame) -> Headline:
     """The headline of made-up results."""
-    return headline(study_of(size), cohort_of(size), Results(tables_of(size, **changed), {}, {}))
+    return headline(
+        study_of(size), cohort_of(size), ResultTables(tables_of(size, **changed), {}, {})
+    )
 
 
 def told(size: Size, **changed: pd.DataFrame) -> str:
     """All findings, with plain spaces."""
-    found = findings(study_of(size), cohort_of(size), Results(tables_of(size, **changed), {}, {}))
+    found = findings(
+        study_of(size), cohort_of(size), ResultTables(tables_of(size, **changed), {}, {})
+    )
     return "\n".join(found).replace("\u00a0", " ").replace("\u2009", " ").replace("\u2212", "-")
 
 
@@ -99,7 +103,7 @@ def test_an_approach_that_lacks_a_motion_is_left_out_and_named() -> None:
     )
     found = told(THREE, errors=rows[~gone])
     assert "Left out, as not all motions were found: dynamics with generic" in found
-    one = standings(cohort_of(THREE), Results({"errors": rows[~gone]}, {}, {}), "centre_mm")[0]
+    one = standings(cohort_of(THREE), ResultTables({"errors": rows[~gone]}, {}, {}), "centre_mm")[0]
     assert LEAST not in one.approaches
     assert one.approaches[0] == "optk_calibrated"
 
@@ -108,7 +112,7 @@ def test_a_person_counts_once_whatever_was_known_of_them() -> None:
     rows = tables_of(THREE)["errors"]
     fewer = rows[(rows["specimen"] != "s01") | rows["level"].isin(["L5", "T1", "L4L5", "T7T8"])]
     for table in (rows, fewer):
-        one = standings(cohort_of(THREE), Results({"errors": table}, {}, {}), "centre_mm")[0]
+        one = standings(cohort_of(THREE), ResultTables({"errors": table}, {}, {}), "centre_mm")[0]
         assert one.words == "in motion"
         assert one.values[LEAST].to_numpy() == pytest.approx([5.0, 5.5, 6.0])
 

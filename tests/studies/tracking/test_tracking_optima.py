@@ -13,11 +13,11 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.asked import Ask, Watched
 from spinepipe.motion.posture import postures
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.motion.spline import Grid
-from spinepipe.motion.trajectory import SMALL, Solved, solve
+from spinepipe.motion.spline import KnotGrid
+from spinepipe.motion.trajectory import SMALL, OptimalMotions, solve
 from spinepipe.status import Status
 from spinepipe.studies.tracking.approaches import asked_of, begun, fitting, seen_in
-from spinepipe.studies.tracking.persons import Person, person_of
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.units import COORDINATES
 
@@ -30,7 +30,7 @@ The criterion allows 0.03 SD; of the prior, which is wider than what is told, th
 
 
 @cache
-def flexion(intervals: int = 50) -> tuple[Tracking, Person, Watched]:
+def flexion(intervals: int = 50) -> tuple[Tracking, TrackedPerson, Watched]:
     """Of s01 in `tracking_phantom`."""
     study, cohort = study_of_kind(Tracking, ROOT, "tracking_phantom")
     study = study.model_copy(update={"intervals": intervals})
@@ -40,7 +40,7 @@ def flexion(intervals: int = 50) -> tuple[Tracking, Person, Watched]:
 
 
 @cache
-def calibrated() -> tuple[Ask, Watched, Array, Solved]:
+def calibrated() -> tuple[Ask, Watched, Array, OptimalMotions]:
     """What was asked, the coefficients to begin with and the answer."""
     study, person, seen = flexion()
     ask = fitting(study, person)
@@ -53,7 +53,7 @@ def degrees_apart(one: Array, other: Array) -> float:
     return float(np.rad2deg(np.abs(one - other)[:, 1:, 3:]).max())
 
 
-def alike(found: Solved, expected: Solved) -> None:
+def alike(found: OptimalMotions, expected: OptimalMotions) -> None:
     assert found.status is expected.status is Status.CONVERGED
     assert abs(found.costs.total - expected.costs.total) < SMALL
     np.testing.assert_allclose(found.parameters, expected.parameters, rtol=0.0, atol=LEFT)
@@ -100,7 +100,7 @@ def test_backwards_in_time_the_answer_is_backwards() -> None:
 def test_a_trial_of_two_frames_is_calibrated() -> None:
     """No motion to speak of: the answer stays, and stiffness is hardly told."""
     study, person, seen = flexion(10)
-    ask, grid = fitting(study, person), Grid(0.0, 0.2, 1)
+    ask, grid = fitting(study, person), KnotGrid(0.0, 0.2, 1)
     seen = replace(seen, grid=grid, places=seen.places[4:6], weight=seen.weight[4:6])
     seen, start = begun(ask, seen)
     solved = solve(ask, [seen], [start])

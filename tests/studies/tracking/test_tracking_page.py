@@ -15,7 +15,7 @@ from study_cases import project
 from tracking_table_cases import ERROR, FOLDER, Size, cohort_of, study_of, tables_of
 
 from spinepipe.jobs import draw, report
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.page.space import Space
 from spinepipe.studies.tracking.in_space import MOST_FRAMES, MOST_SCENES, boxes, spine_in_space
 from spinepipe.studies.tracking.in_space_motions import motions_of
@@ -34,12 +34,12 @@ LARGEST_PAGE = 12e6
 """Bytes that a browser opens without a wait."""
 
 
-def results(size: Size, **changed: pd.DataFrame) -> Results:
+def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
     """Made-up results with a picture."""
     made = tables_of(size, **changed)
     picture = Picture.of("kinematics", "How joints turn", PICTURE, "What it shows.")
     metadata = {name: {"seed": "7", "code_digest": name} for name in made}
-    return Results(made, metadata, {"kinematics": picture})
+    return ResultTables(made, metadata, {"kinematics": picture})
 
 
 def page_of(size: Size, **changed: pd.DataFrame) -> str:
@@ -97,7 +97,7 @@ def test_what_went_wrong_stands_at_the_top_of_its_table() -> None:
     made = tables_of(Size())
     made["fits"].loc[30, "status"] = "not_converged"
     made["clusters"].loc[1, ["variability_mm", "status"]] = [9.0, "not_rigid"]
-    shown = {table.name: table for table in shown_tables(Results(made, {}, {}))}
+    shown = {table.name: table for table in shown_tables(ResultTables(made, {}, {}))}
     assert "not_converged" in [cell.text for cell in shown["fits"].rows[0]]
     assert "not_rigid" in [cell.text for cell in shown["clusters"].rows[0]]
 

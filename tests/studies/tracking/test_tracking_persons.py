@@ -27,7 +27,7 @@ from spinepipe.muscles.subject import Subject
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.forms import FORMS
 from spinepipe.studies.tracking.persons import (
-    Person,
+    TrackedPerson,
     carrying,
     motion_files,
     person_of,
@@ -42,7 +42,7 @@ DE_LEVA_MEN = {"head": 6.94, "upper_arm": 2.71, "forearm": 1.62, "hand": 0.61}
 BODYLESS = both(without("bodies.csv"), swap("cohort.yaml", "gravity: true", "gravity: false"))
 
 
-def read(folder: Path, *changes: Change) -> tuple[Cohort, Person]:
+def read(folder: Path, *changes: Change) -> tuple[Cohort, TrackedPerson]:
     path = write(folder, *changes)
     cohort = cohorts.read(path, (SUBJECTS, *FORMS))
     return cohort, person_of(cohort, "a", path)

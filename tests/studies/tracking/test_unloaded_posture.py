@@ -12,7 +12,7 @@ from spinepipe.motion.points import marker_places
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.approaches import asked_of, unloaded
 from spinepipe.studies.tracking.forms import FORMS
-from spinepipe.studies.tracking.persons import Person, carrying, person_of
+from spinepipe.studies.tracking.persons import TrackedPerson, carrying, person_of
 from spinepipe.studies.tracking.settings import Tracking
 
 
@@ -21,7 +21,7 @@ def asked(unloaded_posture: str) -> Tracking:
     return Tracking.model_validate(given)
 
 
-def bent_where_they_stand(folder: Path) -> tuple[Person, np.ndarray]:
+def bent_where_they_stand(folder: Path) -> tuple[TrackedPerson, np.ndarray]:
     """A person whose stance has the joints L3L4 and L4L5 bent forwards by 4 deg each."""
     cohort = read(write(folder), (SUBJECTS, *FORMS))
     person = person_of(cohort, cohort.specimen_names[0], cohort.folder)

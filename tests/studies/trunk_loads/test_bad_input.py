@@ -11,10 +11,10 @@ from installed import need_male
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.form import InputColumn, TableForm
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.muscles import myo_sim
 from spinepipe.muscles.trunk import LEVELS
-from spinepipe.problems import InputError, Problem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
 from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
@@ -24,7 +24,7 @@ from spinepipe.studies.trunk_loads.settings import TrunkLoads
 YAML, SUBJECT, TASK = "cohort.yaml", "subjects.csv", "tasks.csv"
 POINTS, MUSCLES, SCALING = "muscles.csv", "muscle_parameters.csv", "muscle_regressions.csv"
 NAME = "small"
-DOCUMENT = Document("s.yaml", {}, {})
+DOCUMENT = YamlDocument("s.yaml", {}, {})
 
 TASK_HEADER = (
     "task,number,counted_from,trunk_extension_deg,trunk_right_bending_deg,pelvis_extension_deg,"
@@ -75,7 +75,7 @@ MALE_STRESS_MPA = 1.0
 """Force over cross-section; what it is does not count here, only that it is given."""
 
 
-def told(folder: Path, *changes: Change, **asked: object) -> list[Problem]:
+def told(folder: Path, *changes: Change, **asked: object) -> list[InputProblem]:
     """What is said of the cohort, changed, by the reader or else by the checks of the kind."""
     try:
         cohort = small(folder, *changes)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spinepipe import cohort as cohorts
-from spinepipe.documents.yaml_text import Document
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.muscles.task import Task
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_trunk
@@ -45,7 +45,7 @@ def degrees(task: Task, axis: str = "extension") -> list[float]:
 
 def test_volunteers_and_their_tasks_are_sound(cohort: cohorts.Cohort) -> None:
     study = TrunkLoads.model_validate({"study": "s", "kind": "trunk_loads", "cohort": "c"})
-    assert list(check_trunk(Document("s.yaml", {}, {}), study, cohort)) == []
+    assert list(check_trunk(YamlDocument("s.yaml", {}, {}), study, cohort)) == []
 
 
 def test_all_twelve_tasks_of_table_1_are_there(tasks: dict[str, Task]) -> None:

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from trunk_table_cases import BEYOND, LOST, Size, cohort_of, study_of, tables_of
 
-from spinepipe.report.page.document import Headline, Results
+from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.studies.trunk_loads.findings import findings
 from spinepipe.studies.trunk_loads.headline import headline
 
@@ -15,12 +15,16 @@ ALL = tuple(dict.fromkeys(tables_of(ONE)["tasks"]["task"]))
 
 def answer(size: Size, **changed: pd.DataFrame) -> Headline:
     """The headline of made-up results."""
-    return headline(study_of(size), cohort_of(size), Results(tables_of(size, **changed), {}, {}))
+    return headline(
+        study_of(size), cohort_of(size), ResultTables(tables_of(size, **changed), {}, {})
+    )
 
 
 def told(size: Size, **changed: pd.DataFrame) -> str:
     """All findings, plain spaces before percent signs and between thousands."""
-    found = findings(study_of(size), cohort_of(size), Results(tables_of(size, **changed), {}, {}))
+    found = findings(
+        study_of(size), cohort_of(size), ResultTables(tables_of(size, **changed), {}, {})
+    )
     return "\n".join(found).replace("\u00a0", " ").replace("\u2009", " ")
 
 
@@ -258,7 +262,7 @@ def test_published_quantities_are_told_once_they_are_judged() -> None:
 def test_no_table_is_needed_and_none_needs_rows(gone: str) -> None:
     tables = tables_of(ONE)
     empty = told(ONE, **{gone: tables[gone].iloc[:0]})
-    without = Results({name: rows for name, rows in tables.items() if name != gone}, {}, {})
+    without = ResultTables({name: rows for name, rows in tables.items() if name != gone}, {}, {})
     found = findings(study_of(ONE), cohort_of(ONE), without)
     absent = "\n".join(found).replace("\u00a0", " ").replace("\u2009", " ")
     assert empty == absent

@@ -13,7 +13,7 @@ from scipy.stats import norm
 from trunk_person import SETTINGS, volunteers
 
 from spinepipe.cohort import Cohort
-from spinepipe.muscles.folder import Tables, source_of_folder
+from spinepipe.muscles.folder import SpecimenTables, source_of_folder
 from spinepipe.muscles.settle import held
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
@@ -22,7 +22,7 @@ from spinepipe.studies.trunk_loads import hold, respond, simplify, spread, tune
 from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.sampling import design_of
-from spinepipe.studies.trunk_loads.settings import Uncertain, Volunteer
+from spinepipe.studies.trunk_loads.settings import Uncertain, VolunteerSettings
 from spinepipe.studies.trunk_loads.tables import QUANTITIES, SIMPLIFICATIONS
 
 FEW = ("standing", "flexion_50", "flexion_70_with_load")
@@ -30,7 +30,7 @@ ASKED = SETTINGS.model_copy(
     update={
         "simplified_tasks": ("flexion_50",),
         "uncertain": Uncertain(tasks=("standing", "flexion_70_with_load"), samples=64),
-        "volunteer": Volunteer(specimen="volunteer"),
+        "volunteer": VolunteerSettings(specimen="volunteer"),
     }
 )
 
@@ -200,7 +200,7 @@ def test_the_generic_male_holds_tasks_1_to_9() -> None:
     stretched muscles pull him back by 2 N m more at T12L1 than those in front can hold."""
     place = need_male()
     names = ("muscles", "muscle_parameters", "joints", "body_frames")
-    tables = Tables(*(pd.read_csv(place / f"{name}.csv") for name in names))
+    tables = SpecimenTables(*(pd.read_csv(place / f"{name}.csv") for name in names))
     trunk = source_of_folder("thoracolumbar_male", tables, 1.0e6).trunk
     cohort = volunteers()
     regressions = regressions_of(SETTINGS, cohort.folder)

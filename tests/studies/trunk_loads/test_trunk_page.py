@@ -15,7 +15,7 @@ from study_cases import project
 from trunk_table_cases import DRAWN, FOLDER, Size, cohort_of, study_of, tables_of
 
 from spinepipe.jobs import draw, report
-from spinepipe.report.page.document import Picture, Results
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.studies.trunk_loads.in_space import MOST_SCENES, trunk_in_space
 from spinepipe.studies.trunk_loads.kind import KIND
 from spinepipe.studies.trunk_loads.page import READ, document, left_out, shown_tables
@@ -31,12 +31,12 @@ SIZES = {
 }
 
 
-def results(size: Size, **changed: pd.DataFrame) -> Results:
+def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
     """Made-up results with a picture."""
     made = tables_of(size, **changed)
     picture = Picture.of("load_by_level", "Loads by level", PICTURE, "What it shows.")
     metadata = {name: {"seed": "7", "code_digest": name} for name in made}
-    return Results(made, metadata, {"load_by_level": picture})
+    return ResultTables(made, metadata, {"load_by_level": picture})
 
 
 def page_of(size: Size, **changed: pd.DataFrame) -> str:

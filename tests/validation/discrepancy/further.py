@@ -16,10 +16,10 @@ from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.beyond import beyond
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
+from spinepipe.studies.discrepancy.search.inquiry import Rules, SearchResult
 from spinepipe.studies.discrepancy.search.investigation import Investigation
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Answer
+from spinepipe.studies.discrepancy.verdict import Conclusion
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 Told = dict[str, Any]
@@ -74,7 +74,7 @@ def _of_folds(rows: Sequence[FoldRow]) -> Told:
 
 
 @_told
-def testable_told(found: Found, rules: Rules, names: Sequence[str]) -> Told:
+def testable_told(found: SearchResult, rules: Rules, names: Sequence[str]) -> Told:
     """Of each true effect: whether the tests could show it, and the smallest gap that would.
 
     That gap is in SD of one reading, as the truth's is: repeats are averaged in a search.
@@ -107,7 +107,7 @@ def repeats_of(grounds: Grounds) -> float:
 @_told
 def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
     """Where most is left by the model that the verdict stands for, as the verdict file says it."""
-    if ended.ended.verdict not in (Answer.UNKNOWN, Answer.PART):
+    if ended.ended.verdict not in (Conclusion.UNKNOWN, Conclusion.PART):
         return {}
     told = ended.as_told().found.final
     left = worst(places(residual_frame(told, told.fit, joints)), PLACES_KEPT)
@@ -118,7 +118,10 @@ def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
 def table_told(ended: Investigation) -> Told:
     """Of UNKNOWN and PART: what a tabulated law and a formula close of held-out readings."""
     final, said = ended.as_told().found.final, ended.ended
-    if said.verdict not in (Answer.UNKNOWN, Answer.PART) or said.reason is Reason.DATA_ERRORS:
+    if (
+        said.verdict not in (Conclusion.UNKNOWN, Conclusion.PART)
+        or said.reason is Reason.DATA_ERRORS
+    ):
         return {}
     stays = beyond(final, ended.rules, at_once)
     table, formula = stays.table, stays.formula

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from spinepipe import cohort as cohorts
-from spinepipe.studies.discrepancy.design.seen import Design, candidates, seen_in
+from spinepipe.studies.discrepancy.design.seen import CohortSignatures, candidates, seen_in
 from spinepipe.studies.discrepancy.design.testable import judgements
 from spinepipe.studies.discrepancy.design.told_apart import confusions
 from spinepipe.studies.discrepancy.search.hypothesis import trials
@@ -61,7 +61,7 @@ def gap_of_own_name(row: Row) -> dict[str, Any]:
     of = {specimen: seen_in(grounds, specimen, every) for specimen in grounds.readings}
     needed = row["threshold"] + STUDY.margin
     found = judgements(every, of, joints, grounds.tests, needed, STUDY.seed)
-    design = Design(candidates(every, joints, grounds.tests), of)
+    design = CohortSignatures(candidates(every, joints, grounds.tests), of)
     pairs = [one for one in confusions(design, found, STUDY.margin) if one.effect == name]
     gaps = [one.gap for one in pairs if one.gap is not None]
     if not pairs or len(gaps) < len(pairs):

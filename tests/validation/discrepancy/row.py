@@ -8,7 +8,7 @@ from typing import Any
 from spinepipe import cohort as cohorts
 from spinepipe.problems import InputError
 from spinepipe.studies.discrepancy.search.grounds import NoBase
-from spinepipe.studies.discrepancy.search.inquiry import Found, Standing
+from spinepipe.studies.discrepancy.search.inquiry import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.search.investigation import investigate, prepared
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.regions import estimated
@@ -84,7 +84,7 @@ def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -
     return row
 
 
-def _said(found: Found, said: Outcome) -> Row:
+def _said(found: SearchResult, said: Outcome) -> Row:
     return {
         "verdict": str(said.verdict),
         "why": said.why,
@@ -110,9 +110,9 @@ def _said(found: Found, said: Outcome) -> Row:
     }
 
 
-def _standing(found: Found, number: int) -> Row:
+def _standing(found: SearchResult, number: int) -> Row:
     """A form that stands, with its values and their regions in the units of tables."""
-    one: Standing = found.standing[number]
+    one: SelectedTerm = found.standing[number]
     form = one.supposed.form
     values = estimated(found.final.fit, found.final.setting, number)
     return {

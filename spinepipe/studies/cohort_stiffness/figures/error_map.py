@@ -50,14 +50,14 @@ _INSTEAD = tuple(sorted((*OF_JOINTS[::-1], *SHARED), key=ASKED_FOR.__contains__)
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class PanelLine:
     """One line of panels: what it is called and its rows of the table ``errors``."""
 
     title: str
     rows: pd.DataFrame
 
 
-def stages(loaded: pd.DataFrame, specimens: int) -> list[Stage]:
+def stages(loaded: pd.DataFrame, specimens: int) -> list[PanelLine]:
     """Stages that the study has, from published to predicted; another where one is absent.
 
     Parameters
@@ -72,7 +72,7 @@ def stages(loaded: pd.DataFrame, specimens: int) -> list[Stage]:
         if not any(name in there and at == stage for name, at in wanted):
             wanted += [(name, stage) for name in _INSTEAD if name in there][:1]
     found = [
-        Stage(_title(name, stage), rows)
+        PanelLine(_title(name, stage), rows)
         for name, stage in wanted
         if len(rows := chosen[(chosen["representation"] == name) & (chosen["stage"] == stage)])
     ]
@@ -152,7 +152,7 @@ def _grid(cohort: Cohort, lines: int, across: int) -> tuple[Figure, list[list[Ax
     return figure, lines_of(figure, lines * across, across)
 
 
-def _scale(found: Sequence[Stage]) -> Normalize:
+def _scale(found: Sequence[PanelLine]) -> Normalize:
     """Symmetric around zero; an end that few errors reach is drawn in."""
     sizes = [np.abs(finite(stage.rows["peak_error"])) for stage in found]
     known = [values for values in sizes if len(values)]
@@ -256,7 +256,7 @@ def _explain(
     axes: Sequence[Sequence[Axes]],
     image: AxesImage,
     scale: Normalize,
-    found: Sequence[Stage],
+    found: Sequence[PanelLine],
     signs: pd.DataFrame,
 ) -> None:
     sizes = np.abs(np.concatenate([finite(stage.rows["peak_error"]) for stage in found]))

@@ -26,7 +26,7 @@ MJ_PER_J = 1000.0
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparisonPanel:
     """What a panel compares: points with columns as of `both`, in the unit of its axes."""
 
     title: str
@@ -53,14 +53,14 @@ def range_of_motion_figure(
     return figure
 
 
-def compared(rows: pd.DataFrame) -> list[Compared]:
+def compared(rows: pd.DataFrame) -> list[ComparisonPanel]:
     """What there is to compare; a curve without a neutral zone of the model has one of 0 there."""
     if rows.empty:
         return []
     found = []
     ranges = both(rows, "range_of_motion", "deg").dropna(subset=["measured", "simulated"])
     for test, points in ranges.groupby("test", sort=False):
-        found.append(Compared(short(case(str(test)), 32), "range of motion (°)", points))
+        found.append(ComparisonPanel(short(case(str(test)), 32), "range of motion (°)", points))
     zones = both(rows, "neutral_zone", "deg").dropna(subset="measured")
     none = rows[(rows["source"] != MEASURED) & (rows["neutral_zone"] == Zone.NOT_MEANINGFUL)]
     without = zones.merge(none[KEY].assign(none=True), on=KEY, how="left")["none"].notna()
@@ -68,15 +68,17 @@ def compared(rows: pd.DataFrame) -> list[Compared]:
         zones[name] = zones[name].where(~without.to_numpy(), 0.0)
     zones = zones.dropna(subset="simulated")
     if len(zones):
-        found.append(Compared("Neutral zone", "neutral zone (°)", zones))
+        found.append(ComparisonPanel("Neutral zone", "neutral zone (°)", zones))
     work = both(rows, "hysteresis_area", "j").dropna(subset=["measured", "simulated"])
     if len(work):
         numbers = MJ_PER_J * work.drop(columns=KEY).astype(float)
-        found.append(Compared("Work lost in a cycle", "work lost (mJ)", work[KEY].join(numbers)))
+        found.append(
+            ComparisonPanel("Work lost in a cycle", "work lost (mJ)", work[KEY].join(numbers))
+        )
     return found
 
 
-def _draw(axis: Axes, panel: Compared) -> None:
+def _draw(axis: Axes, panel: ComparisonPanel) -> None:
     points = panel.points
     x, y = (points[name].to_numpy(float) for name in ("measured", "simulated"))
     across, up = (points[f"{name}_way"].to_numpy(float) for name in ("measured", "simulated"))
@@ -101,7 +103,7 @@ def _draw(axis: Axes, panel: Compared) -> None:
     axis.tick_params(axis="y", length=2.5)
 
 
-def _explain(figure: Figure, panels: list[Compared]) -> None:
+def _explain(figure: Figure, panels: list[ComparisonPanel]) -> None:
     handles = [
         Line2D([], [], color=OURS, marker="o", ms=3.0, lw=0.5, label="a joint in one cycle, 95 %"),
         Line2D([], [], color=BLACK, lw=0.6, label="the model moves as the joint"),

@@ -10,7 +10,7 @@ from math import ceil
 
 from spinepipe.studies.discrepancy.design.extra_tests import Bench
 from spinepipe.studies.discrepancy.design.next_test import Offer, left_apart, offers
-from spinepipe.studies.discrepancy.design.patterns import Fitted, generic, strengths
+from spinepipe.studies.discrepancy.design.patterns import RivalFits, generic, strengths
 from spinepipe.studies.discrepancy.design.withheld import (
     FACTORS,
     Withheld,
@@ -20,14 +20,14 @@ from spinepipe.studies.discrepancy.design.withheld import (
 )
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials
-from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
+from spinepipe.studies.discrepancy.search.inquiry import Rules, SearchResult
 from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
 from spinepipe.studies.discrepancy.search.model_files import border
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.refit import Refit
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.tables import ADVICE
-from spinepipe.studies.discrepancy.verdict import Answer
+from spinepipe.studies.discrepancy.verdict import Conclusion
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 ADVISED, OFFERED, TELLS_NOTHING, NO_POSE, WOULD_DO, NOT_ENOUGH = ADVICE
@@ -70,11 +70,11 @@ class Advice:
 
 
 def advice(
-    found: Found,
+    found: SearchResult,
     ended: Outcome,
     rules: Rules,
     place: Bench,
-    run: Run,
+    run: PieceRunner,
     hidden: Sequence[Withheld] | None = None,
 ) -> tuple[Advice, ...]:
     """All advice; nothing where data are wrong or everything is named.
@@ -87,7 +87,7 @@ def advice(
         return ()
     grounds = _standing_on(found, ended)
     rows = [row for pair in _pairs(found, ended, rules) for row in _of_pair(*pair, place, run)]
-    if ended.verdict in (Answer.PART, Answer.UNKNOWN):
+    if ended.verdict in (Conclusion.PART, Conclusion.UNKNOWN):
         rows += run(_of_unnamed, grounds, rules, place)
     threshold = found.stages[0].screen.threshold
     hidden = hidden_effects(found, ended, rules, run) if hidden is None else hidden
@@ -100,7 +100,9 @@ def advice(
     return tuple(rows)
 
 
-def hidden_effects(found: Found, ended: Outcome, rules: Rules, run: Run) -> tuple[Withheld, ...]:
+def hidden_effects(
+    found: SearchResult, ended: Outcome, rules: Rules, run: PieceRunner
+) -> tuple[Withheld, ...]:
     """Effects that are no larger than the imperfections allowed for; none where data are wrong."""
     if ended.reason is Reason.DATA_ERRORS:
         return ()
@@ -109,14 +111,14 @@ def hidden_effects(found: Found, ended: Outcome, rules: Rules, run: Run) -> tupl
     return withheld(_standing_on(found, ended), rules.trials, threshold, sorted(named), run)
 
 
-def _standing_on(found: Found, ended: Outcome) -> Grounds:
+def _standing_on(found: SearchResult, ended: Outcome) -> Grounds:
     return found.final if ended.named or ended.tied else found.base
 
 
-Pair = tuple[str, Fitted, Fitted, float]
+Pair = tuple[str, RivalFits, RivalFits, float]
 
 
-def _pairs(found: Found, ended: Outcome, rules: Rules) -> Iterator[Pair]:
+def _pairs(found: SearchResult, ended: Outcome, rules: Rules) -> Iterator[Pair]:
     """(subject, two patterns, margin that is missing) of names that are tied, or nearly lead."""
     pairs = 0
     for one in found.standing:
@@ -128,15 +130,15 @@ def _pairs(found: Found, ended: Outcome, rules: Rules) -> Iterator[Pair]:
                 fits = found.final.fit, other.fit
                 yield (
                     f"{one.name} or {rival.name}",
-                    Fitted(found.final, fits[0], fits[1]),
-                    Fitted(found.final, fits[1], fits[0]),
+                    RivalFits(found.final, fits[0], fits[1]),
+                    RivalFits(found.final, fits[1], fits[0]),
                     rules.margin - max(rival.margin, 0.0),
                 )
-    if ended.verdict is Answer.UNKNOWN:
+    if ended.verdict is Conclusion.UNKNOWN:
         yield from _leading(found, rules)
 
 
-def _leading(found: Found, rules: Rules) -> Iterator[Pair]:
+def _leading(found: SearchResult, rules: Rules) -> Iterator[Pair]:
     """The two effects with most evidence of those that no verdict stands for."""
     first = found.stages[0]
     best: dict[str, Refit] = {}
@@ -147,13 +149,13 @@ def _leading(found: Found, rules: Rules) -> Iterator[Pair]:
         a, b = list(best.values())[:2]
         yield (
             f"{a.name} or {b.name}",
-            Fitted(found.base, a.fit, b.fit),
-            Fitted(found.base, b.fit, a.fit),
+            RivalFits(found.base, a.fit, b.fit),
+            RivalFits(found.base, b.fit, a.fit),
             max(rules.margin - (a.log_evidence - b.log_evidence), 0.0),
         )
 
 
-def _beside_the_rest(found: Found, name: str, rival: str) -> Refit | None:
+def _beside_the_rest(found: SearchResult, name: str, rival: str) -> Refit | None:
     """The best refit of a rival in the place of an effect that stands."""
     rest = sorted(one.name for one in found.standing if one.name != name)
     tried = [
@@ -168,7 +170,12 @@ def _beside_the_rest(found: Found, name: str, rival: str) -> Refit | None:
 
 
 def _of_pair(
-    subject: str, first: Fitted, second: Fitted, missing: float, place: Bench, run: Run
+    subject: str,
+    first: RivalFits,
+    second: RivalFits,
+    missing: float,
+    place: Bench,
+    run: PieceRunner,
 ) -> list[Advice]:
     """Runs that tell two models apart; the best are checked by refits.
 
@@ -191,7 +198,7 @@ def _of_pair(
 
 
 def _checked(
-    pair: tuple[Fitted, Fitted], place: Bench, every: Sequence[str], run: Run
+    pair: tuple[RivalFits, RivalFits], place: Bench, every: Sequence[str], run: PieceRunner
 ) -> dict[str, float]:
     """Mean gain of each run by refits of both models; of those that both can be asked for."""
     words = [None, *every]  # without any run, and with each

@@ -24,7 +24,7 @@ def key_of(label: Label) -> Key:
 
 
 @dataclass(frozen=True)
-class Rows:
+class ExpectedReadings:
     """Readings in noise SDs: difference d (N,), by unknowns J (N, m), by nuisances U (N, K).
 
     ``keys`` (K,): what each nuisance is of.
@@ -54,7 +54,7 @@ class Sums:
     dd: float
 
     @classmethod
-    def of(cls, rows: Rows) -> "Sums":
+    def of(cls, rows: ExpectedReadings) -> "Sums":
         """Products of some rows."""
         u, j, d = rows.moves, rows.by_unknowns, rows.difference
         return cls(rows.keys, u.T @ u, u.T @ j, u.T @ d, j.T @ j, j.T @ d, float(d @ d))

@@ -34,14 +34,14 @@ from spinepipe.studies.discrepancy.design.plans import (
     times,
     with_preloads,
 )
-from spinepipe.studies.discrepancy.design.seen import Seen, candidates, seen
+from spinepipe.studies.discrepancy.design.seen import SpecimenSignatures, candidates, seen
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
 from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_parameters
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
-from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Solved
+from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.whitening import whitening, with_nuisances
 from spinepipe.studies.discrepancy.verdict import NotTestable
 from spinepipe.units import COORDINATES
@@ -133,11 +133,13 @@ def judged_under(
         one = seen_under(place, plan, trials, tests)
     except (NoEquilibrium, RefusedModel):
         return ()
-    of: Mapping[str, Seen] = dict.fromkeys(place.grounds.readings, one)
+    of: Mapping[str, SpecimenSignatures] = dict.fromkeys(place.grounds.readings, one)
     return judgements(trials, of, joints, tests, needed, seed)
 
 
-def seen_under(place: Bench, plan: Plan, trials: Sequence[Trials], tests: Sequence[str]) -> Seen:
+def seen_under(
+    place: Bench, plan: Plan, trials: Sequence[Trials], tests: Sequence[str]
+) -> SpecimenSignatures:
     """What a plan would see on the bench.
 
     Raises
@@ -149,7 +151,7 @@ def seen_under(place: Bench, plan: Plan, trials: Sequence[Trials], tests: Sequen
     repeats = plan.repeats()
     read = np.any([one.count.any(axis=0) for one in plan.tests], axis=0)
     names = [name for name, there in zip(COORDINATES, read, strict=True) if there]
-    solved = Solved(model, [one.case for one in plan.tests], plan.zeroed)
+    solved = SolvedSpecimen(model, [one.case for one in plan.tests], plan.zeroed)
     plain = whitening(repeats, _noise(place, plan, read))
     white = with_nuisances(plain, nuisance_signatures(solved, place.grounds.priors, names))
     free = base_parameters(model, plan.grouping, names)

@@ -12,11 +12,17 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
-from spinepipe.studies.discrepancy.design.expected import Key, Rows, Sums, key_of, noncentrality
+from spinepipe.studies.discrepancy.design.expected import (
+    ExpectedReadings,
+    Key,
+    Sums,
+    key_of,
+    noncentrality,
+)
 from spinepipe.studies.discrepancy.design.extra_tests import Bench
-from spinepipe.studies.discrepancy.design.patterns import Fitted, Pattern
+from spinepipe.studies.discrepancy.design.patterns import Pattern, RivalFits
 from spinepipe.studies.discrepancy.design.plans import Plan, as_made, thinned, with_preloads
-from spinepipe.studies.discrepancy.design.runs import Run, runs
+from spinepipe.studies.discrepancy.design.runs import ExtraCycle, runs
 from spinepipe.studies.discrepancy.search.base import (
     PER_SPECIMEN,
     base_parameters,
@@ -26,7 +32,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import LOG_STIFFNESS_SD
 from spinepipe.studies.discrepancy.search.imperfections import labels_of
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_labels, nuisance_signatures
-from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, Solved
+from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import EVERY_TEST
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import standing
@@ -136,20 +142,20 @@ class _Tried:
         return 0.5 * self.share * max(0.0, gained)
 
 
-def _rows(pattern: Pattern, name: str) -> Rows:
+def _rows(pattern: Pattern, name: str) -> ExpectedReadings:
     """The readings of a specimen that are there."""
     g, fit = pattern.grounds, pattern.fit
     white = g.setting.whitenings[name]
     keys = tuple(key_of(label) for label in labels_of(g, name))
     by_unknowns = _among_all(fit, name, white.lengthened(fit.jacobians[name]))
-    return Rows(pattern.there(name), by_unknowns, white.moves, keys)
+    return ExpectedReadings(pattern.there(name), by_unknowns, white.moves, keys)
 
 
 def _added(
-    pattern: Pattern, place: Bench, name: str, menu: Sequence[Run]
-) -> Iterator[tuple[Run, Sums | str]]:
+    pattern: Pattern, place: Bench, name: str, menu: Sequence[ExtraCycle]
+) -> Iterator[tuple[ExtraCycle, Sums | str]]:
     """Products of each run; those that change the model and read alike are solved together."""
-    groups: dict[tuple[float, bytes], list[Run]] = {}
+    groups: dict[tuple[float, bytes], list[ExtraCycle]] = {}
     for run in menu:
         read = run.test.count.any(axis=0).tobytes()
         groups.setdefault((run.test.preload, read), []).append(run)
@@ -158,8 +164,8 @@ def _added(
 
 
 def _together(
-    pattern: Pattern, place: Bench, name: str, group: Sequence[Run]
-) -> Iterator[tuple[Run, Sums | str]]:
+    pattern: Pattern, place: Bench, name: str, group: Sequence[ExtraCycle]
+) -> Iterator[tuple[ExtraCycle, Sums | str]]:
     """Of runs in one stack; where one has no pose, in ever smaller ones."""
     try:
         rows = _solved(pattern, place, name, group)
@@ -174,7 +180,9 @@ def _together(
     yield from ((run, Sums.of(one)) for run, one in zip(group, rows, strict=True))
 
 
-def _solved(pattern: Pattern, place: Bench, name: str, group: Sequence[Run]) -> list[Rows]:
+def _solved(
+    pattern: Pattern, place: Bench, name: str, group: Sequence[ExtraCycle]
+) -> list[ExpectedReadings]:
     """Readings of runs with one preload that read the same coordinates."""
     fit, free = pattern.fit, pattern.fit.hypothesis.members[name].free
     cases, first = [run.test.case for run in group], group[0].test
@@ -194,7 +202,9 @@ def _solved(pattern: Pattern, place: Bench, name: str, group: Sequence[Run]) -> 
         ]
         own = [n for n, k in enumerate(keys) if k[-1] in (EVERY_TEST, run.test.case.test)]
         kept = tuple(keys[n] for n in own)
-        found.append(Rows(seen[0], _among_all(fit, name, seen[1]), seen[2][:, own], kept))
+        found.append(
+            ExpectedReadings(seen[0], _among_all(fit, name, seen[1]), seen[2][:, own], kept)
+        )
     return found
 
 
@@ -202,7 +212,7 @@ def _nuisances(
     pattern: Pattern, name: str, model: SpineModel, cases: Sequence[LoadCase], read: Sequence[str]
 ) -> tuple[list[Key], tuple[Array, ...]]:
     """Nuisances of runs; stiffness in a coordinate that was not read before is one more."""
-    solved, priors = Solved(model, cases, False), pattern.grounds.priors
+    solved, priors = SolvedSpecimen(model, cases, False), pattern.grounds.priors
     labels = nuisance_labels(priors, bushing_stiffness(model), cases, read)
     keys, moved = [key_of(label) for label in labels], nuisance_signatures(solved, priors, read)
     fresh = [n for n in read if n not in pattern.grounds.readings[name].coordinates]
@@ -221,7 +231,7 @@ def _among_all(fit: JointFit, name: str, own: Array) -> Array:
     return whole
 
 
-def left_apart(pattern: Fitted, place: Bench, words: str | None) -> float | None:
+def left_apart(pattern: RivalFits, place: Bench, words: str | None) -> float | None:
     """chi2 and priors that stay between the models, the fitted one refitted to the other.
 
     A model of many shapes bends further than its tangent.
@@ -262,14 +272,16 @@ def _as_predicted(test: Repeats, predicted: Array) -> Repeats:
     return replace(test, cycles=np.where(np.isfinite(test.cycles), predicted, np.nan))
 
 
-def _run_as_predicted(pattern: Fitted, name: str, run: Run) -> Repeats:
+def _run_as_predicted(pattern: RivalFits, name: str, run: ExtraCycle) -> Repeats:
     model, case = pattern.other.models[name], run.test.case
     predicted = Simulated(model, [case], run.zeroed, ()).at(np.zeros(0)).readings[0]
     (planned,) = Plan((run.test,), run.zeroed, PER_SPECIMEN).repeats()
     return _as_predicted(planned, predicted)
 
 
-def _white_with(pattern: Fitted, place: Bench, name: str, run: Run, white: Whitening) -> Whitening:
+def _white_with(
+    pattern: RivalFits, place: Bench, name: str, run: ExtraCycle, white: Whitening
+) -> Whitening:
     """The whitening of a specimen's readings and a run's below them."""
     there = _rows(pattern, name)
     (added,) = _solved(pattern, place, name, [run])
@@ -280,14 +292,14 @@ def _white_with(pattern: Fitted, place: Bench, name: str, run: Run, white: White
     return joined(white, _whitening(place, run), moves)
 
 
-def _whitening(place: Bench, run: Run) -> Whitening:
+def _whitening(place: Bench, run: ExtraCycle) -> Whitening:
     """Of the readings of one run, noise alone."""
     read = run.test.count.any(axis=0)
     noise = replace(place.grounds.noise, sd=np.where(read, place.sd, np.nan), zeroed=run.zeroed)
     return whitening(Plan((run.test,), run.zeroed, PER_SPECIMEN).repeats(), noise)
 
 
-def _menu(place: Bench, name: str) -> list[Run]:
+def _menu(place: Bench, name: str) -> list[ExtraCycle]:
     g = place.grounds
     plan = as_made(g.readings[name], g.noise.zeroed, PER_SPECIMEN)
     return runs(thinned(plan, MOST_STEPS).tests, g.noise.zeroed)

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.studies.discrepancy.search.grounds import Grounds
@@ -18,9 +18,9 @@ from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials
 from spinepipe.studies.discrepancy.search.inquiry import linearised_for
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, Term, generic_columns
-from spinepipe.studies.discrepancy.search.prediction import Simulated, Solved
+from spinepipe.studies.discrepancy.search.prediction import Simulated, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
-    Column,
+    VariantColumn,
     linearised,
     products,
     signatures,
@@ -41,7 +41,9 @@ class Pattern(Protocol):
         """(N,) on the specimen's readings, in noise SD."""
         ...
 
-    def under(self, specimen: str, changed: "Change", cases: Sequence[LoadCase]) -> Sequence[Array]:
+    def under(
+        self, specimen: str, changed: "ModelChange", cases: Sequence[LoadCase]
+    ) -> Sequence[Array]:
         """(T, J, 6) m and rad in each run, not zeroed, of the specimen's models as changed.
 
         Raises
@@ -52,14 +54,14 @@ class Pattern(Protocol):
         ...
 
 
-class Change(Protocol):
+class ModelChange(Protocol):
     """What a run does to a model, such as a preload."""
 
     def __call__(self, model: SpineModel) -> SpineModel: ...
 
 
 @dataclass(frozen=True)
-class Fitted:
+class RivalFits:
     """Two fits of the same readings; ``other`` would be true."""
 
     grounds: Grounds
@@ -71,7 +73,9 @@ class Fitted:
         pairs = zip(self.other.predicted[specimen], self.fit.predicted[specimen], strict=True)
         return self.grounds.plain[specimen].noise_only([np.nan_to_num(a - b) for a, b in pairs])
 
-    def under(self, specimen: str, changed: Change, cases: Sequence[LoadCase]) -> Sequence[Array]:
+    def under(
+        self, specimen: str, changed: ModelChange, cases: Sequence[LoadCase]
+    ) -> Sequence[Array]:
         """Difference of what they predict."""
         first, second = (
             Simulated(changed(one.models[specimen]), cases, False, ()).at(np.zeros(0)).readings
@@ -85,7 +89,7 @@ class Strengths:
     """An effect beside the grounds' fit, to first order; ``weights`` (m,) by specimen."""
 
     grounds: Grounds
-    columns: tuple[Column, ...]
+    columns: tuple[VariantColumn, ...]
     weights: Mapping[str, Array]
 
     @property
@@ -96,13 +100,17 @@ class Strengths:
     def there(self, specimen: str) -> Array:
         """Signatures on the readings."""
         g, weights = self.grounds, self.weights[specimen]
-        solved = Solved(self.fit.models[specimen], g.readings[specimen].cases, g.noise.zeroed)
+        solved = SolvedSpecimen(
+            self.fit.models[specimen], g.readings[specimen].cases, g.noise.zeroed
+        )
         moved = [one @ weights for one in signatures(solved, self.columns)]
         return g.plain[specimen].noise_only(moved)
 
-    def under(self, specimen: str, changed: Change, cases: Sequence[LoadCase]) -> Sequence[Array]:
+    def under(
+        self, specimen: str, changed: ModelChange, cases: Sequence[LoadCase]
+    ) -> Sequence[Array]:
         """Signatures in each run."""
-        solved = Solved(changed(self.fit.models[specimen]), cases, False)
+        solved = SolvedSpecimen(changed(self.fit.models[specimen]), cases, False)
         return [one @ self.weights[specimen] for one in signatures(solved, self.columns)]
 
 
@@ -148,7 +156,9 @@ class Generic:
         moved = generic_columns(model, cases, zeroed, self.coordinates).moved
         return g.plain[specimen].noise_only([one @ self.weights[specimen] for one in moved])
 
-    def under(self, specimen: str, changed: Change, cases: Sequence[LoadCase]) -> Sequence[Array]:
+    def under(
+        self, specimen: str, changed: ModelChange, cases: Sequence[LoadCase]
+    ) -> Sequence[Array]:
         """The terms in each run, in units of the motion there was: more goes on as it began."""
         model = changed(self.fit.models[specimen])
         reached = [q.reshape(len(q), -1, 6) for q in self.fit.poses[specimen]]
@@ -189,8 +199,8 @@ def _onto(terms: Sequence[Term], lack: Lack, specimens: Sequence[str]) -> dict[s
     for name in specimens:
         for column, term in enumerate(terms):
             if (term.family, term.coordinate) == (lack.family, lack.coordinate):
-                joint = None if lack.spread is Spread.SHARED else term.joint
-                own = name if lack.spread is Spread.EACH else None
+                joint = None if lack.spread is PlaceSpread.SHARED else term.joint
+                own = name if lack.spread is PlaceSpread.EACH else None
                 row = keys.setdefault((term.number, joint, own), len(keys))
                 owners[name].append((row, column))
     found = {}

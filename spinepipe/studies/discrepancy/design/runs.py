@@ -50,7 +50,7 @@ AGAIN = ("once more", "set up anew, once more")
 
 
 @dataclass(frozen=True)
-class Run:
+class ExtraCycle:
     """One more cycle of a test.
 
     Attributes
@@ -63,19 +63,19 @@ class Run:
     zeroed: bool
 
 
-def runs(tests: Sequence[Planned], zeroed: bool) -> list[Run]:
+def runs(tests: Sequence[Planned], zeroed: bool) -> list[ExtraCycle]:
     """The menu for a specimen that has had these tests; nothing that is there already but repeats.
 
     A run is offered once, however many ways lead to it.
     """
-    found: dict[tuple[object, ...], Run] = {}
+    found: dict[tuple[object, ...], ExtraCycle] = {}
     for one in (*_variations(tests, zeroed), *_directions(tests, zeroed)):
         if one.words.endswith(AGAIN) or not any(_has(test, zeroed, one) for test in tests):
             found.setdefault(_same(one), one)
     return list(found.values())
 
 
-def _has(test: Planned, zeroed: bool, one: Run) -> bool:
+def _has(test: Planned, zeroed: bool, one: ExtraCycle) -> bool:
     """Whether a test that was done is the added run already, about as slow where it has times."""
     loads, added = summed_loads(test.case), summed_loads(one.test.case)
     same = len(loads) == len(added) and np.allclose(loads, added)
@@ -91,7 +91,7 @@ def _lasts(case: LoadCase) -> float:
     return every[-1] - every[0]
 
 
-def _same(one: Run) -> tuple[object, ...]:
+def _same(one: ExtraCycle) -> tuple[object, ...]:
     test = one.test
     loads = tuple(np.round(load, 9).tobytes() for load in summed_loads(test.case))
     seconds = tuple(step.time for step in test.case.steps)
@@ -99,24 +99,24 @@ def _same(one: Run) -> tuple[object, ...]:
     return (test.case.test, loads, seconds, read, test.preload, one.zeroed)
 
 
-def _variations(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
+def _variations(tests: Sequence[Planned], zeroed: bool) -> Iterator[ExtraCycle]:
     for one in tests:
         case, name = one.case, one.case.test
         once = replace(one, count=np.minimum(one.count, 1))
 
-        def run(words: str, changed: LoadCase, once: Planned = once) -> Run:
-            return Run(words, replace(once, case=changed), zeroed)
+        def run(words: str, changed: LoadCase, once: Planned = once) -> ExtraCycle:
+            return ExtraCycle(words, replace(once, case=changed), zeroed)
 
         yield run(f"{name}: once more", case)
         anew = once.renamed(replace(case, test=f"{name}, set up anew"))
-        yield Run(f"{name}: specimen taken out, set up anew, once more", anew, zeroed)
+        yield ExtraCycle(f"{name}: specimen taken out, set up anew, once more", anew, zeroed)
         yield from _read_more(once, zeroed)
         yield run(f"{name}: in twice as many load steps", refined(case))
         if not comes_back(case):
             yield run(f"{name}: unloading too, the same loads back down", back_down(case))
         yield run(f"{name}: loads {LARGER:g} times as large", scaled(case, LARGER))
         squeezed = replace(once, preload=PRELOAD_N)
-        yield Run(f"{name}: under a follower load of {PRELOAD_N:g} N more", squeezed, zeroed)
+        yield ExtraCycle(f"{name}: under a follower load of {PRELOAD_N:g} N more", squeezed, zeroed)
         if not has_times(case):
             timed = at_times(case, times(case))
             yield run(f"{name}: time recorded, {STEP_S:g} s from load step to load step", timed)
@@ -125,17 +125,17 @@ def _variations(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
         held = f"{name}: largest load held for {HELD_S[-1] / 60:g} min, read along the way"
         yield run(held, largest_held(case))
         if zeroed:
-            yield Run(f"{name}: readings kept as they are, not zeroed", once, False)
+            yield ExtraCycle(f"{name}: readings kept as they are, not zeroed", once, False)
 
 
-def _read_more(one: Planned, zeroed: bool) -> Iterator[Run]:
+def _read_more(one: Planned, zeroed: bool) -> Iterator[ExtraCycle]:
     """The test with translations, or rotations, read as well."""
     for part, what in ((slice(0, 3), "translations"), (slice(3, 6), "rotations")):
         if not one.count[:, part].any():
             count = one.count.copy()
             count[:, part] = 1
             words = f"{one.case.test}: {what} read as well"
-            yield Run(words, replace(one, count=count), zeroed)
+            yield ExtraCycle(words, replace(one, count=count), zeroed)
 
 
 def refined(case: LoadCase) -> LoadCase:
@@ -164,7 +164,7 @@ def _between(before: LoadStep, after: LoadStep) -> LoadStep:
     return replace(before, wrenches=wrenches, time=time)
 
 
-def _directions(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
+def _directions(tests: Sequence[Planned], zeroed: bool) -> Iterator[ExtraCycle]:
     """The largest moment, and the largest force, of any test along axes that no test has."""
     loads = [load for one in tests for load in _large(one.case)]
     for start in (3, 0):
@@ -181,7 +181,7 @@ def _directions(tests: Sequence[Planned], zeroed: bool) -> Iterator[Run]:
                     case = replace(_turned(template.case, start, axis, sign), test=f"added {name}")
                     loads += _large(case)  # a test to both sides needs no other
                     words = f"new test: {name} ({_axis(start, axis, sign)})"
-                    yield Run(words, once.renamed(case), zeroed)
+                    yield ExtraCycle(words, once.renamed(case), zeroed)
 
 
 def _axis(start: int, axis: int, sign: float) -> str:

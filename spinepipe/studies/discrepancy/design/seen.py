@@ -14,15 +14,15 @@ from spinepipe.effects.contract import Array
 from spinepipe.statics import FreeParameter
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
     SEEN,
     UNSEEN,
-    Column,
+    VariantColumn,
     columns_of,
     signatures_of_each,
 )
-from spinepipe.studies.discrepancy.search.screen import Index
+from spinepipe.studies.discrepancy.search.screen import EffectColumns
 from spinepipe.studies.discrepancy.search.whitening import Whitening
 
 
@@ -36,12 +36,12 @@ class Candidates:
     """
 
     trials: tuple[Trials, ...]
-    indices: tuple[Index, ...]
+    indices: tuple[EffectColumns, ...]
     starts: tuple[int, ...]
     tests: tuple[str, ...]
 
     @property
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self) -> tuple[VariantColumn, ...]:
         """Columns of all effects."""
         return tuple(column for index in self.indices for column in index.columns)
 
@@ -52,13 +52,13 @@ class Candidates:
 
 def candidates(trials: Sequence[Trials], joints: int, tests: Sequence[str]) -> Candidates:
     """Columns of effects in a chain of that many joints."""
-    indices = tuple(Index(columns_of(one, joints, tests)) for one in trials)
+    indices = tuple(EffectColumns(columns_of(one, joints, tests)) for one in trials)
     ends = np.cumsum([0, *(len(index.columns) for index in indices)])
     return Candidates(tuple(trials), indices, tuple(ends.tolist()), tuple(tests))
 
 
 @dataclass(frozen=True)
-class Seen:
+class SpecimenSignatures:
     """Products of the signatures in one specimen's tests; M columns in all, m of an effect.
 
     Attributes
@@ -75,12 +75,12 @@ class Seen:
 
 
 def seen(
-    solved: Solved,
+    solved: SolvedSpecimen,
     free: Sequence[FreeParameter],
     plain: Whitening,
     white: Whitening,
     those: Candidates,
-) -> Seen:
+) -> SpecimenSignatures:
     """What a specimen's tests see.
 
     Parameters
@@ -101,13 +101,13 @@ def seen(
         left.append(np.where(gone, 0.0, rest))
     together = np.concatenate(left, axis=1)
     freedom = plain.count - bases[0].shape[1]
-    return Seen(tuple(raw), tuple(refitted), together.T @ together, freedom)
+    return SpecimenSignatures(tuple(raw), tuple(refitted), together.T @ together, freedom)
 
 
-def seen_in(grounds: Grounds, specimen: str, trials: Sequence[Trials]) -> Seen:
+def seen_in(grounds: Grounds, specimen: str, trials: Sequence[Trials]) -> SpecimenSignatures:
     """What the tests of a specimen see, at the base fit."""
     model = grounds.fit.models[specimen]
-    solved = Solved(model, grounds.readings[specimen].cases, grounds.noise.zeroed)
+    solved = SolvedSpecimen(model, grounds.readings[specimen].cases, grounds.noise.zeroed)
     white = grounds.setting.whitenings[specimen]
     those = candidates(trials, model.n_joints, grounds.tests)
     return seen(solved, grounds.start.base[specimen], grounds.plain[specimen], white, those)
@@ -126,11 +126,11 @@ def _without(basis: Array, columns: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Design:
+class CohortSignatures:
     """What all specimens' tests see of the candidates."""
 
     those: Candidates
-    of: Mapping[str, Seen]
+    of: Mapping[str, SpecimenSignatures]
 
     @property
     def freedom(self) -> int:

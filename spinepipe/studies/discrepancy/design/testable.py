@@ -13,9 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.studies.discrepancy.design.seen import Design, Seen, candidates
+from spinepipe.studies.discrepancy.design.seen import (
+    CohortSignatures,
+    SpecimenSignatures,
+    candidates,
+)
 from spinepipe.studies.discrepancy.search.hypothesis import (
     Form,
     Trials,
@@ -41,7 +45,7 @@ OFTEN = 0.9
 LARGEST = 3.0
 """Effects that only show beyond this many times their typical strength count as not testable."""
 
-SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.BY_SPECIMEN)
+SPREADS = (PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN)
 """How a typical effect may differ between places; one place only if a trial knows none of these."""
 
 DRAWS = 200
@@ -57,7 +61,7 @@ class Typical:
     ----------
     mean : (k,) prior SDs, of strengths that have one side. sd : (k,) of those that have two.
     signs : (k,) side of off that bounds allow, 0 for both.
-    raw, refitted, left : (k, k) products of the strengths' signatures; see `Seen`.
+    raw, refitted, left : (k, k) products of the strengths' signatures; see `SpecimenSignatures`.
     """
 
     form: Form
@@ -149,7 +153,7 @@ class Judgement:
 
 def judgements(
     trials: Sequence[Trials],
-    of: Mapping[str, Seen],
+    of: Mapping[str, SpecimenSignatures],
     joints: int,
     tests: Sequence[str],
     needed: float,
@@ -161,11 +165,11 @@ def judgements(
     ----------
     of : what each specimen's tests see. needed : log evidence, the screen's threshold and margin.
     """
-    design = Design(candidates(trials, joints, tests), of)
+    design = CohortSignatures(candidates(trials, joints, tests), of)
     return tuple(judged(design, number, needed, seed) for number in range(len(trials)))
 
 
-def judged(design: Design, number: int, needed: float, seed: int) -> Judgement:
+def judged(design: CohortSignatures, number: int, needed: float, seed: int) -> Judgement:
     """What a design could tell of one effect: by the variant that shows best."""
     trials = design.those.trials[number]
     variants = [_best_spread(design, number, variant) for variant in trials.variants]
@@ -178,7 +182,7 @@ def judged(design: Design, number: int, needed: float, seed: int) -> Judgement:
     return Judgement(trials.effect, shown, why, best, best.absorbed, best.absorbed_by_base, least)
 
 
-def _best_spread(design: Design, number: int, variant: Variant) -> Typical:
+def _best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typical:
     """The form of a variant of which least is absorbed (to 1 %, then as declared first); of places,
     the one that shows most.
     """
@@ -264,7 +268,7 @@ def _why(one: Typical, least: Detectable | None) -> str:
     return f"{taken}; it would be found only at {least.times:.1f} times its typical strength"
 
 
-def typical(design: Design, number: int, form: Form) -> Typical:
+def typical(design: CohortSignatures, number: int, form: Form) -> Typical:
     """A form of effect ``number`` under a design."""
     index, start = design.those.indices[number], design.those.starts[number]
     middle = usual_shapes(form.variant)

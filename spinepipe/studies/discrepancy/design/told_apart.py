@@ -16,10 +16,10 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.stats import norm
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
-from spinepipe.studies.discrepancy.design.seen import Design, candidates, seen_in
+from spinepipe.studies.discrepancy.design.seen import CohortSignatures, candidates, seen_in
 from spinepipe.studies.discrepancy.design.testable import (
     NO_TRACE,
     OFTEN,
@@ -32,13 +32,13 @@ from spinepipe.studies.discrepancy.design.testable import (
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, shape_grid
 from spinepipe.studies.discrepancy.search.screen import SIZES, Places
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import NotTestable, SmallestDetectable
 
 ALIKE = 0.95
 """Effects that explain more than this share of each other cannot be told apart."""
 
-FREE = (Spread.SHARED, Spread.BY_JOINT)
+FREE = (PlaceSpread.SHARED, PlaceSpread.BY_JOINT)
 """How the strengths of the explaining effect may differ, if its trial knows one of these."""
 
 
@@ -71,7 +71,7 @@ class _Target:
         return self.form.name
 
     @property
-    def where(self) -> tuple[Spread, int | None, str | None]:
+    def where(self) -> tuple[PlaceSpread, int | None, str | None]:
         """How its values differ, and the one place where it is."""
         return self.form.spread, self.form.joint, self.form.specimen
 
@@ -121,7 +121,7 @@ def told_apart(
     margin: float,
     declared: Array | None,
     seed: int,
-    run: Run,
+    run: PieceRunner,
 ) -> ToldApart:
     """What the tests could tell at the base fit, which ``grounds`` stand on.
 
@@ -135,14 +135,16 @@ def told_apart(
     names = list(grounds.readings)
     seen = run.map(seen_in, [(grounds, name, trials) for name in names])
     of = dict(zip(names, seen, strict=True))
-    design = Design(candidates(trials, joints, grounds.tests), of)
+    design = CohortSignatures(candidates(trials, joints, grounds.tests), of)
     found = judgements(trials, of, joints, grounds.tests, needed, seed)
     pairs = confusions(design, found, margin)
     missing = run(not_testable, bench(grounds, declared), trials, found, needed, seed)
     return ToldApart(found, pairs, families(pairs), missing)
 
 
-def confusions(design: Design, judged: Sequence[Judgement], margin: float) -> tuple[Confusion, ...]:
+def confusions(
+    design: CohortSignatures, judged: Sequence[Judgement], margin: float
+) -> tuple[Confusion, ...]:
     """All ordered pairs of different effects that the tests can show.
 
     Parameters
@@ -164,7 +166,7 @@ def confusions(design: Design, judged: Sequence[Judgement], margin: float) -> tu
     )
 
 
-def _target(design: Design, number: int, one: Typical) -> _Target:
+def _target(design: CohortSignatures, number: int, one: Typical) -> _Target:
     start, directions = design.those.starts[number], one.directions
     made = {}
     for specimen, columns, owners in one.places:
@@ -174,7 +176,7 @@ def _target(design: Design, number: int, one: Typical) -> _Target:
     return _Target(one.form, made, one.squared(one.left), gap)
 
 
-def _shares(design: Design, other: int, targets: Sequence[_Target]) -> list[float]:
+def _shares(design: CohortSignatures, other: int, targets: Sequence[_Target]) -> list[float]:
     """Share of each target that effect ``other`` explains at its best."""
     forms = design.those.trials[other].forms
     best = np.zeros(len(targets))
@@ -189,7 +191,11 @@ def _shares(design: Design, other: int, targets: Sequence[_Target]) -> list[floa
 
 
 def _explained(
-    design: Design, other: int, form: Form, sds: tuple[float, ...], targets: Sequence[_Target]
+    design: CohortSignatures,
+    other: int,
+    form: Form,
+    sds: tuple[float, ...],
+    targets: Sequence[_Target],
 ) -> Array:
     index, start = design.those.indices[other], design.those.starts[other]
     places, strengths = index.places(form, sds, tuple(design.of), design.those.tests)
@@ -206,7 +212,7 @@ def _explained(
 
 
 def _products(
-    design: Design, start: int, places: Places, count: int, targets: Sequence[_Target]
+    design: CohortSignatures, start: int, places: Places, count: int, targets: Sequence[_Target]
 ) -> tuple[Array, list[Array]]:
     """F'F (k, k), and F'a (k, d) of each target."""
     gram = np.zeros((count, count))

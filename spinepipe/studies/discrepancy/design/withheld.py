@@ -15,7 +15,7 @@ from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials
 from spinepipe.studies.discrepancy.search.imperfections import labels_of
 from spinepipe.studies.discrepancy.search.inquiry import look
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
     columns_of,
     linearised,
@@ -23,9 +23,9 @@ from spinepipe.studies.discrepancy.search.projected import (
     signatures,
     taken_out,
 )
-from spinepipe.studies.discrepancy.search.screen import Index, Screened, summed
+from spinepipe.studies.discrepancy.search.screen import EffectColumns, Screened, summed
 from spinepipe.studies.discrepancy.search.whitening import rescaled
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 
 FACTORS = (0.5, 0.25, 0.0)
 """Of a prior SD, at which evidence is told."""
@@ -66,7 +66,11 @@ class Withheld:
 
 
 def withheld(
-    grounds: Grounds, trials: Sequence[Trials], threshold: float, named: Sequence[str], run: Run
+    grounds: Grounds,
+    trials: Sequence[Trials],
+    threshold: float,
+    named: Sequence[str],
+    run: PieceRunner,
 ) -> tuple[Withheld, ...]:
     """Effects beside those of the grounds' fit that imperfections hide.
 
@@ -97,7 +101,7 @@ def _hidden(
 ) -> list[Withheld]:
     """Each kind of imperfection that hides an effect by itself, or the one that comes nearest."""
     best = one.forms[0]
-    evidence = Evidence(grounds, trials, best.form, best.sds)
+    evidence = MaskedEvidence(grounds, trials, best.form, best.sds)
     now = evidence.under(grounds)
     if now > threshold:
         return []  # it is evident: whatever keeps it from a name is something else
@@ -139,7 +143,7 @@ def narrowed(grounds: Grounds, factors: Mapping[str, float]) -> Grounds:
     return replace(grounds, setting=setting, fit=fit)
 
 
-class Evidence:
+class MaskedEvidence:
     """Log evidence of one form at one shape on the linear screen, its share taken off."""
 
     def __init__(
@@ -149,12 +153,13 @@ class Evidence:
         alone = Trials(trials.effect, (form.variant,), (form,))
         joints = next(iter(grounds.fit.models.values())).n_joints
         columns = columns_of(alone, joints, grounds.tests)
-        self._index, self._form, self._sds = Index(columns), form, sds
+        self._index, self._form, self._sds = EffectColumns(columns), form, sds
         self._share = trials.log_share(form)
         self._moved = {
             name: grounds.plain[name].noise_only(
                 signatures(
-                    Solved(grounds.fit.models[name], one.cases, grounds.noise.zeroed), columns
+                    SolvedSpecimen(grounds.fit.models[name], one.cases, grounds.noise.zeroed),
+                    columns,
                 )
             )
             for name, one in grounds.readings.items()

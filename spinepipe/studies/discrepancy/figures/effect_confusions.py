@@ -18,7 +18,7 @@ from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
 from spinepipe.studies.discrepancy.verdict import Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import general
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 _SQUARE_MM, _BESIDE_MM, _SCALE_MM = 5.4, 34.0, 24.0
 _MOST_WITH_NUMBERS = 22
@@ -32,7 +32,7 @@ WORDS = (
 HEADINGS = ("Share of one effect's gap that another explains", "Smallest gap named")
 
 
-def effect_confusions_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+def effect_confusions_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
     """Effects against effects, and beside them the smallest gap at which each is seen."""
     verdict = read_verdict(tables.files["verdict"])
     confusions, candidates = tables["confusions"], tables["candidates"]

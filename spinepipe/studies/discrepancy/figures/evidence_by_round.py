@@ -28,7 +28,7 @@ from spinepipe.studies.discrepancy.figures.gap_map import draw_heat, empty_cell,
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import general
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 SCREEN, REFIT, NO_FIT = "screen", "refit", "no_fit"
 ENTERED, LEFT, REPLACED = "entered", "left", "replaced"
@@ -52,7 +52,7 @@ _NO_TRACE = 0.05
 
 
 @dataclass(frozen=True)
-class Round:
+class EvidenceRound:
     """One look at all effects.
 
     Attributes
@@ -90,7 +90,7 @@ def _counted(names: Sequence[str]) -> str:
     return ", ".join(general(name) + (f" × {n}" if n > 1 else "") for name, n in times.items())
 
 
-def rounds(candidates: pd.DataFrame, end: Sequence[str] = ()) -> list[Round]:
+def rounds(candidates: pd.DataFrame, end: Sequence[str] = ()) -> list[EvidenceRound]:
     """All rounds in their order, each with what it led to.
 
     Parameters
@@ -112,7 +112,7 @@ def rounds(candidates: pd.DataFrame, end: Sequence[str] = ()) -> list[Round]:
     return found
 
 
-def _round(stage: str, rows: pd.DataFrame) -> Round:
+def _round(stage: str, rows: pd.DataFrame) -> EvidenceRound:
     best = rows.groupby(["effect", "way"])["log_evidence"].max().unstack("way")
     evidence = best.reindex(columns=[SCREEN, REFIT])
     refitted = evidence.index.isin(rows.loc[rows["way"] == REFIT, "effect"])
@@ -120,10 +120,10 @@ def _round(stage: str, rows: pd.DataFrame) -> Round:
     place = _IN_PLACE.match(stage)
     beside = tuple(name for name in str(rows["beside"].iloc[0]).split(", ") if name)
     without = tuple(place["names"].split(" and ")) if place else ()
-    return Round(stage, beside, without, bool(place and place["trial"]), evidence)
+    return EvidenceRound(stage, beside, without, bool(place and place["trial"]), evidence)
 
 
-def _model(one: Round) -> Counter[str]:
+def _model(one: EvidenceRound) -> Counter[str]:
     """Effects that the search had in its model when it came to the round, and their forms."""
     return Counter([*one.beside, *one.without])
 
@@ -135,7 +135,7 @@ def _events(before: Counter[str], later: Counter[str]) -> dict[str, str]:
     return dict.fromkeys(sorted(entered), ENTERED) | dict.fromkeys(sorted(gone), lost)
 
 
-def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
     """Effects by rounds: the evidence in each cell, coloured where it passes the threshold."""
     verdict = read_verdict(tables.files["verdict"])
     end = (*verdict.named, *verdict.candidates_in_set)
@@ -190,7 +190,7 @@ def _panel(figure: Figure, columns: int) -> Axes:
     return panel
 
 
-def chosen(every: Sequence[Round]) -> list[Round]:
+def chosen(every: Sequence[EvidenceRound]) -> list[EvidenceRound]:
     """Of many rounds those that led to something first, in their order."""
     if len(every) <= MOST_ROUNDS:
         return list(every)
@@ -230,7 +230,7 @@ def _numbers(
         )
 
 
-def _mark(axis: Axes, names: Sequence[str], shown: Sequence[Round]) -> None:
+def _mark(axis: Axes, names: Sequence[str], shown: Sequence[EvidenceRound]) -> None:
     """What was in the model of a round, and what the round led to."""
     for column, one in enumerate(shown):
         for name in one.beside:
@@ -264,7 +264,7 @@ def _scale_bar(figure: Figure, axis: Axes, image: object, threshold: float, to: 
     bar.outline.set_linewidth(0.4)
 
 
-def _handles(shown: Sequence[Round], grid: Array) -> list[Line2D | Patch]:
+def _handles(shown: Sequence[EvidenceRound], grid: Array) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = []
     if any(one.beside for one in shown):
         handles.append(Patch(fill=False, ec=BLUE, lw=1.2, label="in the model"))
@@ -279,7 +279,9 @@ def _handles(shown: Sequence[Round], grid: Array) -> list[Line2D | Patch]:
     return handles
 
 
-def _words(every: Sequence[Round], shown: Sequence[Round], hidden: int, verdict: Verdict) -> str:
+def _words(
+    every: Sequence[EvidenceRound], shown: Sequence[EvidenceRound], hidden: int, verdict: Verdict
+) -> str:
     told = [
         "A column is a round of the search; best form of each effect; bold: refitted by the full "
         "simulator, else screened",

@@ -40,7 +40,7 @@ from spinepipe.report.style import (
 from spinepipe.report.words import AXIS, case, count, fixed, number, short, unit
 from spinepipe.studies.discrepancy.figures.load_displacement import CLEARLY, LABELS, models_shown
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 from spinepipe.units import COORDINATES
 
 MOST_PLACES, FEWEST_PLACES = 6, 3
@@ -58,7 +58,7 @@ _PANEL_MM, _STEPS_KEY_MM = 50.0, 17.0
 _BAND_SD = 1.96
 
 
-def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
     """A panel for each of the places where the base model is farthest off."""
     gap = tables["gap"]
     places = worst_places(gap)
@@ -239,7 +239,7 @@ _LEAST_SCALE = 2.0
 """The scale reaches at least so many noise SD: noise must not look like physics."""
 
 
-def gap_map_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+def gap_map_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
     """For each test the base model on the left, the model with the named effects on the right."""
     where = tables["where"]
     rows = where[where["by"] == "joint x coordinate x test"]

@@ -18,7 +18,7 @@ from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, sayin
 from spinepipe.report.words import fixed, plain, short
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import share_of_gap
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 KINDS = {
     "test": "One test left out",
@@ -38,7 +38,7 @@ _LEAST_SCALE = 1.0
 """The axis reaches at least so many noise SD: noise must not look like physics."""
 
 
-def held_out_by_test_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+def held_out_by_test_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
     """A panel for left-out tests and one for left-out specimens; a row for each fold."""
     rows = tables["held_out"]
     kinds = [kind for kind in KINDS if (rows["kind"] == kind).any()]

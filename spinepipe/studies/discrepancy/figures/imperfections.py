@@ -14,7 +14,7 @@ from spinepipe.report.style import BLACK, GREY, OURS, THEIRS, blank, note, sayin
 from spinepipe.report.words import plain
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import MODELS
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 
 HEADS = {"base": "Beside the base model", "with_effects": "Beside the model with the effects"}
 EVERY = "*"
@@ -31,7 +31,7 @@ _SHADES = ("#0B3C5D", "#0072B2", "#3FA7D6", "#56B4E9", "#009E73", "#7A9E00")
 """Of joints, caudal to cranial, again from the start where there are more."""
 
 
-def imperfections_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+def imperfections_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
     """A panel per model: a row for each kind, in it a lane of points for each joint."""
     rows = tables["imperfections"]
     if rows.empty:

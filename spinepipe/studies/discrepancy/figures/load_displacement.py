@@ -25,7 +25,7 @@ from spinepipe.report.style import BLACK, GREY, INK, OURS, SMALL_PT, THEIRS, WHI
 from spinepipe.report.words import case, count, fixed, short, unit
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.words import load_axis, motion_of
-from spinepipe.tables import Tables
+from spinepipe.tables import StudyTables
 from spinepipe.units import BORDER_PER_SI, COORDINATES
 
 MOST_PANELS, FEWEST_PANELS = 12, 6
@@ -61,7 +61,7 @@ _BACK = 0.02
 Steps = NDArray[np.int64]
 
 
-def load_displacement_figure(study: Discrepancy, cohort: Cohort, tables: Tables) -> Figure:
+def load_displacement_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
     """The curves where the base is farthest off, each in the specimen where it is worst."""
     gap = tables["gap"]
     curves = worst_curves(gap)
@@ -80,7 +80,7 @@ def load_displacement_figure(study: Discrepancy, cohort: Cohort, tables: Tables)
 
 
 @dataclass(frozen=True)
-class Curve:
+class JointTestCurve:
     """One specimen's joint in one test: ``rows`` of the table gap in the order of load steps.
 
     ``off`` : root mean square of measured less base, noise SD.
@@ -94,7 +94,7 @@ class Curve:
     off: float
 
 
-def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[Curve]:
+def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[JointTestCurve]:
     """Of each joint in each test the driven coordinate, the base's farthest first.
 
     Of many each in the specimen where it is worst.
@@ -102,14 +102,14 @@ def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[Curve]:
     rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)].sort_values("step", kind="stable")
     chosen = driven(rows)
     found = [
-        Curve(str(specimen), str(test), str(joint), str(coordinate), part, _off(part))
+        JointTestCurve(str(specimen), str(test), str(joint), str(coordinate), part, _off(part))
         for (specimen, test, joint, coordinate), part in rows.groupby(PLACE, sort=False)
         if (test, joint, coordinate) in chosen
     ]
     ordered = sorted(found, key=lambda curve: -curve.off)
     if len(ordered) <= most:
         return ordered
-    of_place: dict[tuple[str, str], Curve] = {}
+    of_place: dict[tuple[str, str], JointTestCurve] = {}
     for curve in ordered:
         of_place.setdefault((curve.test, curve.joint), curve)
     shown = list(of_place.values())[:most]
@@ -152,7 +152,7 @@ def models_shown(gap: pd.DataFrame) -> tuple[str, ...]:
     return ("base", *["with_effects"] * added, *["with_table"] * bool(tabulated))
 
 
-def _draw(axis: Axes, curve: Curve, lines: Sequence[str]) -> bool:
+def _draw(axis: Axes, curve: JointTestCurve, lines: Sequence[str]) -> bool:
     """Points, their noise and the models' curves; whether there were unloading steps."""
     rows = curve.rows
     load, measured = rows["load"].to_numpy(float), rows["measured"].to_numpy(float)
@@ -205,7 +205,7 @@ def _branches(way: Steps, back: NDArray[np.bool_]) -> list[Steps]:
     return [way[max(0, a - 1) : b] for a, b in pairwise(turns)]
 
 
-def _label(axis: Axes, index: int, curve: Curve, specimens: int) -> None:
+def _label(axis: Axes, index: int, curve: JointTestCurve, specimens: int) -> None:
     whose = f", {short(curve.specimen, 14)}" if specimens > 1 else ""
     head(axis, index, f"{curve.joint}{whose}\n{short(case(curve.test), 34)}")
     axis.set_xlabel(f"{motion_of(curve.coordinate)} ({unit(curve.coordinate)})")
@@ -237,7 +237,7 @@ def _handles(lines: Sequence[str], unloaded: bool) -> list[Line2D | Patch]:
     return handles + [Line2D([], [], label=LABELS[name], **_LINES[name]) for name in lines]
 
 
-def _words(gap: pd.DataFrame, curves: Sequence[Curve], cohort: Cohort) -> str:
+def _words(gap: pd.DataFrame, curves: Sequence[JointTestCurve], cohort: Cohort) -> str:
     places = len(driven(gap))
     each = len(curves) == len({(curve.test, curve.joint) for curve in curves})
     whose = ", each in the specimen where it is worst" if len(cohort.specimen_names) > 1 else ""

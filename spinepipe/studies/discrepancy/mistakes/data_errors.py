@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spinepipe.cohort.answers import Answer, answers_of_test, joint_loads
+from spinepipe.cohort.answers import LoadResponse, answers_of_test, joint_loads
 from spinepipe.effects.contract import Array
 from spinepipe.plausibility.score import CLEAR
 from spinepipe.studies.discrepancy.mistakes.bad_markers import (
@@ -20,9 +20,9 @@ from spinepipe.studies.discrepancy.mistakes.exchanged import exchanged
 from spinepipe.studies.discrepancy.mistakes.wrong_units_and_signs import wrong_signs, wrong_units
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
-from spinepipe.studies.discrepancy.search.inquiry import Found
+from spinepipe.studies.discrepancy.search.inquiry import SearchResult
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES
 
@@ -30,9 +30,9 @@ from spinepipe.units import COORDINATES
 def suspected_errors(
     grounds: Grounds,
     measured: Sequence[SpecimenReadings],
-    run: Run,
+    run: PieceRunner,
     trials: Sequence[Trials] = (),
-    search: Found | None = None,
+    search: SearchResult | None = None,
 ) -> tuple[SuspectedError, ...]:
     """All suspected mistakes, where the base has a fit.
 
@@ -74,14 +74,14 @@ def before_a_fit(
 
 def answers(
     readings: Mapping[str, SpecimenReadings], zeroed: bool, sd: Array, clear: float
-) -> list[Answer]:
+) -> list[LoadResponse]:
     """All driven coordinates whose motion is clear of the noise.
 
     Parameters
     ----------
     sd : (6,) of a reading, m and rad. clear : SDs that the motion's root mean square exceeds.
     """
-    found: list[Answer] = []
+    found: list[LoadResponse] = []
     for name, one in readings.items():
         for test in one.tests:
             loads = joint_loads(one.frames, test.case)

@@ -28,15 +28,15 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     Trials,
     hypothesis,
 )
-from spinepipe.studies.discrepancy.search.inquiry import Found, look
+from spinepipe.studies.discrepancy.search.inquiry import SearchResult, look
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
-from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, Solved
+from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD, Screen
 from spinepipe.studies.discrepancy.search.whitening import with_nuisances
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 
 NEEDED = 8.0
@@ -63,7 +63,10 @@ class _Exchange:
 
 
 def exchanged(
-    grounds: Grounds, run: Run, trials: Sequence[Trials] = (), found: Found | None = None
+    grounds: Grounds,
+    run: PieceRunner,
+    trials: Sequence[Trials] = (),
+    found: SearchResult | None = None,
 ) -> list[SuspectedError]:
     """Pairs that evidently changed places, best first, each specimen in one pair at most.
 
@@ -140,7 +143,9 @@ def _exchange(
     return max(best, key=lambda one: one.evidence)
 
 
-def _as_read(grounds: Grounds, run: Run, trials: Sequence[Trials], found: Found | None) -> float:
+def _as_read(
+    grounds: Grounds, run: PieceRunner, trials: Sequence[Trials], found: SearchResult | None
+) -> float:
     """Log evidence of the effects that explain what the base leaves of the readings as they are."""
     if not trials:
         return 0.0
@@ -153,7 +158,9 @@ def _look(grounds: Grounds, trials: Sequence[Trials]) -> Screen:
     return look(grounds, trials, 0, 0.5, 0, LEAST_THRESHOLD)
 
 
-def _ways(grounds: Grounds, run: Run, found: Found | None) -> Iterator[tuple[Grounds, float]]:
+def _ways(
+    grounds: Grounds, run: PieceRunner, found: SearchResult | None
+) -> Iterator[tuple[Grounds, float]]:
     """Fits with effects that stand: all, and all but one with the evidence of that one."""
     if found is None or not found.standing:
         return
@@ -199,7 +206,7 @@ def _setting(grounds: Grounds, pair: tuple[str, str]) -> Setting | None:
     for name, other in zip(pair, pair[::-1], strict=True):
         one = readings[name]
         try:
-            solved = Solved(models[name], one.cases, grounds.noise.zeroed)
+            solved = SolvedSpecimen(models[name], one.cases, grounds.noise.zeroed)
         except NoEquilibrium:
             return None
         moved = nuisance_signatures(solved, grounds.priors, one.coordinates)

@@ -18,7 +18,7 @@ import numpy as np
 from spinepipe.anatomy.stiffness_range import middle, published_range
 from spinepipe.cohort.answers import (
     ALL,
-    Answer,
+    LoadResponse,
     of_specimens,
     typical,
 )
@@ -36,7 +36,7 @@ APART = 30.0
 
 
 def wrong_signs(
-    found: Sequence[Answer], joints: Sequence[str], specimens: Sequence[str], sd: Array
+    found: Sequence[LoadResponse], joints: Sequence[str], specimens: Sequence[str], sd: Array
 ) -> list[SuspectedError]:
     """Suspected signs, whole tests first; ``sd`` (6,) of a reading."""
     errors: list[SuspectedError] = []
@@ -48,10 +48,10 @@ def wrong_signs(
     return errors
 
 
-def _split(found: Sequence[Answer]) -> tuple[list[Answer], list[Answer]]:
+def _split(found: Sequence[LoadResponse]) -> tuple[list[LoadResponse], list[LoadResponse]]:
     """Answers against the load: of tests where most are, and of single joints."""
-    whole: list[Answer] = []
-    single: list[Answer] = []
+    whole: list[LoadResponse] = []
+    single: list[LoadResponse] = []
     for answer in found:
         if _is_against(answer, found):
             beside = [a for a in found if (a.specimen, a.test) == (answer.specimen, answer.test)]
@@ -60,16 +60,16 @@ def _split(found: Sequence[Answer]) -> tuple[list[Answer], list[Answer]]:
     return whole, single
 
 
-def _is_against(answer: Answer, found: Sequence[Answer]) -> bool:
+def _is_against(answer: LoadResponse, found: Sequence[LoadResponse]) -> bool:
     return answer.correlation < AGAINST and is_plausible(abs(answer.slope) / _usual(answer, found))
 
 
-def _usual(answer: Answer, found: Sequence[Answer]) -> float:
+def _usual(answer: LoadResponse, found: Sequence[LoadResponse]) -> float:
     return typical([a.slope for a in found if a.specimen == answer.specimen])
 
 
 def _tests(
-    whole: Sequence[Answer], found: Sequence[Answer], specimens: Sequence[str]
+    whole: Sequence[LoadResponse], found: Sequence[LoadResponse], specimens: Sequence[str]
 ) -> list[SuspectedError]:
     """One for each set of tests that the same specimens have wrong."""
     errors = []
@@ -89,7 +89,7 @@ def _tests(
     return errors
 
 
-def _same(chosen: Sequence[Answer]) -> dict[tuple[str, ...], list[str]]:
+def _same(chosen: Sequence[LoadResponse]) -> dict[tuple[str, ...], list[str]]:
     """Sets of tests, and the specimens that have them."""
     found: dict[tuple[str, ...], list[str]] = {}
     for name in dict.fromkeys(a.specimen for a in chosen):
@@ -99,8 +99,8 @@ def _same(chosen: Sequence[Answer]) -> dict[tuple[str, ...], list[str]]:
 
 
 def _joints(
-    single: Sequence[Answer],
-    found: Sequence[Answer],
+    single: Sequence[LoadResponse],
+    found: Sequence[LoadResponse],
     joints: Sequence[str],
     specimens: Sequence[str],
     sd: Array,
@@ -120,7 +120,7 @@ def _joints(
     return errors
 
 
-def _words_of_sign(chosen: Sequence[Answer], found: Sequence[Answer], sd: Array) -> str:
+def _words_of_sign(chosen: Sequence[LoadResponse], found: Sequence[LoadResponse], sd: Array) -> str:
     """How much better the sign changed agrees with what the other joints do."""
     size = sd[COORDINATES.index(chosen[0].coordinate)]
     slopes, as_read, changed = [], 0.0, 0.0
@@ -136,7 +136,7 @@ def _words_of_sign(chosen: Sequence[Answer], found: Sequence[Answer], sd: Array)
     )
 
 
-def wrong_units(found: Sequence[Answer]) -> list[SuspectedError]:
+def wrong_units(found: Sequence[LoadResponse]) -> list[SuspectedError]:
     """Suspected units: of single specimens and tests, else of the whole cohort.
 
     Translations and rotations apart: a unit is of forces or of moments, of mm or of deg.
@@ -145,7 +145,7 @@ def wrong_units(found: Sequence[Answer]) -> list[SuspectedError]:
     return [error for of_kind in kinds for error in _of_kind(of_kind)]
 
 
-def _of_kind(found: Sequence[Answer]) -> list[SuspectedError]:
+def _of_kind(found: Sequence[LoadResponse]) -> list[SuspectedError]:
     whole = {a.specimen: (a.specimen,) for a in found}
     tests = {f"{a.specimen}, test {a.test}": (a.specimen, a.test) for a in found}
     for places, everywhere in ((whole, True), (tests, False)):
@@ -165,7 +165,7 @@ def _of_kind(found: Sequence[Answer]) -> list[SuspectedError]:
 
 
 def _apart(
-    where: str, own: Sequence[Answer], others: Sequence[Answer], *, everywhere: bool
+    where: str, own: Sequence[LoadResponse], others: Sequence[LoadResponse], *, everywhere: bool
 ) -> list[SuspectedError]:
     """An error where all are far from the others', and further from the published."""
     mine, theirs = _stiffness(own), _stiffness(others)
@@ -182,7 +182,7 @@ def _apart(
     return [SuspectedError(where, _mix_up(factor, mine), evidence)]
 
 
-def _stiffness(found: Sequence[Answer]) -> dict[str, float]:
+def _stiffness(found: Sequence[LoadResponse]) -> dict[str, float]:
     """N/m or N m/rad by coordinate: of most joints."""
     names = dict.fromkeys(a.coordinate for a in found)
     return {n: 1.0 / typical([a.slope for a in found if a.coordinate == n]) for n in names}

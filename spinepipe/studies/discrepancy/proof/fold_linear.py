@@ -14,7 +14,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from spinepipe.decomposition import bounded_lstsq
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.studies.discrepancy.proof.folds import Chosen, Flags, Part
+from spinepipe.studies.discrepancy.proof.folds import ChosenSteps, Flags, FoldFit
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Unknown
 from spinepipe.studies.discrepancy.search.lack_of_fit import generic_columns
@@ -97,7 +97,7 @@ def in_readings(plain: Whitening, white: Array) -> tuple[Array, ...]:
 
 
 @dataclass(frozen=True)
-class Placed:
+class FoldPrediction:
     """A model's prediction of a part's scored specimens, from its training.
 
     Attributes
@@ -136,11 +136,11 @@ class _Normal:
 class LinearFolds:
     """Predictions of any part by one linear model."""
 
-    def __init__(self, model: LinearModel, chosen: Chosen) -> None:
+    def __init__(self, model: LinearModel, chosen: ChosenSteps) -> None:
         self.model, self.chosen = model, chosen
         self._grams: dict[tuple[str, int, bytes], Array] = {}
 
-    def placed(self, part: Part) -> Placed:
+    def placed(self, part: FoldFit) -> FoldPrediction:
         """The scored specimens as the training has them."""
         members = self.model.members
         normals = {name: self._normal(name, part) for name in members}
@@ -153,9 +153,9 @@ class LinearFolds:
                 p + by_x @ move for p, by_x in zip(one.predicted, one.by_x, strict=True)
             )
             nuisances[name] = tuple(moved @ z for moved in one.nuisances)
-        return Placed(motion, nuisances)
+        return FoldPrediction(motion, nuisances)
 
-    def standard_errors(self, part: Part) -> dict[str, tuple[Array, ...]]:
+    def standard_errors(self, part: FoldFit) -> dict[str, tuple[Array, ...]]:
         """Per test (T, J, 6) standard error of what the training predicts, nuisances held."""
         members, count = self.model.members, len(self.model.mean)
         precision = np.diag(self.model.sd**-2.0)
@@ -168,7 +168,7 @@ class LinearFolds:
             found[name] = tuple(_se(by_x, own) for by_x in members[name].by_x)
         return found
 
-    def left_open(self, part: Part) -> dict[str, Array]:
+    def left_open(self, part: FoldFit) -> dict[str, Array]:
         """(k, k) covariance of each scored specimen's nuisances after training, unknowns held."""
         found = {}
         for name in part.scored:
@@ -176,7 +176,7 @@ class LinearFolds:
             found[name] = _solved_alike(inner, np.eye(len(inner)))
         return found
 
-    def _fitted(self, part: Part, normals: Mapping[str, _Normal]) -> Array:
+    def _fitted(self, part: FoldFit, normals: Mapping[str, _Normal]) -> Array:
         """(M,) most likely values."""
         others = {name: one for name, one in normals.items() if name != part.apart}
         x = np.zeros(len(self.model.mean))
@@ -198,7 +198,7 @@ class LinearFolds:
         drive = moment[free] - matrix[np.ix_(free, fixed)] @ x[fixed]
         return _bounded(matrix[np.ix_(free, free)], drive, model.low[free], model.high[free])
 
-    def _normal(self, specimen: str, part: Part) -> _Normal:
+    def _normal(self, specimen: str, part: FoldFit) -> _Normal:
         one = self.model.members[specimen]
         m, k = len(one.numbers), one.nuisances[0].shape[-1]
         gram = np.zeros((m + k + 1, m + k + 1))

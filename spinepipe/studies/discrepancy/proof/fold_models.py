@@ -14,26 +14,34 @@ import numpy as np
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics import moved
 from spinepipe.studies.discrepancy.proof.fold_linear import (
+    FoldPrediction,
     LinearFolds,
     LinearModel,
-    Placed,
     own_unknowns,
     surrogate,
     tangent,
 )
-from spinepipe.studies.discrepancy.proof.folds import TEST, Chosen, Flags, Fold, Masks, Part, only
+from spinepipe.studies.discrepancy.proof.folds import (
+    TEST,
+    ChosenSteps,
+    Flags,
+    Fold,
+    FoldFit,
+    Masks,
+    only,
+)
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, Member
+from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, HypothesisMember
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium
 from spinepipe.studies.discrepancy.search.whitening import whitening, with_nuisances
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 
 SIZES = np.array([0.03, 0.1, 0.2, 0.35, 0.6, 1.0])
 """Of one prior SD."""
 
 
-Both = tuple[Placed | str, Placed | str]
+Both = tuple[FoldPrediction | str, FoldPrediction | str]
 """A part as base and model with effects have it, or why a fit has no start."""
 
 
@@ -52,9 +60,9 @@ class Predictions:
     """
 
     scored: Masks
-    base: Placed
-    with_effects: Placed
-    surrogate: Placed | None
+    base: FoldPrediction
+    with_effects: FoldPrediction
+    surrogate: FoldPrediction | None
     left_open: float
 
 
@@ -66,11 +74,11 @@ class FoldModels:
     refit : whether base and model with effects are fitted anew by the full simulator.
     """
 
-    def __init__(self, base: Grounds, final: Grounds, refit: bool, run: Run) -> None:
+    def __init__(self, base: Grounds, final: Grounds, refit: bool, run: PieceRunner) -> None:
         self.grounds = (base, final)
         self.refit, self.run = refit, run
         self.named = bool(final.fit.hypothesis.supposed)
-        self.chosen = Chosen(base.readings, base.noise)
+        self.chosen = ChosenSteps(base.readings, base.noise)
         size = nuisance_size(final)
         self.base = LinearFolds(tangent(base, size), self.chosen)
         self.final = LinearFolds(tangent(final, size), self.chosen) if self.named else self.base
@@ -82,13 +90,13 @@ class FoldModels:
         except NoEquilibrium as trouble:
             return None, f"no surrogate: {trouble}"
 
-    def placed(self, parts: Sequence[Part]) -> list[Both]:
+    def placed(self, parts: Sequence[FoldFit]) -> list[Both]:
         """Each part as base and model with effects have it, before it is said what counts."""
         base = self._placed(self.grounds[0], self.base, parts)
         final = self._placed(self.grounds[1], self.final, parts) if self.named else base
         return list(zip(base, final, strict=True))
 
-    def predictions(self, fold: Fold, part: Part, placed: Both) -> Predictions:
+    def predictions(self, fold: Fold, part: FoldFit, placed: Both) -> Predictions:
         """A part as each model has it.
 
         Raises
@@ -105,7 +113,7 @@ class FoldModels:
         scored = self._scored(fold, part)
         return Predictions(scored, base, final, by_surrogate, self._left_open(part, scored))
 
-    def _left_open(self, part: Part, scored: Masks) -> float:
+    def _left_open(self, part: FoldFit, scored: Masks) -> float:
         """Trace of the nuisances' covariance after training, in noise SDs of scored readings."""
         covariance, total = self.base.left_open(part), 0.0
         for name, tests in scored.items():
@@ -118,13 +126,13 @@ class FoldModels:
         return total
 
     def _placed(
-        self, grounds: Grounds, linear: LinearFolds, parts: Sequence[Part]
-    ) -> Sequence[Placed | str]:
+        self, grounds: Grounds, linear: LinearFolds, parts: Sequence[FoldFit]
+    ) -> Sequence[FoldPrediction | str]:
         if self.refit:
             return self.run.map(refitted, [(grounds, linear.model, part) for part in parts])
         return [linear.placed(part) for part in parts]
 
-    def _scored(self, fold: Fold, part: Part) -> Masks:
+    def _scored(self, fold: Fold, part: FoldFit) -> Masks:
         """Readings left out; of an unseen test those that the training determines in both models.
 
         A reading is determined where its prediction has a smaller standard error than itself.
@@ -149,7 +157,7 @@ class FoldModels:
             told = told & (error < sd)
         return told
 
-    def left_out(self, part: Part) -> Masks:
+    def left_out(self, part: FoldFit) -> Masks:
         """By specimen, per test (T, J, 6): what was read in the load steps that are left out."""
         return {
             name: tuple(
@@ -160,7 +168,7 @@ class FoldModels:
         }
 
 
-def refitted(grounds: Grounds, linear: LinearModel, part: Part) -> Placed | str:
+def refitted(grounds: Grounds, linear: LinearModel, part: FoldFit) -> FoldPrediction | str:
     """The scored specimens as fits to the training have them, or why one has no start.
 
     Parameters
@@ -173,7 +181,7 @@ def refitted(grounds: Grounds, linear: LinearModel, part: Part) -> Placed | str:
         return str(trouble)
 
 
-def _refitted(grounds: Grounds, linear: LinearModel, part: Part) -> Placed:
+def _refitted(grounds: Grounds, linear: LinearModel, part: FoldFit) -> FoldPrediction:
     hypothesis = grounds.fit.hypothesis
     count = len(hypothesis.unknowns)
     free, x = np.arange(count), np.zeros(count)
@@ -189,13 +197,13 @@ def _refitted(grounds: Grounds, linear: LinearModel, part: Part) -> Placed:
         x, _ = _fitted(grounds, linear, part, others, np.setdiff1d(free, own), x)
         _, fit = _fitted(grounds, linear, part, [part.apart], own, x)
     nuisances = {name: _nuisances(grounds, linear, part, name, fit) for name in part.scored}
-    return Placed({name: fit.predicted[name] for name in part.scored}, nuisances)
+    return FoldPrediction({name: fit.predicted[name] for name in part.scored}, nuisances)
 
 
 def _fitted(
     grounds: Grounds,
     linear: LinearModel,
-    part: Part,
+    part: FoldFit,
     specimens: Sequence[str],
     free: Indices,
     x: Array,
@@ -226,7 +234,7 @@ def _again(
     for name in specimens:
         one = fit.hypothesis.members[name]
         kept = [k for k, number in enumerate(one.numbers) if number in order]
-        members[name] = Member(
+        members[name] = HypothesisMember(
             moved(fit.models[name], one.free, x[list(one.numbers)]),
             tuple(one.free[k] for k in kept),
             tuple(order[one.numbers[k]] for k in kept),
@@ -244,7 +252,7 @@ def _again(
 
 
 def _nuisances(
-    grounds: Grounds, linear: LinearModel, part: Part, specimen: str, fit: JointFit
+    grounds: Grounds, linear: LinearModel, part: FoldFit, specimen: str, fit: JointFit
 ) -> tuple[Array, ...]:
     """What the nuisances add per test (T, J, 6), at their most likely values in the training."""
     moves = linear.members[specimen].nuisances

@@ -22,7 +22,7 @@ TEST, SPECIMEN, STEPS = "test", "specimen", "steps"
 
 
 @dataclass(frozen=True)
-class Part:
+class FoldFit:
     """One fit and what it predicts.
 
     Attributes
@@ -42,7 +42,7 @@ class Fold:
 
     name: str
     kind: str
-    parts: tuple[Part, ...]
+    parts: tuple[FoldFit, ...]
 
 
 def folds_by_test(
@@ -70,25 +70,25 @@ def step_fold(readings: Mapping[str, SpecimenReadings]) -> Fold:
     for first in (0, 1):
         training = {name: _every_second(one, first) for name, one in readings.items()}
         scored = {name: _every_second(one, 1 - first) for name, one in readings.items()}
-        halves.append(Part(training, scored))
+        halves.append(FoldFit(training, scored))
     return Fold("every second load step", STEPS, tuple(halves))
 
 
-def _without(readings: Mapping[str, SpecimenReadings], test: str) -> Part:
+def _without(readings: Mapping[str, SpecimenReadings], test: str) -> FoldFit:
     training, scored = {}, {}
     for name, one in readings.items():
         shapes = [(case.test == test, len(case.steps)) for case in one.cases]
         scored[name] = tuple(np.full(steps, left_out) for left_out, steps in shapes)
         training[name] = tuple(np.full(steps, not left_out) for left_out, steps in shapes)
-    return Part(training, scored)
+    return FoldFit(training, scored)
 
 
-def _half(readings: Mapping[str, SpecimenReadings], specimen: str, first: int) -> Part:
+def _half(readings: Mapping[str, SpecimenReadings], specimen: str, first: int) -> FoldFit:
     training = {
         name: _every_second(one, first) if name == specimen else _all(one)
         for name, one in readings.items()
     }
-    return Part(training, {specimen: _every_second(readings[specimen], 1 - first)}, specimen)
+    return FoldFit(training, {specimen: _every_second(readings[specimen], 1 - first)}, specimen)
 
 
 def _all(one: SpecimenReadings) -> tuple[NDArray[np.bool_], ...]:
@@ -111,7 +111,7 @@ def only(test: Repeats, chosen: Flags) -> Repeats:
     return replace(test, cycles=np.where(there, test.cycles, np.nan))
 
 
-class Chosen:
+class ChosenSteps:
     """Whitenings of chosen load steps of a test; each is made once."""
 
     def __init__(self, readings: Mapping[str, SpecimenReadings], noise: Noise) -> None:

@@ -15,7 +15,7 @@ from spinepipe.studies.discrepancy.store import at_once
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenTerm:
     """A term of a formula.
 
     Attributes
@@ -28,7 +28,7 @@ class Chosen:
     sd: float
 
 
-def proof_of_terms(before: Grounds, after: Grounds, terms: Sequence[Chosen] = ()) -> HeldOut:
+def proof_of_terms(before: Grounds, after: Grounds, terms: Sequence[ChosenTerm] = ()) -> HeldOut:
     """Two fits, the second one with terms besides, on each test and specimen left out.
 
     Which terms was found with all readings; their coefficients are fitted without those left out.
@@ -40,17 +40,17 @@ def proof_of_terms(before: Grounds, after: Grounds, terms: Sequence[Chosen] = ()
 class _WithTerms(FoldModels):
     """One fit as the base, another and terms besides as the model with effects."""
 
-    def __init__(self, before: Grounds, after: Grounds, terms: Sequence[Chosen]) -> None:
+    def __init__(self, before: Grounds, after: Grounds, terms: Sequence[ChosenTerm]) -> None:
         self.grounds = (before, after)
         self.refit, self.run, self.named = False, at_once, True
-        self.chosen = folds.Chosen(before.readings, before.noise)
+        self.chosen = folds.ChosenSteps(before.readings, before.noise)
         size = nuisance_size(after)
         self.base = LinearFolds(tangent(before, size), self.chosen)
         self.final = LinearFolds(with_terms(tangent(after, size), terms), self.chosen)
         self.surrogate, self.why_none = None, ""
 
 
-def with_terms(plain: LinearModel, terms: Sequence[Chosen]) -> LinearModel:
+def with_terms(plain: LinearModel, terms: Sequence[ChosenTerm]) -> LinearModel:
     """A linear model with a coefficient more for each term, in prior SDs."""
     known = len(plain.mean)
     members = {}
@@ -72,6 +72,6 @@ def with_terms(plain: LinearModel, terms: Sequence[Chosen]) -> LinearModel:
     )
 
 
-def _scaled(term: Chosen, specimen: str, test: int) -> Array:
+def _scaled(term: ChosenTerm, specimen: str, test: int) -> Array:
     """(T, J, 6, 1) by one prior SD."""
     return term.sd * term.moved[specimen][test][..., None]

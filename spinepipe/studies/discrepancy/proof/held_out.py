@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.proof.fold_linear import Placed
+from spinepipe.studies.discrepancy.proof.fold_linear import FoldPrediction
 from spinepipe.studies.discrepancy.proof.fold_models import Both, FoldModels, NoFold, Predictions
 from spinepipe.studies.discrepancy.proof.folds import (
     STEPS,
-    Chosen,
+    ChosenSteps,
     Flags,
     Fold,
     Masks,
@@ -27,9 +27,9 @@ from spinepipe.studies.discrepancy.proof.folds import (
 )
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.inquiry import Found
+from spinepipe.studies.discrepancy.search.inquiry import SearchResult
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
-from spinepipe.studies.discrepancy.store import Run, at_once
+from spinepipe.studies.discrepancy.store import PieceRunner, at_once
 
 SAME = 1e-6
 """Share of chi2 by which predictions that hang on nothing that was scored may differ."""
@@ -173,7 +173,7 @@ class Asked:
     refit: bool = False
 
 
-def held_out(found: Found, asked: Asked, run: Run) -> HeldOut:
+def held_out(found: SearchResult, asked: Asked, run: PieceRunner) -> HeldOut:
     """Each fold's readings as predicted by fits without them."""
     if asked.refit:  # each fit is kept
         return _proof(found.base, found.final, asked, run)
@@ -185,7 +185,7 @@ def to_first_order(base: Grounds, final: Grounds, asked: Asked) -> HeldOut:
     return _proof(base, final, asked, at_once)
 
 
-def _proof(base: Grounds, final: Grounds, asked: Asked, run: Run) -> HeldOut:
+def _proof(base: Grounds, final: Grounds, asked: Asked, run: PieceRunner) -> HeldOut:
     models = FoldModels(base, final, asked.refit, run)
     return proven(models, base.readings, base.tests, asked)
 
@@ -302,7 +302,7 @@ def _margin(other: Sequence[Gap], ours: Sequence[Gap]) -> Margin | None:
     return Margin(float(drops.sum()), se)
 
 
-def scored_gap(chosen: Chosen, parts: Sequence[tuple[Masks, Placed]]) -> Gap:
+def scored_gap(chosen: ChosenSteps, parts: Sequence[tuple[Masks, FoldPrediction]]) -> Gap:
     """The gap over the scored readings of all parts, noise whitened within each test."""
     white = [
         _missed(chosen, name, test, there, placed)
@@ -315,7 +315,7 @@ def scored_gap(chosen: Chosen, parts: Sequence[tuple[Masks, Placed]]) -> Gap:
     return Gap(float(residual @ residual), float(len(residual)), len(residual))
 
 
-def _moved(chosen: Chosen, part: Predictions) -> float:
+def _moved(chosen: ChosenSteps, part: Predictions) -> float:
     """chi2 of the difference between base and model with effects, over the scored readings."""
     total = 0.0
     for name, tests in part.scored.items():
@@ -327,7 +327,9 @@ def _moved(chosen: Chosen, part: Predictions) -> float:
     return total
 
 
-def _missed(chosen: Chosen, specimen: str, test: int, there: Flags, placed: Placed) -> Array:
+def _missed(
+    chosen: ChosenSteps, specimen: str, test: int, there: Flags, placed: FoldPrediction
+) -> Array:
     """(N,) residuals with SD one and independent where only noise is left."""
     predicted = placed.motion[specimen][test] + placed.nuisances[specimen][test]
     errors = chosen.mean(specimen, test) - predicted

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.tabulated_law import ITSELF
 from spinepipe.studies.discrepancy.proof.formula_folds import proof_of_terms
 from spinepipe.studies.discrepancy.search.formula import formula
@@ -22,7 +22,7 @@ from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
 from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, LackOfFit, lack_of_fit
 from spinepipe.studies.discrepancy.search.refit import laplace, standing
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD, exceeded
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import EVERY
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula, Tabulated
 from spinepipe.units import COORDINATES
@@ -41,7 +41,7 @@ class Beyond:
     grounds: Grounds
 
 
-def beyond(grounds: Grounds, rules: Rules, run: Run) -> Beyond:
+def beyond(grounds: Grounds, rules: Rules, run: PieceRunner) -> Beyond:
     """What the grounds' fit leaves as a formula, and as tables."""
     asked = (rules.coordinates, rules.draws, rules.seed)
     found = run(formula, grounds, *asked, rules.false_alarm)
@@ -100,22 +100,22 @@ def _forms(
             specimen = None if term.specimen == EVERY[0] else term.specimen
             variant = _variant(grounds, term.coordinate, along)
             if joint is None:
-                yield Form(variant, Spread.SHARED, None, specimen)
+                yield Form(variant, PlaceSpread.SHARED, None, specimen)
             else:
-                spread = Spread.ONE_JOINT if specimen is None else Spread.ONE
+                spread = PlaceSpread.ONE_JOINT if specimen is None else PlaceSpread.ONE
                 yield Form(variant, spread, joint, specimen)
 
 
 def _of_lack(grounds: Grounds, coordinate: str, one: Lack) -> Iterator[Form]:
     variant = _variant(grounds, coordinate, coordinate)
     joints = next(iter(grounds.fit.models.values())).n_joints
-    yield Form(variant, Spread.SHARED)
-    if one.spread is not Spread.SHARED and joints > 1:
-        yield Form(variant, Spread.BY_JOINT)
+    yield Form(variant, PlaceSpread.SHARED)
+    if one.spread is not PlaceSpread.SHARED and joints > 1:
+        yield Form(variant, PlaceSpread.BY_JOINT)
     if len(grounds.readings) > 1:
-        yield Form(variant, Spread.BY_SPECIMEN)
-    if one.spread is Spread.EACH:
-        yield Form(variant, Spread.EACH)
+        yield Form(variant, PlaceSpread.BY_SPECIMEN)
+    if one.spread is PlaceSpread.EACH:
+        yield Form(variant, PlaceSpread.EACH)
 
 
 def _variant(grounds: Grounds, coordinate: str, along: str) -> Variant:
@@ -153,7 +153,7 @@ def _where(grounds: Grounds, form: Form) -> str:
     joints = next(iter(grounds.fit.models.values())).joints
     over = "" if options["over"] == ITSELF else f" over {options['over']}"
     joint = "every joint" if form.joint is None else joints[form.joint]
-    differ = form.spread in (Spread.BY_JOINT, Spread.BY_SPECIMEN, Spread.EACH)
+    differ = form.spread in (PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN, PlaceSpread.EACH)
     apart = f", {form.spread.value}" if differ else ""
     of = "" if form.specimen is None else f" of {form.specimen}"
     return f"{options['coordinate']}{over} at {joint}{of}{apart}".replace("_", " ")

@@ -11,10 +11,10 @@ from itertools import combinations
 
 import numpy as np
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Rival, Stage, Standing
+from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Rival, SearchStage, SelectedTerm
 from spinepipe.studies.discrepancy.search.refit import (
     ANOTHER_FORM,
     Refit,
@@ -42,7 +42,7 @@ class Examined:
     """
 
     grounds: Grounds
-    standing: tuple[Standing, ...] | None
+    standing: tuple[SelectedTerm, ...] | None
 
 
 def examined(current: Grounds, inquiry: Inquiry, *, settled: bool = False) -> Examined:
@@ -52,11 +52,11 @@ def examined(current: Grounds, inquiry: Inquiry, *, settled: bool = False) -> Ex
     ----------
     settled : nothing leaves or gives way any more; what is better is a rival like the others.
     """
-    stood: list[Standing] = []
+    stood: list[SelectedTerm] = []
     supposed = standing(current.fit)
     for number, one in enumerate(supposed):
         found = _one(current, number, one, inquiry, settled)
-        if not isinstance(found, Standing):
+        if not isinstance(found, SelectedTerm):
             return Examined(found, None)
         stood.append(found)
     for pair in combinations(range(len(supposed)), 2):
@@ -68,7 +68,7 @@ def examined(current: Grounds, inquiry: Inquiry, *, settled: bool = False) -> Ex
 
 def _one(
     current: Grounds, number: int, one: Supposed, inquiry: Inquiry, settled: bool
-) -> Grounds | Standing:
+) -> Grounds | SelectedTerm:
     """One effect with its rivals, or the grounds where it left or gave way."""
     without, stage = _tried_without(current, (number,), inquiry)
     if without is None or stage is None:
@@ -90,7 +90,7 @@ def _one(
             rivals = _nearest(rivals, Rival(form.name, -two.lead, form.variant.acts_on))
     over = _over_stiffness(without, own, inquiry)
     alone = _alone(one, inquiry)
-    return Standing(one, own.log_evidence, alone, own.gain, rivals, over)
+    return SelectedTerm(one, own.log_evidence, alone, own.gain, rivals, over)
 
 
 def _better(form: Form, own: Refit, tried: Sequence[Refit], margin: float) -> Refit | None:
@@ -115,17 +115,17 @@ def _alone(one: Supposed, inquiry: Inquiry) -> float:
     return next(e.log_evidence for e in effects if e.effect == one.form.name)
 
 
-def _without_rivals(current: Grounds, number: int, one: Supposed, inquiry: Inquiry) -> Standing:
+def _without_rivals(current: Grounds, number: int, one: Supposed, inquiry: Inquiry) -> SelectedTerm:
     """An effect without which the others have no fit: nothing could be tried in its place."""
     trials = next(t for t in inquiry.rules.trials if t.effect == one.form.name)
     gain, log_evidence = in_place(current.fit, number)
     log_evidence += trials.log_share(one.form)
-    return Standing(one, log_evidence, _alone(one, inquiry), gain, (), None, rivals_known=False)
+    return SelectedTerm(one, log_evidence, _alone(one, inquiry), gain, (), None, rivals_known=False)
 
 
 def _tried_without(
     current: Grounds, left_out: tuple[int, ...], inquiry: Inquiry
-) -> tuple[Grounds | None, Stage | None]:
+) -> tuple[Grounds | None, SearchStage | None]:
     """The grounds without some of the effects, and all effects tried there; None without a fit."""
     supposed = standing(current.fit)
     others = tuple(one for number, one in enumerate(supposed) if number not in left_out)
@@ -139,9 +139,9 @@ def _tried_without(
 def _against_one(
     current: Grounds,
     pair: tuple[int, ...],
-    stood: Sequence[Standing],
+    stood: Sequence[SelectedTerm],
     inquiry: Inquiry,
-) -> tuple[Grounds | None, list[Standing]]:
+) -> tuple[Grounds | None, list[SelectedTerm]]:
     """Two effects against each single one in their place: together two may imitate a third.
 
     Returns the grounds with the single one if it has clearly more evidence than both together, and
@@ -226,14 +226,14 @@ def _over_stiffness(without: Grounds, own: Refit, inquiry: Inquiry) -> float | N
 
     Forms that differ between joints can imitate it by their many strengths.
     """
-    many = own.form.spread in (Spread.BY_JOINT, Spread.EACH)
+    many = own.form.spread in (PlaceSpread.BY_JOINT, PlaceSpread.EACH)
     known = any(t.effect == LEVELS for t in inquiry.rules.trials)
     coordinate = dict(own.form.variant.options).get("coordinate")
     if not many or own.name == LEVELS or not known or coordinate not in COORDINATES:
         return None
     variant = Variant(LEVELS, (("coordinate", coordinate),))
     start = variant.off(()) * np.exp(0.01)
-    plain = inquiry.refit(without, Supposed(Form(variant, Spread.EACH), start))
+    plain = inquiry.refit(without, Supposed(Form(variant, PlaceSpread.EACH), start))
     return own.log_evidence - plain.log_evidence if np.isfinite(plain.log_evidence) else None
 
 

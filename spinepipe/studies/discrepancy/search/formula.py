@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects import Spread
-from spinepipe.studies.discrepancy.proof.formula_folds import Chosen, proof_of_terms
+from spinepipe.effects import PlaceSpread
+from spinepipe.studies.discrepancy.proof.formula_folds import ChosenTerm, proof_of_terms
 from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
@@ -28,9 +28,9 @@ from spinepipe.studies.discrepancy.search.law_terms import (
 from spinepipe.studies.discrepancy.search.model_files import standard_errors
 from spinepipe.studies.discrepancy.search.pursuit import (
     EVERYWHERE,
-    Candidate,
-    Problem,
+    PursuitProblem,
     Ranked,
+    TermAtPlace,
     pursuit_problem,
 )
 from spinepipe.studies.discrepancy.search.refit import STARTS, standing, weaker
@@ -52,22 +52,22 @@ class _Term:
     """A term that entered. ``number`` : of its effect in the fit, None where it stays linear."""
 
     law: LawTerm
-    place: Candidate
+    place: TermAtPlace
     number: int | None
     explained: float
 
 
 @dataclass(frozen=True)
-class _State:
+class _FormulaState:
     """Terms so far, the fit with those that are laws, and the problem about it."""
 
     grounds: Grounds
     columns: Mapping[str, TermColumns]
-    problem: Problem
+    problem: PursuitProblem
     terms: tuple[_Term, ...]
 
     @property
-    def linear(self) -> list[Candidate]:
+    def linear(self) -> list[TermAtPlace]:
         """Terms that no effect says, in order."""
         return [one.place for one in self.terms if one.number is None]
 
@@ -94,12 +94,12 @@ def formula(
 
 def _pursued(
     grounds: Grounds, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
-) -> tuple[list[_State], float]:
+) -> tuple[list[_FormulaState], float]:
     """States with no term, one and so on; and what the first term had to explain."""
 
-    def about(at: Grounds, terms: tuple[_Term, ...]) -> _State:
+    def about(at: Grounds, terms: tuple[_Term, ...]) -> _FormulaState:
         columns = terms_of(at, coordinates)
-        return _State(at, columns, pursuit_problem(at, columns, draws, seed), terms)
+        return _FormulaState(at, columns, pursuit_problem(at, columns, draws, seed), terms)
 
     states = [about(grounds, ())]
     excess, threshold = states[0].problem.excess, None
@@ -132,7 +132,7 @@ def terms_of(grounds: Grounds, coordinates: Sequence[str]) -> dict[str, TermColu
 
 
 def _with_one_more(
-    here: _State, ranked: Ranked, excess: float
+    here: _FormulaState, ranked: Ranked, excess: float
 ) -> tuple[Grounds, tuple[_Term, ...]]:
     """The grounds with one term more: the law that fits best, or the leader as it is."""
     leader, drop = ranked.best[0], ranked.drops[0]
@@ -149,9 +149,9 @@ def _with_one_more(
     return here.grounds, (*here.terms, _Term(law, leader, None, drop / above))
 
 
-def _best_fit(here: _State, ranked: Ranked) -> tuple[Grounds, Candidate] | None:
+def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[Grounds, TermAtPlace] | None:
     """The grounds with the law, of those that lead, that fits best by the full simulator."""
-    found: list[tuple[Grounds, Candidate]] = []
+    found: list[tuple[Grounds, TermAtPlace]] = []
     tried = 0
     for place, drop, value in zip(ranked.best, ranked.drops, ranked.values, strict=True):
         variant = here.problem.terms[place.term].variant
@@ -180,15 +180,17 @@ def _fit_with(grounds: Grounds, one: Supposed) -> Grounds | None:
     return None
 
 
-def _form(variant: Variant, place: Candidate, specimens: Sequence[str]) -> Form:
+def _form(variant: Variant, place: TermAtPlace, specimens: Sequence[str]) -> Form:
     joint = None if place.joint == EVERYWHERE else place.joint
     specimen = None if place.specimen == EVERYWHERE else specimens[place.specimen]
     if joint is None:
-        return Form(variant, Spread.SHARED, None, specimen)
-    return Form(variant, Spread.ONE_JOINT if specimen is None else Spread.ONE, joint, specimen)
+        return Form(variant, PlaceSpread.SHARED, None, specimen)
+    return Form(
+        variant, PlaceSpread.ONE_JOINT if specimen is None else PlaceSpread.ONE, joint, specimen
+    )
 
 
-def _chosen(state: _State, one: Candidate) -> Chosen:
+def _chosen(state: _FormulaState, one: TermAtPlace) -> ChosenTerm:
     """The columns of a candidate as readings, and a prior SD that joints' own loads give."""
     moved, size = {}, 0.0
     for number, (name, of) in enumerate(state.columns.items()):
@@ -198,10 +200,10 @@ def _chosen(state: _State, one: Candidate) -> Chosen:
             at = [one.term * joints + joint for joint in places]
             moved[name] = tuple(test[..., at].sum(axis=-1) for test in of.moved)
             size = max(size, float(of.sizes[one.term, places].max()))
-    return Chosen(moved, size)
+    return ChosenTerm(moved, size)
 
 
-def _told(state: _State) -> tuple[FormulaTerm, ...]:
+def _told(state: _FormulaState) -> tuple[FormulaTerm, ...]:
     """The terms with their values, in the units of tables."""
     fit = state.grounds.fit
     errors = standard_errors(fit)

@@ -93,7 +93,7 @@ class LeftOver:
 
 
 @dataclass(frozen=True)
-class Place:
+class GapPlace:
     """A place and the gap there; ``at`` holds what is told apart, the rest is together."""
 
     by: str
@@ -179,7 +179,7 @@ def _rows(
             yield (*place, residual[t, j, c] ** 2, freedom[t, j, c])
 
 
-def places(frame: pd.DataFrame) -> list[Place]:
+def places(frame: pd.DataFrame) -> list[GapPlace]:
     """Gaps pooled in every way."""
     found = []
     for by, keys in POOLED.items():
@@ -187,11 +187,11 @@ def places(frame: pd.DataFrame) -> list[Place]:
         for key, rows in groups:
             at = dict(zip(keys, key if isinstance(key, tuple) else (key,), strict=True))
             gap = Gap(float(rows["chi2"].sum()), float(rows["freedom"].sum()), len(rows))
-            found.append(Place(by, at, gap))
+            found.append(GapPlace(by, at, gap))
     return found
 
 
-def worst(found: Sequence[Place], count: int) -> list[Place]:
+def worst(found: Sequence[GapPlace], count: int) -> list[GapPlace]:
     """The places of joint, coordinate and test with the largest gap that is above the noise."""
     fine = [p for p in found if p.by == "joint x coordinate x test" and p.gap.interval[0] > 0.0]
     return sorted(fine, key=lambda place: -place.gap.gap)[:count]

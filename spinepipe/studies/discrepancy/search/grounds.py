@@ -12,15 +12,15 @@ from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, Supposed
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Near, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.noise import Noise, noise_of_residuals
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
-from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Solved
+from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening, with_nuisances
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import REPEATS
 
 
 @dataclass(frozen=True)
-class Start:
+class BaselineModels:
     """Models where fits start, their free base parameters, and the factor they may move by."""
 
     models: Mapping[str, SpineModel]
@@ -41,7 +41,7 @@ class Grounds:
     readings: Mapping[str, SpecimenReadings]
     noise: Noise
     priors: NuisancePriors
-    start: Start
+    start: BaselineModels
     tests: tuple[str, ...]
     plain: Mapping[str, Whitening]
     setting: Setting
@@ -83,8 +83,8 @@ def laid(
     readings: Sequence[SpecimenReadings],
     noise: Noise,
     priors: NuisancePriors,
-    start: Start,
-    run: Run,
+    start: BaselineModels,
+    run: PieceRunner,
 ) -> Grounds:
     """Fit the base, first with noise alone, then with nuisances where the last fit stands.
 
@@ -127,7 +127,7 @@ def laid(
 def _nuisances(
     model: SpineModel, one: SpecimenReadings, zeroed: bool, priors: NuisancePriors
 ) -> tuple[Array, ...]:
-    return nuisance_signatures(Solved(model, one.cases, zeroed), priors, one.coordinates)
+    return nuisance_signatures(SolvedSpecimen(model, one.cases, zeroed), priors, one.coordinates)
 
 
 def _plain(readings: Mapping[str, SpecimenReadings], noise: Noise) -> dict[str, Whitening]:
@@ -138,13 +138,13 @@ def _why_not(models: Hypothesis, setting: Setting) -> str:
     """Why the models do not stand where their fit starts, by the engine of record; or nothing."""
     for name, member in models.members.items():
         try:
-            Solved(member.model, setting.readings[name].cases, setting.zeroed)
+            SolvedSpecimen(member.model, setting.readings[name].cases, setting.zeroed)
         except NoEquilibrium as trouble:
             return str(trouble)
     return ""
 
 
-def _base_fit(models: Hypothesis, setting: Setting, run: Run) -> JointFit:
+def _base_fit(models: Hypothesis, setting: Setting, run: PieceRunner) -> JointFit:
     near: Near = None
     for _ in range(MOST_BASE_FITS):
         fit = run(joint_fit, models, setting, near)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.effects import Effect, Parameter, Spread, Trial, create, registered
+from spinepipe.effects import Effect, Parameter, PlaceSpread, TriedValues, create, registered
 from spinepipe.effects.carried_share import coordinates_of
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
@@ -70,7 +70,7 @@ class Form:
     """A variant and how its values may differ; joint, specimen and test for one place only."""
 
     variant: Variant
-    spread: Spread
+    spread: PlaceSpread
     joint: int | None = None
     specimen: str | None = None
 
@@ -98,12 +98,12 @@ class Trials:
         return -float(np.log(len(self.variants) * spreads * places.get(_place(form), 1)))
 
     @cached_property
-    def _alike(self) -> tuple[int, Mapping[tuple[Variant, Spread], int]]:
+    def _alike(self) -> tuple[int, Mapping[tuple[Variant, PlaceSpread], int]]:
         """Number of ways to differ, and of forms of each variant and way to differ."""
         return len({one.spread for one in self.forms}), Counter(map(_place, self.forms))
 
 
-def _place(form: Form) -> tuple[Variant, Spread]:
+def _place(form: Form) -> tuple[Variant, PlaceSpread]:
     return form.variant, form.spread
 
 
@@ -145,7 +145,7 @@ def trials(
     """
     found = []
     for name, cls in sorted(registered().items()):
-        trial: Trial | None = getattr(cls, "trial", None)
+        trial: TriedValues | None = getattr(cls, "trial", None)
         if trial is not None and (names is None or name in names):
             every = (Variant(name, _options(options)) for options in trial.variants)
             variants = tuple(variant for variant in every if _is_read(variant, coordinates))
@@ -181,22 +181,24 @@ def _options(options: Mapping[str, Any]) -> Options:
     )
 
 
-def _possible(spreads: Sequence[Spread], specimens: int) -> list[Spread]:
+def _possible(spreads: Sequence[PlaceSpread], specimens: int) -> list[PlaceSpread]:
     """With one specimen, what is shared by all specimens and what is of one are the same."""
     if specimens > 1:
         return list(spreads)
     same = {
-        Spread.BY_SPECIMEN: Spread.SHARED,
-        Spread.EACH: Spread.BY_JOINT,
-        Spread.ONE: Spread.ONE_JOINT,
+        PlaceSpread.BY_SPECIMEN: PlaceSpread.SHARED,
+        PlaceSpread.EACH: PlaceSpread.BY_JOINT,
+        PlaceSpread.ONE: PlaceSpread.ONE_JOINT,
     }
     return list(dict.fromkeys(same.get(spread, spread) for spread in spreads))
 
 
-def _forms(variant: Variant, spread: Spread, specimens: Sequence[str], joints: int) -> list[Form]:
-    if spread is Spread.ONE_JOINT:
+def _forms(
+    variant: Variant, spread: PlaceSpread, specimens: Sequence[str], joints: int
+) -> list[Form]:
+    if spread is PlaceSpread.ONE_JOINT:
         return [Form(variant, spread, joint) for joint in range(joints)]
-    if spread is Spread.ONE:
+    if spread is PlaceSpread.ONE:
         return [Form(variant, spread, j, s) for s in specimens for j in range(joints)]
     return [Form(variant, spread)]
 
@@ -252,7 +254,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Member:
+class HypothesisMember:
     """A specimen's model at the start, its unknowns and their numbers among all."""
 
     model: SpineModel
@@ -264,7 +266,7 @@ class Member:
 class Hypothesis:
     """Members by specimen and all unknowns."""
 
-    members: Mapping[str, Member]
+    members: Mapping[str, HypothesisMember]
     unknowns: tuple[Unknown, ...]
     supposed: tuple[Supposed, ...]
 
@@ -310,7 +312,7 @@ def hypothesis(
     order = {label: number for number, label in enumerate(unknowns)}
     return Hypothesis(
         {
-            name: Member(model, free, tuple(order[label] for label in labels))
+            name: HypothesisMember(model, free, tuple(order[label] for label in labels))
             for name, (model, free, labels) in members.items()
         },
         tuple(unknowns.values()),
@@ -324,7 +326,7 @@ def _scoped(one: Supposed, joints: int, tests: Sequence[str]) -> list[ScopedEffe
     places = tuple(range(joints)) if one.form.joint is None else (one.form.joint,)
     rows = len(places) if effect.per_joint else 1
     scoped = ScopedEffect(effect, places, np.tile(one.start, (rows, 1)))
-    if one.form.spread is Spread.BY_TEST:
+    if one.form.spread is PlaceSpread.BY_TEST:
         return [replace(scoped, tests=(test,)) for test in tests]
     return [scoped]
 
@@ -336,18 +338,22 @@ def _unknowns(
     index = len(model.effects) - 1
     scoped, variant, spread = model.effects[index], one.form.variant, one.form.spread
     every = tuple(range(len(scoped.values)))
-    own_rows = spread in (Spread.BY_JOINT, Spread.EACH)
+    own_rows = spread in (PlaceSpread.BY_JOINT, PlaceSpread.EACH)
     strength_rows = [(row,) for row in every] if own_rows else [every]
     found = []
     for column in (*variant.strengths, *variant.shapes):
         is_strength = column in variant.strengths
         for rows in strength_rows if is_strength else [every]:
             place: list[str] = []
-            if is_strength and spread in (Spread.BY_SPECIMEN, Spread.EACH, Spread.ONE):
+            if is_strength and spread in (
+                PlaceSpread.BY_SPECIMEN,
+                PlaceSpread.EACH,
+                PlaceSpread.ONE,
+            ):
                 place.append(specimen)
             if (is_strength and own_rows) or one.form.joint is not None:
                 place.append(model.joints[scoped.joints[rows[0]]])
-            if spread is Spread.BY_TEST and is_strength:
+            if spread is PlaceSpread.BY_TEST and is_strength:
                 place.append(scoped.tests[0])
             found.append(_unknown(variant, number, index, column, rows, tuple(place), model))
     return found

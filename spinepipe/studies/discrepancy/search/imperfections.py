@@ -23,7 +23,7 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, jo
 from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.whitening import Whitening
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 
 EVERYWHERE = "*"
 
@@ -39,7 +39,7 @@ SHARED = tuple(KINDS.get(name, name) for name in ALIKE)
 
 
 @dataclass(frozen=True)
-class Place:
+class NuisancePlace:
     """Which nuisance, and where; ``*`` stands for all. ``sd``: one prior SD in ``unit``, SI."""
 
     specimen: str
@@ -61,7 +61,7 @@ class Imperfection:
     chi2 : what it takes up of chi2; may be negative where another takes up more for it.
     """
 
-    at: Place
+    at: NuisancePlace
     size: float
     sd: float
     chi2: float
@@ -78,7 +78,7 @@ class InCommon:
     certain : whether that is too seldom, of all means that are looked at.
     """
 
-    at: Place
+    at: NuisancePlace
     size: float
     sd: float
     count: int
@@ -120,7 +120,7 @@ class TakenUp:
         return tuple(sorted(self.each, key=lambda one: -abs(one.size)))
 
 
-def taken_up(grounds: Grounds, fit: JointFit, joints: Sequence[str], run: Run) -> TakenUp:
+def taken_up(grounds: Grounds, fit: JointFit, joints: Sequence[str], run: PieceRunner) -> TakenUp:
     """What imperfections took up of what a fit would leave without them."""
     places = _places(grounds, joints)
     parts = _parts(grounds, fit)
@@ -155,9 +155,9 @@ def labels_of(grounds: Grounds, specimen: str) -> tuple[Label, ...]:
     return nuisance_labels(grounds.priors, stiffness, one.cases, one.coordinates)
 
 
-def _places(grounds: Grounds, joints: Sequence[str]) -> tuple[Place, ...]:
+def _places(grounds: Grounds, joints: Sequence[str]) -> tuple[NuisancePlace, ...]:
     return tuple(
-        Place(
+        NuisancePlace(
             specimen,
             one.kind,
             one.component,
@@ -172,7 +172,7 @@ def _places(grounds: Grounds, joints: Sequence[str]) -> tuple[Place, ...]:
 
 
 @dataclass(frozen=True)
-class _Part:
+class _SpecimenBlock:
     """A specimen: U (N, K), H = (I + U'U)^-1 (K, K), J (N, m) of all unknowns, r (N,)."""
 
     moves: Array
@@ -181,7 +181,7 @@ class _Part:
     residual: Array
 
 
-def _parts(grounds: Grounds, fit: JointFit) -> list[_Part]:
+def _parts(grounds: Grounds, fit: JointFit) -> list[_SpecimenBlock]:
     found = []
     for name, member in fit.hypothesis.members.items():
         white = grounds.setting.whitenings[name]
@@ -189,7 +189,7 @@ def _parts(grounds: Grounds, fit: JointFit) -> list[_Part]:
         whole = np.zeros((len(own), len(fit.x)))
         np.add.at(whole.T, np.array(member.numbers), own.T)
         residual = -white.lengthened(fit.residuals[name])  # measured less predicted
-        found.append(_Part(white.moves, _inverse(white), whole, residual))
+        found.append(_SpecimenBlock(white.moves, _inverse(white), whole, residual))
     return found
 
 
@@ -213,7 +213,7 @@ class _Posterior:
         return np.maximum(np.diagonal(self.covariance), 0.0)
 
 
-def _posterior(fit: JointFit, parts: Sequence[_Part]) -> _Posterior:
+def _posterior(fit: JointFit, parts: Sequence[_SpecimenBlock]) -> _Posterior:
     """Of all nuisances, with the unknowns of the fit free."""
     prior = np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
     jacobians = [part.jacobian for part in parts]
@@ -235,7 +235,9 @@ def _posterior(fit: JointFit, parts: Sequence[_Part]) -> _Posterior:
     return _Posterior(whole, whole * np.concatenate(left), covariance)
 
 
-def in_common(places: Sequence[Place], size: Array, covariance: Array) -> tuple[InCommon, ...]:
+def in_common(
+    places: Sequence[NuisancePlace], size: Array, covariance: Array
+) -> tuple[InCommon, ...]:
     """Means over joints, specimens or both, those of the most places first.
 
     A mean is certain where random errors would hardly make it, and no wider one says it already.
@@ -261,7 +263,7 @@ def in_common(places: Sequence[Place], size: Array, covariance: Array) -> tuple[
     return tuple(ended)
 
 
-def _mean(at: Place, size: Array, covariance: Array) -> InCommon | None:
+def _mean(at: NuisancePlace, size: Array, covariance: Array) -> InCommon | None:
     """The mean of nuisances; None where readings say too little.
 
     Of random errors ``size`` is N(0, I - covariance): by their SDs as allowed for, and by their
@@ -282,9 +284,9 @@ def _mean(at: Place, size: Array, covariance: Array) -> InCommon | None:
     return InCommon(at, mean, float(by_scatter), len(size), chance)
 
 
-def _groups(places: Sequence[Place]) -> Mapping[Place, Indices]:
+def _groups(places: Sequence[NuisancePlace]) -> Mapping[NuisancePlace, Indices]:
     """Numbers of the nuisances of one kind and component that could be off together."""
-    found: dict[Place, list[int]] = {}
+    found: dict[NuisancePlace, list[int]] = {}
     for number, one in enumerate(places):
         if one.kind in SHARED:
             continue
@@ -302,6 +304,8 @@ def _groups(places: Sequence[Place]) -> Mapping[Place, Indices]:
     }
 
 
-def _repeated(at: Place, numbers: list[int], found: Mapping[Place, list[int]]) -> bool:
+def _repeated(
+    at: NuisancePlace, numbers: list[int], found: Mapping[NuisancePlace, list[int]]
+) -> bool:
     """Whether the same nuisances are another group already, as with one specimen or one joint."""
     return next(other for other, same in found.items() if same == numbers) != at

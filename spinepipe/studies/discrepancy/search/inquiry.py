@@ -12,7 +12,7 @@ from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.hypothesis import Supposed, Trials
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, lack_of_fit
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
@@ -24,8 +24,8 @@ from spinepipe.studies.discrepancy.search.projected import (
     taken_out,
 )
 from spinepipe.studies.discrepancy.search.refit import STARTS, Refit, refit, refits, weaker
-from spinepipe.studies.discrepancy.search.screen import Index, Screen, screen, screened
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.search.screen import EffectColumns, Screen, screen, screened
+from spinepipe.studies.discrepancy.store import PieceRunner
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Rival:
 
 
 @dataclass(frozen=True)
-class Standing:
+class SelectedTerm:
     """A form that stands in the final model.
 
     Attributes
@@ -81,7 +81,7 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class Stage:
+class SearchStage:
     """One look at the effects, with the refits that followed.
 
     Attributes
@@ -99,7 +99,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """Where a search ended.
 
     Attributes
@@ -114,8 +114,8 @@ class Found:
 
     base: Grounds
     final: Grounds
-    standing: tuple[Standing, ...]
-    stages: tuple[Stage, ...]
+    standing: tuple[SelectedTerm, ...]
+    stages: tuple[SearchStage, ...]
     lack: LackOfFit
     generic_threshold: float
     base_gap: Gap
@@ -125,7 +125,7 @@ class Found:
     generic_threshold_at: Mapping[str, float]
     base_lack: LackOfFit
 
-    def with_only(self, kept: Sequence[Standing], fit: JointFit) -> "Found":
+    def with_only(self, kept: Sequence[SelectedTerm], fit: JointFit) -> "SearchResult":
         """The same with some of the effects, and the fit that has no others."""
         final = self.final.at(fit)
         gap, at = whole_gap(final, fit), gaps_at(final, fit)
@@ -157,7 +157,7 @@ def look(
 
 def linearised_for(
     grounds: Grounds, trials: Sequence[Trials], draws: int, seed: int
-) -> list[tuple[Index, Linearised]]:
+) -> list[tuple[EffectColumns, Linearised]]:
     """The products of each effect's signatures; draws of the null are the same for all effects."""
     joints = next(iter(grounds.fit.models.values())).n_joints
     indices = [_index(one, joints, tuple(grounds.tests)) for one in trials]
@@ -165,7 +165,7 @@ def linearised_for(
     taken = taken_out(grounds.fit)
     parts: list[dict[str, Products]] = [{} for _ in trials]
     for number, (name, one) in enumerate(grounds.readings.items()):
-        solved = Solved(grounds.fit.models[name], one.cases, grounds.noise.zeroed)
+        solved = SolvedSpecimen(grounds.fit.models[name], one.cases, grounds.noise.zeroed)
         errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
         for place, moved in zip(parts, signatures_of_each(solved, columns), strict=True):
             plain = grounds.plain[name].noise_only(moved)
@@ -175,24 +175,24 @@ def linearised_for(
 
 
 @lru_cache(maxsize=256)
-def _index(trials: Trials, joints: int, tests: tuple[str, ...]) -> Index:
+def _index(trials: Trials, joints: int, tests: tuple[str, ...]) -> EffectColumns:
     """Columns of one effect; looks at the same cohort, and at others like it, share them."""
-    return Index(columns_of(trials, joints, tests))
+    return EffectColumns(columns_of(trials, joints, tests))
 
 
 class Inquiry:
     """Looks, refits and fits by the rules, from the base alone on; ``stages`` is the log."""
 
-    def __init__(self, base: Grounds, rules: Rules, run: Run, progress: Progress) -> None:
+    def __init__(self, base: Grounds, rules: Rules, run: PieceRunner, progress: Progress) -> None:
         self.base, self.rules, self.run, self.progress = base, rules, run, progress
-        self.stages: list[Stage] = []
+        self.stages: list[SearchStage] = []
 
     @property
-    def first(self) -> Stage:
+    def first(self) -> SearchStage:
         """The first look, beside the base alone."""
         return self.stages[0]
 
-    def stage(self, grounds: Grounds, in_place_of: str = "") -> Stage:
+    def stage(self, grounds: Grounds, in_place_of: str = "") -> SearchStage:
         """A look at all effects beside the grounds' fit, refits of those that lead, an entry.
 
         Parameters
@@ -215,7 +215,7 @@ class Inquiry:
         number = 1 + sum(one.in_place == place for one in self.stages)
         name = f"in place of {in_place_of} ({number})" if place else str(number)
         beside = tuple(one.form.name for one in grounds.fit.hypothesis.supposed)
-        self.stages.append(Stage(name, screen, tried, place, beside))
+        self.stages.append(SearchStage(name, screen, tried, place, beside))
         return self.stages[-1]
 
     def _look(self, grounds: Grounds) -> Screen:

@@ -13,10 +13,10 @@ from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
 from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_model, base_parameters
-from spinepipe.studies.discrepancy.search.grounds import Grounds, NoBase, Start, laid
+from spinepipe.studies.discrepancy.search.grounds import BaselineModels, Grounds, NoBase, laid
 from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.indistinct import cannot_be_excluded
-from spinepipe.studies.discrepancy.search.inquiry import Found, Rules
+from spinepipe.studies.discrepancy.search.inquiry import Rules, SearchResult
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.noise import (
     Noise,
@@ -29,7 +29,7 @@ from spinepipe.studies.discrepancy.search.prediction import recorded
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, DEG_PER_RAD, MM_PER_M
 
@@ -66,7 +66,7 @@ class Investigation:
 
     grounds: Grounds
     rules: Rules
-    found: Found
+    found: SearchResult
     errors: tuple[SuspectedError, ...]
     proof: HeldOut
     ended: Outcome
@@ -91,7 +91,9 @@ def prepared(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prep
     return Prepared(study, cohort, file, coordinates, measured, readings, noise, declared)
 
 
-def investigate(ready: Prepared, run: Run, progress: Progress | None = None) -> Investigation:
+def investigate(
+    ready: Prepared, run: PieceRunner, progress: Progress | None = None
+) -> Investigation:
     """All that decides the verdict of a study.
 
     Raises
@@ -111,7 +113,7 @@ def investigate(ready: Prepared, run: Run, progress: Progress | None = None) -> 
     return _with_sure_effects(told, asked, run)
 
 
-def _not_excluded(study: Discrepancy, found: Found) -> dict[str, tuple[str, ...]]:
+def _not_excluded(study: Discrepancy, found: SearchResult) -> dict[str, tuple[str, ...]]:
     """By each standing effect, others that what was recorded cannot exclude, if they are tried."""
     cases = {name: one.cases for name, one in found.base.readings.items()}
     return {
@@ -124,7 +126,7 @@ def _not_excluded(study: Discrepancy, found: Found) -> dict[str, tuple[str, ...]
     }
 
 
-def _with_sure_effects(one: Investigation, asked: Asked, run: Run) -> Investigation:
+def _with_sure_effects(one: Investigation, asked: Asked, run: PieceRunner) -> Investigation:
     """Fitted and held out again without effects that stood and are doubted beside sure ones."""
     kept = [effect for effect in one.found.standing if one.ended.keeps(effect)]
     if not kept or len(kept) == len(one.found.standing):
@@ -138,7 +140,9 @@ def _with_sure_effects(one: Investigation, asked: Asked, run: Run) -> Investigat
     return replace(one, found=found, proof=held_out(found, asked, run))
 
 
-def on_record(fits: Sequence[JointFit], readings: Mapping[str, SpecimenReadings], run: Run) -> None:
+def on_record(
+    fits: Sequence[JointFit], readings: Mapping[str, SpecimenReadings], run: PieceRunner
+) -> None:
     """Solve all that fits predict by the engine of record, specimen by specimen.
 
     Raises
@@ -176,7 +180,7 @@ def _declared_sd(study: Discrepancy, cohort: Cohort) -> Array | None:
     return np.array([sd.translation_mm / MM_PER_M] * 3 + [sd.rotation_deg / DEG_PER_RAD] * 3)
 
 
-def base_fitted(ready: Prepared, run: Run) -> Grounds:
+def base_fitted(ready: Prepared, run: PieceRunner) -> Grounds:
     """Grounds with the base fitted."""
     study = ready.study
     start = np.array(study.stiffness.in_order(), dtype=float)
@@ -187,7 +191,7 @@ def base_fitted(ready: Prepared, run: Run) -> Grounds:
     base = {
         name: base_parameters(model, grouping, ready.coordinates) for name, model in models.items()
     }
-    begin = Start(models, base, study.bound_factor)
+    begin = BaselineModels(models, base, study.bound_factor)
     grounds = laid(ready.readings, ready.noise, as_si(study.nuisance.model_dump()), begin, run)
     if grounds.noise.source == DECLARED and ready.declared is None:
         raise NoBase("too few repeated readings to tell the noise: state measurement_sd")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.descent import OFF_THE_PATH, Settled, descend
+from spinepipe.calibrate.descent import OFF_THE_PATH, DescentTolerances, descend
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import moved
@@ -14,13 +14,13 @@ from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis
 from spinepipe.studies.discrepancy.search.prediction import (
     NoEquilibrium,
     Predicted,
-    Subject,
+    PredictedSpecimen,
     Together,
 )
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening
 
-SETTLED = Settled(cost=1e-5, step=1e-6, slope=1e-10, evaluations=40)
+SETTLED = DescentTolerances(cost=1e-5, step=1e-6, slope=1e-10, evaluations=40)
 """Chi2 settles to a share at which a log evidence is right to 0.01 or so."""
 
 
@@ -86,7 +86,7 @@ class Points:
     def __init__(self, hypothesis: Hypothesis, setting: Setting, near: Near) -> None:
         self.hypothesis, self.setting = hypothesis, setting
         subjects = {
-            name: Subject(member.model, setting.readings[name].cases, member.free)
+            name: PredictedSpecimen(member.model, setting.readings[name].cases, member.free)
             for name, member in hypothesis.members.items()
         }
         self.together = Together(subjects, setting.zeroed, near)

@@ -15,12 +15,12 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.studies.discrepancy.search.base import BUSHING
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
@@ -83,7 +83,7 @@ def generic_columns(
     reached : motions (T, J, 6) whose largest is the unit of the terms; None for those of ``cases``.
     shifted : tests that may have a shift of their own; none tells how that of another test is.
     """
-    solved = Solved(model, cases, zeroed)
+    solved = SolvedSpecimen(model, cases, zeroed)
     motions = solved.poses
     largest = [np.abs(q).max(axis=0) for q in (motions if reached is None else reached)]
     reach = np.maximum(np.max(largest, axis=0), LEAST_REACH)
@@ -167,7 +167,7 @@ def _readings(by_step: Array, size: Array, at: int) -> Array:
     return found.reshape(steps, joints, 6, count * joints)
 
 
-SPREADS = (Spread.SHARED, Spread.BY_JOINT, Spread.EACH)
+SPREADS = (PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.EACH)
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ class Lack:
     null: Array
     family: str
     coordinate: str
-    spread: Spread
+    spread: PlaceSpread
     explained: float
     by_family: Mapping[str, float]
 
@@ -204,10 +204,10 @@ class LackOfFit(Lack):
 
 
 @dataclass(frozen=True)
-class _Part:
+class _SpecimenResiduals:
     family: str
     coordinate: str
-    spread: Spread
+    spread: PlaceSpread
     logs: Array
     explained: float
 
@@ -215,7 +215,7 @@ class _Part:
 def lack_of_fit(grounds: Grounds, coordinates: Sequence[str], draws: int, seed: int) -> LackOfFit:
     """Evidence of the generic basis beside the grounds' fit."""
     terms, problem = _problem(grounds, coordinates, draws, seed)
-    spreads = [s for s in SPREADS if not (s is Spread.EACH and len(grounds.readings) == 1)]
+    spreads = [s for s in SPREADS if not (s is PlaceSpread.EACH and len(grounds.readings) == 1)]
     families = list(dict.fromkeys(term.family for term in terms))
     parts = {
         coordinate: [
@@ -230,7 +230,7 @@ def lack_of_fit(grounds: Grounds, coordinates: Sequence[str], draws: int, seed: 
     return LackOfFit(**vars(whole), at=at)
 
 
-def _lack(parts: Sequence[_Part]) -> Lack:
+def _lack(parts: Sequence[_SpecimenResiduals]) -> Lack:
     logs = logsumexp(np.stack([part.logs for part in parts]), axis=0) - np.log(len(parts))
     best = max(parts, key=lambda part: part.logs[0])
     share = np.log(len(parts))
@@ -262,14 +262,16 @@ def _problem(
 
 
 def _part(
-    problem: Linearised, terms: Sequence[Term], family: str, coordinate: str, spread: Spread
-) -> _Part:
+    problem: Linearised, terms: Sequence[Term], family: str, coordinate: str, spread: PlaceSpread
+) -> _SpecimenResiduals:
     chosen = [
         number
         for number, term in enumerate(terms)
         if (term.family, term.coordinate) == (family, coordinate)
     ]
-    keys = [(terms[n].number, terms[n].joint if spread is not Spread.SHARED else 0) for n in chosen]
+    keys = [
+        (terms[n].number, terms[n].joint if spread is not PlaceSpread.SHARED else 0) for n in chosen
+    ]
     order = {key: number for number, key in enumerate(dict.fromkeys(keys))}
     onto = np.zeros((len(order), len(chosen)))
     onto[[order[key] for key in keys], np.arange(len(chosen))] = 1.0
@@ -278,7 +280,7 @@ def _part(
         grams.append(onto @ part.gram[np.ix_(chosen, chosen)] @ onto.T)
         moments.append(onto @ part.moments[chosen])
     coupled = [onto @ part.shared[chosen] for part in problem.of.values()]
-    if spread is Spread.EACH:
+    if spread is PlaceSpread.EACH:
         gram, moment, shared = block_diag(*grams), np.concatenate(moments), np.concatenate(coupled)
     else:
         gram, moment, shared = _added(grams), _added(moments), _added(coupled)
@@ -286,7 +288,7 @@ def _part(
     group = Group.of(gram, np.zeros(len(gram)))
     estimate = group.estimate(moment[:, 0])
     explained = float(2.0 * estimate @ moment[:, 0] - estimate @ gram @ estimate)
-    return _Part(family, coordinate, spread, group.log_evidence(moment), explained)
+    return _SpecimenResiduals(family, coordinate, spread, group.log_evidence(moment), explained)
 
 
 def _added(arrays: Sequence[Array]) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.studies.discrepancy.search.hypothesis import Variant
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, TRANSLATIONS, less_step_0
 
 SUPERIOR = COORDINATES.index("superior")
@@ -94,7 +94,7 @@ class TermColumns:
 
 
 @dataclass(frozen=True)
-class _State:
+class _TestState:
     """A test where the model stands: q (T, J, 6), its rate or None, its way, the joints' loads."""
 
     q: Array
@@ -122,7 +122,7 @@ def term_columns(
     NoEquilibrium
         When a load step has no stable pose.
     """
-    solved = Solved(model, cases, zeroed)
+    solved = SolvedSpecimen(model, cases, zeroed)
     states = _states(solved, timed)
     reach = np.max([np.abs(s.q).max(axis=0) for s in states], axis=0)
     terms: list[LawTerm] = []
@@ -149,7 +149,7 @@ def term_columns(
     return TermColumns(tuple(terms), columns, np.concatenate(sizes))
 
 
-def _states(solved: Solved, timed: bool) -> list[_State]:
+def _states(solved: SolvedSpecimen, timed: bool) -> list[_TestState]:
     found = []
     for q, load, case in zip(solved.poses, solved.held, solved.cases, strict=True):
         steps = np.diff(q, axis=0, prepend=q[:1])
@@ -159,7 +159,7 @@ def _states(solved: Solved, timed: bool) -> list[_State]:
             rate = steps / np.diff(times, prepend=times[0] - 1.0)[:, None, None]
         least = AT_REST * np.abs(steps).max(axis=0)
         way = np.where(np.abs(steps) > least, np.sign(steps), 0.0)
-        found.append(_State(q, rate, way, load))
+        found.append(_TestState(q, rate, way, load))
     return found
 
 
@@ -171,7 +171,7 @@ def tell_time(cases: Sequence[LoadCase]) -> bool:
     return all(np.all(np.diff(np.array(of_test, dtype=float)) > 0.0) for of_test in times)
 
 
-def _of(state: _State, name: str, coordinates: Sequence[str]) -> Iterator[Valued]:
+def _of(state: _TestState, name: str, coordinates: Sequence[str]) -> Iterator[Valued]:
     """Each term for a coordinate, and its values (T, J)."""
     yield from _powers(state.q, name, coordinates)
     own = state.q[..., COORDINATES.index(name)]

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values
@@ -122,7 +122,7 @@ def _row(specimen: str, joint: str, names: Sequence[str], values: Sequence[float
 
 def _copies(form: Form, models: Mapping[str, SpineModel], after: Mapping[str, int]) -> int:
     """One copy of the effect, or one per test that it tells apart."""
-    if form.spread is not Spread.BY_TEST:
+    if form.spread is not PlaceSpread.BY_TEST:
         return 1
     name, model = next(iter(models.items()))
     behind = model.effects[after[name] :]

@@ -14,10 +14,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.hypothesis import Variant
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
     EVERY_TEST,
-    Column,
+    VariantColumn,
     signatures_of_each,
 )
 from spinepipe.units import COORDINATES, ROTATIONS
@@ -57,7 +57,7 @@ def nuisance_columns(
     stiffness: Array,
     cases: Sequence[LoadCase],
     coordinates: Sequence[str] = ROTATIONS,
-) -> list[Column]:
+) -> list[VariantColumn]:
     """The nuisances of a specimen as columns, each scaled to its prior SD.
 
     Parameters
@@ -91,12 +91,12 @@ def _has_forces(case: LoadCase) -> bool:
     return any(wrench.force.any() for step in case.steps for wrench in step.wrenches)
 
 
-def _columns(variant: Variant, sds: Array, places: Sequence[str]) -> list[Column]:
+def _columns(variant: Variant, sds: Array, places: Sequence[str]) -> list[VariantColumn]:
     """Columns of a nuisance with these prior SDs (J,), those of zero left out."""
     rows = list(range(len(sds))) if variant.create().per_joint else [None]
     shapes = (0.0,) * len(variant.shapes)
     return [
-        Column(variant, shapes, strength, joint, test, float(sds[joint or 0]))
+        VariantColumn(variant, shapes, strength, joint, test, float(sds[joint or 0]))
         for strength in variant.strengths
         for joint in rows
         for test in places
@@ -108,7 +108,7 @@ ALIKE = ("rotation_order", "bending_rotation_coupling")
 """Nuisances that joints may share, as they come from one convention or one kind of tissue."""
 
 
-def _alike(columns: Sequence[Column], moved: tuple[Array, ...]) -> list[Array]:
+def _alike(columns: Sequence[VariantColumn], moved: tuple[Array, ...]) -> list[Array]:
     """(T, J, 6, g) per test: columns of a nuisance that joints may share, all joints together."""
     names = [(c.variant, c.strength) if c.variant.effect in ALIKE else None for c in columns]
     kinds = _shared(columns)
@@ -116,7 +116,7 @@ def _alike(columns: Sequence[Column], moved: tuple[Array, ...]) -> list[Array]:
     return [one @ onto.reshape(len(columns), len(kinds)) for one in moved]
 
 
-def _shared(columns: Sequence[Column]) -> list[tuple[Variant, int]]:
+def _shared(columns: Sequence[VariantColumn]) -> list[tuple[Variant, int]]:
     """Variant and strength of the nuisances that joints may share, in order of appearance."""
     names = [(c.variant, c.strength) for c in columns if c.variant.effect in ALIKE]
     return list(dict.fromkeys(names))
@@ -178,7 +178,7 @@ def nuisance_labels(
     )
 
 
-def _label(one: Column, joint: int | None, priors: NuisancePriors) -> Label:
+def _label(one: VariantColumn, joint: int | None, priors: NuisancePriors) -> Label:
     parameter = one.variant.create().parameters[one.strength]
     kind = KINDS.get(one.variant.effect, one.variant.effect)
     if one.variant == TURNED_FORCES:
@@ -191,7 +191,7 @@ def _label(one: Column, joint: int | None, priors: NuisancePriors) -> Label:
 
 
 def nuisance_signatures(
-    solved: Solved, priors: NuisancePriors, coordinates: Sequence[str] = ROTATIONS
+    solved: SolvedSpecimen, priors: NuisancePriors, coordinates: Sequence[str] = ROTATIONS
 ) -> tuple[Array, ...]:
     """(T, J, 6, k) change of each test's readings by one prior SD of each nuisance.
 

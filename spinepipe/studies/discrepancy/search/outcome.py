@@ -14,10 +14,10 @@ from scipy.special import logsumexp
 from spinepipe.studies.discrepancy.proof.folds import TEST
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.inquiry import Found, Rival, Standing
+from spinepipe.studies.discrepancy.search.inquiry import Rival, SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.search.lack_of_fit import FAMILIES, OWN
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
-from spinepipe.studies.discrepancy.verdict import Answer, SuspectedError, share_of_gap
+from spinepipe.studies.discrepancy.verdict import Conclusion, SuspectedError, share_of_gap
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 UNEXPLAINED_SHARE = 0.1
@@ -53,14 +53,14 @@ class Outcome:
     left : why what is named is not all, a sentence each.
     """
 
-    verdict: Answer
+    verdict: Conclusion
     why: str
-    named: tuple[Standing, ...] = ()
+    named: tuple[SelectedTerm, ...] = ()
     tied: tuple[str, ...] = ()
     reason: Reason | None = None
     left: tuple[str, ...] = ()
 
-    def keeps(self, one: Standing) -> bool:
+    def keeps(self, one: SelectedTerm) -> bool:
         """Whether the verdict stands for an effect, for certain or in a set."""
         return one.name in self.tied or any(one is other for other in self.named)
 
@@ -70,7 +70,7 @@ _NoName = tuple[Reason, str]
 
 
 def outcome(
-    found: Found,
+    found: SearchResult,
     margin: float,
     proof: HeldOut | None = None,
     errors: Sequence[SuspectedError] = (),
@@ -104,14 +104,14 @@ def outcome(
     )
     if unexplained:
         reason, why = unexplained
-        return Outcome(Answer.UNKNOWN, why, reason=reason)
+        return Outcome(Conclusion.UNKNOWN, why, reason=reason)
     if not found.standing:
         why = "no effect has evidence above what noise alone would show on these tests"
-        return Outcome(Answer.NULL, why)
+        return Outcome(Conclusion.NULL, why)
     left = _left(found, [doubt for doubt in doubts.values() if doubt is not None], proof)
     if tied:
         why = f"something is missing, but these tests cannot tell which: {_listed(tied, 'or')}"
-        return Outcome(Answer.SET, why, named, tied, left=left)
+        return Outcome(Conclusion.SET, why, named, tied, left=left)
     names = _listed(list(dict.fromkeys(one.name for one in named)), "and")
     why = (
         f"{names}: more evidence than noise alone would show, and at least {margin:g} more than "
@@ -119,8 +119,8 @@ def outcome(
     )
     if left:
         why = f"{why}; but more stays: {'; '.join(left)}"
-        return Outcome(Answer.PART, why, named, left=left)
-    return Outcome(Answer.NAMED, why, named)
+        return Outcome(Conclusion.PART, why, named, left=left)
+    return Outcome(Conclusion.NAMED, why, named)
 
 
 def _mistaken(errors: Sequence[SuspectedError]) -> _NoName | None:
@@ -131,7 +131,7 @@ def _mistaken(errors: Sequence[SuspectedError]) -> _NoName | None:
     return Reason.DATA_ERRORS, f"the data look wrong, so nothing is named: {places}"
 
 
-def _unexplained(found: Found) -> _NoName | None:
+def _unexplained(found: SearchResult) -> _NoName | None:
     """Why something is missing that no known effect is, where none stands."""
     if found.lack.log_evidence <= max(LEAST_THRESHOLD, found.generic_threshold):
         return None
@@ -139,7 +139,7 @@ def _unexplained(found: Found) -> _NoName | None:
     return Reason.NO_KNOWN_EFFECT, why
 
 
-def _doubt(found: Found, number: int, margin: float) -> _NoName | None:
+def _doubt(found: SearchResult, number: int, margin: float) -> _NoName | None:
     """Why an effect that stands is not sure, if so."""
     one = found.standing[number]
     if one.over_stiffness is not None and one.over_stiffness < margin:
@@ -154,7 +154,7 @@ def _doubt(found: Found, number: int, margin: float) -> _NoName | None:
     return _most_stays(found, one) or _imitated(found, one) or _other_shape(found, one, margin)
 
 
-def _most_stays(found: Found, one: Standing) -> _NoName | None:
+def _most_stays(found: SearchResult, one: SelectedTerm) -> _NoName | None:
     """Whether too much stays on the coordinates that an effect loads."""
     at = one.supposed.form.variant.coordinates(tuple(found.base_at))
     for coordinate in at if len(at) < len(found.base_at) else (EVERYWHERE,):
@@ -177,18 +177,18 @@ def _in(coordinate: str) -> str:
     return f" in {coordinate.replace('_', ' ')}" if coordinate else ""
 
 
-def _gain(found: Found, coordinate: str) -> float:
+def _gain(found: SearchResult, coordinate: str) -> float:
     """Drop of chi2 by the effects."""
     if not coordinate:
         return found.base.fit.chi2 - found.final.fit.chi2
     return found.base_at[coordinate].chi2 - found.final_at[coordinate].chi2
 
 
-def _final(found: Found, coordinate: str) -> Gap:
+def _final(found: SearchResult, coordinate: str) -> Gap:
     return found.final_at[coordinate] if coordinate else found.final_gap
 
 
-def _share_left(found: Found, coordinate: str) -> float:
+def _share_left(found: SearchResult, coordinate: str) -> float:
     """Share of what effects and generic basis explain that is left to the basis; 0 if not evident.
 
     Evidence e is a drop of chi2 of 2 e or so.
@@ -203,7 +203,7 @@ def _share_left(found: Found, coordinate: str) -> float:
     return left / (gain + left)
 
 
-def _imitated(found: Found, one: Standing) -> _NoName | None:
+def _imitated(found: SearchResult, one: SelectedTerm) -> _NoName | None:
     """Whether effects on the same coordinates stand only together.
 
     A prop, for which by itself nothing speaks, is never sure. What it props is not either, unless
@@ -229,7 +229,7 @@ NEARLY_ALL = 0.9
 """Share of the standing effects' evidence that a generic shape must have to be the truer one."""
 
 
-def _other_shape(found: Found, one: Standing, margin: float) -> _NoName | None:
+def _other_shape(found: SearchResult, one: SelectedTerm, margin: float) -> _NoName | None:
     """Whether what the base lacks follows what no known effect follows.
 
     Beside the base alone, and to first order for all alike: where a load over what the neighbouring
@@ -252,25 +252,25 @@ def _other_shape(found: Found, one: Standing, margin: float) -> _NoName | None:
     return None
 
 
-def _best_of(found: Found, coordinate: str) -> float:
+def _best_of(found: SearchResult, coordinate: str) -> float:
     """Log evidence of the best effect of a coordinate, beside the base alone."""
     forms = (form for effect in found.stages[0].screen.effects for form in effect.forms)
     of_it = (one.log_evidence for one in forms if coordinate in one.form.variant.acts_on)
     return max(of_it, default=0.0)
 
 
-def _together(found: Found, coordinate: str) -> float:
+def _together(found: SearchResult, coordinate: str) -> float:
     """Log evidence of all effects that stand on a coordinate."""
     on_it = (one for one in found.standing if coordinate in _loaded(found, one))
     return sum(one.log_evidence for one in on_it)
 
 
-def _loaded(found: Found, one: Standing) -> set[str]:
+def _loaded(found: SearchResult, one: SelectedTerm) -> set[str]:
     """Coordinates that an effect loads, of those that were read."""
     return set(one.supposed.form.variant.coordinates(tuple(found.base_at)))
 
 
-def _unproven(found: Found, proof: HeldOut | None) -> _NoName | None:
+def _unproven(found: SearchResult, proof: HeldOut | None) -> _NoName | None:
     """What is named must predict better than the base what it has not seen."""
     if not found.standing or proof is None or proof.over_base is None:
         return None
@@ -292,7 +292,7 @@ def _worse_on_tests(proof: HeldOut) -> bool:
     return drops < -max(WORSE, WORSE_SHARE * max(excess, 0.0))
 
 
-def _left(found: Found, doubts: Sequence[_NoName], proof: HeldOut | None) -> tuple[str, ...]:
+def _left(found: SearchResult, doubts: Sequence[_NoName], proof: HeldOut | None) -> tuple[str, ...]:
     """Why what is sure is not all that is missing, a sentence each."""
     said = [why for _, why in doubts]
     for coordinate, gap in found.final_at.items():
@@ -315,7 +315,7 @@ def _left(found: Found, doubts: Sequence[_NoName], proof: HeldOut | None) -> tup
 
 
 def _close(
-    one: Standing, found: Found, margin: float, not_excluded: Mapping[str, Sequence[str]]
+    one: SelectedTerm, found: SearchResult, margin: float, not_excluded: Mapping[str, Sequence[str]]
 ) -> tuple[str, ...]:
     """Rivals of an effect that are not clearly behind, or not excluded.
 

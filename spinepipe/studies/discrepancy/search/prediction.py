@@ -7,15 +7,15 @@ from functools import cached_property
 import numpy as np
 
 from spinepipe.calibrate.solvers import on_record
-from spinepipe.effects import Kind
+from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import FreeParameter, moved
 from spinepipe.statics.many import (
     Answering,
     Idle,
-    Poses,
     Stack,
+    StepPoses,
     answered,
     poses_by,
     readings,
@@ -45,7 +45,7 @@ class Predicted:
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class PredictedSpecimen:
     """A specimen's model, its tests, and what may move of the model."""
 
     model: SpineModel
@@ -58,7 +58,7 @@ class Together:
 
     def __init__(
         self,
-        subjects: Mapping[str, Subject],
+        subjects: Mapping[str, PredictedSpecimen],
         zeroed: bool,
         near: Mapping[str, Sequence[Array]] | None = None,
     ) -> None:
@@ -153,7 +153,7 @@ def recorded(model: SpineModel, cases: Sequence[LoadCase]) -> None:
     Disagreement
         For a small difference that is no rounding error.
     """
-    solved = Solved(model, cases, zeroed=False)
+    solved = SolvedSpecimen(model, cases, zeroed=False)
     poses = [q.reshape(len(q), -1) for q in solved.poses]
     if on_record(model, cases, poses, SAME) is None:
         raise NoEquilibrium(f"{model.specimen}: the engine of record finds no such motion")
@@ -169,7 +169,9 @@ class Simulated:
         zeroed: bool,
         free: Sequence[FreeParameter],
     ) -> None:
-        self._together = Together({model.specimen: Subject(model, tuple(cases), free)}, zeroed)
+        self._together = Together(
+            {model.specimen: PredictedSpecimen(model, tuple(cases), free)}, zeroed
+        )
         self._name = model.specimen
 
     def at(self, x: Array) -> Predicted:
@@ -183,7 +185,7 @@ class Simulated:
         return self._together.at({self._name: x})[self._name]
 
 
-class Solved:
+class SolvedSpecimen:
     """A specimen's tests solved under one model, for derivatives by what it lacks."""
 
     def __init__(self, model: SpineModel, cases: Sequence[LoadCase], zeroed: bool) -> None:
@@ -219,7 +221,7 @@ class Solved:
         free : unknowns of ``full``.
         """
         stack = Stack.of([full], [(0, case) for case in self.cases])
-        if all(full.effects[one.effect].effect.kind is Kind.MEASUREMENT for one in free):
+        if all(full.effects[one.effect].effect.kind is EffectKind.MEASUREMENT for one in free):
             dq = np.zeros((*self._q.shape, len(free)))  # instruments move no joint
         else:
             dq = poses_by(stack, self._q, [free])
@@ -255,7 +257,7 @@ class Solved:
         return tuple(np.split(of_lanes, self._stack.first[1:-1]))
 
 
-def _must_stand(found: Poses, stack: Stack, models: Sequence[SpineModel]) -> None:
+def _must_stand(found: StepPoses, stack: Stack, models: Sequence[SpineModel]) -> None:
     """Refuse poses of which one is missing, with the first that is and why."""
     if found.trouble is None:
         return

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spinepipe.decomposition import pinvh, svd
-from spinepipe.effects import Effect, Kind, Spread
+from spinepipe.effects import Effect, EffectKind, PlaceSpread
 from spinepipe.effects.contract import AcrossJoints, Array
 from spinepipe.effects.dead_load import DeadLoad
 from spinepipe.model import ScopedEffect
@@ -23,7 +23,7 @@ from spinepipe.statics import FreeParameter
 from spinepipe.statics.many import Acting, Idle, acts_here
 from spinepipe.studies.discrepancy.search.hypothesis import Trials, Variant, shape_grid
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
-from spinepipe.studies.discrepancy.search.prediction import Solved
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 
 SEEN = 1e-8
 """Directions of a Jacobian with less than this share of its largest singular value are none."""
@@ -100,7 +100,7 @@ class Linearised:
 
 
 @dataclass(frozen=True)
-class Column:
+class VariantColumn:
     """One strength of a variant at one place.
 
     Attributes
@@ -176,10 +176,10 @@ def products(taken: Taken, white: Array, raw: Array, errors: Array) -> Products:
     return Products(gram, moments, raw, shared, own @ taken.shared, own @ errors)
 
 
-def columns_of(trials: Trials, joints: int, tests: Sequence[str]) -> list[Column]:
+def columns_of(trials: Trials, joints: int, tests: Sequence[str]) -> list[VariantColumn]:
     """Columns of all variants and shapes of one effect."""
     places = [EVERY_TEST]
-    if any(form.spread is Spread.BY_TEST for form in trials.forms):
+    if any(form.spread is PlaceSpread.BY_TEST for form in trials.forms):
         places += list(tests)
     found = []
     for variant in trials.variants:
@@ -187,7 +187,9 @@ def columns_of(trials: Trials, joints: int, tests: Sequence[str]) -> list[Column
         rows: Iterable[int | None] = range(joints) if effect.per_joint else [None]
         for sds in shape_grid(variant):
             found += [
-                Column(variant, sds, strength, joint, test, effect.parameters[strength].prior_scale)
+                VariantColumn(
+                    variant, sds, strength, joint, test, effect.parameters[strength].prior_scale
+                )
                 for strength in variant.strengths
                 for joint in rows
                 for test in places
@@ -195,23 +197,23 @@ def columns_of(trials: Trials, joints: int, tests: Sequence[str]) -> list[Column
     return found
 
 
-def signatures(solved: Solved, columns: Sequence[Column]) -> tuple[Array, ...]:
+def signatures(solved: SolvedSpecimen, columns: Sequence[VariantColumn]) -> tuple[Array, ...]:
     """(T, J, 6, m) derivative of each test's readings by each column's strength, in prior SDs."""
     return next(signatures_of_each(solved, [columns]))
 
 
 def signatures_of_each(
-    solved: Solved, groups: Sequence[Sequence[Column]]
+    solved: SolvedSpecimen, groups: Sequence[Sequence[VariantColumn]]
 ) -> Iterator[tuple[Array, ...]]:
     """The same for several effects; what differs by the test alone is derived once."""
-    every = dict.fromkeys(_Moved.of(column) for columns in groups for column in columns)
-    parts: dict[Variant, list[_Moved]] = {}
+    every = dict.fromkeys(_IdleStrength.of(column) for columns in groups for column in columns)
+    parts: dict[Variant, list[_IdleStrength]] = {}
     for one in every:
         parts.setdefault(one.variant, []).append(one)
     found, places = _derived(solved, list(parts.values()))
     whole = [np.concatenate(of_test, axis=-1) for of_test in zip(*found, strict=True)]
     for columns in groups:
-        at = [places[_Moved.of(column)] for column in columns]
+        at = [places[_IdleStrength.of(column)] for column in columns]
         scales = np.array([column.scale for column in columns])
         yield tuple(
             by_x[..., at]
@@ -220,7 +222,7 @@ def signatures_of_each(
         )
 
 
-class _Moved(NamedTuple):
+class _IdleStrength(NamedTuple):
     """A strength of an idle effect at one joint, or at all."""
 
     variant: Variant
@@ -229,14 +231,14 @@ class _Moved(NamedTuple):
     joint: int | None
 
     @classmethod
-    def of(cls, column: Column) -> "_Moved":
+    def of(cls, column: VariantColumn) -> "_IdleStrength":
         """What moves for a column."""
         return cls(column.variant, column.sds, column.strength, column.joint)
 
 
 def _derived(
-    solved: Solved, parts: Sequence[Sequence[_Moved]]
-) -> tuple[list[tuple[Array, ...]], dict[_Moved, int]]:
+    solved: SolvedSpecimen, parts: Sequence[Sequence[_IdleStrength]]
+) -> tuple[list[tuple[Array, ...]], dict[_IdleStrength, int]]:
     """(T, J, 6, m) derivatives of each test's readings by strengths of idle variants.
 
     Parameters
@@ -247,8 +249,8 @@ def _derived(
     -------
     columns in a few portions, and the place of each strength among all.
     """
-    acting: list[tuple[Acting, Sequence[_Moved]]] = []
-    together: dict[object, list[_Moved]] = {}
+    acting: list[tuple[Acting, Sequence[_IdleStrength]]] = []
+    together: dict[object, list[_IdleStrength]] = {}
     for some in parts:
         effect = some[0].variant.create()
         if solved.answering is not None and acts_here(effect):
@@ -264,13 +266,13 @@ def _derived(
 
 def _stands_with(effect: Effect) -> object:
     """Idle effects for which this is the same may stand in one model: none knows of the others."""
-    if effect.kind is Kind.MEASUREMENT or isinstance(effect, DeadLoad | AcrossJoints):
+    if effect.kind is EffectKind.MEASUREMENT or isinstance(effect, DeadLoad | AcrossJoints):
         return effect.kind
     return effect
 
 
 def _answered(
-    solved: Solved, parts: Sequence[tuple[Acting, Sequence[_Moved]]]
+    solved: SolvedSpecimen, parts: Sequence[tuple[Acting, Sequence[_IdleStrength]]]
 ) -> list[tuple[Array, ...]]:
     """The same of what the solved runs answer as they are."""
     idle, at = [], []
@@ -290,7 +292,7 @@ def _answered(
     ]
 
 
-def _by_model(solved: Solved, moved: Sequence[_Moved]) -> tuple[Array, ...]:
+def _by_model(solved: SolvedSpecimen, moved: Sequence[_IdleStrength]) -> tuple[Array, ...]:
     """The same of any effect, from a model that has it."""
     model = solved.model
     effects, free = list(model.effects), []

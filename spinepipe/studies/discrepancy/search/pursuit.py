@@ -26,7 +26,7 @@ MOST_RANKED = 20
 
 
 @dataclass(frozen=True)
-class Candidate:
+class TermAtPlace:
     """A term at a place: number of the term, joint and specimen, or `EVERYWHERE`."""
 
     term: int
@@ -41,14 +41,14 @@ class Ranked:
     ``threshold`` : drop that noise alone seldom shows for the best of all candidates.
     """
 
-    best: tuple[Candidate, ...]
+    best: tuple[TermAtPlace, ...]
     drops: tuple[float, ...]
     values: tuple[float, ...]
     threshold: float
 
 
 @dataclass(frozen=True)
-class _Part:
+class _WhitenedColumns:
     """A specimen: whitened columns (N, C), own unknowns taken out; raw squared norms (C,)."""
 
     columns: Array
@@ -56,7 +56,7 @@ class _Part:
 
 
 @dataclass(frozen=True)
-class Problem:
+class PursuitProblem:
     """What the steps of a pursuit about one fit share.
 
     Attributes
@@ -68,7 +68,7 @@ class Problem:
 
     terms: tuple[LawTerm, ...]
     joints: int
-    parts: tuple[_Part, ...]
+    parts: tuple[_WhitenedColumns, ...]
     rows: tuple[int, ...]
     shared: Array
     errors: Array
@@ -79,19 +79,19 @@ class Problem:
         """Chi2 above what noise makes."""
         return float(self.errors[:, 0] @ self.errors[:, 0]) - self.freedom
 
-    def candidates(self) -> list[Candidate]:
+    def candidates(self) -> list[TermAtPlace]:
         """Every term at each joint and at all, in all specimens and, where several, in each."""
         places = [EVERYWHERE, *range(self.joints)] if self.joints > 1 else [0]
         several = len(self.parts) > 1
         specimens = [EVERYWHERE, *range(len(self.parts))] if several else [EVERYWHERE]
         return [
-            Candidate(term, joint, specimen)
+            TermAtPlace(term, joint, specimen)
             for specimen in specimens
             for term in range(len(self.terms))
             for joint in places
         ]
 
-    def column(self, one: Candidate) -> Array:
+    def column(self, one: TermAtPlace) -> Array:
         """(N,) of a candidate."""
         found = np.zeros(self.rows[-1])
         width, place = (self.joints + 1, one.joint + 1) if self.joints > 1 else (1, 0)
@@ -101,7 +101,7 @@ class Problem:
                 found[rows] = part.columns[:, one.term * width + place]
         return found
 
-    def ranked(self, linear: Sequence[Candidate], false_alarm: float) -> Ranked:
+    def ranked(self, linear: Sequence[TermAtPlace], false_alarm: float) -> Ranked:
         """The candidates that lead beside terms that are there already."""
         basis, errors = self._beside(linear)
         values, drops = self._drops(basis, errors)
@@ -115,7 +115,7 @@ class Problem:
             float(threshold),
         )
 
-    def fitted(self, linear: Sequence[Candidate]) -> tuple[Array, Array]:
+    def fitted(self, linear: Sequence[TermAtPlace]) -> tuple[Array, Array]:
         """Coefficients of terms together, SI, and their SDs."""
         if not linear:
             return np.zeros(0), np.zeros(0)
@@ -127,7 +127,7 @@ class Problem:
         values = covariance @ (scaled.T @ self.errors[:, 0]) / sizes
         return values, np.sqrt(np.diagonal(covariance)) / sizes
 
-    def _beside(self, linear: Sequence[Candidate]) -> tuple[Array, Array]:
+    def _beside(self, linear: Sequence[TermAtPlace]) -> tuple[Array, Array]:
         """Basis of all that is taken out, and the errors without it."""
         basis, errors = self.shared, self.errors
         for one in linear:
@@ -163,7 +163,7 @@ class Problem:
 
 def pursuit_problem(
     grounds: Grounds, columns: Mapping[str, TermColumns], draws: int, seed: int
-) -> Problem:
+) -> PursuitProblem:
     """The problem about the grounds' fit, with draws of the null."""
     taken = taken_out(grounds.fit)
     parts, errors = [], []
@@ -179,7 +179,7 @@ def pursuit_problem(
     rows = tuple(np.cumsum([0, *(len(one) for one in errors)]).tolist())
     first = next(iter(columns.values()))
     joints = first.sizes.shape[1]
-    return Problem(first.terms, joints, tuple(parts), rows, shared, every, rows[-1] - fitted)
+    return PursuitProblem(first.terms, joints, tuple(parts), rows, shared, every, rows[-1] - fitted)
 
 
 def _with_sums(one: TermColumns, joints: int) -> list[Array]:
@@ -194,10 +194,10 @@ def _with_sums(one: TermColumns, joints: int) -> list[Array]:
     return found
 
 
-def _part(grounds: Grounds, name: str, moved: Sequence[Array], taken: Taken) -> _Part:
+def _part(grounds: Grounds, name: str, moved: Sequence[Array], taken: Taken) -> _WhitenedColumns:
     plain = grounds.plain[name].noise_only(moved)
     white = grounds.setting.whitenings[name].shortened(plain)
-    return _Part(taken.out_of(white), np.sum(plain**2, axis=0))
+    return _WhitenedColumns(taken.out_of(white), np.sum(plain**2, axis=0))
 
 
 def _orthonormal(columns: Array) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
-from spinepipe.effects import Parameter, Spread
+from spinepipe.effects import Parameter, PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.grounds import Grounds
@@ -20,7 +20,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.screen import SIZES, Screen, Screened, Tried
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 
 SMALLEST_START = 0.02
 """Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
@@ -69,7 +69,7 @@ def refits(
     grounds: Grounds,
     screen: Screen,
     trials: Sequence[Trials],
-    run: Run,
+    run: PieceRunner,
     progress: Progress,
 ) -> tuple[Refit, ...]:
     """The leading effects of a screen, refitted beside those of the grounds' fit; best first."""
@@ -118,7 +118,7 @@ def _simpler(
     for one in best:
         possible = next(e for e in screen.effects if e.effect == one.name).forms
         for form in (t.form for t in possible):
-            simple = form.variant == one.form.variant and form.spread is Spread.SHARED
+            simple = form.variant == one.form.variant and form.spread is PlaceSpread.SHARED
             if simple and form not in tried and np.isfinite(one.log_evidence):
                 fitted = standing(one.fit)[len(before)]
                 yield replace(fitted, form=form)
@@ -203,7 +203,7 @@ def _forms(one: Screened, most: int) -> list[Tried]:
             by_variant.setdefault(tried.form.variant, tried)
     chosen = list(by_variant.values())[:most]
     for tried in one.forms:
-        same = tried.form.variant == best.form.variant and tried.form.spread is Spread.SHARED
+        same = tried.form.variant == best.form.variant and tried.form.spread is PlaceSpread.SHARED
         if same and tried not in chosen and tried.log_evidence > least:
             chosen.append(tried)
     return chosen

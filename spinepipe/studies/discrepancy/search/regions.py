@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.calibrate.descent import Point, Settled, descend, once
-from spinepipe.calibrate.profile import NORMAL_95, Best, Reach, profile_in_turn
+from spinepipe.calibrate.descent import DescentTolerances, Point, descend, once
+from spinepipe.calibrate.profile import NORMAL_95, Best, RegionEnds, profile_in_turn
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.joint_fit import SETTLED, JointFit, Points, Setting
 from spinepipe.studies.discrepancy.search.model_files import FittedValue, fitted_values, in_tables
@@ -34,11 +34,11 @@ PULLED = 0.05
 SOFTEST = 1e-3
 """Share of a fitted stiffness of contact, below which there is none."""
 
-OPEN = Reach(None, None, True, True)
+OPEN = RegionEnds(None, None, True, True)
 
 
 @dataclass(frozen=True)
-class Estimated(FittedValue):
+class ValueWithRegion(FittedValue):
     """A fitted value with its region.
 
     Attributes
@@ -58,7 +58,7 @@ class Estimated(FittedValue):
         return not (self.open_below or self.open_above)
 
 
-def estimated(fit: JointFit, setting: Setting, number: int) -> tuple[Estimated, ...]:
+def estimated(fit: JointFit, setting: Setting, number: int) -> tuple[ValueWithRegion, ...]:
     """All fitted values of one supposed effect with their regions.
 
     Parameters
@@ -74,7 +74,7 @@ def estimated(fit: JointFit, setting: Setting, number: int) -> tuple[Estimated, 
             for end in (reach.low, reach.high)
         )
         found.append(
-            Estimated(
+            ValueWithRegion(
                 value.name,
                 value.place,
                 value.value,
@@ -89,7 +89,7 @@ def estimated(fit: JointFit, setting: Setting, number: int) -> tuple[Estimated, 
     return tuple(found)
 
 
-def region(fit: JointFit, setting: Setting, unknown: int) -> Reach:
+def region(fit: JointFit, setting: Setting, unknown: int) -> RegionEnds:
     """Ends of one unknown, as moves from where the fit started; the value lies within."""
     if not fit.usable:
         return OPEN
@@ -105,7 +105,7 @@ def region(fit: JointFit, setting: Setting, unknown: int) -> Reach:
         return OPEN
     below, above = bool(seen.open_below[unknown]), bool(seen.open_above[unknown])
     value = float(fit.x[unknown])
-    return Reach(
+    return RegionEnds(
         None if below else min(ruler.move(float(seen.low[unknown])), value),
         None if above else max(ruler.move(float(seen.high[unknown])), value),
         below,
@@ -197,7 +197,7 @@ def _likeliest(fit: JointFit, point: Point, unknown: int, ruler: _Ruler) -> Best
     return replace(begun, x=ended.x, residual=found[0], jacobian=found[1])
 
 
-def _enough(residual: Array) -> Settled:
+def _enough(residual: Array) -> DescentTolerances:
     """When the others have been fitted well enough beside the noise."""
     cost = KNOWN * NORMAL_95**2 / max(float(residual @ residual), 1.0)
-    return Settled(cost, step=1e-4, slope=1e-10, evaluations=MOST_LOOKS)
+    return DescentTolerances(cost, step=1e-4, slope=1e-10, evaluations=MOST_LOOKS)

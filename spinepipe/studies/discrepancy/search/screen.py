@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from spinepipe.decomposition import eigh
-from spinepipe.effects import Spread
+from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, shape_grid
-from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Column, Linearised
+from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Linearised, VariantColumn
 
 SIZES = np.array([0.1, 0.3, 1.0, 3.0])
 """Sizes of strengths, in declared prior SDs, that are held equally likely."""
@@ -145,10 +145,10 @@ class Summed:
     group: Group
 
 
-class Index:
+class EffectColumns:
     """Columns of one effect by variant, shape, test and joint."""
 
-    def __init__(self, columns: Sequence[Column]) -> None:
+    def __init__(self, columns: Sequence[VariantColumn]) -> None:
         self._at: dict[tuple[object, ...], dict[tuple[object, ...], list[int]]] = {}
         for number, c in enumerate(columns):
             places = self._at.setdefault((c.variant, c.sds), {})
@@ -205,9 +205,9 @@ class Index:
     ) -> list[tuple[int, tuple[object, ...]]]:
         """Columns and which strength each belongs to."""
         spread = form.spread
-        by_specimen = spread in (Spread.BY_SPECIMEN, Spread.EACH)
-        by_joint = spread in (Spread.BY_JOINT, Spread.EACH)
-        wanted = tests if spread is Spread.BY_TEST else (EVERY_TEST,)
+        by_specimen = spread in (PlaceSpread.BY_SPECIMEN, PlaceSpread.EACH)
+        by_joint = spread in (PlaceSpread.BY_JOINT, PlaceSpread.EACH)
+        wanted = tests if spread is PlaceSpread.BY_TEST else (EVERY_TEST,)
         found: list[tuple[int, tuple[object, ...]]] = []
         for (test, joint, strength), numbers in self._at.get((form.variant, sds), {}).items():
             if test not in wanted:
@@ -277,7 +277,7 @@ def screen(
 
 def screened(
     trials: Trials,
-    index: Index,
+    index: EffectColumns,
     problem: Linearised,
     specimens: Sequence[str],
     tests: Sequence[str],
@@ -316,7 +316,7 @@ def _explained(estimates: Array, moments: Array, gram: Array) -> Array:
 
 
 def summed(
-    index: Index,
+    index: EffectColumns,
     problem: Linearised,
     form: Form,
     sds: tuple[float, ...],

@@ -11,11 +11,17 @@ from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.examination import examined
 from spinepipe.studies.discrepancy.search.gaps import Gap, gaps_at, whole_gap
 from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.inquiry import Found, Inquiry, Rules, Stage, Standing
+from spinepipe.studies.discrepancy.search.inquiry import (
+    Inquiry,
+    Rules,
+    SearchResult,
+    SearchStage,
+    SelectedTerm,
+)
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import exceeded
-from spinepipe.studies.discrepancy.store import Run
+from spinepipe.studies.discrepancy.store import PieceRunner
 
 HOPELESS = (4.0, 2.5, 1.5)
 """Times the evidence of the first, second and further effect that the generic basis may have.
@@ -32,14 +38,16 @@ MOST_CHANGES = 6
 """Times that an effect may leave or give way; then what stands is kept and nothing gives way."""
 
 
-def search(base: Grounds, rules: Rules, run: Run, progress: Progress | None = None) -> Found:
+def search(
+    base: Grounds, rules: Rules, run: PieceRunner, progress: Progress | None = None
+) -> SearchResult:
     """Effects that the base lacks, each with its rivals."""
     inquiry = Inquiry(base, rules, run, progress or Progress())
     base_at, base_lack = gaps_at(base, base.fit), inquiry.lack(base)
     current, stood = _settled(_forward(base, inquiry, base_at), inquiry, base_at)
     lack = inquiry.lack(current)
     single = rules.false_alarm / len(rules.coordinates)
-    return Found(
+    return SearchResult(
         base,
         current,
         stood,
@@ -57,7 +65,7 @@ def search(base: Grounds, rules: Rules, run: Run, progress: Progress | None = No
 
 def _settled(
     current: Grounds, inquiry: Inquiry, base_at: Mapping[str, Gap]
-) -> tuple[Grounds, tuple[Standing, ...]]:
+) -> tuple[Grounds, tuple[SelectedTerm, ...]]:
     """The effects that stand after all changes; what took turns ends up among the rivals."""
     for _ in range(MOST_CHANGES):
         found = examined(current, inquiry)
@@ -78,7 +86,7 @@ def _forward(current: Grounds, inquiry: Inquiry, base_at: Mapping[str, Gap]) -> 
 
 
 def _admitted(
-    current: Grounds, stage: Stage, inquiry: Inquiry, base_at: Mapping[str, Gap]
+    current: Grounds, stage: SearchStage, inquiry: Inquiry, base_at: Mapping[str, Gap]
 ) -> Refit | None:
     """The best refit, if it may enter."""
     rules, supposed = inquiry.rules, current.fit.hypothesis.supposed

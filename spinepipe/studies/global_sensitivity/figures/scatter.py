@@ -39,7 +39,7 @@ Values = Mapping[str, pd.Series]
 
 
 @dataclass(frozen=True, eq=False)
-class Output:
+class JointOutput:
     """One output of one joint.
 
     Attributes
@@ -65,7 +65,7 @@ def output_of(
     measures: Measures,
     drawn: Values,
     groups: Mapping[str, str],
-) -> Output | None:
+) -> JointOutput | None:
     """The output at the joint where it varies most, of the first specimen; None without runs.
 
     Parameters
@@ -93,7 +93,7 @@ def output_of(
     order = index["estimate"].drop(DUMMY, errors="ignore").sort_values(ascending=False)
     leading = _drawn(list(order.index), values, drawn, groups)
     failed = pd.Index(every.loc[~stands, "sample"].unique())
-    return Output(panel, specimen, joint, values, leading, index, failed)
+    return JointOutput(panel, specimen, joint, values, leading, index, failed)
 
 
 def _drawn(
@@ -179,7 +179,7 @@ def _values(design: pd.DataFrame) -> tuple[Values, Mapping[str, str]]:
 
 def _line(
     axes: Sequence[Axes],
-    one: Output,
+    one: JointOutput,
     values: Values,
     units: Mapping[str, str],
     measures: Measures,
@@ -226,7 +226,7 @@ def _cloud(axis: Axes, x: Array, y: Array, unit: str, lost: Array) -> None:
         log_ticks(axis.xaxis, float(ends.min()), float(ends.max()))
 
 
-def _index(one: Output, factor: str, measures: Measures) -> str:
+def _index(one: JointOutput, factor: str, measures: Measures) -> str:
     """``ST 0.71 (0.66 to 0.75)``; a factor of a group has no index."""
     if factor not in one.index.index:
         return "in a group"
@@ -246,7 +246,7 @@ def _handles(failed: bool) -> list[Line2D | Patch]:
     ]
 
 
-def _words(lines: Sequence[Output], cohort: Cohort) -> str:
+def _words(lines: Sequence[JointOutput], cohort: Cohort) -> str:
     runs = max(len(one.values) for one in lines)
     parts = ["Each output at the joint where it varies most"]
     if len(cohort.specimen_names) > 1:

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import EXACT, exact, rounded
 from spinepipe.report.panels import (
-    Rows,
+    PanelRows,
     explain,
     grid,
     head,
@@ -81,7 +81,7 @@ def _usable(table: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
 
 
 @dataclass(frozen=True)
-class _Panel:
+class _AgreementPanel:
     """One joint and coordinate of a specimen: the row of the table and the readings behind it."""
 
     row: pd.Series
@@ -89,7 +89,7 @@ class _Panel:
     title: str
 
 
-def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int) -> _Panel:
+def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int) -> _AgreementPanel:
     column = COORDINATE_COLUMNS[COORDINATES.index(row["coordinate"])]
     success, runs = tables["success"], tables["simulations"]
     kept = success.loc[success["reduced"] & (success["specimen"] == row["specimen"]), "pose"]
@@ -103,7 +103,7 @@ def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int)
     readings["difference"] = rounded(readings["difference"])
     words = [row["specimen"]] if n_specimens > 1 else []
     title = ", ".join([*words, row["joint"], AXIS[row["coordinate"]].lower()])
-    return _Panel(row, readings, title)
+    return _AgreementPanel(row, readings, title)
 
 
 def _grid(n: int, n_coordinates: int) -> tuple[Figure, Sequence[Axes]]:
@@ -113,7 +113,7 @@ def _grid(n: int, n_coordinates: int) -> tuple[Figure, Sequence[Axes]]:
     return figure, side_by_side(figure, n, across)
 
 
-def _draw(axis: Axes, panel: _Panel) -> None:
+def _draw(axis: Axes, panel: _AgreementPanel) -> None:
     row, readings = panel.row, panel.readings
     axis.plot(
         readings["mean"],
@@ -174,7 +174,7 @@ def _draw_rows(cohort: Cohort, known: pd.DataFrame, settled: str = "") -> Figure
     return figure
 
 
-def _draw_coordinate(name: str, axis: Axes, rows: Rows) -> None:
+def _draw_coordinate(name: str, axis: Axes, rows: PanelRows) -> None:
     axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
     for y, frame in enumerate(rows.frames):
         here = frame[frame["coordinate"] == name]

@@ -16,7 +16,7 @@ from spinepipe.report.panels import (
     EVERY_JOINT,
     MOST_ACROSS,
     MOST_ROWS,
-    Rows,
+    PanelRows,
     explain,
     head,
     label_rows,
@@ -101,13 +101,13 @@ def _most_rows(n_above: int, n_below: int) -> int:
     return int(((TALLEST_MM - _KEY_MM) / lines - _AROUND_MM) / _NARROW_MM)
 
 
-def _room_for_words(parts: Sequence[tuple[int, Rows]]) -> int:
+def _room_for_words(parts: Sequence[tuple[int, PanelRows]]) -> int:
     """Up to how many rows of a panel have words: none where the page would be too small."""
     height = sum(-(-n // MOST_ACROSS) * _height(rows, MOST_ROWS_WITH_WORDS) for n, rows in parts)
     return MOST_ROWS_WITH_WORDS if height + _KEY_MM <= TALLEST_MM else 0
 
 
-def _height(rows: Rows, room: int) -> float:
+def _height(rows: PanelRows, room: int) -> float:
     return len(rows) * (_ROW_MM if len(rows) <= room else _NARROW_MM) + _AROUND_MM
 
 
@@ -130,7 +130,7 @@ def bootstrap_rows(
     specimens: Sequence[str],
     joints: Sequence[str],
     most: int = MOST_ROWS,
-) -> tuple[Rows, bool]:
+) -> tuple[PanelRows, bool]:
     """Rows from the bottom up, and whether more than ``most`` of them were pooled.
 
     Where they were, each specimen and joint is taken relative to its own median: ``columns`` are
@@ -140,7 +140,7 @@ def bootstrap_rows(
     parts = [(key, part) for key in keys if len(part := _part(solved, *key))]
     if len(parts) <= most:
         labels = [_label(*key, len(specimens), len(joints)) for key, _ in reversed(parts)]
-        return Rows(tuple(labels), tuple(part for _, part in reversed(parts)), ""), False
+        return PanelRows(tuple(labels), tuple(part for _, part in reversed(parts)), ""), False
     relative = pd.concat([_from_median(part, columns) for _, part in parts])
     groups = [
         ((sampled, loading), part)
@@ -148,7 +148,7 @@ def bootstrap_rows(
         if len(part := relative.query("bootstrap == @sampled and loading == @loading"))
     ]
     labels = [f"{SAMPLED[sampled]}, {LOADING_NAMES[loading]}" for (sampled, loading), _ in groups]
-    return Rows(
+    return PanelRows(
         tuple(labels), tuple(part for _, part in groups), "specimens and joints pooled"
     ), True
 
@@ -181,7 +181,7 @@ def _label(
 
 
 def _draw_stiffness(
-    name: str, axis: Axes, rows: Rows, study: JointPoseSensitivity, relative: bool
+    name: str, axis: Axes, rows: PanelRows, study: JointPoseSensitivity, relative: bool
 ) -> None:
     index = COORDINATES.index(name)
     box = study.start_bootstrap
@@ -208,7 +208,7 @@ def _limit(axis: Axes, samples: Sequence[Array], more: list[float]) -> None:
     axis.tick_params(axis="x", labelsize=_TICK_PT)
 
 
-def _draw_errors(name: str, axis: Axes, rows: Rows, relative: bool, cohort: str) -> None:
+def _draw_errors(name: str, axis: Axes, rows: PanelRows, relative: bool, cohort: str) -> None:
     axis.xaxis.set_major_locator(MaxNLocator(_FEW_TICKS))
     for y, frame in enumerate(rows.frames):
         values = rounded(finite(frame[_error(name)]))
@@ -242,7 +242,7 @@ def draw_paper(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) 
     axis.plot([median], [y], "D", color=THEIRS, ms=2.6, mew=0.0, zorder=4)
 
 
-def _tell_stiffness(name: str, axis: Axes, rows: Rows, relative: bool, cohort: str) -> None:
+def _tell_stiffness(name: str, axis: Axes, rows: PanelRows, relative: bool, cohort: str) -> None:
     """Numbers of each row, and the paper's below them."""
     _tell(axis, rows, _stiffness(name), relative)
     for y, frame in enumerate(rows.frames):
@@ -258,7 +258,7 @@ def _write_range(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float
         note(axis, 0.02, y, f"range {number(width, 2)}", THEIRS)
 
 
-def _tell(axis: Axes, rows: Rows, column: str, relative: bool) -> None:
+def _tell(axis: Axes, rows: PanelRows, column: str, relative: bool) -> None:
     """Median, width of the range and n of each row; a relative median says nothing."""
     for y, frame in enumerate(rows.frames):
         values = rounded(finite(frame[column]))
@@ -280,7 +280,7 @@ def _bars(cohort: str) -> dict[str, str]:
     return bars | ({THEIRS: f"{paper[0]}, median and range"} if paper else {})
 
 
-def _words(tried: int, found: int, rows: Rows) -> str:
+def _words(tried: int, found: int, rows: PanelRows) -> str:
     solved = f"{count(found, 'fit')} of {tried} with a stiffness"
     grey = "" if rows.note else "grey: where start values were drawn"
     return "; ".join(part for part in (solved, rows.note, STRIP_KEY, grey) if part) + "."

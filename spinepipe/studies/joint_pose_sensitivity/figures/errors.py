@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import BAR_PT, EXACT, KEY, THIN_BAR_PT, draw_bar, exact, finite, rounded
-from spinepipe.report.panels import Rows, explain, grid, head, label_rows, row_height, rows_of
+from spinepipe.report.panels import PanelRows, explain, grid, head, label_rows, row_height, rows_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, note, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, percent, unit
 from spinepipe.status import USABLE
@@ -72,7 +72,7 @@ def _column(coordinate: str) -> str:
     return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
 
 
-def _draw(name: str, axis: Axes, rows: Rows, sets: Sequence[_Set]) -> None:
+def _draw(name: str, axis: Axes, rows: PanelRows, sets: Sequence[_Set]) -> None:
     """One coordinate: two bars per row, the second below the first."""
     column = f"error_{_column(name)}"
     axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
@@ -128,7 +128,7 @@ def _draw_failures(axis: Axes, runs: pd.DataFrame) -> None:
     axis.spines["left"].set_visible(False)
 
 
-def _bars(sets: Sequence[_Set], runs: pd.DataFrame, rows: Rows) -> dict[str, str]:
+def _bars(sets: Sequence[_Set], runs: pd.DataFrame, rows: PanelRows) -> dict[str, str]:
     """Meaning of each colour."""
     best = f"all poses with the {count(_n_best(runs), 'best set')}"
     return {
@@ -137,7 +137,7 @@ def _bars(sets: Sequence[_Set], runs: pd.DataFrame, rows: Rows) -> dict[str, str
     }
 
 
-def _words(runs: pd.DataFrame, rows: Rows, study: JointPoseSensitivity) -> str:
+def _words(runs: pd.DataFrame, rows: PanelRows, study: JointPoseSensitivity) -> str:
     own = runs["stiffness"] == OWN
     total = f"{count(int(own.sum()), 'run')} with the own calibration, {int((~own).sum())} with"
     meaning = "Error: predicted less measured, all measured load steps together, median (IQR)"
@@ -150,7 +150,7 @@ def _n_best(runs: pd.DataFrame) -> int:
     return len(set(runs["stiffness"]) - {OWN})
 
 
-def _readings(rows: Rows, group: _Set) -> str:
+def _readings(rows: PanelRows, group: _Set) -> str:
     """How many errors a bar stands for, over all rows."""
     numbers = [int(frame.index.isin(group.rows.index).sum()) for frame in rows.frames]
     low, high = int(np.min(numbers)), int(np.max(numbers))

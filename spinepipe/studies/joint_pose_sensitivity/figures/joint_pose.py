@@ -12,7 +12,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.frames import zxy_angles
 from spinepipe.report.marks import KEY, Quartiles, draw_bar, draw_density, draw_iqr, finite
-from spinepipe.report.panels import Rows, explain, grid, head, label_rows, row_height, rows_of
+from spinepipe.report.panels import PanelRows, explain, grid, head, label_rows, row_height, rows_of
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, fixed, percent, unit
 from spinepipe.status import Status
@@ -84,7 +84,7 @@ def _less_nominal(sampled: pd.DataFrame, nominal: pd.DataFrame) -> pd.DataFrame:
     return both
 
 
-def _draw(column: str, axis: Axes, rows: Rows, nominal: pd.DataFrame, cohort: Cohort) -> None:
+def _draw(column: str, axis: Axes, rows: PanelRows, nominal: pd.DataFrame, cohort: Cohort) -> None:
     axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
     for y, frame in enumerate(rows.frames):
         values = finite(frame[column])
@@ -126,7 +126,7 @@ def _paper(cohort: Cohort, joint: str, column: str) -> Quartiles | None:
     return Quartiles(median - iqr / 2.0, median, median + iqr / 2.0, 0)
 
 
-def _words(total: int, failed: int, rows: Rows) -> str:
+def _words(total: int, failed: int, rows: PanelRows) -> str:
     share = f"{percent(failed, total)} define no frame" if failed else "all define frames"
     numbers = "numbers: median and IQR in ground axes" if rows.with_numbers else ""
     zero = "line at 0: the cohort's own frames"

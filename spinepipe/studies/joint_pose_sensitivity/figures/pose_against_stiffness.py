@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.marks import draw_interval
-from spinepipe.report.panels import Rows, explain, head, label_rows, rows_of, sections
+from spinepipe.report.panels import PanelRows, explain, head, label_rows, rows_of, sections
 from spinepipe.report.style import BEST, GREY, OURS, note, saying
 from spinepipe.report.words import AXIS, count, fixed, percent
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
@@ -75,11 +75,11 @@ def _without(table: pd.DataFrame) -> pd.DataFrame:
     return table[table["status"] != "done"].drop_duplicates(TREE)
 
 
-def _height(rows: Rows) -> float:
+def _height(rows: PanelRows) -> float:
     return len(rows) * (_ROW_MM if rows.with_numbers else _NARROW_MM) + _AROUND_MM
 
 
-def _draw(axis: Axes, rows: Rows, name: str, what: str) -> None:
+def _draw(axis: Axes, rows: PanelRows, name: str, what: str) -> None:
     for y, frame in enumerate(rows.frames):
         here = frame[frame["coordinate"] == name]
         found = here[here[_RESULT[what]].notna()]
@@ -98,7 +98,7 @@ def _draw(axis: Axes, rows: Rows, name: str, what: str) -> None:
     axis.set_xlabel(label)
 
 
-def _draw_shares(axis: Axes, y: int, here: pd.DataFrame, rows: Rows, column: str) -> None:
+def _draw_shares(axis: Axes, y: int, here: pd.DataFrame, rows: PanelRows, column: str) -> None:
     crowded = here["factor"].duplicated().any()
     for _, row in here.iterrows():
         color, at = COLORS[row["factor"]], y + _OFFSETS[row["factor"]]
@@ -109,7 +109,7 @@ def _draw_shares(axis: Axes, y: int, here: pd.DataFrame, rows: Rows, column: str
             note(axis, 1.0, at, words, color, ha="right")
 
 
-def _draw_tree(axis: Axes, y: int, here: pd.DataFrame, rows: Rows) -> None:
+def _draw_tree(axis: Axes, y: int, here: pd.DataFrame, rows: PanelRows) -> None:
     """A bar from 0 to 100 %: what splits on the pose take, then stiffness; one per specimen."""
     trees = list(here.groupby("specimen", sort=False))
     height = 0.5 / max(1, len(trees))
@@ -150,7 +150,7 @@ def _span(numbers: pd.Series) -> str:
     return f"{low}" if low == high else f"{low}–{high}"
 
 
-def _words(tables: Mapping[str, pd.DataFrame], rows: Rows) -> str:
+def _words(tables: Mapping[str, pd.DataFrame], rows: PanelRows) -> str:
     grid = tables["variance_shares"]
     poses, sets = (_span(grid[name]) for name in ("n_poses", "n_stiffness"))
     told = f"Grid of {poses} joint poses times {sets} stiffness sets" if len(grid) else ""

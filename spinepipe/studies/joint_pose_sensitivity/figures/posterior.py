@@ -11,7 +11,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.marks import draw_interval
 from spinepipe.report.panels import (
     EVERY_JOINT,
-    Rows,
+    PanelRows,
     explain,
     head,
     label_rows,
@@ -67,7 +67,7 @@ def posterior_figure(
 
 
 def _draw_stiffness(
-    axis: Axes, rows: Rows, name: str, index: int, study: JointPoseSensitivity
+    axis: Axes, rows: PanelRows, name: str, index: int, study: JointPoseSensitivity
 ) -> None:
     coordinate = COORDINATES[STIFFNESS_COLUMNS.index(name)]
     head(axis, index, AXIS[coordinate])

@@ -23,7 +23,7 @@ from spinepipe.report.marks import (
 )
 from spinepipe.report.panels import (
     EVERY_JOINT,
-    Rows,
+    PanelRows,
     explain,
     grid,
     head,
@@ -79,7 +79,7 @@ def stiffness_figure(
 
 
 @dataclass(frozen=True)
-class _Panel:
+class _StiffnessPanel:
     """What one panel shows: a coordinate, its start and bounds, and the paper's quartiles."""
 
     coordinate: str
@@ -95,13 +95,13 @@ class _Panel:
         return values[(values > above) & (values < below)]
 
 
-def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _Panel:
+def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _StiffnessPanel:
     index = COORDINATES.index(coordinate)
     start = study.stiffness.in_order()[index]
     factor = study.calibration.bound_factor
     column = STIFFNESS_COLUMNS[index]
     paper = _paper(cohort, column)
-    return _Panel(coordinate, column, start, start / factor, start * factor, paper)
+    return _StiffnessPanel(coordinate, column, start, start / factor, start * factor, paper)
 
 
 def _paper(cohort: Cohort, column: str) -> Quartiles | None:
@@ -115,7 +115,7 @@ def _paper(cohort: Cohort, column: str) -> Quartiles | None:
     return Quartiles(low, reduced["median"][column], high, 0)
 
 
-def _draw(panel: _Panel, axis: Axes, rows: Rows, solved: pd.DataFrame) -> None:
+def _draw(panel: _StiffnessPanel, axis: Axes, rows: PanelRows, solved: pd.DataFrame) -> None:
     axis.set_xscale("log")
     axis.set_xlabel(f"stiffness ({stiffness_unit(panel.coordinate)})")
     values = finite(solved[panel.column])
@@ -135,7 +135,7 @@ def _draw(panel: _Panel, axis: Axes, rows: Rows, solved: pd.DataFrame) -> None:
         note(axis, 0.02, len(rows) + 0.25, _shares(panel, solved), GREY)
 
 
-def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
+def _limit(axis: Axes, panel: _StiffnessPanel, values: Array) -> None:
     """Limits around the middle 98 % of what was found, start and paper as far as they are near."""
     inside = panel.inside(values)
     low, high = np.percentile(inside if len(inside) else values, [1.0, 99.0])
@@ -154,7 +154,9 @@ def _limit(axis: Axes, panel: _Panel, values: Array) -> None:
     log_ticks(axis.xaxis, low / margin, high * margin)
 
 
-def _draw_row(panel: _Panel, axis: Axes, y: int, frame: pd.DataFrame, with_numbers: bool) -> None:
+def _draw_row(
+    panel: _StiffnessPanel, axis: Axes, y: int, frame: pd.DataFrame, with_numbers: bool
+) -> None:
     """Hill and bar of the fits; grey and without a median where the data do not hold most."""
     values = finite(frame[panel.column])
     held = _lost(panel, frame) <= MOSTLY * len(values)
@@ -168,13 +170,13 @@ def _draw_row(panel: _Panel, axis: Axes, y: int, frame: pd.DataFrame, with_numbe
         _tell_far_bound(panel, axis, values, y - 0.125)
 
 
-def _lost(panel: _Panel, frame: pd.DataFrame) -> int:
+def _lost(panel: _StiffnessPanel, frame: pd.DataFrame) -> int:
     """Fits that do not identify the stiffness."""
     flags = frame[f"{panel.coordinate}_identifiable"]
     return int((flags == False).sum())  # noqa: E712  (None: held fixed)
 
 
-def _lower_ends(panel: _Panel, frame: pd.DataFrame) -> str:
+def _lower_ends(panel: _StiffnessPanel, frame: pd.DataFrame) -> str:
     """What is known of a stiffness that most fits do not hold: how low it may be."""
     ends = finite(frame[region_columns(panel.coordinate)[1]])
     if not len(ends):
@@ -187,7 +189,7 @@ def _median_and_iqr(found: Quartiles) -> str:
     return f"median {number(found.median)} (IQR {number(found.low)}–{number(found.high)})"
 
 
-def _shares(panel: _Panel, frame: pd.DataFrame) -> str:
+def _shares(panel: _StiffnessPanel, frame: pd.DataFrame) -> str:
     """Shares at a bound and not identifiable, of the solved fits."""
     values = finite(frame[panel.column])
     at = percent(len(values) - len(panel.inside(values)), len(values))
@@ -195,7 +197,7 @@ def _shares(panel: _Panel, frame: pd.DataFrame) -> str:
     return f"at a bound {at}, not identifiable {lost}, n = {len(values)}"
 
 
-def _tell_far_bound(panel: _Panel, axis: Axes, values: Array, y: float) -> None:
+def _tell_far_bound(panel: _StiffnessPanel, axis: Axes, values: Array, y: float) -> None:
     """Where fits ended at a bound beyond the axis, say at its edge how many and where it is."""
     for bound, x, words in ((panel.low, 0.0, "← {} at {}"), (panel.high, 1.0, "{} at {} →")):
         there = int(np.isclose(values, bound, rtol=AT_BOUND).sum())
@@ -210,7 +212,7 @@ def _shown(axis: Axes, x: float) -> bool:
     return bool(low < x < high)
 
 
-def _words(bound_factor: float, found: int, poses: int, rows: Rows) -> str:
+def _words(bound_factor: float, found: int, poses: int, rows: PanelRows) -> str:
     solved = f"{count(found, 'joint pose')} of {poses} with a stiffness"
     parts = (solved, rows.note, KEY, f"bounds: start times and divided by {number(bound_factor)}")
     return "; ".join(part for part in parts if part) + "."

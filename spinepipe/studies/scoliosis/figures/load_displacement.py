@@ -19,7 +19,7 @@ from spinepipe.studies.scoliosis.figures.film_overlay import chosen
 from spinepipe.studies.scoliosis.figures.looks import LOOKS, axis_lines, key_of_lines
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tangent_laws import Ends
+from spinepipe.studies.scoliosis.tangent_laws import EndRotations
 from spinepipe.studies.scoliosis.words import in_order
 from spinepipe.units import DEG_PER_RAD
 
@@ -83,13 +83,13 @@ def curve(row: pd.Series, reach: float) -> tuple[Array, Array]:
 
     The stretch A is the stiffness at rest over the slope of ``tan(B r + C)`` at rest.
     """
-    ends = Ends(*(np.array([row[name]], dtype=float) / DEG_PER_RAD for name in _ENDS))
+    ends = EndRotations(*(np.array([row[name]], dtype=float) / DEG_PER_RAD for name in _ENDS))
     moments = np.linspace(-reach, reach, POINTS)
     found: Array = DEG_PER_RAD * ends.rotation(moments / _stretch(ends, row))
     return found, moments
 
 
-def _stretch(ends: Ends, row: pd.Series) -> float:
+def _stretch(ends: EndRotations, row: pd.Series) -> float:
     b, c = ends.shape
     return float(row["at_rest_nm_per_rad"]) / float(b[0] * (1.0 + np.tan(c[0]) ** 2))
 
@@ -98,7 +98,7 @@ def _reach(rows: pd.DataFrame, pairs: Mapping[str, pd.Series]) -> float:
     """The largest moment to draw, N m: beyond those at the rotations of the bending films."""
     found = [1.0]
     for _, row in rows.iterrows():
-        ends = Ends(*(np.array([row[name]], dtype=float) / DEG_PER_RAD for name in _ENDS))
+        ends = EndRotations(*(np.array([row[name]], dtype=float) / DEG_PER_RAD for name in _ENDS))
         for position in _MARKS:
             r = float(pairs[position].get(row["joint"], 0.0)) / DEG_PER_RAD
             if ends.lower[0] < r < ends.upper[0]:

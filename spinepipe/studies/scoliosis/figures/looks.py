@@ -12,7 +12,7 @@ from spinepipe.studies.scoliosis.words import IN_WORDS
 
 
 @dataclass(frozen=True)
-class Look:
+class ModelStyle:
     """What tells a model from the others, in colour and without."""
 
     color: str
@@ -25,11 +25,11 @@ class Look:
 
 
 LOOKS = {
-    "tangent": Look(BLUE, "o", "-"),
-    "tangent_fitted": Look(GREEN, "s", (0, (6.0, 1.5))),
-    "linear_regions": Look(VERMILLION, "^", (0, (4.0, 2.0))),
-    "linear_per_segment": Look(PURPLE, "D", (0, (2.0, 1.5))),
-    "uniform": Look(GREY, "v", (0, (1.0, 1.0))),
+    "tangent": ModelStyle(BLUE, "o", "-"),
+    "tangent_fitted": ModelStyle(GREEN, "s", (0, (6.0, 1.5))),
+    "linear_regions": ModelStyle(VERMILLION, "^", (0, (4.0, 2.0))),
+    "linear_per_segment": ModelStyle(PURPLE, "D", (0, (2.0, 1.5))),
+    "uniform": ModelStyle(GREY, "v", (0, (1.0, 1.0))),
 }
 
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import BODIES, JOINTS
-from spinepipe.report.looks import Look
+from spinepipe.report.looks import LineStyle
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
 from spinepipe.report.style import blank, saying
 from spinepipe.report.words import capital
@@ -75,7 +75,7 @@ def _panel(
     axis: Axes,
     rows: pd.DataFrame,
     measure: str,
-    looks: Mapping[str, Look],
+    looks: Mapping[str, LineStyle],
     ends: tuple[float, float],
 ) -> None:
     levels = LEVELS[measure]
@@ -99,7 +99,7 @@ def _panel(
         axis.set_xlim(0.0, 1.1 * ends[1])
 
 
-def _course(axis: Axes, rows: pd.DataFrame, levels: Sequence[str], look: Look) -> None:
+def _course(axis: Axes, rows: pd.DataFrame, levels: Sequence[str], look: LineStyle) -> None:
     """Mean over persons from the lowest level up, and the range of persons."""
     by_level = rows.groupby("level", observed=True)["mean"]
     means = by_level.mean().reindex(list(levels))
@@ -111,7 +111,7 @@ def _course(axis: Axes, rows: pd.DataFrame, levels: Sequence[str], look: Look) -
         )
 
 
-def _explain(figure: Figure, looks: dict[str, Look], rows: pd.DataFrame, more: int) -> None:
+def _explain(figure: Figure, looks: dict[str, LineStyle], rows: pd.DataFrame, more: int) -> None:
     persons = int(rows["specimen"].nunique())
     words = persons_words(persons)
     if persons > 1:

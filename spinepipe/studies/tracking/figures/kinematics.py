@@ -14,7 +14,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
 from spinepipe.motion.measures import between_neighbours
 from spinepipe.motion.skeleton import JOINTS, PELVIS, body_poses
-from spinepipe.report.looks import Look
+from spinepipe.report.looks import LineStyle
 from spinepipe.report.panels import explain_marks, lettered
 from spinepipe.report.style import BLACK, blank, saying
 from spinepipe.report.words import capital, listed
@@ -89,7 +89,9 @@ def kinematics_figure(
     return figure
 
 
-def _block(block: SubFigure, index: int, trial: str, one: Courses, looks: dict[str, Look]) -> None:
+def _block(
+    block: SubFigure, index: int, trial: str, one: Courses, looks: dict[str, LineStyle]
+) -> None:
     block.suptitle(
         lettered(index, f"{capital(trial_words(trial))}, {about(one.kind)}"),
         **{"x": 0.01, "ha": "left", "fontsize": 7.5, "fontweight": "bold"},
@@ -109,7 +111,7 @@ def _block(block: SubFigure, index: int, trial: str, one: Courses, looks: dict[s
     block.supxlabel("cycle of the motion (%)", fontsize=7.0)
 
 
-def _course(axis: Axes, persons: Array, look: Look, calm: bool) -> None:
+def _course(axis: Axes, persons: Array, look: LineStyle, calm: bool) -> None:
     """Mean over persons; of calm approaches one SD to either side, where there are persons."""
     mean = persons.mean(axis=0)
     if not calm:
@@ -186,7 +188,7 @@ def _of_truth(cohort: Cohort, truth: Truth, time_s: Array, kind: str) -> Iterato
 
 
 def _explain(
-    figure: Figure, looks: dict[str, Look], shown: Mapping[str, Courses], trials: int
+    figure: Figure, looks: dict[str, LineStyle], shown: Mapping[str, Courses], trials: int
 ) -> None:
     handles = key_of(looks, marks=False)
     if any(len(one.true) for one in shown.values()):

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from spinepipe.report.looks import PURPLE, SKY, Look
+from spinepipe.report.looks import PURPLE, SKY, LineStyle
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION
 from spinepipe.report.words import plain
 from spinepipe.status import Status
@@ -16,11 +16,11 @@ from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.words import in_order, short_of
 
 LOOKS = (
-    Look(VERMILLION, "o", "-"),
-    Look(BLUE, "s", "-"),
-    Look(GREEN, "D", (0, (5.0, 1.5))),
-    Look(PURPLE, "v", (0, (2.5, 1.2))),
-    Look(SKY, "^", (0, (5.0, 1.5, 1.0, 1.5))),
+    LineStyle(VERMILLION, "o", "-"),
+    LineStyle(BLUE, "s", "-"),
+    LineStyle(GREEN, "D", (0, (5.0, 1.5))),
+    LineStyle(PURPLE, "v", (0, (2.5, 1.2))),
+    LineStyle(SKY, "^", (0, (5.0, 1.5, 1.0, 1.5))),
 )
 
 FURTHER = ("optk_from_both", "optk_zero", "optk_calibrated", "ik_springs", "ik_smooth")
@@ -47,7 +47,7 @@ OWN = {
 """Approaches that look the same in all figures."""
 
 
-def looks_of_approaches(names: Sequence[str]) -> dict[str, Look]:
+def looks_of_approaches(names: Sequence[str]) -> dict[str, LineStyle]:
     """A look of each approach; those without one of their own take what is left."""
     taken = [OWN[name] for name in names if name in OWN]
     spare = [look for look in LOOKS if look not in taken] or list(LOOKS)
@@ -56,12 +56,12 @@ def looks_of_approaches(names: Sequence[str]) -> dict[str, Look]:
     return {name: OWN.get(name) or left[name] for name in names}
 
 
-def looks_of(names: Sequence[str]) -> dict[str, Look]:
+def looks_of(names: Sequence[str]) -> dict[str, LineStyle]:
     """A look of each person or trial; they come again after the last."""
     return {name: LOOKS[k % len(LOOKS)] for k, name in enumerate(names)}
 
 
-def key_of(looks: dict[str, Look], marks: bool = True) -> list[Line2D]:
+def key_of(looks: dict[str, LineStyle], marks: bool = True) -> list[Line2D]:
     """Marks of a legend, of approaches."""
     bare: dict[str, Any] = {} if marks else {"marker": ""}
     return [Line2D([], [], **look.line(**bare), label=short_of(n)) for n, look in looks.items()]

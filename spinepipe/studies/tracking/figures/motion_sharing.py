@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.report.looks import Look
+from spinepipe.report.looks import LineStyle
 from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
 from spinepipe.report.style import GREY, blank, saying
 from spinepipe.report.words import capital
@@ -58,7 +58,7 @@ def motion_sharing_figure(
     return figure
 
 
-def _trial(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, Look]) -> None:
+def _trial(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, LineStyle]) -> None:
     known = rows.dropna(subset=["share"])
     if known.empty:
         says(axis, "the lumbar spine turns too little to be shared out")
@@ -81,7 +81,7 @@ def _trial(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, Look]) -> None:
     _ends(axis, 100.0 * known["share"].to_numpy(float))
 
 
-def _mark(axis: Axes, x: float, shares: Array, look: Look) -> None:
+def _mark(axis: Axes, x: float, shares: Array, look: LineStyle) -> None:
     """Mean and one SD over persons, each person a small dot."""
     low, high = _FARTHEST
     inside = shares[(shares > low) & (shares < high)]
@@ -106,7 +106,7 @@ def _ends(axis: Axes, shares: Array) -> None:
         axis.set_ylim(top=_FARTHEST[1])
 
 
-def _explain(figure: Figure, looks: dict[str, Look], rows: pd.DataFrame, more: int) -> None:
+def _explain(figure: Figure, looks: dict[str, LineStyle], rows: pd.DataFrame, more: int) -> None:
     handles = key_of(looks)
     handles.append(Line2D([], [], color=GREY, lw=0.7, ls=(0, (4, 2)), label="evenly shared"))
     persons = int(rows["specimen"].nunique())

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.report.looks import Look
+from spinepipe.report.looks import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, BLUE, GREY, VERMILLION, WHITE, blank, saying
 from spinepipe.report.words import AXIS
@@ -21,7 +21,7 @@ from spinepipe.studies.tracking.settings import LEARNT, Tracking
 from spinepipe.studies.tracking.words import short_of
 from spinepipe.units import ROTATIONS
 
-SIDES = {"positive": Look(BLUE, "o", "-"), "negative": Look(VERMILLION, "s", "-")}
+SIDES = {"positive": LineStyle(BLUE, "o", "-"), "negative": LineStyle(VERMILLION, "s", "-")}
 WORDS = {
     "extension": ("extension", "flexion"),
     "right_bending": ("right bending", "left bending"),

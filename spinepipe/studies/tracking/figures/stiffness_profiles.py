@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.looks import Look
+from spinepipe.report.looks import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, SMALL_PT, WHITE, blank, saying
 from spinepipe.report.words import AXIS, capital, plain, short, tick
@@ -72,7 +72,9 @@ def _of(rows: pd.DataFrame, coordinate: str, region: str) -> pd.DataFrame:
     return rows[(rows["coordinate"] == coordinate) & (rows["region"] == region)]
 
 
-def _panel(axis: Axes, points: pd.DataFrame, ends: pd.DataFrame, looks: Mapping[str, Look]) -> None:
+def _panel(
+    axis: Axes, points: pd.DataFrame, ends: pd.DataFrame, looks: Mapping[str, LineStyle]
+) -> None:
     low, high = float(points["ratio"].min()), float(points["ratio"].max())
     reach = (0.75 * low, 1.33 * high)
     axis.set_xscale("log")
@@ -106,7 +108,7 @@ def _verdict(points: pd.DataFrame, row: "pd.Series[Any]") -> str:
     return f"{said}\nleast cost at {tick(float(best))}" + (", an end" if at_end else "")
 
 
-def _course(axis: Axes, points: pd.DataFrame, look: Look) -> None:
+def _course(axis: Axes, points: pd.DataFrame, look: LineStyle) -> None:
     """The curve; arrows where it leaves the panel, crosses where no fit settled."""
     points = points.sort_values("ratio")
     cost = points["cost_over_best"].to_numpy(float)
@@ -123,7 +125,7 @@ def _course(axis: Axes, points: pd.DataFrame, look: Look) -> None:
 
 
 def _interval(
-    axis: Axes, row: "pd.Series[float]", y: float, look: Look, reach: tuple[float, float]
+    axis: Axes, row: "pd.Series[float]", y: float, look: LineStyle, reach: tuple[float, float]
 ) -> None:
     """What is not excluded, as a bar; an open end has an arrow out of the panel."""
     if pd.isna(row["best_ratio"]):
@@ -137,7 +139,7 @@ def _interval(
         axis.plot([at * shift], [y], mark, color=look.color, ms=5.0, mew=1.0, zorder=4)
 
 
-def _explain(figure: Figure, looks: Mapping[str, Look], persons: int, lost: bool) -> None:
+def _explain(figure: Figure, looks: Mapping[str, LineStyle], persons: int, lost: bool) -> None:
     handles = [Line2D([], [], **look.line(), label=short(name)) for name, look in looks.items()]
     grey: dict[str, Any] = {"color": GREY, "lw": 0.7, "ls": (0, (4, 2))}
     handles.append(Line2D([], [], **grey, label=f"limit of 95 %, {LIMIT}"))

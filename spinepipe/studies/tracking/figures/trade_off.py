@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.report.looks import Look
+from spinepipe.report.looks import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, SMALL_PT, WHITE, blank, saying
 from spinepipe.report.words import tick
@@ -46,7 +46,7 @@ def trade_off_figure(study: Tracking, cohort: Cohort, tables: Mapping[str, pd.Da
     return figure
 
 
-def _against(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, Look]) -> None:
+def _against(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, LineStyle]) -> None:
     head(axis, 0, "Markers against loads")
     for name, look in looks.items():
         own = rows[rows["trial"] == name].sort_values("ratio")
@@ -64,7 +64,7 @@ def _against(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, Look]) -> None:
 
 
 def _errors(
-    axis: Axes, index: int, rows: pd.DataFrame, column: str, looks: Mapping[str, Look]
+    axis: Axes, index: int, rows: pd.DataFrame, column: str, looks: Mapping[str, LineStyle]
 ) -> None:
     title, unit = ERRORS[column]
     known = rows.dropna(subset=[column])
@@ -85,7 +85,7 @@ def _errors(
     scale(axis)
 
 
-def _course(axis: Axes, rows: pd.DataFrame, x: Array, y: Array, look: Look) -> None:
+def _course(axis: Axes, rows: pd.DataFrame, x: Array, y: Array, look: LineStyle) -> None:
     """A line through the weights, hollow where a fit did not settle, a ring at the study's own."""
     axis.plot(x, y, **look.line(marker="", zorder=2))
     places = zip(x, y, rows["ratio"], settled(rows), strict=True)
@@ -95,7 +95,9 @@ def _course(axis: Axes, rows: pd.DataFrame, x: Array, y: Array, look: Look) -> N
             axis.plot([at], [height], "o", mfc="none", mec=BLACK, ms=7.0, mew=0.7, zorder=4)
 
 
-def _explain(figure: Figure, rows: pd.DataFrame, looks: Mapping[str, Look], trials: int) -> None:
+def _explain(
+    figure: Figure, rows: pd.DataFrame, looks: Mapping[str, LineStyle], trials: int
+) -> None:
     handles = [
         Line2D([], [], **look.line(), label=trial_words(name)) for name, look in looks.items()
     ]

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.looks import Look
+from spinepipe.report.looks import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, blank, saying
 from spinepipe.studies.trunk_loads.chosen import of_person, shown_person
@@ -83,7 +83,11 @@ def _logarithmic(axis: Axes, rows: pd.DataFrame) -> None:
 
 
 def _marks(
-    axis: Axes, rows: pd.DataFrame, tasks: Sequence[str], looks: Mapping[str, Look], column: str
+    axis: Axes,
+    rows: pd.DataFrame,
+    tasks: Sequence[str],
+    looks: Mapping[str, LineStyle],
+    column: str,
 ) -> None:
     for y in range(len(tasks)):
         axis.axhline(y, color=GREY, lw=0.2, zorder=0)

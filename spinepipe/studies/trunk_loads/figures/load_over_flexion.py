@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.fascicles import GLOBAL_EXTENSORS
-from spinepipe.report.looks import Look
+from spinepipe.report.looks import LineStyle
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, BLUE, VERMILLION, blank, saying
 from spinepipe.report.words import plain, short
@@ -98,7 +98,7 @@ def _left_out(tasks: pd.DataFrame, courses: Mapping[str, pd.DataFrame]) -> Seque
 
 
 def _explain(
-    figure: Figure, looks: Mapping[str, Look], bender: str, muscles: bool, lost: Sequence[str]
+    figure: Figure, looks: Mapping[str, LineStyle], bender: str, muscles: bool, lost: Sequence[str]
 ) -> None:
     handles = key_of({short(name): look for name, look in looks.items()})
     words = []

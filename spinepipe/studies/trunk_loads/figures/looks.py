@@ -4,28 +4,28 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from spinepipe.report.looks import PURPLE, SKY, Look
+from spinepipe.report.looks import PURPLE, SKY, LineStyle
 from spinepipe.report.style import BLACK, BLUE, GREEN, VERMILLION
 from spinepipe.report.words import plain, short
 
 LOOKS = (
-    Look(BLACK, "o", "-"),
-    Look(BLUE, "s", (0, (6.0, 1.5))),
-    Look(VERMILLION, "^", (0, (4.0, 2.0))),
-    Look(GREEN, "D", (0, (2.0, 1.5))),
-    Look(PURPLE, "v", (0, (5.0, 1.5, 1.0, 1.5))),
-    Look(SKY, "P", (0, (1.0, 1.0))),
+    LineStyle(BLACK, "o", "-"),
+    LineStyle(BLUE, "s", (0, (6.0, 1.5))),
+    LineStyle(VERMILLION, "^", (0, (4.0, 2.0))),
+    LineStyle(GREEN, "D", (0, (2.0, 1.5))),
+    LineStyle(PURPLE, "v", (0, (5.0, 1.5, 1.0, 1.5))),
+    LineStyle(SKY, "P", (0, (1.0, 1.0))),
 )
 
 HOLLOW_WORDS = "Hollow: forces did not settle, or do not hold the task."
 
 
-def look_of(number: int) -> Look:
+def look_of(number: int) -> LineStyle:
     """The look of one of several; they come again after the last."""
     return LOOKS[number % len(LOOKS)]
 
 
-def key_of(labels: dict[str, Look]) -> list[Line2D]:
+def key_of(labels: dict[str, LineStyle]) -> list[Line2D]:
     """Marks of a legend."""
     return [Line2D([], [], **look.line(), label=name) for name, look in labels.items()]
 

@@ -33,7 +33,7 @@ _AROUND = tuple((np.cos(a * np.pi), np.sin(a * np.pi)) for a in (0.75, 1.0, 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class PersonPanel:
     """What is drawn of one person.
 
     Attributes
@@ -81,7 +81,7 @@ def pressure_against_measured_figure(
     return figure
 
 
-def _compared(rows: pd.DataFrame, intervals: pd.DataFrame) -> Compared:
+def _compared(rows: pd.DataFrame, intervals: pd.DataFrame) -> PersonPanel:
     order = rows.drop_duplicates("task").sort_values("measured_mpa", kind="stable")["task"]
     tiers = tuple(tier for tier in TIERS if (rows["tier"] == tier).any())
     ends = {}
@@ -93,7 +93,7 @@ def _compared(rows: pd.DataFrame, intervals: pd.DataFrame) -> Compared:
             for task, low, high in zip(own["task"], own["low"], own["high"], strict=True)
             if task in set(order)
         }
-    return Compared(rows, tuple(order), tiers, ends)
+    return PersonPanel(rows, tuple(order), tiers, ends)
 
 
 def _agreement(agreement: pd.DataFrame, tier: str) -> str:
@@ -111,7 +111,7 @@ def _agreement(agreement: pd.DataFrame, tier: str) -> str:
     return "\n".join(told)
 
 
-def _square(axis: Axes, compared: Compared, tier: str, words: str) -> None:
+def _square(axis: Axes, compared: PersonPanel, tier: str, words: str) -> None:
     """Points beside the line on which both pressures are the same."""
     top = compared.top
     axis.plot([0.0, top], [0.0, top], color=GREY, lw=0.7, zorder=1)
@@ -129,7 +129,7 @@ def _square(axis: Axes, compared: Compared, tier: str, words: str) -> None:
     axis.text(0.97, 0.03, words, transform=axis.transAxes, ha="right", va="bottom", fontsize=6.0)
 
 
-def _of_tier(compared: Compared, tier: str) -> pd.DataFrame:
+def _of_tier(compared: PersonPanel, tier: str) -> pd.DataFrame:
     rows = compared.rows[compared.rows["tier"] == tier]
     return rows.dropna(subset=["computed_mpa"]).sort_values("measured_mpa", kind="stable")
 
@@ -141,7 +141,7 @@ def _mark(tier: str, row: Mapping[Any, Any]) -> dict[str, Any]:
     return {"marker": marker, "ls": "", "ms": 4.2, "mec": COLORS[tier], "mfc": face, "mew": 0.9}
 
 
-def _number(axis: Axes, compared: Compared, tier: str) -> None:
+def _number(axis: Axes, compared: PersonPanel, tier: str) -> None:
     """The number of each task near its point, where the others leave room."""
     rows = _of_tier(compared, tier)
     points = axis.transData.transform(rows[["measured_mpa", "computed_mpa"]].to_numpy(float))
@@ -162,7 +162,7 @@ def _number(axis: Axes, compared: Compared, tier: str) -> None:
         axis.text(x, y, number, fontsize=5.5, ha="center", va="center", in_layout=False, zorder=5)
 
 
-def _list(axis: Axes, compared: Compared) -> None:
+def _list(axis: Axes, compared: PersonPanel) -> None:
     """Measured and computed pressure of each task on a line."""
     names = list(compared.tasks)[::-1]
     for y, task in enumerate(names):
@@ -194,7 +194,7 @@ def _place(axis: Axes, y: float, row: Mapping[Any, Any]) -> None:
         note(axis, 0.99, y, f"{ended}: no pressure", GREY, ha="right")
 
 
-def _explain(figure: Figure, compared: Compared) -> None:
+def _explain(figure: Figure, compared: PersonPanel) -> None:
     look: dict[str, Any] = {"ls": "", "ms": 4.2, "mew": 0.9}
     handles = [Line2D([], [], marker="D", color=BLACK, **look, label="measured")]
     handles += [
@@ -204,7 +204,7 @@ def _explain(figure: Figure, compared: Compared) -> None:
     explain_marks(figure, handles, " ".join(_words(compared)), len(handles))
 
 
-def _words(compared: Compared) -> Sequence[str]:
+def _words(compared: PersonPanel) -> Sequence[str]:
     words = []
     if not compared.rows["counted"].all():
         words.append("Hollow: does not count, as the measured value is not confirmed.")

@@ -4,12 +4,12 @@ from spinepipe.studies.joint_count.settings import JointCount
 from spinepipe.studies.joint_count.tables import TOTALS
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, Results, sortable
+from spinepipe.report.page.document import Document, ResultTables, sortable
 
 READ = ("totals",)
 
 
-def document(study: JointCount, cohort: Cohort, results: Results) -> Document:
+def document(study: JointCount, cohort: Cohort, results: ResultTables) -> Document:
     """One finding, one figure, one table."""
     rows = results.table("totals")
     return Document(
