@@ -10,7 +10,7 @@ from benchmarks.study import ROOT, Run, copy_of_project, run_workflow
 from benchmarks.timing import cpu_seconds
 from spinepipe.calibrate import MeasuredCase, Problem, fit, pool
 from spinepipe.model import LoadCase
-from spinepipe.statics import System, follow, free_parameters, moved
+from spinepipe.statics import System, follow, free_parameters, with_parameters
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.read import check
@@ -37,7 +37,7 @@ def specimen() -> Result:
     tests = [[with_moments(chain, share)[axis] for share in shares] for axis in range(3)]
     problem = _problem(chain, tests, truth)
     ours = cpu_seconds(lambda: fit(problem), 10)
-    found = moved(problem.model, problem.free, fit(problem).x).effects[0].values
+    found = with_parameters(problem.model, problem.free, fit(problem).x).effects[0].values
     observed = np.concatenate([case.measured for case in problem.cases])
     predict = opensim_calibration.static_predictor(
         chain, [one.loads for test in tests for one in test]

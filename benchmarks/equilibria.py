@@ -17,8 +17,8 @@ import numpy as np
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import free_parameters
-from spinepipe.statics.many import Cases, Spines, Stack, poses_by
-from spinepipe.statics.many.spines import stacked
+from spinepipe.statics.batched import Cases, Spines, Stack, poses_by
+from spinepipe.statics.batched.spines import stacked
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers.chain import random_chain
 

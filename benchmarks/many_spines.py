@@ -10,7 +10,7 @@ from benchmarks.timing import cpu_seconds
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import System, follow
-from spinepipe.statics.many import Cases, Spines, Stack, solve_many
+from spinepipe.statics.batched import Cases, Spines, Stack, solve_many
 from spinepipe.world import Chain
 from tests.cases.random_stacks import values
 from tests.reference.bridge import load_case, spine_model

@@ -9,7 +9,7 @@ from benchmarks.engine import Result, off, with_moments
 from benchmarks.timing import cpu_seconds
 from spinepipe.calibrate import MeasuredCase, Problem, fit
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.statics import FreeParameter, System, follow, moved
+from spinepipe.statics import FreeParameter, System, follow, with_parameters
 from spinepipe.units import STIFFNESS_COLUMNS
 from spinepipe.world import Chain
 from tests.reference.bridge import load_case, spine_model
@@ -36,7 +36,7 @@ def _calibration(chain: PeerChain, regions: int) -> Result:
     truth = chain.stiffness * factors[groups]
     problem = _problem(chain, loaded, groups, truth)
     ours = cpu_seconds(lambda: fit(problem), 20)
-    found = moved(problem.model, problem.free, fit(problem).x).effects[0].values
+    found = with_parameters(problem.model, problem.free, fit(problem).x).effects[0].values
     observed = np.concatenate([case.measured for case in problem.cases])
     predict = opensim_calibration.static_predictor(chain, [case.loads for case in loaded])
     peer = opensim_calibration.calibrate(predict, chain.stiffness, observed, groups)

@@ -11,7 +11,7 @@ from benchmarks.memory import per_row
 from benchmarks.study import Run, copy_of_project, run_workflow
 from spinepipe.marks import read_mark
 from spinepipe.sensitivity.global_indices.spread import values_of
-from spinepipe.statics.many import solve_many
+from spinepipe.statics.batched import solve_many
 from spinepipe.studies.global_sensitivity.batch import start_of_specimen
 from spinepipe.studies.global_sensitivity.drawn import design_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of

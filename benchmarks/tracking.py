@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.memory import peak_mib
 from benchmarks.study import ROOT
 from benchmarks.timing import cpu_seconds
-from spinepipe.motion.asked import Ask, ForceCost, Watched, watched
+from spinepipe.motion.objective import Ask, ForceCost, Watched, watched
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.passive_elements import passive_elements
 from spinepipe.motion.points import marker_places

@@ -13,9 +13,9 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.forces import Demand, least_stress
+from spinepipe.muscles.muscle_equilibrium import angles_of, held
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import posed, rotations_of
-from spinepipe.muscles.settle import angles_of, held
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.muscles.upright import Upright

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 import pandas as pd
 
 from papers.ranges import RULES, Range
-from papers.run import NotComputed, Ours, StudyRun
+from papers.run import Computed, NotComputed, StudyRun
 from papers.selectors import selectors_of
 
 FOLDER = Path(__file__).parent
@@ -62,7 +62,7 @@ class Claim:
     unit: str
     printed: float | None
     range: Range
-    ours: Callable[[StudyRun], Ours]
+    ours: Callable[[StudyRun], Computed]
     evidence: Evidence | None = Evidence.INDEPENDENT
     contradicted: str = ""
     also: tuple[Range, ...] = ()
@@ -84,7 +84,7 @@ def rows_of(paper: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def claim_of(row: Mapping[str, str], selectors: Mapping[str, Callable[..., Ours]]) -> Claim:
+def claim_of(row: Mapping[str, str], selectors: Mapping[str, Callable[..., Computed]]) -> Claim:
     """One row, its rule applied and its selector found."""
     return Claim(
         **{name: row[name] for name in ("id", "where", "quantity", "unit", "contradicted")},
@@ -125,7 +125,7 @@ def value_of(text: str) -> Any:
     return float(found) if type(found) in (int, float) else found
 
 
-def _ours(row: Mapping[str, str], selectors: Mapping[str, Callable[..., Ours]]) -> Any:
+def _ours(row: Mapping[str, str], selectors: Mapping[str, Callable[..., Computed]]) -> Any:
     """Our value; what is shown without a verdict is told in the reason alone."""
     args, missing, unit = arguments(row["selector_args"]), row["missing"], row["unit"]
 
@@ -172,7 +172,7 @@ def judge(claim: Claim, run: StudyRun) -> dict[str, Any]:
     }
 
 
-def _verdict(claim: Claim, ours: Ours | None) -> str:
+def _verdict(claim: Claim, ours: Computed | None) -> str:
     """Inside or outside, or why neither means anything."""
     printed = (claim.range, *claim.also) if claim.also else ()
     disagrees = ours is not None and printed and not any(r.holds(ours.value) for r in printed)
@@ -186,7 +186,7 @@ def _verdict(claim: Claim, ours: Ours | None) -> str:
     return "inside" if independent else str(claim.evidence)
 
 
-def _reason(claim: Claim, verdict: str, ours: Ours | None, missing: str) -> str:
+def _reason(claim: Claim, verdict: str, ours: Computed | None, missing: str) -> str:
     """What the range is, why ours is outside it or absent, and the notes."""
     told = {
         "outside": [
@@ -202,7 +202,7 @@ def _reason(claim: Claim, verdict: str, ours: Ours | None, missing: str) -> str:
     return "; ".join(part for part in parts if part)
 
 
-def _factor(claim: Claim, ours: Ours | None) -> str:
+def _factor(claim: Claim, ours: Computed | None) -> str:
     """Ours in terms of the paper's value, where both are sizes and not a count or yes or no."""
     printed, fixed = claim.printed, claim.range.low == claim.range.high
     if printed is None or ours is None or fixed or printed <= 0.0 or ours.value < 0.0:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from papers.run import NotComputed, Ours, StudyRun
+from papers.run import Computed, NotComputed, StudyRun
 from papers.selectors import named
 
 VOLUNTEER = "volunteer"
@@ -90,32 +90,34 @@ def task(
     table: str = "tasks",
     scale: float = 1.0,
     **where: Any,
-) -> Ours:
+) -> Computed:
     """A number of the first task of a number: persons are asked the same, so any will do."""
     row = _numbered(run, number, table, **where).iloc[[0]]
     note = f"ours: of {where['specimen']}" if where else ""
-    return Ours(scale * float(_whole(row, column).iloc[0]) + 0.0, note=note)  # no minus nought
+    return Computed(scale * float(_whole(row, column).iloc[0]) + 0.0, note=note)  # no minus nought
 
 
-def task_says(run: StudyRun, number: float, column: str, text: str) -> Ours:
+def task_says(run: StudyRun, number: float, column: str, text: str) -> Computed:
     """Whether tasks.csv has a text for the first task of a number."""
-    return Ours(float(_numbered(run, number, "asked").iloc[0][column] == text))
+    return Computed(float(_numbered(run, number, "asked").iloc[0][column] == text))
 
 
-def hand_load(run: StudyRun, number: float) -> Ours:
+def hand_load(run: StudyRun, number: float) -> Computed:
     """Load in the hands in the first task of a number, kg."""
     return task(run, number, "hand_load_kg")
 
 
-def tasks_of_number(run: StudyRun, number: float) -> Ours:
+def tasks_of_number(run: StudyRun, number: float) -> Computed:
     """How many tasks have a number."""
-    return Ours(float(_numbered(run, number)["task"].nunique()))
+    return Computed(float(_numbered(run, number)["task"].nunique()))
 
 
 # --- Fig 5: pressure in the disc L4L5 -------------------------------------------------------------
 
 
-def pressure_error(run: StudyRun, number: float, tier: str, sideways: float | None = None) -> Ours:
+def pressure_error(
+    run: StudyRun, number: float, tier: str, sideways: float | None = None
+) -> Computed:
     """Computed less measured pressure of the volunteer's task, MPa, of confirmed measurements."""
     rows = _numbered(run, number, specimen=VOLUNTEER) if sideways is None else None
     name = str((_sideways(run, sideways or 0.0) if rows is None else rows.iloc[0])["task"])
@@ -127,18 +129,18 @@ def pressure_error(run: StudyRun, number: float, tier: str, sideways: float | No
     told = f"ours: {computed:.3g} MPa computed, {measured:.3g} MPa measured"
     if status == "from_memory":
         raise NotComputed(f"the measured value is not confirmed; {told} from memory")
-    return Ours(computed - measured, note=f"{told} ({status}, {row['measured_source']})")
+    return Computed(computed - measured, note=f"{told} ({status}, {row['measured_source']})")
 
 
-def agreement(run: StudyRun, column: str, tier: str) -> Ours:
+def agreement(run: StudyRun, column: str, tier: str) -> Computed:
     """Correlation, or root mean square error, of computed and measured pressures."""
     value = run.number("agreement", column, tier=tier)
     note = f"ours: over {run.number('agreement', 'n_tasks', tier=tier):g} tasks"
     if column != "r":
-        return Ours(value, note=note)
+        return Computed(value, note=note)
     row = run.row("agreement", tier=tier)
     low, high = (None if pd.isna(row[end]) else float(row[end]) for end in ("r_low", "r_high"))
-    return Ours(value, low, high, f"{note}; ends: 95 % interval (Fisher)")
+    return Computed(value, low, high, f"{note}; ends: 95 % interval (Fisher)")
 
 
 # --- Fig 6: global extensors in forward flexion ---------------------------------------------------
@@ -162,24 +164,24 @@ def _course(run: StudyRun, group: str) -> pd.DataFrame:
     return forces.groupby(rows["task"].map(tasks)).sum().sort_index()
 
 
-def peaks_between(run: StudyRun, group: str) -> Ours:
+def peaks_between(run: StudyRun, group: str) -> Computed:
     """Whether the active force is largest between upright and full flexion."""
     force = _course(run, group)["active"]
-    return Ours(float(force.iloc[1:-1].max() > max(force.iloc[0], force.iloc[-1])))
+    return Computed(float(force.iloc[1:-1].max() > max(force.iloc[0], force.iloc[-1])))
 
 
-def left_at_full_flexion(run: StudyRun, group: str) -> Ours:
+def left_at_full_flexion(run: StudyRun, group: str) -> Computed:
     """Active force at full flexion over its largest, percent."""
     force = _course(run, group)["active"]
     if force.max() <= 0.0:
         raise NotComputed("the muscle pulls at no angle")
-    return Ours(100.0 * float(force.iloc[-1] / force.max()))
+    return Computed(100.0 * float(force.iloc[-1] / force.max()))
 
 
-def largest_at_full_flexion(run: StudyRun, group: str, force: str) -> Ours:
+def largest_at_full_flexion(run: StudyRun, group: str, force: str) -> Computed:
     """Whether a force is largest at full flexion."""
     course = _course(run, group)[force]
-    return Ours(float(course.iloc[-1] > 0.0 and course.iloc[-1] >= course.max()))
+    return Computed(float(course.iloc[-1] > 0.0 and course.iloc[-1] >= course.max()))
 
 
 # --- Fig 9: loads of four persons in forward flexion ----------------------------------------------
@@ -214,7 +216,7 @@ def _apart(run: StudyRun, column: str, persons: tuple[str, ...]) -> _Apart:
     return _Apart(float(both.index[at]), one, other, len(both))
 
 
-def persons_apart(run: StudyRun, column: str, of: str, pair: bool = True) -> Ours:
+def persons_apart(run: StudyRun, column: str, of: str, pair: bool = True) -> Computed:
     """Loads of two persons where they differ most: `percent`, difference `n`, or the `lighter`'s.
 
     Of the heavier and the lighter of the paper's pair, or of all pairs of the four.
@@ -229,24 +231,24 @@ def persons_apart(run: StudyRun, column: str, of: str, pair: bool = True) -> Our
     )
     difference = found.one_n - found.other_n
     if of != "percent":
-        return Ours(difference if of == "n" else found.other_n, note=note)
+        return Computed(difference if of == "n" else found.other_n, note=note)
     if found.other_n <= 0.0:
         raise NotComputed(f"the load that is compared with is {found.other_n:.3g} N")
-    return Ours(100.0 * difference / found.other_n, note=note)
+    return Computed(100.0 * difference / found.other_n, note=note)
 
 
-def heavier_bears_more(run: StudyRun, column: str) -> Ours:
+def heavier_bears_more(run: StudyRun, column: str) -> Computed:
     """Share of angles at which the heavier of the pair bears more, percent."""
     loads = _loads(run, column, (HEAVIER, LIGHTER)).to_numpy(float)
     share = 100.0 * float((loads[:, 0] > loads[:, 1]).mean())
-    return Ours(share, note=f"ours: {len(loads)} angles")
+    return Computed(share, note=f"ours: {len(loads)} angles")
 
 
-def grows_with_flexion(run: StudyRun, column: str) -> Ours:
+def grows_with_flexion(run: StudyRun, column: str) -> Computed:
     """Whether the pair differs more at the largest angle than upright."""
     loads = _loads(run, column, (HEAVIER, LIGHTER)).to_numpy(float)
     size = np.abs(loads[:, 0] - loads[:, 1])
-    return Ours(float(size[-1] > size[0]))
+    return Computed(float(size[-1] > size[0]))
 
 
 # --- upright, and forces within their bounds ------------------------------------------------------
@@ -261,39 +263,39 @@ def _upright(run: StudyRun, person: str) -> "pd.Series[float]":
     return found[BODIES]
 
 
-def upright(run: StudyRun, person: str, body: str) -> Ours:
+def upright(run: StudyRun, person: str, body: str) -> Computed:
     """Rotation of a body, deg."""
-    return Ours(float(_upright(run, person)[body]))
+    return Computed(float(_upright(run, person)[body]))
 
 
-def ordered_upright(run: StudyRun, person: str) -> Ours:
+def ordered_upright(run: StudyRun, person: str) -> Computed:
     """Whether bodies are turned the more backwards the lower they lie."""
-    return Ours(float((np.diff(_upright(run, person)) > 0.0).all()))
+    return Computed(float((np.diff(_upright(run, person)) > 0.0).all()))
 
 
-def spread_upright(run: StudyRun) -> Ours:
+def spread_upright(run: StudyRun) -> Computed:
     """Largest difference among four persons, deg."""
     apart = np.ptp([_upright(run, person) for person in PERSONS], axis=0)
-    return Ours(float(apart.max()), note=f"ours: at {BODIES[int(apart.argmax())]}")
+    return Computed(float(apart.max()), note=f"ours: at {BODIES[int(apart.argmax())]}")
 
 
-def turned_from_start(run: StudyRun) -> Ours:
+def turned_from_start(run: StudyRun) -> Computed:
     """Largest rotation of a body from the start of Eq 2, deg."""
     rows = run.rows("upright")
-    return Ours(float((rows["upright_deg"] - rows["start_deg"]).abs().max()))
+    return Computed(float((rows["upright_deg"] - rows["start_deg"]).abs().max()))
 
 
-def moments_over_start(run: StudyRun) -> Ours:
+def moments_over_start(run: StudyRun) -> Computed:
     """Sum of moments upright over that at the start of Eq 2, the worst of all persons."""
     columns = ["moment_before_nm", "moment_after_nm"]
     rows = run.rows("upright").dropna(subset=columns)
     sums = rows[columns].abs().groupby(rows["specimen"]).sum()
     if sums.empty or (sums["moment_before_nm"] == 0.0).any():
         raise NotComputed("no moments stand at the start of Eq 2")
-    return Ours(float((sums["moment_after_nm"] / sums["moment_before_nm"]).max()))
+    return Computed(float((sums["moment_after_nm"] / sums["moment_before_nm"]).max()))
 
 
-def largest_slack(run: StudyRun) -> Ours:
+def largest_slack(run: StudyRun) -> Computed:
     """Largest moment that no muscle holds in tasks 1 to 9, N m."""
     rows = run.rows("tasks")
     rows = rows[_numbers(rows).between(1.0, 9.0)]
@@ -301,10 +303,10 @@ def largest_slack(run: StudyRun) -> Ours:
         raise NotComputed("this run's table tasks has none of tasks 1 to 9")
     slack = _whole(rows, "largest_slack_nm")
     worst = rows.iloc[int(slack.to_numpy().argmax())]
-    return Ours(float(slack.max()), note=f"ours: task {worst['task']} of {worst['specimen']}")
+    return Computed(float(slack.max()), note=f"ours: task {worst['task']} of {worst['specimen']}")
 
 
-def out_of_bounds(run: StudyRun) -> Ours:
+def out_of_bounds(run: StudyRun) -> Computed:
     """Fascicles that pull less than passively, or actively beyond the largest stress."""
     stress = run.rows("tasks").set_index(["specimen", "task"])["largest_stress_mpa"]
     rows = run.rows("muscles").dropna(subset=["force_n", "passive_n"])
@@ -314,7 +316,7 @@ def out_of_bounds(run: StudyRun) -> Ours:
     largest = allowed * rows["pcsa_mm2"].to_numpy(float)  # MPa mm2 are N
     active = (rows["force_n"] - rows["passive_n"]).to_numpy(float)
     beyond = (active < -TRIFLE * largest) | (active > (1.0 + TRIFLE) * largest)
-    return Ours(float(beyond.sum()), note=f"ours: of {len(rows)} forces")
+    return Computed(float(beyond.sum()), note=f"ours: of {len(rows)} forces")
 
 
 SELECTORS = named(

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from papers.ranges import IQR_PER_SD, spearman_interval, spearman_threshold, wilson_percent
-from papers.run import NotComputed, Ours, StudyRun
+from papers.run import Computed, NotComputed, StudyRun
 from papers.selectors import named, tested
 
 JOINTS = ("L1L2", "L2L3", "L3L4")
@@ -65,59 +65,59 @@ def _each(where: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield where | dict(zip(several, values, strict=True))
 
 
-def summary(run: StudyRun, column: str, **where: Any) -> Ours:
+def summary(run: StudyRun, column: str, **where: Any) -> Computed:
     """A column of one row, a median with its quartiles; of several rows the largest."""
     value = max(_value(run, column, **one) for one in _each(where))
     if column != "median" or len(list(_each(where))) > 1:
-        return Ours(value)
+        return Computed(value)
     row = run.row("summary", **where)
     low, high = (
         None if pd.isna(row[name]) else float(row[name])
         for name in ("low_quartile", "high_quartile")
     )
-    return Ours(value, low, high)
+    return Computed(value, low, high)
 
 
-def percent_of_median(run: StudyRun, column: str, **where: Any) -> Ours:
+def percent_of_median(run: StudyRun, column: str, **where: Any) -> Computed:
     """A spread as a percentage of its median."""
     middle = _value(run, "median", **where)
     if middle == 0.0:
         raise NotComputed("the median is 0")
-    return Ours(100.0 * _value(run, column, **where) / middle)
+    return Computed(100.0 * _value(run, column, **where) / middle)
 
 
-def ratio(run: StudyRun, column: str, what: str, **where: Any) -> Ours:
+def ratio(run: StudyRun, column: str, what: str, **where: Any) -> Computed:
     """The first of two rows in the second; the filter with two values tells them apart."""
     first, second = (_value(run, column, **one) for one in _each(where))
     if second == 0.0:
         raise NotComputed(f"the {what} is 0")
-    return Ours(first / second)
+    return Computed(first / second)
 
 
-def percent_ratio(run: StudyRun, column: str, what: str, **where: Any) -> Ours:
+def percent_ratio(run: StudyRun, column: str, what: str, **where: Any) -> Computed:
     """The same of spreads in percent of their medians."""
     first, second = (percent_of_median(run, column, **one).value for one in _each(where))
     if second == 0.0:
         raise NotComputed(f"the {what} is 0")
-    return Ours(first / second)
+    return Computed(first / second)
 
 
-def largest_shift(run: StudyRun, column: str, **where: Any) -> Ours:
+def largest_shift(run: StudyRun, column: str, **where: Any) -> Computed:
     """Largest size of a difference between reduced and complete dataset."""
     shifts = (
         _value(run, column, **one, dataset="reduced") - _value(run, column, **one, dataset="all")
         for one in _each(where)
     )
-    return Ours(max(map(abs, shifts)))
+    return Computed(max(map(abs, shifts)))
 
 
-def drop(run: StudyRun, column: str, **where: Any) -> Ours:
+def drop(run: StudyRun, column: str, **where: Any) -> Computed:
     """Complete less reduced dataset."""
     reduced, complete = (_value(run, column, **where, dataset=one) for one in ("reduced", "all"))
-    return Ours(-(reduced - complete))
+    return Computed(-(reduced - complete))
 
 
-def share_lower(run: StudyRun) -> Ours:
+def share_lower(run: StudyRun) -> Computed:
     """Medians and ranges of error of both bootstraps that are lower quasi-static, percent."""
     lower = []
     parts = ("damping_bootstrap", "start_bootstrap")
@@ -128,7 +128,7 @@ def share_lower(run: StudyRun) -> Ours:
             for loading in ("quasi_static", "dynamic")
         )
         lower.append(quasi_static < dynamic)
-    return Ours(100.0 * sum(lower) / len(lower))
+    return Computed(100.0 * sum(lower) / len(lower))
 
 
 def _stiffness_where(part: str, dataset: str, coordinate: str) -> dict[str, str]:
@@ -136,7 +136,7 @@ def _stiffness_where(part: str, dataset: str, coordinate: str) -> dict[str, str]
     return where | {"quantity": "stiffness", "joint": "*", "coordinate": coordinate}
 
 
-def stiffness_range(run: StudyRun, part: str, dataset: str, coordinate: str) -> Ours:
+def stiffness_range(run: StudyRun, part: str, dataset: str, coordinate: str) -> Computed:
     """Range of fitted stiffness, with how many fits end close to the median."""
     where = _stiffness_where(part, dataset, coordinate)
     middle = _value(run, "median", **where)
@@ -145,10 +145,10 @@ def stiffness_range(run: StudyRun, part: str, dataset: str, coordinate: str) -> 
     close = int(((values - middle).abs() <= CLOSE * abs(middle)).sum())
     which = "" if dataset == "all" else ", outliers counted,"
     note = f"ours: {close} of {len(values)} fits{which} within {100.0 * CLOSE:g} % of the median"
-    return Ours(_value(run, "range", **where), note=note)
+    return Computed(_value(run, "range", **where), note=note)
 
 
-def start_over_damping(run: StudyRun, coordinate: str) -> Ours:
+def start_over_damping(run: StudyRun, coordinate: str) -> Computed:
     """Range of stiffness over start values in that over sets of damping."""
     both = [_stiffness_where(part, "all", coordinate) for part in ("start", "damping")]
     start, damping = (_value(run, "range", **where) for where in both)
@@ -156,7 +156,7 @@ def start_over_damping(run: StudyRun, coordinate: str) -> Ours:
     if max(start, damping) < SAME * middle or damping == 0.0:
         told = f"their ranges are {start / middle:.1e} and {damping / middle:.1e} of the median"
         raise NotComputed(f"all fits end in the same stiffness, {told}: no ratio has a meaning")
-    return Ours(start / damping)
+    return Computed(start / damping)
 
 
 # --- what the landmarks' SD, or the load point, would have to be ----------------------------------
@@ -187,7 +187,7 @@ def _at(x: float, xs: np.ndarray, ys: np.ndarray) -> float:
 
 def frame_spread(
     run: StudyRun, printed: float, dataset: str, quantity: str, joint: Any, coordinate: Any
-) -> Ours:
+) -> Computed:
     """Largest interquartile range of cells of joint frames, with the landmark SD of the printed."""
     cells = {"quantity": quantity, "joint": joint, "coordinate": coordinate}
     poses = {"part": "poses", "loading": "equilibrium", "dataset": dataset}
@@ -251,15 +251,15 @@ def _lowered(run: StudyRun, printed: float) -> tuple[float, float]:
     return -shift, float(np.interp(shift, shifts, costs)) / stated
 
 
-def lower_load(run: StudyRun, printed: float) -> Ours:
+def lower_load(run: StudyRun, printed: float) -> Computed:
     """How much lower the load must act for a printed flexion stiffness, mm."""
     lower, cost = _lowered(run, printed)
     worth = "" if cost > 1.0 else ": motion does not speak against it"
     note = f"ours: the cost there is {cost:.2f} times that at the assumed height{worth}"
-    return Ours(lower, note=note)
+    return Computed(lower, note=note)
 
 
-def flexion_stiffness(run: StudyRun, printed: float, **where: Any) -> Ours:
+def flexion_stiffness(run: StudyRun, printed: float, **where: Any) -> Computed:
     """Median of the summary, with where the load would have to act for the printed one."""
     found = summary(run, "median", **where)
     try:
@@ -296,21 +296,21 @@ def _motion(run: StudyRun, joints: tuple[str, ...], column: str) -> "pd.Series[f
     return sizes
 
 
-def best_stiffness(run: StudyRun, coordinate: str) -> Ours:
+def best_stiffness(run: StudyRun, coordinate: str) -> Computed:
     """A stiffness of the best model."""
     best = _best(run)
     if best["joint"] != "*":
         raise NotComputed("stiffness is per joint in this study")
-    return Ours(float(best[STIFFNESS[coordinate]]), note=f"pose {int(best['pose'])}")
+    return Computed(float(best[STIFFNESS[coordinate]]), note=f"pose {int(best['pose'])}")
 
 
-def best_error(run: StudyRun, coordinate: str, joint: str = "") -> Ours:
+def best_error(run: StudyRun, coordinate: str, joint: str = "") -> Computed:
     """Error of the best model at a joint, or the larger of two."""
     joints = (joint,) if joint else MEASURED_JOINTS
-    return Ours(float(_motion(run, joints, f"error_{MOTION[coordinate]}").max()))
+    return Computed(float(_motion(run, joints, f"error_{MOTION[coordinate]}").max()))
 
 
-def best_error_percent(run: StudyRun, coordinate: str) -> Ours:
+def best_error_percent(run: StudyRun, coordinate: str) -> Computed:
     """The larger share of the measured motion."""
     errors, sizes = (
         _motion(run, MEASURED_JOINTS, f"{what}_{MOTION[coordinate]}")
@@ -319,20 +319,20 @@ def best_error_percent(run: StudyRun, coordinate: str) -> Ours:
     shares = (100.0 * errors / sizes[sizes > 0.0]).dropna()
     if shares.empty:
         raise NotComputed(f"no {coordinate} motion was measured")
-    return Ours(float(shares.max()))
+    return Computed(float(shares.max()))
 
 
-def carried_force(run: StudyRun, joint: str) -> Ours:
+def carried_force(run: StudyRun, joint: str) -> Computed:
     """Stiffness times superior motion of a joint in the best model, N."""
     stiffness = best_stiffness(run, "superior")
     motion = float(_motion(run, (joint,), "predicted_superior_mm").max())
-    return Ours(stiffness.value * motion / 1000.0, note=stiffness.note)
+    return Computed(stiffness.value * motion / 1000.0, note=stiffness.note)
 
 
 # --- how many fits succeed ------------------------------------------------------------------------
 
 
-def _rate(count: int, of: int) -> Ours:
+def _rate(count: int, of: int) -> Computed:
     if of == 0:
         raise NotComputed("this run tried no such fit")
     low, high = wilson_percent(count, of)
@@ -341,23 +341,23 @@ def _rate(count: int, of: int) -> Ours:
             f"too few for a rate: {count} of {of} fits, 95 % interval {low:.0f} to {high:.0f} %; "
             f"at least {FEWEST_OF_A_RATE} are needed"
         )
-    return Ours(100.0 * count / of, low, high, f"ours: {count} of {of}")
+    return Computed(100.0 * count / of, low, high, f"ours: {count} of {of}")
 
 
-def successful(run: StudyRun, part: str, loading: str) -> Ours:
+def successful(run: StudyRun, part: str, loading: str) -> Computed:
     """Solved and moved away from the start, outliers included, as the paper counts, percent."""
     row = run.row("counts", part=part, loading=loading)
     failed = int(row[f"near_start_{run.asked['failed_when']}"])
     return _rate(int(row["solved"]) - failed, int(row["fits"]))
 
 
-def kept(run: StudyRun) -> Ours:
+def kept(run: StudyRun) -> Computed:
     """Poses in the reduced dataset, percent."""
     row = run.row("counts", part="poses", loading="equilibrium")
     return _rate(int(row["reduced"]), int(row["fits"]))
 
 
-def successful_by(run: StudyRun, method: str) -> Ours:
+def successful_by(run: StudyRun, method: str) -> Computed:
     """The same of one way of fitting."""
     row = run.row("success_by_method", method=method)
     return _rate(int(row["successful"]), int(row["fits"]))
@@ -366,26 +366,26 @@ def successful_by(run: StudyRun, method: str) -> Ours:
 # --- tests of significance ------------------------------------------------------------------------
 
 
-def rho(run: StudyRun, family: str, response: str, factor: str) -> Ours:
+def rho(run: StudyRun, family: str, response: str, factor: str) -> Computed:
     """A rank correlation, with its own interval."""
     where = {"family": family, "response": response, "factor": factor}
     row = tested(run, "spearman", **where).iloc[0]
     found, n = float(row["effect"]), int(row["n"])
     spread = spearman_interval(found, n) if abs(found) < 1.0 else None
     low, high = (None, None) if spread is None else (spread.low, spread.high)
-    return Ours(found, low, high, f"ours: n = {n}, p = {row['p']:.2g} uncorrected")
+    return Computed(found, low, high, f"ours: n = {n}, p = {row['p']:.2g} uncorrected")
 
 
-def depends_on_motion(run: StudyRun, joint: str, coordinate: str) -> Ours:
+def depends_on_motion(run: StudyRun, joint: str, coordinate: str) -> Computed:
     """Whether an error correlates with the measured motion, which each frame sees otherwise."""
     where = {"joint": joint, "response": f"{coordinate}_error"}
     row = tested(run, "spearman", family="error against motion", **where).iloc[0]
     found = float(row["effect"])
     note = f"ours: rho {found:.2f}, n = {int(row['n'])}, p = {row['p']:.2g} uncorrected"
-    return Ours(float(abs(found) > THRESHOLD), note=note)
+    return Computed(float(abs(found) > THRESHOLD), note=note)
 
 
-def significant_pairs(run: StudyRun, family: str, of: str) -> Ours:
+def significant_pairs(run: StudyRun, family: str, of: str) -> Computed:
     """Pairs of stiffness or error and joint pose beyond the paper's threshold."""
     rows = tested(run, "spearman", family=family)
     rows = rows[rows["response"].isin([f"{name}_{of}" for name in FITTED])]
@@ -394,17 +394,17 @@ def significant_pairs(run: StudyRun, family: str, of: str) -> Ours:
     corrected = int((rows["p_bonferroni"] < P_BELOW).sum())
     note = f"ours: of {len(rows)} tested; {corrected} significant after Bonferroni"
     beyond = float((rows["effect"].abs() > THRESHOLD).sum())
-    return Ours(beyond, note=f"{note} with n = {int(rows['n'].max())}")
+    return Computed(beyond, note=f"{note} with n = {int(rows['n'].max())}")
 
 
-def not_normal(run: StudyRun, responses: Any) -> Ours:
+def not_normal(run: StudyRun, responses: Any) -> Computed:
     """Distributions that are not normal (chi-squared)."""
     rows = tested(run, "chi", family="normality")
     rows = rows[rows["response"].isin(responses)]
     if rows.empty:
         raise NotComputed("no such distribution was tested")
     rejected = int((rows["p"] < P_BELOW).sum())
-    return Ours(float(rejected), note=f"ours: {rejected} of {len(rows)} tested, uncorrected")
+    return Computed(float(rejected), note=f"ours: {rejected} of {len(rows)} tested, uncorrected")
 
 
 def _two_factor(run: StudyRun, kind: str, factor: str, joint: str, error: str) -> pd.DataFrame:
@@ -416,15 +416,15 @@ def _two_factor(run: StudyRun, kind: str, factor: str, joint: str, error: str) -
     return tested(run, test, family=family, factor=f"{factor}_{kind}")
 
 
-def any_significant(run: StudyRun, kind: str, factor: str, joint: str, error: str) -> Ours:
+def any_significant(run: StudyRun, kind: str, factor: str, joint: str, error: str) -> Computed:
     """Whether any test of a cell is significant after Bonferroni."""
     rows = _two_factor(run, kind, factor, joint, error)
     count = int((rows["p_bonferroni"] < P_BELOW).sum())
     note = f"ours: {count} of {len(rows)} tests, family of {int(rows['family_size'].max())}"
-    return Ours(float(count > 0), note=note)
+    return Computed(float(count > 0), note=note)
 
 
-def coefficient(run: StudyRun, kind: str, factor: str, joint: str, error: str) -> Ours:
+def coefficient(run: StudyRun, kind: str, factor: str, joint: str, error: str) -> Computed:
     """Median coefficient of the significant tests of a cell."""
     rows = _two_factor(run, kind, factor, joint, error)
     found = rows.loc[rows["p_bonferroni"] < P_BELOW, "effect"]
@@ -433,33 +433,33 @@ def coefficient(run: StudyRun, kind: str, factor: str, joint: str, error: str) -
         ends = f"{rows['effect'].min():.2f} to {rows['effect'].max():.2f}"
         raise NotComputed(f"{told}; their coefficients run from {ends}")
     note = f"ours: {int((found > 0.0).sum())} of {len(found)} significant ones are positive"
-    return Ours(float(found.median()), float(found.min()), float(found.max()), note)
+    return Computed(float(found.median()), float(found.min()), float(found.max()), note)
 
 
-def number_significant(run: StudyRun, joint: str) -> Ours:
+def number_significant(run: StudyRun, joint: str) -> Computed:
     """Stiffness sets in which the anterior error goes with the extension of the frames."""
     rows = _two_factor(run, "orientation", "extension", joint, "anterior")
-    return Ours(float((rows["p_bonferroni"] < P_BELOW).sum()), note=f"ours: of {len(rows)}")
+    return Computed(float((rows["p_bonferroni"] < P_BELOW).sum()), note=f"ours: of {len(rows)}")
 
 
-def largest_share(run: StudyRun, factor: str) -> Ours:
+def largest_share(run: StudyRun, factor: str) -> Computed:
     """Poses in which a stiffness correlates with an error, the largest of six cells, percent."""
     cells = []
     for joint, error in product(MEASURED_JOINTS, FITTED):
         rows = _two_factor(run, "stiffness", factor, joint, error)
         cells.append(100.0 * float((rows["p_bonferroni"] < P_BELOW).mean()))
-    return Ours(max(cells), min(cells), max(cells), "ours: smallest to largest of six cells")
+    return Computed(max(cells), min(cells), max(cells), "ours: smallest to largest of six cells")
 
 
-def friedman(run: StudyRun, factor: str) -> Ours:
+def friedman(run: StudyRun, factor: str) -> Computed:
     """Largest p of tests of errors between levels of a factor."""
     rows = tested(run, "friedman", family="friedman", factor=factor)
     corrected = float(rows["p_bonferroni"].max())
     note = f"ours: {len(rows)} tests; after Bonferroni at most {corrected:.2g}"
-    return Ours(float(rows["p"].max()), note=note)
+    return Computed(float(rows["p"].max()), note=note)
 
 
-def pose_in_tree(run: StudyRun, joint: str, coordinate: str) -> Ours:
+def pose_in_tree(run: StudyRun, joint: str, coordinate: str) -> Computed:
     """Share of the joint pose in the regression tree of an error."""
     rows = run.rows("importance", joint=joint, coordinate=coordinate)
     known = rows.dropna(subset=["importance"])
@@ -468,10 +468,10 @@ def pose_in_tree(run: StudyRun, joint: str, coordinate: str) -> Ours:
         raise NotComputed(str(rows.iloc[0]["message"]) or "the pruned tree has no split")
     pose = float(known.loc[known["factor"] == "pose", "importance"].sum())
     first = known.iloc[0]
-    return Ours(pose / total, note=f"ours: {int(first['leaves'])} leaves, r2 {first['r2']:.2f}")
+    return Computed(pose / total, note=f"ours: {int(first['leaves'])} leaves, r2 {first['r2']:.2f}")
 
 
-def pose_in_variance(run: StudyRun, joint: str, coordinate: str) -> Ours:
+def pose_in_variance(run: StudyRun, joint: str, coordinate: str) -> Computed:
     """Variance of an error due to the joint pose, of that due to pose or stiffness alone."""
     pose, stiffness = (
         run.number("variance_shares", "share", factor=one, joint=joint, coordinate=coordinate)
@@ -480,47 +480,47 @@ def pose_in_variance(run: StudyRun, joint: str, coordinate: str) -> Ours:
     if pose + stiffness == 0.0:
         raise NotComputed("neither factor alone explains any variance")
     note = f"ours: pose {pose:.2f}, stiffness {stiffness:.2f}, rest interaction"
-    return Ours(pose / (pose + stiffness), note=note)
+    return Computed(pose / (pose + stiffness), note=note)
 
 
 # --- how precise landmarks must be ----------------------------------------------------------------
 
 
-def required_sd(run: StudyRun) -> Ours:
+def required_sd(run: StudyRun) -> Computed:
     """Largest landmark SD per axis that keeps the limits, mm; an end of the sampled ones else."""
     row = run.row("required_precision", stiffness="calibrated", motion="both")
     if pd.notna(row["sd_mm"]):
         ends = (row["sd_low_mm"], row["sd_high_mm"])
         low, high = (None if pd.isna(end) else float(end) for end in ends)
         note = f"ours: for {100.0 * row['share']:g} % of poses"
-        return Ours(float(row["sd_mm"]), low, high, note)
+        return Computed(float(row["sd_mm"]), low, high, note)
     message = str(row["message"])
     sampled = run.rows("landmark_precision", stiffness="calibrated")["sd_mm"]
     if "will do" in message:
-        return Ours(float(sampled.max()), note=f"ours is a lower end: {message}")
+        return Computed(float(sampled.max()), note=f"ours is a lower end: {message}")
     if sampled.min() >= PER_AXIS_MM:
         raise NotComputed(message)
-    return Ours(float(sampled.min()), note=f"ours is an upper end: {message}")
+    return Computed(float(sampled.min()), note=f"ours is an upper end: {message}")
 
 
-def share_below(run: StudyRun, motion: str, limit: float) -> Ours:
+def share_below(run: StudyRun, motion: str, limit: float) -> Computed:
     """Poses with errors below a limit at the sampled SD nearest to the paper's, percent."""
     rows = run.rows("landmark_precision", stiffness="calibrated", motion=motion)
     row = rows.iloc[int((rows["sd_mm"] - PER_AXIS_MM).abs().to_numpy().argmin())]
     if row["limit"] != limit:
         raise NotComputed(f"this study's limit is {row['limit']:g}")
     share, low, high = (100.0 * float(row[n]) for n in ("below", "below_low", "below_high"))
-    return Ours(share, low, high, f"ours: SD {row['sd_mm']:g} mm, {int(row['n'])} poses")
+    return Computed(share, low, high, f"ours: SD {row['sd_mm']:g} mm, {int(row['n'])} poses")
 
 
-def midpoint_iqr(run: StudyRun) -> Ours:
+def midpoint_iqr(run: StudyRun) -> Computed:
     """IQR of a joint origin midway between two endplate centres, mm."""
     landmarks = run.rows("landmarks")
     centres = landmarks[landmarks["landmark"].str.contains("endplate")]["sd_mm"].unique()
     if len(centres) != 1:
         raise NotComputed("endplate centres have different SDs in this run, or none")
     sd = float(centres[0])
-    return Ours(IQR_PER_SD * sd / sqrt(2.0), note=f"ours: {IQR_PER_SD:.3f} x {sd:g} / sqrt 2")
+    return Computed(IQR_PER_SD * sd / sqrt(2.0), note=f"ours: {IQR_PER_SD:.3f} x {sd:g} / sqrt 2")
 
 
 SELECTORS = named(

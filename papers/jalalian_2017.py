@@ -11,7 +11,7 @@ angle of each patient's main curve as it is on the erect film.
 import numpy as np
 import pandas as pd
 
-from papers.run import NotComputed, Ours, StudyRun
+from papers.run import Computed, NotComputed, StudyRun
 from papers.selectors import named
 
 MODELS = ("tangent", "linear_regions")
@@ -19,7 +19,7 @@ BELOW = ("below_0.2", "0.2_to_0.8")
 """Ranges of a rotation that end at 0.8 of the published end, or below."""
 
 
-def least_error_at(run: StudyRun, table: str, column: str, **where: str) -> Ours:
+def least_error_at(run: StudyRun, table: str, column: str, **where: str) -> Computed:
     """The enlargement of the smallest error, mean over patients."""
     rows = run.rows(table, varied="enlargement", **where)
     known = rows.drop_duplicates([name for name in ("specimen", "value") if name in rows])
@@ -27,20 +27,20 @@ def least_error_at(run: StudyRun, table: str, column: str, **where: str) -> Ours
     if by_value.empty:
         raise NotComputed("no enlargement has an error")
     told = ", ".join(f"{value:g} % {error:.3g}" for value, error in by_value.items())
-    return Ours(float(by_value.index[int(np.argmin(by_value))]), note=f"ours: {told} deg")
+    return Computed(float(by_value.index[int(np.argmin(by_value))]), note=f"ours: {told} deg")
 
 
-def below_the_end(run: StudyRun) -> Ours:
+def below_the_end(run: StudyRun) -> Computed:
     """Share of rotations on held-out films below 0.8 of the published end, percent."""
     rows = run.rows("by_range", films="held_out", model="tangent")
     counts = rows.groupby("range")["n"].sum()
     if not counts["all"]:
         raise NotComputed("nothing was held out")
     note = f"ours: {int(counts['beyond'])} of {int(counts['all'])} beyond the end"
-    return Ours(100.0 * float(counts.reindex(BELOW).sum()) / float(counts["all"]), note=note)
+    return Computed(100.0 * float(counts.reindex(BELOW).sum()) / float(counts["all"]), note=note)
 
 
-def error(run: StudyRun, column: str, unit: str, **where: str) -> Ours:
+def error(run: StudyRun, column: str, unit: str, **where: str) -> Computed:
     """An error of table `accuracy`, beside mean less and plus SD of the patients' own errors."""
     value = run.number("accuracy", column, **where)
     row = run.row("accuracy", **where)
@@ -49,7 +49,7 @@ def error(run: StudyRun, column: str, unit: str, **where: str) -> Ours:
     )
     told = f"ours: reading the films alone makes {noise:.2g} {unit}" if noise > 0.0 else ""
     low, high = (mean - sd, mean + sd) if np.isfinite(sd) else (None, None)
-    return Ours(value, low, high, told)
+    return Computed(value, low, high, told)
 
 
 def _against_the_bend(run: StudyRun, films: str, model: str) -> "pd.Series[float]":
@@ -62,13 +62,13 @@ def _against_the_bend(run: StudyRun, films: str, model: str) -> "pd.Series[float
     return sizes
 
 
-def error_against_the_bend(run: StudyRun, films: str, model: str, of: str) -> Ours:
+def error_against_the_bend(run: StudyRun, films: str, model: str, of: str) -> Computed:
     """Mean or SD of those errors."""
     sizes = _against_the_bend(run, films, model)
     mean, sd = float(sizes.mean()), float(sizes.std(ddof=0))
     if of == "sd":
-        return Ours(sd)
-    return Ours(mean, mean - sd, mean + sd, f"ours: {len(sizes)} rotations")
+        return Computed(sd)
+    return Computed(mean, mean - sd, mean + sd, f"ours: {len(sizes)} rotations")
 
 
 # --- by how much tangent laws are better, percent -------------------------------------------------
@@ -85,19 +85,19 @@ def _reduction(run: StudyRun, measure: str, column: str, films: str) -> float:
     return _less(*(run.number("accuracy", column, **where, model=model) for model in MODELS))
 
 
-def reduction(run: StudyRun, measure: str, column: str, films: str) -> Ours:
+def reduction(run: StudyRun, measure: str, column: str, films: str) -> Computed:
     """Of an error of table `accuracy`."""
-    return Ours(_reduction(run, measure, column, films))
+    return Computed(_reduction(run, measure, column, films))
 
 
-def reduction_of_both(run: StudyRun, measure: str) -> Ours:
+def reduction_of_both(run: StudyRun, measure: str) -> Computed:
     """The mean of the reductions on fitted and on held-out films."""
     both = [_reduction(run, measure, "mean_of_patients", one) for one in ("fitted", "held_out")]
     told = f"ours: {both[0]:.0f} % on fitted, {both[1]:.0f} % on held-out films"
-    return Ours(0.5 * sum(both), min(both), max(both), told)
+    return Computed(0.5 * sum(both), min(both), max(both), told)
 
 
-def reduction_in_range(run: StudyRun, films: str, range: str) -> Ours:
+def reduction_in_range(run: StudyRun, films: str, range: str) -> Computed:
     """Of rotations by their share of the published end, with and against the bend together."""
     sizes = []
     for model in MODELS:
@@ -109,12 +109,12 @@ def reduction_in_range(run: StudyRun, films: str, range: str) -> Ours:
         squares = known["rmse_deg"].to_numpy(float) ** 2
         sizes.append(float(np.sqrt((counts * squares).sum() / counts.sum())))
     rows = run.rows("by_range", films=films, range=range, model=MODELS[0])
-    return Ours(_less(*sizes), note=f"ours: {int(rows['n'].sum())} rotations")
+    return Computed(_less(*sizes), note=f"ours: {int(rows['n'].sum())} rotations")
 
 
-def reduction_against_the_bend(run: StudyRun, films: str) -> Ours:
+def reduction_against_the_bend(run: StudyRun, films: str) -> Computed:
     """Of the mean error of segments that turn against a bend."""
-    return Ours(_less(*(float(_against_the_bend(run, films, one).mean()) for one in MODELS)))
+    return Computed(_less(*(float(_against_the_bend(run, films, one).mean()) for one in MODELS)))
 
 
 SELECTORS = named(

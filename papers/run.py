@@ -13,7 +13,7 @@ class NotComputed(Exception):
 
 
 @dataclass(frozen=True)
-class Ours:
+class Computed:
     """Our value, the ends of our range where there is one, and what a reader must know."""
 
     value: float

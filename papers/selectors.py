@@ -6,9 +6,9 @@ from typing import Any
 
 import pandas as pd
 
-from papers.run import NotComputed, Ours, StudyRun
+from papers.run import Computed, NotComputed, StudyRun
 
-Selector = Callable[..., Ours]
+Selector = Callable[..., Computed]
 
 
 def selectors_of(paper: str) -> dict[str, Selector]:
@@ -23,16 +23,16 @@ def named(*selectors: Selector) -> dict[str, Selector]:
 
 def number(
     run: StudyRun, value: float, low: float | None = None, high: float | None = None
-) -> Ours:
+) -> Computed:
     """A value that the paper's other numbers give, whatever the run."""
-    return Ours(value, low, high)
+    return Computed(value, low, high)
 
 
-def setting(run: StudyRun, name: str) -> Ours:
+def setting(run: StudyRun, name: str) -> Computed:
     """A setting of the study, or a number that the product has of its own."""
     if run.asked.get(name) is None:
         raise NotComputed(f"this study states no {name.replace('_', ' ')}")
-    return Ours(float(run.asked[name]))
+    return Computed(float(run.asked[name]))
 
 
 def cell(
@@ -43,22 +43,22 @@ def cell(
     high: str = "",
     scale: float = 1.0,
     **where: Any,
-) -> Ours:
+) -> Computed:
     """One cell, and cells of the same row that are its ends."""
     value = run.number(table, column, **where)
     row = run.row(table, **where)
     ends = [None if not name or pd.isna(row[name]) else float(row[name]) for name in (low, high)]
-    return Ours(scale * value, ends[0], ends[1])
+    return Computed(scale * value, ends[0], ends[1])
 
 
-def equals(run: StudyRun, table: str, column: str, text: Any, **where: Any) -> Ours:
+def equals(run: StudyRun, table: str, column: str, text: Any, **where: Any) -> Computed:
     """Whether a cell has a text."""
-    return Ours(float(run.row(table, **where)[column] == text))
+    return Computed(float(run.row(table, **where)[column] == text))
 
 
-def distinct(run: StudyRun, table: str, column: str, **where: Any) -> Ours:
+def distinct(run: StudyRun, table: str, column: str, **where: Any) -> Computed:
     """How many values a column has."""
-    return Ours(float(run.rows(table, **where)[column].nunique()))
+    return Computed(float(run.rows(table, **where)[column].nunique()))
 
 
 def reduced(
@@ -69,11 +69,11 @@ def reduced(
     ends: bool = False,
     scale: float = 1.0,
     **where: Any,
-) -> Ours:
+) -> Computed:
     """Mean, median, largest ... of a column's numbers; its ends, the least and the largest."""
     values = filled(run.rows(table, **where), column)
     low, high = (float(values.min()), float(values.max())) if ends else (None, None)
-    return Ours(scale * float(values.agg(by)), low, high)
+    return Computed(scale * float(values.agg(by)), low, high)
 
 
 def tested(run: StudyRun, test: str, **where: Any) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from papers.run import NotComputed, Ours, StudyRun
+from papers.run import Computed, NotComputed, StudyRun
 from papers.selectors import filled, named
 
 CONSTRAINED = "ik_constrained_"
@@ -64,7 +64,7 @@ def first_of(run: StudyRun, table: str, names: Any, column: str = "approach") ->
 # --- errors against X-rays in stance --------------------------------------------------------------
 
 
-def error_in_stance(run: StudyRun, measure: str, approaches: Any, best: bool = True) -> Ours:
+def error_in_stance(run: StudyRun, measure: str, approaches: Any, best: bool = True) -> Computed:
     """Our error of what stands for an approach, the best or the worst of several, and whose it is.
 
     Means over persons and stances. Where the run has none of the paper's sets of ratios, others
@@ -82,7 +82,7 @@ def error_in_stance(run: StudyRun, measure: str, approaches: Any, best: bool = T
         wanted = ", ".join(several(approaches))
         raise NotComputed(f"this run has no {wanted} in stance with a truth")
     name = (min if best else max)(named, key=lambda name: there[name])
-    return Ours(there[name], note="; ".join(part for part in (name, _ratios(name)) if part))
+    return Computed(there[name], note="; ".join(part for part in (name, _ratios(name)) if part))
 
 
 def _ratios(name: str) -> str:
@@ -96,10 +96,10 @@ def _ratios(name: str) -> str:
     )
 
 
-def range_of_errors(run: StudyRun, measure: str, approaches: Any) -> Ours:
+def range_of_errors(run: StudyRun, measure: str, approaches: Any) -> Computed:
     """The worst approach less the best."""
     low, high = (error_in_stance(run, measure, approaches, best).value for best in (True, False))
-    return Ours(high - low)
+    return Computed(high - low)
 
 
 def smaller_error(
@@ -109,7 +109,7 @@ def smaller_error(
     other: Any,
     one_best: bool = True,
     other_best: bool = True,
-) -> Ours:
+) -> Computed:
     """Whether an approach has a smaller error than another, where persons tell it."""
     unit = measure.rpartition("_")[2]
     first = error_in_stance(run, measure, one, one_best)
@@ -126,7 +126,7 @@ def smaller_error(
     return _told(first.value < second.value, (means[0] - means[1]).dropna(), told, unit)
 
 
-def _told(holds: bool, apart: "pd.Series[float]", told: str, unit: str) -> Ours:
+def _told(holds: bool, apart: "pd.Series[float]", told: str, unit: str) -> Computed:
     """What an order hangs on: means of ours, as told, and by how much persons (N,) differ.
 
     Raises
@@ -141,7 +141,7 @@ def _told(holds: bool, apart: "pd.Series[float]", told: str, unit: str) -> Ours:
         raise NotComputed(f"fewer than {LEAST_PERSONS} persons tell no order; {told}")
     if abs(mean) < sd:
         raise NotComputed(f"not told: the difference is smaller than its spread; {found}")
-    return Ours(float(holds), note=found)
+    return Computed(float(holds), note=found)
 
 
 # --- motions --------------------------------------------------------------------------------------
@@ -177,31 +177,31 @@ def motion(
     by: str = "",
     value: str = "mean",
     **where: Any,
-) -> Ours:
+) -> Computed:
     """Mean or largest of a column, means over persons or joints first; its ends."""
     found, approach = _of_approach(run, table, column, kinds, approaches, by, "mean", **where)
     note = f"{approach}, {found.idxmax()}; means over persons" if value == "max" else approach
-    return Ours(float(found.agg(value)), float(found.min()), float(found.max()), note)
+    return Computed(float(found.agg(value)), float(found.min()), float(found.max()), note)
 
 
-def likeness(run: StudyRun, kind: str, approaches: Any) -> Ours:
+def likeness(run: StudyRun, kind: str, approaches: Any) -> Computed:
     """How alike persons share a motion among joints."""
     found, approach = _of_approach(
         run, "similarity", "cmc", kind, approaches, "", "mean", window="20-80"
     )
-    return Ours(float(found.mean()), note=approach)
+    return Computed(float(found.mean()), note=approach)
 
 
-def seconds(run: StudyRun, approaches: Any) -> Ours:
+def seconds(run: StudyRun, approaches: Any) -> Computed:
     """Processor time of a motion, and how much faster than the paper's fastest."""
     kinds = ("flexion_extension", "lateral_bending")
     found = motion(run, "fits", "cpu_s", kinds, approaches)
     factor = FASTEST_S / found.value
     faster = f"; {factor:.0f} times faster than the paper's fastest" if factor > 1.0 else ""
-    return Ours(found.value, found.low, found.high, found.note + faster)
+    return Computed(found.value, found.low, found.high, found.note + faster)
 
 
-def along_the_spine(run: StudyRun, low: float, high: float, approaches: Any) -> Ours:
+def along_the_spine(run: StudyRun, low: float, high: float, approaches: Any) -> Computed:
     """How far a lumbar vertebra slides, of the joint farthest outside a window with two ends."""
     found, approach = _of_approach(
         *(run, "ranges", "range", "flexion_extension", approaches, "joint", "mean"),
@@ -210,7 +210,7 @@ def along_the_spine(run: StudyRun, low: float, high: float, approaches: Any) -> 
     )
     inside = int(found.between(low, high).sum())
     note = f"{approach}; {inside} of {len(found)} joints inside"
-    return Ours(_farthest(found, low, high), float(found.min()), float(found.max()), note)
+    return Computed(_farthest(found, low, high), float(found.min()), float(found.max()), note)
 
 
 def _farthest(values: Any, low: float, high: float) -> float:
@@ -229,7 +229,7 @@ def differs(
     sign: float,
     unit: str,
     **where: Any,
-) -> Ours:
+) -> Computed:
     """Whether persons have more (sign 1) or less (-1) by inverse kinematics than by dynamics."""
     (one, _), (other, approach) = (
         _of_approach(run, table, column, kinds, names, "specimen", how, **where)
@@ -240,17 +240,17 @@ def differs(
     return _told(bool(sign * apart.mean() > 0.0), apart, told, unit)
 
 
-def largest_of_third_set(run: StudyRun) -> Ours:
+def largest_of_third_set(run: StudyRun) -> Computed:
     """Largest rotation of a joint with the third set of ratios, taken as Shojaei 2017."""
     rows = run.rows("ranges", unit="deg")
     rows = rows[rows["approach"] == SETS[-1]]
     if rows.empty:
         raise NotComputed("these ratios are printed in no text at hand, and no other set is theirs")
     largest = rows.iloc[int(rows["range"].to_numpy(float).argmax())]
-    return Ours(float(largest["range"]), note=f"{largest['approach']}, {largest['joint']}")
+    return Computed(float(largest["range"]), note=f"{largest['approach']}, {largest['joint']}")
 
 
-def shares(run: StudyRun, kind: str, approaches: Any, pattern: str) -> Ours:
+def shares(run: StudyRun, kind: str, approaches: Any, pattern: str) -> Computed:
     """Whether a pattern holds of lumbar joints' mean shares: `largest_L2L3`, or `down`."""
     approach = first_of(run, "sharing", approaches)
     rows = of_kind(run, "sharing", kind, approach=approach, window="20-80")
@@ -273,7 +273,7 @@ def shares(run: StudyRun, kind: str, approaches: Any, pattern: str) -> Ours:
     whole = [own for own in persons if own.notna().all()]
     few = "" if len(whole) >= LEAST_PERSONS else ", too few to tell it"
     agreeing = f"so in {sum(map(holds, whole))} of {len(whole)} persons{few}"
-    return Ours(float(holds(mean)), note=f"ours: {told}; {agreeing}")
+    return Computed(float(holds(mean)), note=f"ours: {told}; {agreeing}")
 
 
 # --- passive elements -----------------------------------------------------------------------------
@@ -291,16 +291,16 @@ def _beside_generic(run: StudyRun, laws: Any) -> pd.DataFrame:
     return both
 
 
-def multiplier(run: StudyRun, laws: Any, low: float, high: float) -> Ours:
+def multiplier(run: StudyRun, laws: Any, low: float, high: float) -> Computed:
     """Parameter A or B over the generic one, the one farthest outside a window."""
     rows = _beside_generic(run, laws)
     found = np.concatenate([rows[name] / rows[f"{name}_generic"] for name in ("a", "b")])
     note = f"median {np.median(found):.3g}; sides that were loaded, {rows['law'].iloc[0]}"
     value = float(np.exp(_farthest(np.log(found), np.log(low), np.log(high))))
-    return Ours(value, float(found.min()), float(found.max()), note)
+    return Computed(value, float(found.min()), float(found.max()), note)
 
 
-def mostly_softer(run: StudyRun, laws: Any) -> Ours:
+def mostly_softer(run: StudyRun, laws: Any) -> Computed:
     """Whether most sides are less stiff at a low moment than generic ones, k = B (F + A)."""
     rows = _beside_generic(run, laws)
     a, b = rows["a_generic"], rows["b_generic"]
@@ -312,50 +312,50 @@ def mostly_softer(run: StudyRun, laws: Any) -> Ours:
     return _most(ratio < 1.0, ratio, f"; {below:.0%} below the lower end of generic ones")
 
 
-def mostly_stiffer(run: StudyRun, laws: Any) -> Ours:
+def mostly_stiffer(run: StudyRun, laws: Any) -> Computed:
     """Whether most sides are stiffer at a high moment than generic ones."""
     ratio = _beside_generic(run, laws)["ratio_to_generic"].to_numpy(float)
     return _most(ratio > 1.0, ratio, "")
 
 
-def _most(holds: Any, ratio: Any, further: str) -> Ours:
+def _most(holds: Any, ratio: Any, further: str) -> Computed:
     share, alike = float(np.mean(holds)), float(np.mean(np.abs(ratio - 1.0) < HARDLY))
     note = (
         f"ours: {share:.0%} of {len(ratio)} sides that were loaded{further}; ratio "
         f"{np.median(ratio):.3g} (median), {ratio.min():.3g} to {ratio.max():.3g}; "
         f"{alike:.0%} differ by less than {HARDLY:.0%}"
     )
-    return Ours(float(share > 0.5), note=note)
+    return Computed(float(share > 0.5), note=note)
 
 
-def low_moment(run: StudyRun) -> Ours:
+def low_moment(run: StudyRun) -> Computed:
     """Passive moment at which the low stiffness is read, k / B - A, N m."""
     rows = run.rows("stiffness").dropna(subset=["at_low_moment"])
     rows = rows[rows["b"] > 0.0]
     if rows.empty:
         raise NotComputed("this run has no stiffness at a low moment")
     found = rows["at_low_moment"] / rows["b"] - rows["a"]
-    return Ours(float(found.median()), float(found.min()), float(found.max()))
+    return Computed(float(found.median()), float(found.min()), float(found.max()))
 
 
 # --- cohort ---------------------------------------------------------------------------------------
 
 
-def all_motions(run: StudyRun) -> Ours:
+def all_motions(run: StudyRun) -> Computed:
     """Whether each person stands, bends forwards and back, and sideways."""
     kinds = run.rows("trials").groupby("specimen")["kind"].agg(set)
     wanted = {"stance", "flexion_extension", "lateral_bending"}
-    return Ours(float(all(wanted <= own for own in kinds)))
+    return Computed(float(all(wanted <= own for own in kinds)))
 
 
-def markers(run: StudyRun, vertebra: str) -> Ours:
+def markers(run: StudyRun, vertebra: str) -> Computed:
     """Markers of the first person on a vertebra; none is no fault."""
-    return Ours(float((_first(run)["vertebra"] == vertebra).sum()))
+    return Computed(float((_first(run)["vertebra"] == vertebra).sum()))
 
 
-def marked_vertebrae(run: StudyRun) -> Ours:
+def marked_vertebrae(run: StudyRun) -> Computed:
     """Vertebrae of the first person that have a marker."""
-    return Ours(float(len(set(_first(run)["vertebra"].dropna()) - {"S1"})))
+    return Computed(float(len(set(_first(run)["vertebra"].dropna()) - {"S1"})))
 
 
 def _first(run: StudyRun) -> pd.DataFrame:
@@ -363,10 +363,10 @@ def _first(run: StudyRun) -> pd.DataFrame:
     return rows[rows["specimen"] == rows["specimen"].iloc[0]]
 
 
-def moving(run: StudyRun, approaches: Any) -> Ours:
+def moving(run: StudyRun, approaches: Any) -> Computed:
     """Coordinates of a joint that move."""
     rows = run.rows("ranges", approach=first_of(run, "ranges", approaches))
-    return Ours(float(rows[rows["range"] > 0.0]["coordinate"].nunique()))
+    return Computed(float(rows[rows["range"] > 0.0]["coordinate"].nunique()))
 
 
 SELECTORS = named(

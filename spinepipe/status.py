@@ -37,7 +37,7 @@ class PrescribedStatus(StrEnum):
 
 
 class Balanced(StrEnum):
-    """Outcome of finding the muscle forces of a trunk (`spinepipe.muscles.settle`)."""
+    """Outcome of finding the muscle forces of a trunk (`spinepipe.muscles.muscle_equilibrium`)."""
 
     CONVERGED = "converged"
     BEYOND_STRENGTH = "beyond_strength"

@@ -26,7 +26,7 @@ STANDARD_GRAVITY = np.array([0.0, -9.81, 0.0])
 MM_PER_M = 1000.0
 DEG_PER_RAD = float(np.rad2deg(1.0))
 
-BORDER_PER_SI = np.array([MM_PER_M] * 3 + [DEG_PER_RAD] * 3)
+DISPLAY_PER_SI = np.array([MM_PER_M] * 3 + [DEG_PER_RAD] * 3)
 """(6,) what one SI unit of each coordinate is in file units (mm, deg)."""
 
 COORDINATE_COLUMNS = tuple(
@@ -51,15 +51,15 @@ STIFFNESS_UNITS = {name: "N/m" if name in TRANSLATIONS else "N m/rad" for name i
 
 def to_si(coordinates: ArrayLike) -> NDArray[np.float64]:
     """(…, 6) coordinates in mm and deg to m and rad."""
-    return np.asarray(coordinates, dtype=float) / BORDER_PER_SI
+    return np.asarray(coordinates, dtype=float) / DISPLAY_PER_SI
 
 
 def from_si(coordinates: ArrayLike) -> NDArray[np.float64]:
     """(…, 6) coordinates in m and rad to mm and deg."""
-    return np.asarray(coordinates, dtype=float) * BORDER_PER_SI
+    return np.asarray(coordinates, dtype=float) * DISPLAY_PER_SI
 
 
-def less_step_0(motion: NDArray[np.float64], zeroed: bool) -> NDArray[np.float64]:
+def subtract_baseline(motion: NDArray[np.float64], zeroed: bool) -> NDArray[np.float64]:
     """(T, ...) motion by load step, or what is linear in it, as it is read: zeroed or not."""
     return motion - motion[0] if zeroed else motion
 

@@ -21,7 +21,7 @@ from spinepipe.calibrate.solvers import by_record
 from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.status import Status
 
 At = Callable[[Array], Evaluation]
@@ -420,7 +420,7 @@ def tipped(problem: Problem, at: At, start: Array) -> str:
     x = np.where(stiffness, problem.upper, start)
     why: object = at(x).message
     if problem.course is None:
-        stiffest = moved(problem.model, problem.free, x)
+        stiffest = with_parameters(problem.model, problem.free, x)
         why = by_record(stiffest, [measured.case for measured in problem.cases])
     return f"{TIPPED} ({why})" if isinstance(why, str) else TIPPED
 
@@ -440,7 +440,7 @@ def bounds_reached(problem: Problem, x: Array) -> Array:
 
 def values(problem: Problem, x: Array) -> Array:
     """(m,) value of each unknown's first row, SI."""
-    effects = moved(problem.model, problem.free, x).effects
+    effects = with_parameters(problem.model, problem.free, x).effects
     return np.array([effects[p.effect].values[p.rows[0], p.column] for p in problem.free])
 
 

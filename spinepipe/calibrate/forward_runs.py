@@ -45,8 +45,8 @@ from spinepipe.calibrate.problem import Evaluator, Problem
 from spinepipe.calibrate.solvers import steps_alone
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
-from spinepipe.statics import Course, moved, no_settling, observe
-from spinepipe.statics.many import Moving, Stack, survey
+from spinepipe.statics import Course, no_settling, observe, with_parameters
+from spinepipe.statics.batched import Moving, Stack, forward_kinematics
 from spinepipe.status import Status
 
 ABSOLUTE_SHARE = 0.1
@@ -105,7 +105,7 @@ class _Motion:
         if q.tobytes() == self._pose:
             return
         held = self.bound.held(q)
-        seen = survey(self.stack.chains, self.stack.loads, q, held.tangent)
+        seen = forward_kinematics(self.stack.chains, self.stack.loads, q, held.tangent)
         self._missing = seen.applied - held.load
         self._moving = Moving.of(self.stack.chains, self.stack.loads.chain, seen)
         self._pose = q.tobytes()
@@ -157,7 +157,7 @@ class ForwardCost(Evaluator):
         return forward_run(model, case, self.duration_s, self.accuracy)
 
     def _run(self, x: Array) -> float:
-        model = moved(self.problem.model, self.problem.free, x)
+        model = with_parameters(self.problem.model, self.problem.free, x)
         known: dict[bytes, Array | None] = {}  # cycles repeat their loads
         total = 0.0
         for number, system in enumerate(self._systems):

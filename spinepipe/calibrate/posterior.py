@@ -22,7 +22,7 @@ from scipy.special import ndtr, ndtri
 from spinepipe.calibrate.problem import Evaluation, Evaluator
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.units import BORDER_PER_SI
+from spinepipe.units import DISPLAY_PER_SI
 
 ARRIVED = 1e-3
 """A mode is reached where a Newton step would lower the energy by less: a twentieth of an SD."""
@@ -97,7 +97,7 @@ def noise_of(evaluator: Evaluator, sd: Array, scatter: float) -> ResidualNoise:
     ValueError
         Where both are zero for a coordinate that is read.
     """
-    variance = evaluator.problem.weights * (BORDER_PER_SI * sd) ** 2 + scatter**2
+    variance = evaluator.problem.weights * (DISPLAY_PER_SI * sd) ** 2 + scatter**2
     if np.any(variance[evaluator.coordinate] <= 0.0):
         raise ValueError("neither an error of readings nor a scatter of residuals is known")
     return ResidualNoise(variance, evaluator.coordinate)

@@ -28,11 +28,11 @@ from spinepipe.statics import (
     FreeParameter,
     System,
     declared,
-    moved,
     no_settling,
     observe,
+    with_parameters,
 )
-from spinepipe.units import BORDER_PER_SI, less_step_0
+from spinepipe.units import DISPLAY_PER_SI, subtract_baseline
 from spinepipe.world import Chain
 
 OF_PRIOR = -1
@@ -154,7 +154,7 @@ class Evaluator:
         alone = np.full(len(priors), -1)
         shared = sharing(problem.cases, self._used, problem.correlated)
         self.sharing = np.concatenate([shared, alone])
-        self._scale = np.sqrt(problem.weights) * BORDER_PER_SI
+        self._scale = np.sqrt(problem.weights) * DISPLAY_PER_SI
         self._solver: AtRest | Settling
         if beside is not None:
             self._solver = beside._solver
@@ -204,7 +204,10 @@ class Evaluator:
             Where the engine differs by more than rounding.
         """
         found, problem = self.at(x), self.problem
-        model, cases = moved(problem.model, problem.free, x), [c.case for c in problem.cases]
+        model, cases = (
+            with_parameters(problem.model, problem.free, x),
+            [c.case for c in problem.cases],
+        )
         poses = held_against(
             self._solver.record(x, problem.model), model, cases, found.poses, SAME_POSE
         )
@@ -225,12 +228,12 @@ class Evaluator:
     def _residual(self, number: int, seen: Array) -> Array:
         """(N,) weighted residuals of the readings (T, J, 6) of one case that enter the cost."""
         measured = self.problem.cases[number]
-        errors = less_step_0(seen, measured.zeroed) - measured.measured
+        errors = subtract_baseline(seen, measured.zeroed) - measured.measured
         return self._entering(number, errors * self._scale)
 
     def _jacobian(self, number: int, by_x: Array) -> Array:
         """(N, m) derivative of the residuals of one case, from that of its readings."""
-        seen = less_step_0(by_x, self.problem.cases[number].zeroed)
+        seen = subtract_baseline(by_x, self.problem.cases[number].zeroed)
         return self._entering(number, seen * self._scale[:, None])
 
     def _entering(self, number: int, errors: Array) -> Array:

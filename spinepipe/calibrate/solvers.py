@@ -10,9 +10,9 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.statics import Course, FreeParameter, System, follow, moved, retrace
-from spinepipe.statics.many import Stack, poses_by, readings, readings_by, settle
-from spinepipe.statics.settling import STEP
+from spinepipe.statics import Course, FreeParameter, System, follow, retrace, with_parameters
+from spinepipe.statics.batched import Stack, poses_by, readings, readings_by, settle
+from spinepipe.statics.transient import STEP
 from spinepipe.world import Chain
 
 
@@ -89,7 +89,10 @@ class AtRest:
         models : of each point, where they are not all of this one; they differ from it in numbers.
         """
         models = models or [self._model] * len(points)
-        there = [moved(model, self._free, x) for model, (_, x) in zip(models, points, strict=True)]
+        there = [
+            with_parameters(model, self._free, x)
+            for model, (_, x) in zip(models, points, strict=True)
+        ]
         stack, unknowns = self._stacks.of(models, there), [self._free] * len(points)
         found = stack.solve(self._guesses(points, models, stack), why=False)
         q = np.where(np.isnan(found.q), 0.0, found.q)
@@ -134,7 +137,7 @@ class AtRest:
         """
         model = model or self._model
         self.start_at(model, x)
-        there, first = moved(model, self._free, x), self._first.get(id(model))
+        there, first = with_parameters(model, self._free, x), self._first.get(id(model))
         if first is None:
             return by_record(there, self._cases)
         ends = np.cumsum([len(case.steps) for case in self._cases[:-1]])
@@ -160,7 +163,7 @@ class _Stacks:
 class Settling:
     """Poses a time after each load step came on, from rest in the neutral pose.
 
-    Derivatives are differences over the same steps in time, see `spinepipe.statics.settling`.
+    Derivatives are differences over the same steps in time, see `spinepipe.statics.transient`.
     """
 
     def __init__(
@@ -200,10 +203,15 @@ class Settling:
         models : of each point, where they are not all of this one; they differ from it in numbers.
         """
         models = models or [self._model] * len(points)
-        bases = [moved(model, self._free, x) for model, (_, x) in zip(models, points, strict=True)]
+        bases = [
+            with_parameters(model, self._free, x)
+            for model, (_, x) in zip(models, points, strict=True)
+        ]
         steps = STEP * np.eye(len(self._free))
         runs = [
-            one for base in bases for one in (base, *(moved(base, self._free, s) for s in steps))
+            one
+            for base in bases
+            for one in (base, *(with_parameters(base, self._free, s) for s in steps))
         ]
         count, each = len(self._cases), 1 + len(steps)
         stack = self._stacks.of([model for model in models for _ in range(each)], runs)
@@ -232,7 +240,7 @@ class Settling:
     def record(self, x: Array, model: SpineModel | None = None) -> tuple[Array, ...] | str:
         """The poses (T, n) of every case by the engine of record, over the steps of `solve`."""
         model = model or self._model
-        there, sizes = moved(model, self._free, x), self._sizes[id(model), x.tobytes()]
+        there, sizes = with_parameters(model, self._free, x), self._sizes[id(model), x.tobytes()]
         chain = Chain(there)
         ends = []
         for case, taken in zip(self._cases, sizes, strict=True):

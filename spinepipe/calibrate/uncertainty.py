@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from spinepipe.calibrate.problem import OF_PRIOR, Evaluation, Problem, shared_sums
 from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array
-from spinepipe.units import BORDER_PER_SI
+from spinepipe.units import DISPLAY_PER_SI
 
 RANK_TOLERANCE = 1e-8
 """Directions whose singular value is this far below the largest leave no trace in the data."""
@@ -58,7 +58,7 @@ def declared_deviation(problem: Problem, coordinate: NDArray[np.int64], noise: A
 
     That of a prior is 1: it is in SDs as it is.
     """
-    scale = np.sqrt(problem.weights) * BORDER_PER_SI * noise
+    scale = np.sqrt(problem.weights) * DISPLAY_PER_SI * noise
     deviation: Array = np.where(coordinate == OF_PRIOR, 1.0, scale[coordinate])
     return deviation
 

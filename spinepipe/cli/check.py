@@ -16,8 +16,8 @@ from spinepipe.marks import mark_in
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
-from spinepipe.studies.doubts import doubts, refusals
 from spinepipe.studies.free import unmeasured
+from spinepipe.studies.plausibility import doubts, refusals
 from spinepipe.studies.read import ReadCohort
 from spinepipe.studies.registry import PACKAGE, every_form, files_of, kind_of
 from spinepipe.studies.study import COHORTS, Study

@@ -13,7 +13,7 @@ from spinepipe.calibrate import Problem, fit
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, MeasuredCase, ScopedEffect, SpineModel
-from spinepipe.motion.asked import SHAPE, Ask, watched
+from spinepipe.motion.objective import SHAPE, Ask, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import postures
 from spinepipe.motion.skeleton import BODIES as TRACKED
@@ -23,11 +23,11 @@ from spinepipe.muscles import pose
 from spinepipe.muscles.diaphragm import AREA_M2
 from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, JointLaws
 from spinepipe.muscles.masses import masses_of
+from spinepipe.muscles.muscle_equilibrium import held
 from spinepipe.muscles.myo_sim import source_of_myo_sim
 from spinepipe.muscles.passive_muscle import PassiveMuscle
 from spinepipe.muscles.paths import Lines, Standoff
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import held
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import BODIES, LEVELS

@@ -8,7 +8,7 @@ from spinepipe.cli.find import specimen_of, study_names, unknown
 from spinepipe.files import appearing
 from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.studies import read as studies
-from spinepipe.studies.kind import Wanted
+from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.registry import PACKAGE, every_kind, kind_of
 
 
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
         able = one_of([name for name, other in every_kind().items() if other.exports])
         why = kind.why_no_export or "choose such a study"
         raise InputError([_problem("STUDY", f"kind {study.kind}", f"a study of kind {able}", why)])
-    wanted = Wanted(
+    wanted = WantedFiles(
         root=options.root,
         results=options.root / "results" / study.study,
         specimen=specimen_of(cohort, options.specimen),

@@ -11,7 +11,7 @@ from math import isnan, sqrt
 import numpy as np
 
 from spinepipe.cohort.draft import Draft
-from spinepipe.cohort.exchanged_landmarks import Suspect, suspect
+from spinepipe.cohort.swapped_landmarks import Suspect, suspect
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.frames import joint_pose

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.cohort.answers import joint_loads
 from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.load_response import joint_loads
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose

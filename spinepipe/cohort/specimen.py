@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.kept import kept_with_cohort
+from spinepipe.cohort.memoize import kept_with_cohort
 from spinepipe.decomposition import eigh
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array

@@ -17,7 +17,7 @@ from spinepipe.cohort.cohort import Cohort, MeasurementSd
 from spinepipe.documents.names import EVERYONE
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, Support
-from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, COORDINATES
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, DISPLAY_PER_SI
 
 FREE, HELD, PRESCRIBED = "free", "held", "prescribed"
 STATES = (FREE, HELD, PRESCRIBED)
@@ -98,7 +98,7 @@ def _read_as(sd: MeasurementSd | None) -> Mapping[int, float | None]:
         return dict.fromkeys(range(6))
     pairs = [(sd.translation_mm, sd.force_n)] * 3 + [(sd.rotation_deg, sd.moment_nm)] * 3
     return {
-        number: None if load is None else moved / float(BORDER_PER_SI[number]) / load
+        number: None if load is None else moved / float(DISPLAY_PER_SI[number]) / load
         for number, (moved, load) in enumerate(pairs)
     }
 

@@ -24,7 +24,7 @@ from spinepipe.jobs.run_lock import AtWork, lock
 from spinepipe.marks import mark_in
 from spinepipe.problems import InputError
 from spinepipe.studies import read as studies
-from spinepipe.studies.doubts import doubts, refusals
+from spinepipe.studies.plausibility import doubts, refusals
 from spinepipe.studies.registry import kind_names, modules_of_many
 from spinepipe.studies.study_files import StudyFiles
 

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.units import BORDER_PER_SI, COORDINATES
+from spinepipe.units import COORDINATES, DISPLAY_PER_SI
 
 GIVEN = "given"
 """Status of rows of a cohort's own table that tells none."""
@@ -51,5 +51,5 @@ def coordinate_places(rows: pd.DataFrame) -> NDArray[np.int64]:
 
 def per_si(coordinates: NDArray[np.int64]) -> NDArray[np.float64]:
     """(N,) what one m or rad is in mm or deg."""
-    found: NDArray[np.float64] = BORDER_PER_SI[coordinates]
+    found: NDArray[np.float64] = DISPLAY_PER_SI[coordinates]
     return found

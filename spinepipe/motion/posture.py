@@ -12,10 +12,10 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.articulated import damped_steps
-from spinepipe.motion.asked import SHAPE, Ask, Watched
+from spinepipe.motion.objective import SHAPE, Ask, Watched
 from spinepipe.motion.points import COUNT, joints_of, marker_places
+from spinepipe.motion.residual_terms import Markers, MuscleDemand, beyond
 from spinepipe.motion.skeleton import PELVIS
-from spinepipe.motion.terms import Markers, MuscleDemand, beyond
 
 MOST_STEPS = 400
 SHORTEST = 1e-7

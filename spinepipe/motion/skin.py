@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.asked import SHAPE, ResidualScales, Watched
+from spinepipe.motion.objective import SHAPE, ResidualScales, Watched
 from spinepipe.motion.skeleton import PELVIS, body_poses
 
 WHOLE_BEND_RAD = float(np.deg2rad(60.0))

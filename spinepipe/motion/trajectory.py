@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import dgemm
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.asked import Ask, Watched
 from spinepipe.motion.banded import REACH, Band, BandFactor, bordered_step
+from spinepipe.motion.objective import Ask, Watched
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.points import COUNT
+from spinepipe.motion.residual_terms import Markers, MuscleDemand, beyond
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.motion.terms import Markers, MuscleDemand, beyond
 from spinepipe.status import Status
 
 MOST_STEPS = 200

@@ -1,7 +1,7 @@
 """Fascicles of a trunk in a posture: how long they are and what they do to the bodies.
 
 Straight lines and via points as the source has them. Fascicles that lie on the vertebrae they pass
-run over bars behind those (`spinepipe.muscles.strings`). A bar stands at a share of the fascicle's
+run over bars behind those (`spinepipe.muscles.wrapping`). A bar stands at a share of the fascicle's
 distance from the vertebra in the source's pose, so that it touches when the trunk bends; and no
 nearer than the arches of the vertebrae let a muscle come, where the source's own line does.
 
@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.pose import BodyPoses, crossed
-from spinepipe.muscles.strings import tight
 from spinepipe.muscles.trunk import (
     BODIES,
     NO_BODY,
@@ -28,6 +27,7 @@ from spinepipe.muscles.trunk import (
     Trunk,
     body_of,
 )
+from spinepipe.muscles.wrapping import wrap_path
 
 _SACRUM = 0
 
@@ -104,7 +104,7 @@ class Lines:
         muscles, bars = self.trunk.muscles, self.bars
         points = self._points(poses)
         turned = poses.rotations[bars.body]
-        lengths, forces, moments, contacts, pushes, trace, traced, on = tight(
+        lengths, forces, moments, contacts, pushes, trace, traced, on = wrap_path(
             points,
             muscles.body,
             bars.first,

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
+from spinepipe.muscles.muscle_equilibrium import SolvedTask
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import SolvedTask
 from spinepipe.muscles.trunk import LEVELS
 
 LENGTH_M = 0.05

@@ -4,8 +4,8 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.forces import most_along
+from spinepipe.muscles.muscle_equilibrium import SolvedTask
 from spinepipe.muscles.person import above
-from spinepipe.muscles.settle import SolvedTask
 from spinepipe.muscles.trunk import LEVELS
 
 _EXTENSION = 2

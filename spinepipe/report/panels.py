@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from spinepipe.report.marks import BAR_PT
+from spinepipe.report.glyphs import BAR_PT
 from spinepipe.report.style import GREY, blank
 from spinepipe.report.words import tick
 

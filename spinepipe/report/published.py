@@ -8,7 +8,7 @@ from spinepipe.anatomy import published
 
 
 @dataclass(frozen=True)
-class Rebuilt:
+class Reproduction:
     """A paper and its cohort.
 
     Attributes

@@ -8,11 +8,12 @@ from spinepipe.statics.sensitivity import (
     by_parameters,
     declared,
     free_parameters,
-    moved,
     observe,
     observed_by_parameters,
+    with_parameters,
 )
-from spinepipe.statics.settling import (
+from spinepipe.statics.system import Balance, Loading, Slots, System
+from spinepipe.statics.transient import (
     Course,
     Program,
     TransientResult,
@@ -21,7 +22,6 @@ from spinepipe.statics.settling import (
     retrace,
     settle,
 )
-from spinepipe.statics.system import Balance, Loading, Slots, System
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -43,7 +43,6 @@ __all__ = [
     "follow",
     "free_parameters",
     "move",
-    "moved",
     "no_settling",
     "observe",
     "observed_by_parameters",
@@ -51,4 +50,5 @@ __all__ = [
     "reactions_by",
     "retrace",
     "settle",
+    "with_parameters",
 ]

@@ -27,7 +27,7 @@ from scipy.linalg import eigvals
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf
 
 from spinepipe.effects.contract import Array, Indices, straight_over
-from spinepipe.statics.holding import States
+from spinepipe.statics.joint_forces import States
 from spinepipe.statics.system import Loading, System
 from spinepipe.status import Status
 from spinepipe.units import COORDINATES

@@ -8,7 +8,7 @@ from spinepipe.effects import Advance
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
 from spinepipe.statics.equilibrium import Equilibrium, LUFactors, solve
-from spinepipe.statics.holding import States, states_after
+from spinepipe.statics.joint_forces import States, states_after
 from spinepipe.statics.system import Loading, System
 
 
@@ -82,5 +82,5 @@ def _advance(system: System, q: Array, states: States) -> dict[int, Advance]:
         return {}
     joints = q.reshape(-1, 6)
     if system.geometry:
-        joints = system.placed(q, with_parameters=False).q
+        joints = system.placed(q, by_parameters=False).q
     return states_after(joints, system.laws, states)

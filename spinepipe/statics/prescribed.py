@@ -27,14 +27,14 @@ from numpy.typing import NDArray
 from spinepipe.effects import EffectKind, JointLaw
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import SpineModel
+from spinepipe.statics.batched.dynamics import add_cross
+from spinepipe.statics.batched.forward_kinematics import Plain, compiled, placed
 from spinepipe.statics.equilibrium import (
     FIRST_INCREMENT,
     LARGEST_ROTATION,
     SMALLEST_FRACTION,
     STEP_TOLERANCE,
 )
-from spinepipe.statics.many.dynamics import add_cross
-from spinepipe.statics.many.survey import Plain, compiled, placed
 from spinepipe.status import PrescribedStatus
 
 Flags = NDArray[np.bool_]

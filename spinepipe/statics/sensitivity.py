@@ -13,8 +13,8 @@ import numpy as np
 from spinepipe.effects import Parameter
 from spinepipe.effects.contract import Array, MeasurementContext
 from spinepipe.model import SpineModel
-from spinepipe.statics.holding import ActivePath, Law
-from spinepipe.statics.instruments import beside, followed, passed, read, read_by
+from spinepipe.statics.joint_forces import ActivePath, Law
+from spinepipe.statics.measurement_model import beside, followed, passed, read, read_by
 from spinepipe.statics.path import SolvedStep
 from spinepipe.statics.system import ActiveMeasurement, System
 
@@ -40,8 +40,8 @@ class FreeParameter:
 
     def derivative(self, values: Array) -> Array:
         """(len(rows),) derivative of the moved values by the unknown."""
-        moved: Array = values[list(self.rows), self.column]
-        return moved if self.logarithmic else np.ones(len(self.rows))
+        by_logarithm: Array = values[list(self.rows), self.column]
+        return by_logarithm if self.logarithmic else np.ones(len(self.rows))
 
 
 def free_parameters(
@@ -83,7 +83,7 @@ def declared(model: SpineModel, free: FreeParameter) -> Parameter:
     return model.effects[free.effect].effect.parameters[free.column]
 
 
-def moved(model: SpineModel, free: Sequence[FreeParameter], x: Array) -> SpineModel:
+def with_parameters(model: SpineModel, free: Sequence[FreeParameter], x: Array) -> SpineModel:
     """The model with its unknowns moved by x from where they are (log or absolute)."""
     values = {p.effect: model.effects[p.effect].values.copy() for p in free}
     for parameter, change in zip(free, x, strict=True):
@@ -171,7 +171,7 @@ def _advance(
     """Derivatives of the states after the step: by pose, parameter, earlier state and carried."""
     if not step.advances:
         return {}
-    placed = system.placed(step.equilibrium.q, with_parameters=True)
+    placed = system.placed(step.equilibrium.q, by_parameters=True)
     joints_by_x = np.einsum(
         "jab,jbm->jam", placed.by_coordinate, dq.reshape(len(dq) // 6, 6, len(free))
     )
@@ -288,8 +288,8 @@ def observed_by_parameters(
             if parameter.effect == active.index:
                 rows = _joints_moved(parameter, active.per_joint)
                 weights = parameter.derivative(active.values)
-                moved = own[rows, :, parameter.column] * weights[:, None]
-                by_x[active.joints[rows], :, column] += moved
+                by_parameters = own[rows, :, parameter.column] * weights[:, None]
+                by_x[active.joints[rows], :, column] += by_parameters
         joints[active.joints] = seen.q
     return by_x
 

@@ -22,19 +22,19 @@ from spinepipe.effects import (
 )
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.statics.holding import (
+from spinepipe.statics.joint_forces import (
     ActiveLaw,
     ActivePath,
     Holding,
     HoldingDerivatives,
     Law,
     States,
-    hold,
+    assemble_joint_forces,
 )
-from spinepipe.statics.holding import differentiate as differentiate_holding
-from spinepipe.statics.instruments import Instrument
+from spinepipe.statics.joint_forces import differentiate as differentiate_holding
+from spinepipe.statics.joint_kinematics import ActiveGeometry, JointKinematics, place
+from spinepipe.statics.measurement_model import Instrument
 from spinepipe.statics.motion import ChainMotion, cross_matrix, dead_tangent
-from spinepipe.statics.placement import ActiveGeometry, JointKinematics, place
 from spinepipe.world import Chain
 
 
@@ -241,15 +241,17 @@ class System:
         stiffness[self._blocks] += holding.tangent
         return Balance(holding.load.ravel() - applied, stiffness)
 
-    def placed(self, q: Array, with_parameters: bool) -> JointKinematics:
+    def placed(self, q: Array, by_parameters: bool) -> JointKinematics:
         """Coordinates seen by the laws at q (n,)."""
-        return place(q.reshape(-1, 6), self.geometry, with_parameters)
+        return place(q.reshape(-1, 6), self.geometry, by_parameters)
 
     def _hold(self, q: Array, states: States) -> Holding:
         if not self.geometry:
             unmoved = JointKinematics(q.reshape(-1, 6), _NOTHING, _NOTHING, {})
-            return hold(unmoved, self.laws, states, moved=False)
-        return hold(self.placed(q, with_parameters=False), self.laws, states, moved=True)
+            return assemble_joint_forces(unmoved, self.laws, states, moved=False)
+        return assemble_joint_forces(
+            self.placed(q, by_parameters=False), self.laws, states, moved=True
+        )
 
     def residual(self, q: Array, loading: Loading, states: States) -> Array:
         """Residual alone at q (n,), at half the price of a balance."""
@@ -333,7 +335,7 @@ class System:
 
     def derivatives(self, q: Array, states: States) -> HoldingDerivatives:
         """Derivatives of the holding loads by all parameters and states, at fixed q (n,)."""
-        return differentiate_holding(self.placed(q, with_parameters=True), self.laws, states)
+        return differentiate_holding(self.placed(q, by_parameters=True), self.laws, states)
 
     def load_derivative(self, q: Array, loading: Loading, active: ActiveLoad) -> Array:
         """(n, R, P) derivative of the residual by a load effect's parameters."""

@@ -6,10 +6,10 @@ from pathlib import Path
 from spinepipe.model import SpineModel
 from spinepipe.model.osim import expressible, osim
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.studies.kind import Wanted
+from spinepipe.studies.kind import WantedFiles
 
 
-def refuse(wanted: Wanted, *, poses: bool = False, representations: bool = False) -> None:
+def refuse(wanted: WantedFiles, *, poses: bool = False, representations: bool = False) -> None:
     """Refuse what a kind of study does not have.
 
     Parameters
@@ -26,7 +26,7 @@ def refuse(wanted: Wanted, *, poses: bool = False, representations: bool = False
         raise InputError(problems)
 
 
-def _options(wanted: Wanted, poses: bool, representations: bool) -> Iterator[InputProblem]:
+def _options(wanted: WantedFiles, poses: bool, representations: bool) -> Iterator[InputProblem]:
     if wanted.pose is not None and not poses:
         allowed = "none: this kind of study exports no sampled joints"
         yield problem("--pose", f"pose {wanted.pose}", allowed, "leave it out")

@@ -12,7 +12,7 @@ import numpy as np
 
 from spinepipe.anatomy.stiffness_range import middle
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.answers import UNSURE_M, joint_loads
+from spinepipe.cohort.load_response import UNSURE_M, joint_loads
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.documents.yaml_text import read_yaml
 from spinepipe.effects.contract import Array

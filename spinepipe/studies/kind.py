@@ -76,7 +76,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedFiles:
     """Which model of a study is asked for.
 
     Attributes
@@ -112,7 +112,7 @@ class Kind:
     ignored_by_figures : settings that no figure looks at.
     makes_models : the job that writes model files on which other studies may build.
     exports : ``file:function`` of what makes OpenSim's document of a specimen; called with study,
-        cohort and what is `Wanted`, it returns the document, and in words what it is.
+        cohort and what is `WantedFiles`, it returns the document, and in words what it is.
     why_no_export : where it has none, why, as a sentence.
     forms : files of a cohort's folder that it reads besides those of every cohort.
     holds : whether it solves tests in which a rig fixes joint coordinates (supports.csv).

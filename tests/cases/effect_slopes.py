@@ -15,9 +15,9 @@ from spinepipe.statics import (
     declared,
     follow,
     free_parameters,
-    moved,
     observe,
     observed_by_parameters,
+    with_parameters,
 )
 from spinepipe.world import Chain
 
@@ -90,7 +90,9 @@ def unknowns(model: SpineModel) -> tuple[FreeParameter, ...]:
 
 def reported(system: System, free: tuple[FreeParameter, ...] = (), x: Array | None = None) -> Array:
     """(T, J, 6) solved afresh and reported, with the unknowns moved by x."""
-    other = fresh(system).with_model(moved(system.model, free, np.zeros(0) if x is None else x))
+    other = fresh(system).with_model(
+        with_parameters(system.model, free, np.zeros(0) if x is None else x)
+    )
     steps = follow(other)
     assert all(step.usable for step in steps)
     return np.stack([observe(other, step.equilibrium.q, k) for k, step in enumerate(steps)])

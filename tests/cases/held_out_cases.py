@@ -10,16 +10,16 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.search.base import base_parameters
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit, BaselineModels, fit_baseline
 from spinepipe.studies.discrepancy.search.gaps import gaps_at, whole_gap
-from spinepipe.studies.discrepancy.search.grounds import BaselineModels, Grounds, laid
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
-from spinepipe.studies.discrepancy.search.inquiry import SearchResult
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.prediction import Simulated
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.search.search_state import SearchResult
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
@@ -30,7 +30,7 @@ CORRELATION = 0.3
 MOMENTS_NM = np.arange(6.0)
 AXES = {"flexion": (2, -1.0), "extension": (2, 1.0), "bending": (0, 1.0)}
 NONE = NuisancePriors(*[0.0] * 8)
-ZONE = Form(Variant("neutral_zone", ()), PlaceSpread.SHARED)
+ZONE = CandidateForm(Variant("neutral_zone", ()), PlaceSpread.SHARED)
 ZONE_VALUES = np.array([0.6, 0.03, 12.0])
 
 
@@ -103,17 +103,17 @@ def read(
     return tuple(found)
 
 
-def grounds(readings: Sequence[SpecimenReadings], priors: NuisancePriors = NONE) -> Grounds:
+def grounds(readings: Sequence[SpecimenReadings], priors: NuisancePriors = NONE) -> BaselineFit:
     models = {one.specimen: chain(one.specimen, 50.0) for one in readings}
     base = {name: base_parameters(m, "per_specimen", ROTATIONS) for name, m in models.items()}
-    return laid(readings, noise(), priors, BaselineModels(models, base, 100.0), at_once)
+    return fit_baseline(readings, noise(), priors, BaselineModels(models, base, 100.0), at_once)
 
 
-def found(base: Grounds, zone: bool, spread: PlaceSpread = PlaceSpread.SHARED) -> SearchResult:
+def found(base: BaselineFit, zone: bool, spread: PlaceSpread = PlaceSpread.SHARED) -> SearchResult:
     """A search that ended with a neutral zone, or with nothing."""
     final = base
     if zone:
-        guess = Supposed(replace(ZONE, spread=spread), np.array([0.4, 0.04, 12.0]))
+        guess = ActiveTerm(replace(ZONE, spread=spread), np.array([0.4, 0.04, 12.0]))
         final = base.at(joint_fit(base.suppose((guess,)), base.setting))
     lack = LackOfFit(0.0, np.zeros(1), "own", "extension", PlaceSpread.SHARED, 0.0, {}, at={})
     gaps = whole_gap(base, base.fit), whole_gap(final, final.fit)

@@ -12,7 +12,7 @@ import spring_chain_cases as chains
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit, fit_baseline
 from spinepipe.studies.discrepancy.search.noise import estimated_noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
@@ -52,8 +52,8 @@ def alike(centre_m: Array) -> dict[str, Array]:
     return {name: np.tile(centre_m, (len(JOINTS), 1)) for name in SPECIMENS}
 
 
-def grounds_of(given: list[SpecimenReadings], priors: NuisancePriors | None = None) -> Grounds:
+def grounds_of(given: list[SpecimenReadings], priors: NuisancePriors | None = None) -> BaselineFit:
     """The base fitted, noise from the repeats."""
     noise = estimated_noise(given, None, zeroed=False, outliers=0)
     assert noise is not None
-    return laid(given, noise, priors or NuisancePriors(), chains.start(given), at_once)
+    return fit_baseline(given, noise, priors or NuisancePriors(), chains.start(given), at_once)

@@ -15,12 +15,12 @@ from example_effects import loaded, spine
 from trunk_person import tasks, volunteer
 
 import spinepipe
-from spinepipe.muscles.settle import How, held
+from spinepipe.muscles.muscle_equilibrium import SolverOptions, held
 from spinepipe.muscles.stability import stiffness
 from spinepipe.statics import Course
-from spinepipe.statics.many import Stack, settle
+from spinepipe.statics.batched import Stack, settle
 
-_AT_ONCE = How(change=np.inf, residual_nm=np.inf, most=1)
+_AT_ONCE = SolverOptions(change=np.inf, residual_nm=np.inf, most=1)
 
 
 @contextmanager

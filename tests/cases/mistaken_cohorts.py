@@ -13,7 +13,7 @@ from mistaken_cases import Mistake
 
 from spinepipe import cohort as cohorts
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.studies.doubts import suspicions
+from spinepipe.studies.plausibility import suspicions
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, make
 from tests.generators.phantom import phantom

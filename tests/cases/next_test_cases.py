@@ -11,8 +11,13 @@ from search_cases import exponential
 from spinepipe.effects import PlaceSpread
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.design.plans import summed_loads
-from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Trials, trials
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit, fit_baseline
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    ActiveTerm,
+    CandidateForm,
+    Trials,
+    trials,
+)
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
@@ -64,9 +69,11 @@ def readings(seed: int, added: Sequence[LoadCase] = (), added_seed: int = 0):
     ]
 
 
-def grounds_of(given: Sequence[SpecimenReadings], priors: NuisancePriors | None = None) -> Grounds:
+def grounds_of(
+    given: Sequence[SpecimenReadings], priors: NuisancePriors | None = None
+) -> BaselineFit:
     """The base fitted, noise as it is."""
-    return laid(given, NOISE, priors or NuisancePriors(), chains.start(given), at_once)
+    return fit_baseline(given, NOISE, priors or NuisancePriors(), chains.start(given), at_once)
 
 
 def tried(effects: Sequence[str]) -> Mapping[str, Trials]:
@@ -74,7 +81,7 @@ def tried(effects: Sequence[str]) -> Mapping[str, Trials]:
     return {one.effect: one for one in trials(effects, ROTATIONS, tuple(STIFFNESS), JOINTS)}
 
 
-def shared_form(trials: Trials, **options: str) -> Form:
+def shared_form(trials: Trials, **options: str) -> CandidateForm:
     """The form with these options whose values are the same everywhere."""
     return next(
         form
@@ -84,7 +91,7 @@ def shared_form(trials: Trials, **options: str) -> Form:
     )
 
 
-def fitted(grounds: Grounds, trials: Trials, form: Form) -> Refit:
+def fitted(grounds: BaselineFit, trials: Trials, form: CandidateForm) -> Refit:
     """The form beside the base, from a third of its typical strength."""
     start = []
     for p in form.variant.create().parameters:
@@ -94,7 +101,7 @@ def fitted(grounds: Grounds, trials: Trials, form: Form) -> Refit:
             start.append(p.off * (p.default / p.off) ** 0.3)
         else:
             start.append(p.off + 0.3 * (p.default - p.off))
-    return refit(grounds, Supposed(form, np.array(start)), trials)
+    return refit(grounds, ActiveTerm(form, np.array(start)), trials)
 
 
 def scaled_case(test: str, factor: float) -> LoadCase:

@@ -8,14 +8,14 @@ import spring_chain_cases as chains
 from numpy.typing import NDArray
 from spring_chain_cases import Yield
 
-from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit, fit_baseline
 from spinepipe.studies.discrepancy.search.hypothesis import trials
-from spinepipe.studies.discrepancy.search.inquiry import Rules, SearchResult
 from spinepipe.studies.discrepancy.search.noise import estimated_noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.search import search
+from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
@@ -76,11 +76,11 @@ def readings(
     return chains.readings(seed, laws, specimens, joints=JOINTS)
 
 
-def grounds_of(given: Sequence[SpecimenReadings]) -> Grounds:
+def grounds_of(given: Sequence[SpecimenReadings]) -> BaselineFit:
     """The base fitted, noise from the repeats, nuisances as large as by default."""
     noise = estimated_noise(given, None, zeroed=False, outliers=0)
     assert noise is not None
-    return laid(given, noise, NuisancePriors(), chains.start(given), at_once)
+    return fit_baseline(given, noise, NuisancePriors(), chains.start(given), at_once)
 
 
 def searched(

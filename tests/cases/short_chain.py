@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from moving_spine import everywhere, law, spine
 
-from spinepipe.motion.asked import Ask, ForceCost, Watched, watched
+from spinepipe.motion.objective import Ask, ForceCost, Watched, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import MarkerSet, MarkerTrial, Masses, Skeleton
 

@@ -7,11 +7,11 @@ from spinepipe.effects import PlaceSpread, Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
-from spinepipe.studies.discrepancy.design.seen import seen_in
+from spinepipe.studies.discrepancy.design.fisher_information import seen_in
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
 from spinepipe.studies.discrepancy.search.base import BUSHING, DAMPING, base_parameters
-from spinepipe.studies.discrepancy.search.grounds import BaselineModels, Grounds, laid
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant, trials
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit, BaselineModels, fit_baseline
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant, trials
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.prediction import Simulated
@@ -61,7 +61,7 @@ def grounds_of(
     sd: float = float(np.deg2rad(0.1)),
     priors: NuisancePriors | None = None,
     specimens: int = 1,
-) -> Grounds:
+) -> BaselineFit:
     """The grounds of readings that the base makes without error."""
     readings, models = [], {}
     for name in "abc"[:specimens]:
@@ -78,10 +78,10 @@ def grounds_of(
     driven = [("extension", "right_bending", "left_rotation")[list(AXES).index(t)] for t in tests]
     base = {name: base_parameters(model, grouping, driven) for name, model in models.items()}
     start = BaselineModels(models, base, 100.0)
-    return laid(readings, noise, priors or NuisancePriors(), start, at_once)
+    return fit_baseline(readings, noise, priors or NuisancePriors(), start, at_once)
 
 
-def judged(grounds: Grounds, effects) -> dict[str, Judgement]:
+def judged(grounds: BaselineFit, effects) -> dict[str, Judgement]:
     tried = tried_in(grounds, effects) if isinstance(effects[0], str) else effects
     joints = next(iter(grounds.fit.models.values())).n_joints
     of = {name: seen_in(grounds, name, tried) for name in grounds.readings}
@@ -89,12 +89,12 @@ def judged(grounds: Grounds, effects) -> dict[str, Judgement]:
     return {one.effect: one for one in found}
 
 
-def tried_in(grounds: Grounds, effects) -> tuple[Trials, ...]:
+def tried_in(grounds: BaselineFit, effects) -> tuple[Trials, ...]:
     joints = next(iter(grounds.fit.models.values())).n_joints
     return trials(effects, ROTATIONS, tuple(grounds.readings), joints)
 
 
-def revealed(grounds: Grounds, effect: str) -> str:
+def revealed(grounds: BaselineFit, effect: str) -> str:
     """The test that would tell."""
     tried = tried_in(grounds, [effect])
     found = list(judged(grounds, tried).values())
@@ -105,4 +105,4 @@ def revealed(grounds: Grounds, effect: str) -> str:
 def only(effect: str, **options) -> Trials:
     """An effect in one variant, the same at all joints."""
     variant = Variant(effect, tuple(options.items()))
-    return Trials(effect, (variant,), (Form(variant, PlaceSpread.SHARED),))
+    return Trials(effect, (variant,), (CandidateForm(variant, PlaceSpread.SHARED),))

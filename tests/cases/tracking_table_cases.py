@@ -18,10 +18,10 @@ from spinepipe.motion.skeleton import BODIES, JOINTS
 from spinepipe.schema import Table
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.accuracy import accuracy_rows
+from spinepipe.studies.tracking.error_metrics import SAGITTAL
 from spinepipe.studies.tracking.forms import FORMS
-from spinepipe.studies.tracking.moved import AXIS, IN_ORDER
-from spinepipe.studies.tracking.off_truth import SAGITTAL
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, point_rows, verdict
+from spinepipe.studies.tracking.reload_motions import AXIS, IN_ORDER
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.shares import LUMBAR_JOINTS
 from spinepipe.studies.tracking.tables import (

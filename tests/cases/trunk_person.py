@@ -7,8 +7,8 @@ from pathlib import Path
 from trunk_cases import made_up_trunk
 
 from spinepipe.cohort import Cohort, read
+from spinepipe.muscles.muscle_equilibrium import SolvedTask, SolverOptions, held
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import How, SolvedTask, held
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import Trunk
@@ -21,7 +21,7 @@ from spinepipe.studies.trunk_loads.settings import TrunkLoads
 FOLDER = Path(__file__).resolve().parents[2] / "config" / "cohorts" / "trunk_volunteers"
 SETTINGS = TrunkLoads(study="persons", kind="trunk_loads", cohort="trunk_volunteers")
 
-CLOSELY = How(change=1e-7, residual_nm=1e-5, most=300)
+CLOSELY = SolverOptions(change=1e-7, residual_nm=1e-5, most=300)
 """Rounds until nothing moves."""
 
 

@@ -8,10 +8,10 @@ from sweeps import sweep
 
 from papers.engine import Claim, Evidence, arguments, judge
 from papers.ranges import Range
-from papers.run import NotComputed, Ours, StudyRun
+from papers.run import Computed, NotComputed, StudyRun
 
 
-def missing(run: StudyRun) -> Ours:
+def missing(run: StudyRun) -> Computed:
     raise NotComputed("this run made no table x")
 
 
@@ -19,7 +19,7 @@ def judged(value: float | None, low: float | None, high: float | None, wrong: st
     claim = Claim(
         *("a", "Table 1", "something", "mm", 2.0),
         range=Range(low, high, "the paper's IQR"),
-        ours=missing if value is None else lambda run: Ours(value),
+        ours=missing if value is None else lambda run: Computed(value),
         evidence=Evidence.CONTRADICTED if wrong else Evidence.INDEPENDENT,
         contradicted=wrong,
         outside="for a reason",

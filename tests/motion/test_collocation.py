@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from short_chain import BODIES, INTERVALS, ask, by_ipopt, trial
 
-from spinepipe.motion.asked import ForceCost
+from spinepipe.motion.objective import ForceCost
 from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
 

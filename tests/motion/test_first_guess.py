@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from moving_spine import everywhere, markers, postures, spine
 
-from spinepipe.motion.asked import SHAPE, Ask, Watched, watched
+from spinepipe.motion.objective import SHAPE, Ask, Watched, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import MOST_STEPS
 from spinepipe.motion.posture import postures as fitted

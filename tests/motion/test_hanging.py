@@ -8,7 +8,7 @@ import pytest
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
-from spinepipe.motion.hanging import ARMS, T1, Arms, carried_parts, elbow_between, hung
+from spinepipe.motion.head_and_arms import ARMS, T1, Arms, carried_parts, elbow_between, hung
 from spinepipe.motion.rigid import RigidPart, joined, seen_from
 from spinepipe.motion.skeleton import Masses, Skeleton, body_poses, skeleton_of
 from spinepipe.muscles.subject import Subject

@@ -10,8 +10,8 @@ import pytest
 from moving_spine import everywhere, markers, postures, spine
 
 from spinepipe.model import RefusedModel
-from spinepipe.motion.asked import SHAPE, Ask, watched
 from spinepipe.motion.export import COLUMNS, mot, osim
+from spinepipe.motion.objective import SHAPE, Ask, watched
 from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.posture import postures as fitted
 from spinepipe.motion.rigid_body import bodies_of

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from moving_spine import law, markers, postures, spine
 
-from spinepipe.motion.asked import SHAPE, Ask, ResidualScales, Watched, watched
+from spinepipe.motion.objective import SHAPE, Ask, ResidualScales, Watched, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import postures as fitted
+from spinepipe.motion.residual_terms import Markers, MuscleDemand, beyond
 from spinepipe.motion.skeleton import JOINTS, MarkerTrial
-from spinepipe.motion.terms import Markers, MuscleDemand, beyond
 
 FRAMES = 6
 SKIN_M = 1e-3

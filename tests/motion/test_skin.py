@@ -7,12 +7,12 @@ import pytest
 from moving_spine import law, markers, spine
 from scipy.spatial.transform import Rotation
 
-from spinepipe.motion.asked import Ask, ResidualScales, Watched, watched
+from spinepipe.motion.objective import Ask, ResidualScales, Watched, watched
 from spinepipe.motion.points import marker_places
+from spinepipe.motion.residual_terms import Markers, MuscleDemand
 from spinepipe.motion.skeleton import PELVIS, MarkerTrial, body_poses
 from spinepipe.motion.skin import bends, with_sliding_skin
 from spinepipe.motion.spline import KnotGrid
-from spinepipe.motion.terms import Markers, MuscleDemand
 from spinepipe.motion.trajectory import solve
 
 FRAMES = 21

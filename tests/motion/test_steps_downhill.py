@@ -9,7 +9,7 @@ from moving_spine import everywhere, law, markers, spine
 from numpy.linalg import LinAlgError
 
 from spinepipe.motion import trajectory
-from spinepipe.motion.asked import SHAPE, Ask, watched
+from spinepipe.motion.objective import SHAPE, Ask, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
 from spinepipe.motion.trajectory import (

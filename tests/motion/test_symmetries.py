@@ -8,7 +8,7 @@ import pytest
 from moving_spine import law, markers, spine
 from scipy.spatial.transform import Rotation
 
-from spinepipe.motion.asked import Ask, ForceCost, Watched, watched
+from spinepipe.motion.objective import Ask, ForceCost, Watched, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
 from spinepipe.motion.trajectory import solve

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from moving_spine import everywhere, law, markers, postures, spine
 
-from spinepipe.motion.asked import Ask, ResidualScales, watched
 from spinepipe.motion.banded import Band, BandFactor, bordered_step
+from spinepipe.motion.objective import Ask, ResidualScales, watched
 from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.posture import postures as fitted_postures
+from spinepipe.motion.residual_terms import Markers, MuscleDemand, beyond
 from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
 from spinepipe.motion.spline import KnotGrid
-from spinepipe.motion.terms import Markers, MuscleDemand, beyond
 from spinepipe.motion.trajectory import Trajectory, _Iterate, law_of, solve
 from spinepipe.status import Status
 

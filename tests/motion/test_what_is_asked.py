@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from moving_spine import markers, spine
 
-from spinepipe.motion.asked import SHAPE, Ask, ResidualScales, watched
+from spinepipe.motion.objective import SHAPE, Ask, ResidualScales, watched
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import MarkerTrial
 from spinepipe.motion.spline import KnotGrid

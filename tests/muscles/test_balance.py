@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from trunk_person import held_task, tasks, volunteer
 
-from spinepipe.muscles.settle import SolvedTask, held
+from spinepipe.muscles.muscle_equilibrium import SolvedTask, held
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS, THORAX

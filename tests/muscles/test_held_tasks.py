@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from trunk_person import CLOSELY, SETTINGS, held_task, made_up, tasks, volunteer
 
+from spinepipe.muscles.muscle_equilibrium import SolverOptions, acted_on, held
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import How, acted_on, held
 from spinepipe.muscles.task import Exertion, Hands, Task
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.persons import how_of
@@ -100,7 +100,7 @@ def test_beyond_strength_says_how_much_is_missing_and_where() -> None:
 
 
 def test_too_few_rounds_are_told() -> None:
-    found = held(volunteer(), tasks()["side_10"], How(change=1e-9, most=3))
+    found = held(volunteer(), tasks()["side_10"], SolverOptions(change=1e-9, most=3))
     assert found.status in (Balanced.NOT_CONVERGED, Balanced.CYCLING)
     assert found.message.startswith("after 3 rounds forces still change by")
 
@@ -115,6 +115,6 @@ def test_wrong_simplifications_leave_the_whole_model_out_of_balance() -> None:
     person, task = volunteer(), tasks()["flexion_50"]
     whole = held(person, task)
     assert np.abs(acted_on(person, task, whole.found.forces).found.slack).max() < 1.0
-    alone = held(person, task, How(lowest_alone=True))
+    alone = held(person, task, SolverOptions(lowest_alone=True))
     assert np.abs(alone.found.slack[:3]).max() < 0.1
     assert np.abs(acted_on(person, task, alone.found.forces).found.slack).max() > 5.0

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spinepipe.muscles import settle
+from spinepipe.muscles import muscle_equilibrium
 from spinepipe.muscles import upright as standing
 from spinepipe.muscles.forces import Forces
-from spinepipe.muscles.settle import How, SolverRound, held
+from spinepipe.muscles.muscle_equilibrium import SolverOptions, SolverRound, held
 from spinepipe.muscles.trunk import BODIES, LEVELS
 from spinepipe.status import Balanced
 
@@ -18,7 +18,7 @@ NOBODY: Any = None
 
 def at_rest(forces: list[float], status: Balanced = Balanced.CONVERGED) -> Any:
     found = Forces(np.array(forces), np.zeros(21), True)
-    return settle.SolvedTask(status, "", *[NOBODY] * 4, found, *[NOBODY] * 4)
+    return muscle_equilibrium.SolvedTask(status, "", *[NOBODY] * 4, found, *[NOBODY] * 4)
 
 
 class Rounds:
@@ -27,17 +27,17 @@ class Rounds:
     def __init__(self, *ends: Any) -> None:
         self.ends, self.starts, self.tones = list(ends), list[Any](), list[float]()
 
-    def __call__(self, person: Any, task: Any, how: How, tone: float, start: Any) -> Any:
+    def __call__(self, person: Any, task: Any, how: SolverOptions, tone: float, start: Any) -> Any:
         self.starts.append(start)
         self.tones.append(tone)
         return self.ends.pop(0)
 
 
 def asked_twice(
-    monkeypatch: pytest.MonkeyPatch, how: How, *ends: Any
-) -> tuple[settle.SolvedTask, Rounds]:
+    monkeypatch: pytest.MonkeyPatch, how: SolverOptions, *ends: Any
+) -> tuple[muscle_equilibrium.SolvedTask, Rounds]:
     rounds = Rounds(*ends)
-    monkeypatch.setattr(settle, "_rounds", rounds)
+    monkeypatch.setattr(muscle_equilibrium, "_rounds", rounds)
     task: Any = SimpleNamespace(tone_share=0.03, tone="least")
     return held(NOBODY, task, how), rounds
 
@@ -55,7 +55,7 @@ def test_a_second_answer_is_one_more_than_twice_the_change_away(
 ) -> None:
     """Of forces whose size is that of the second answer; begun again pressed by 3 kN."""
     ends = at_rest([3.0, 4.0 - 5.0 * apart]), at_rest([3.0, 4.0])
-    found, rounds = asked_twice(monkeypatch, How(twice=True), *ends)
+    found, rounds = asked_twice(monkeypatch, SolverOptions(twice=True), *ends)
     assert (found.status, found.message) == (status, message)
     np.testing.assert_array_equal(found.found.forces, ends[0].found.forces)
     np.testing.assert_array_equal(rounds.starts, [np.zeros(7), np.full(7, 3000.0)])
@@ -64,14 +64,14 @@ def test_a_second_answer_is_one_more_than_twice_the_change_away(
 @pytest.mark.parametrize(
     ("how", "status"),
     [
-        (How(), Balanced.CONVERGED),
-        (How(twice=True, feedback=False), Balanced.CONVERGED),
-        (How(twice=True), Balanced.BEYOND_STRENGTH),
-        (How(twice=True), Balanced.NOT_CONVERGED),
+        (SolverOptions(), Balanced.CONVERGED),
+        (SolverOptions(twice=True, feedback=False), Balanced.CONVERGED),
+        (SolverOptions(twice=True), Balanced.BEYOND_STRENGTH),
+        (SolverOptions(twice=True), Balanced.NOT_CONVERGED),
     ],
 )
 def test_once_is_enough_where_no_other_answer_is_looked_for(
-    how: How, status: Balanced, monkeypatch: pytest.MonkeyPatch
+    how: SolverOptions, status: Balanced, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found, rounds = asked_twice(monkeypatch, how, at_rest([1.0], status))
     assert found.status is status
@@ -86,14 +86,14 @@ def test_the_tone_that_is_asked_for_comes_before_the_task_s(
     tone: float | None, kind: str, least: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rounds = Rounds(at_rest([1.0]))
-    monkeypatch.setattr(settle, "_rounds", rounds)
+    monkeypatch.setattr(muscle_equilibrium, "_rounds", rounds)
     task: Any = SimpleNamespace(tone_share=0.03, tone=kind)
-    held(NOBODY, task, How(), tone)
+    held(NOBODY, task, SolverOptions(), tone)
     assert rounds.tones == [least]
 
 
 def test_rounds_end_as_the_documentation_says_where_nothing_is_asked() -> None:
-    how = How()
+    how = SolverOptions()
     assert (how.change, how.residual_nm, how.slack_nm, how.most) == (0.01, 0.1, 0.5, 60)
     assert (how.feedback, how.translates, how.lowest_alone, how.twice) == (True, True, False, False)
 
@@ -113,14 +113,14 @@ def test_rounds_end_as_the_documentation_says_where_nothing_is_asked() -> None:
 )
 def test_steps_follow_aitkens_rule(off: list[float], last: list[float], step: float) -> None:
     """The last step of 0.5: -0.5 last (off - last) / (off - last)^2."""
-    assert settle._step(0.5, np.array(off), np.array(last)) == pytest.approx(step)
+    assert muscle_equilibrium._step(0.5, np.array(off), np.array(last)) == pytest.approx(step)
 
 
 def test_changes_are_told_over_the_size_of_what_is() -> None:
     now = np.array([3.0, 4.0])
-    assert settle._change(now, np.array([3.0, 3.0])) == pytest.approx(0.2)
-    assert settle._change(now, now) == 0.0
-    assert settle._change(np.zeros(2), now) == 0.0
+    assert muscle_equilibrium._change(now, np.array([3.0, 3.0])) == pytest.approx(0.2)
+    assert muscle_equilibrium._change(now, now) == 0.0
+    assert muscle_equilibrium._change(np.zeros(2), now) == 0.0
 
 
 def demanded(required: list[float], forces: list[float], enough: bool) -> Any:
@@ -139,7 +139,7 @@ def test_what_the_round_before_misses(enough: bool, alone: bool, residual: float
     """Of moments asked for; beyond strength of those of this round. L5S1 has three rows."""
     now = demanded([3.0, 2.0, 4.0, 9.0], [0.0, 0.0, 3.0, 7.0], enough)
     before = np.array([1.0, 2.0, 1.0, 1.0])
-    assert settle._residual(now, before, How(lowest_alone=alone)) == residual
+    assert muscle_equilibrium._residual(now, before, SolverOptions(lowest_alone=alone)) == residual
 
 
 def trail(*sizes: float) -> list[np.ndarray]:
@@ -161,7 +161,9 @@ def test_rounds_that_go_to_and_fro_are_told(
     sizes: tuple[float, ...], change: float | None, status: Balanced
 ) -> None:
     rounds = [SolverRound(change, 1.0, 500.0)] * len(sizes)
-    found, told = settle._ended(NOBODY, How(), rounds, trail(*sizes), settled=False)
+    found, told = muscle_equilibrium._ended(
+        NOBODY, SolverOptions(), rounds, trail(*sizes), settled=False
+    )
     shown = "50.0" if change else "0.0"
     assert found is status
     assert told.startswith(f"after {len(sizes)} rounds forces still change by {shown} %")
@@ -183,9 +185,12 @@ def test_what_muscles_leave_over_is_told_where_it_is_most(
     left = np.zeros((len(LEVELS), 3))
     left[4], left[LEVELS.index("L3L4"), 1] = 0.05, slack
     now: Any = SimpleNamespace(found=SimpleNamespace(enough=False, slack=left.ravel()))
-    assert settle._ended(now, How(), [], [], settled=True) == (status, told)
+    assert muscle_equilibrium._ended(now, SolverOptions(), [], [], settled=True) == (status, told)
     now.found.enough = True
-    assert settle._ended(now, How(), [], [], settled=True) == (Balanced.CONVERGED, "")
+    assert muscle_equilibrium._ended(now, SolverOptions(), [], [], settled=True) == (
+        Balanced.CONVERGED,
+        "",
+    )
 
 
 def begun(monkeypatch: pytest.MonkeyPatch, sums: dict[int, float]) -> tuple[Any, np.ndarray]:

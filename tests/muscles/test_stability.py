@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from trunk_person import CLOSELY, SETTINGS, tasks, volunteers
 
+from spinepipe.muscles.muscle_equilibrium import SolvedTask, held
 from spinepipe.muscles.pose import BodyPoses, rotation_of_vector
-from spinepipe.muscles.settle import SolvedTask, held
 from spinepipe.muscles.stability import _joints, smallest_eigenvalue, stiffness
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.studies.subjects import subject_of

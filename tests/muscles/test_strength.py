@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linprog
 from trunk_person import held_task
 
-from spinepipe.muscles.settle import SolvedTask
+from spinepipe.muscles.muscle_equilibrium import SolvedTask
 from spinepipe.muscles.strength import capacity_left, load_factor
 
 JUST = 1e-5

@@ -5,10 +5,10 @@ import pytest
 from scipy.optimize import minimize
 from trunk_person import held_task, tasks, volunteer
 
+from spinepipe.muscles.muscle_equilibrium import angles_of
 from spinepipe.muscles.pose import BodyPoses, posed, rotation_of_vector, rotations_of
-from spinepipe.muscles.settle import angles_of
-from spinepipe.muscles.strings import tight
 from spinepipe.muscles.trunk import LEVELS
+from spinepipe.muscles.wrapping import wrap_path
 
 NO_MOVES = np.zeros((len(LEVELS), 3))
 
@@ -16,7 +16,7 @@ NO_MOVES = np.zeros((len(LEVELS), 3))
 def string(ends: np.ndarray, bars: np.ndarray, along: np.ndarray, behind: np.ndarray) -> tuple:
     """Length and touched bars of one string from the first end to the second."""
     count = len(bars)
-    found = tight(
+    found = wrap_path(
         ends[None],
         np.array([[0, 1]]),
         np.array([0, count]),

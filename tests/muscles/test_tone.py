@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from spinepipe.muscles import tone
-from spinepipe.muscles.tone import Toned, least_stable
+from spinepipe.muscles import co_contraction
+from spinepipe.muscles.co_contraction import CoContraction, least_stable
 from spinepipe.status import Balanced
 
 
@@ -17,17 +17,17 @@ class Tried:
         self.stands_from, self.held_below = stands_from, held_below
         self.tones: list[float] = []
 
-    def toned(self, person: Any, task: Any, how: Any, gain: float, share: float) -> Toned:
+    def toned(self, person: Any, task: Any, how: Any, gain: float, share: float) -> CoContraction:
         assert (person, task, how, gain) == ("person", "task", "how", 10.0)
         self.tones.append(share)
         holds = share < self.held_below
         status = Balanced.CONVERGED if holds else Balanced.BEYOND_STRENGTH
         held: Any = SimpleNamespace(status=status)
-        return Toned(held, share, share - self.stands_from)
+        return CoContraction(held, share, share - self.stands_from)
 
 
-def found(monkeypatch: pytest.MonkeyPatch, tried: Tried) -> Toned | None:
-    monkeypatch.setattr(tone, "toned", tried.toned)
+def found(monkeypatch: pytest.MonkeyPatch, tried: Tried) -> CoContraction | None:
+    monkeypatch.setattr(co_contraction, "toned", tried.toned)
     person: Any = "person"
     task: Any = "task"
     how: Any = "how"
@@ -75,7 +75,7 @@ def test_a_tone_that_strength_has_not_left_ends_the_search(
 
 def test_a_posture_that_cannot_be_held_does_not_stand() -> None:
     held: Any = SimpleNamespace(status=Balanced.BEYOND_STRENGTH)
-    assert not Toned(held, 0.1, 1.0).stands
+    assert not CoContraction(held, 0.1, 1.0).stands
     held = SimpleNamespace(status=Balanced.CONVERGED)
-    assert Toned(held, 0.1, 0.0).stands
-    assert not Toned(held, 0.1, -1e-9).stands
+    assert CoContraction(held, 0.1, 0.0).stands
+    assert not CoContraction(held, 0.1, -1e-9).stands

@@ -20,7 +20,7 @@ from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import System, follow
-from spinepipe.statics.many import Stack
+from spinepipe.statics.batched import Stack
 from spinepipe.status import Status
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain as LoadedChain

@@ -13,8 +13,8 @@ from example_effects import ExtraWeight
 from spinepipe.effects import Wrench, create
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import System, follow
-from spinepipe.statics.holding import hold
-from spinepipe.statics.many import Cases, Spines, solve, solve_many
+from spinepipe.statics.batched import Cases, Spines, solve, solve_many
+from spinepipe.statics.joint_forces import assemble_joint_forces
 from spinepipe.status import Status
 from spinepipe.world import Chain
 from tests.reference import bridge
@@ -64,7 +64,9 @@ def by_engine(model: SpineModel, case: LoadCase) -> tuple[np.ndarray, np.ndarray
     q = np.array([step.equilibrium.q.reshape(-1, 6) for step in solved])
     load = np.array(
         [
-            hold(system.placed(step.equilibrium.q, False), system.laws, step.states, False).load
+            assemble_joint_forces(
+                system.placed(step.equilibrium.q, False), system.laws, step.states, False
+            ).load
             for step in solved
         ]
     )

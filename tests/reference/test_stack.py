@@ -26,8 +26,7 @@ from spinepipe.statics import (
     observe,
     observed_by_parameters,
 )
-from spinepipe.statics.equilibrium import factor
-from spinepipe.statics.many import (
+from spinepipe.statics.batched import (
     Acting,
     Answering,
     Idle,
@@ -36,8 +35,9 @@ from spinepipe.statics.many import (
     readings,
     readings_by,
 )
-from spinepipe.statics.many.lanes import acting
-from spinepipe.statics.many.survey import Flags
+from spinepipe.statics.batched.forward_kinematics import Flags
+from spinepipe.statics.batched.lanes import acting
+from spinepipe.statics.equilibrium import factor
 from spinepipe.status import Status
 from spinepipe.world import Chain
 

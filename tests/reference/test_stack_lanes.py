@@ -14,11 +14,11 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import free_parameters
-from spinepipe.statics.many import Stack, poses_by
-from spinepipe.statics.many.dynamics import tangents_of
-from spinepipe.statics.many.elimination import Changes, answers, eliminated
-from spinepipe.statics.many.survey import survey
-from spinepipe.statics.many.vectors import blocks, lanes
+from spinepipe.statics.batched import Stack, poses_by
+from spinepipe.statics.batched.dynamics import tangents_of
+from spinepipe.statics.batched.elimination import Changes, answers, eliminated
+from spinepipe.statics.batched.forward_kinematics import forward_kinematics
+from spinepipe.statics.batched.vectors import blocks, lanes
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 
@@ -81,13 +81,13 @@ def test_bad_pivots_cost_no_digits(n_joints: int, small: float) -> None:
     chain = chains.random_chain(rng, n_joints)
     stack = Stack.of([bridge.spine_model(chain)], [(0, bridge.load_case(chain))] * 5)
     q, tangents = np.zeros((5, n_joints, 6)), stiff(rng, 5, n_joints)
-    plain = survey(stack.chains, stack.loads, q, tangents)
+    plain = forward_kinematics(stack.chains, stack.loads, q, tangents)
     sources = rng.normal(size=(5, n_joints, 6, 3))
     before, _ = eliminated(plain, Changes(sources))
     tangents[2, -1, :2] = tangents[2, -1, :, :2] = 0.0
     tangents[2, -1, 0, 1], tangents[2, -1, 1, 0] = 30.0, 40.0
     tangents[2, -1, 0, 0] = tangents[2, -1, 1, 1] = small
-    seen = survey(stack.chains, stack.loads, q, tangents)
+    seen = forward_kinematics(stack.chains, stack.loads, q, tangents)
     found, good = answers(seen, Changes(sources))
     assert good.all()
     whole = tangents_of(seen)[2]

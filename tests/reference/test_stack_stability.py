@@ -12,14 +12,14 @@ from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.statics import System
+from spinepipe.statics.batched import stability
+from spinepipe.statics.batched.dynamics import BatchedLUFactors, Moving
+from spinepipe.statics.batched.forward_kinematics import forward_kinematics, part
+from spinepipe.statics.batched.newton import newton
+from spinepipe.statics.batched.stability_certificate import respond
+from spinepipe.statics.batched.stack import Stack
+from spinepipe.statics.batched.vectors import lanes as unblocked
 from spinepipe.statics.equilibrium import decays
-from spinepipe.statics.many import stability
-from spinepipe.statics.many.dynamics import BatchedLUFactors, Moving
-from spinepipe.statics.many.newton import newton
-from spinepipe.statics.many.proofs import respond
-from spinepipe.statics.many.stack import Stack
-from spinepipe.statics.many.survey import part, survey
-from spinepipe.statics.many.vectors import lanes as unblocked
 from spinepipe.world import Chain
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
@@ -78,7 +78,7 @@ def test_inertia_is_pybullet_s(n_joints: int) -> None:
     q = rng.normal(0.0, 0.05, (3, n_joints, 6)) * np.array([0.02] * 3 + [1.0] * 3)
     rates, forces = rng.normal(size=q.shape), rng.normal(size=(3, 6 * n_joints))
     tangents = stack.bound(np.arange(3), {}).held(q).tangent
-    seen = survey(stack.chains, stack.loads, q, tangents)
+    seen = forward_kinematics(stack.chains, stack.loads, q, tangents)
     moving = Moving.of(stack.chains, stack.loads.chain, seen)
     inertial, accelerations = moving.inertial(rates), moving.accelerations(forces)
     solved = BatchedLUFactors(moving.mass).solve(forces)

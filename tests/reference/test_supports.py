@@ -29,13 +29,12 @@ from spinepipe.statics import (
     by_parameters,
     follow,
     free_parameters,
-    moved,
     no_settling,
     reaction,
     reactions_by,
+    with_parameters,
 )
-from spinepipe.statics.equilibrium import factor
-from spinepipe.statics.many import (
+from spinepipe.statics.batched import (
     Answering,
     Idle,
     Stack,
@@ -44,10 +43,11 @@ from spinepipe.statics.many import (
     readings,
     readings_by,
 )
-from spinepipe.statics.many import (
+from spinepipe.statics.batched import (
     reactions_by as stack_reactions_by,
 )
-from spinepipe.statics.many.derive import answered
+from spinepipe.statics.batched.derive import answered
+from spinepipe.statics.equilibrium import factor
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -296,7 +296,7 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
         h = 1e-5 * (1.0 if one.logarithmic else max(size, 1e-3))
         ends = []
         for sign in (1.0, -1.0):
-            there = stack.with_models([moved(model, [one], np.array([sign * h]))])
+            there = stack.with_models([with_parameters(model, [one], np.array([sign * h]))])
             ends.append(readings(there, there.solve(q).q))
         expected = (ends[0] - ends[1]) / (2.0 * h)
         largest = max(np.abs(expected).max(), 1e-6)

@@ -15,7 +15,7 @@ from cohort_cases import write as write_small
 from mistaken_cohorts import SHIPPED, good, told
 
 from spinepipe import cohort as cohorts
-from spinepipe.studies.doubts import refusals
+from spinepipe.studies.plausibility import refusals
 from spinepipe.studies.registry import every_form
 
 Table = Callable[[pd.DataFrame], None]

@@ -12,7 +12,7 @@ from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, SpineModel
 from spinepipe.statics import System, follow
-from spinepipe.statics.many import Stack
+from spinepipe.statics.batched import Stack
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 

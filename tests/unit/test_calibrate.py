@@ -26,7 +26,14 @@ from spinepipe.calibrate.uncertainty import uncertainty
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, SpineModel
-from spinepipe.statics import FreeParameter, System, follow, free_parameters, moved, observe
+from spinepipe.statics import (
+    FreeParameter,
+    System,
+    follow,
+    free_parameters,
+    observe,
+    with_parameters,
+)
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS
 from spinepipe.tables import to_arrow
@@ -43,7 +50,7 @@ def measure(
     model: SpineModel, case: LoadCase, free: tuple[FreeParameter, ...], truth: Array
 ) -> MeasuredCase:
     """What a model with its unknowns moved to the truth would show."""
-    model = moved(model, free, truth)
+    model = with_parameters(model, free, truth)
     system = System(Chain(model), model, case)
     return MeasuredCase(
         case, np.stack([observe(system, step.equilibrium.q) for step in follow(system)])
@@ -83,14 +90,14 @@ def test_exact_data_give_the_truth_from_any_start(grouping: str) -> None:
         shift = rng.uniform(-1.5, 2.0, len(free))
         start = replace(
             problem,
-            model=moved(model, free, shift),
+            model=with_parameters(model, free, shift),
             lower=problem.lower - shift,
             upper=problem.upper - shift,
         )
         found = fit(start)
         assert found.status is Status.CONVERGED, found.message
         np.testing.assert_allclose(found.x + shift, truth, rtol=0, atol=1e-6)
-        springs = moved(model, free, truth).effects[0].values
+        springs = with_parameters(model, free, truth).effects[0].values
         expected = [springs[p.rows[0], p.column] for p in free]
         np.testing.assert_allclose(found.values, expected, rtol=1e-6)
         assert found.uncertainty.identifiable.all()
@@ -239,7 +246,7 @@ def test_a_start_that_cannot_stand_is_stiffened_and_says_so() -> None:
     problem = problem_of(model, free, np.zeros(6))
     soft = replace(
         problem,
-        model=moved(model, free, np.full(6, np.log(1 / 64))),
+        model=with_parameters(model, free, np.full(6, np.log(1 / 64))),
         lower=np.full(6, -1.0),
         upper=np.full(6, np.log(1000.0)),
     )
@@ -255,7 +262,7 @@ def test_stiffening_leaves_offsets_where_they_are() -> None:
     problem = problem_of(model, free, np.zeros(4))
     soft = replace(
         problem,
-        model=moved(model, free, np.array([*np.full(3, np.log(1 / 64)), 0.0])),
+        model=with_parameters(model, free, np.array([*np.full(3, np.log(1 / 64)), 0.0])),
         lower=np.array([-1.0, -1.0, -1.0, -0.02]),
         upper=np.array([6.0, 6.0, 6.0, 0.02]),
     )

@@ -30,7 +30,7 @@ from spinepipe.decomposition import (
     pinvh,
     svd,
 )
-from spinepipe.studies.discrepancy.search import grounds, whitening
+from spinepipe.studies.discrepancy.search import baseline, whitening
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.whitening import Whitening
@@ -369,7 +369,7 @@ def noise() -> Noise:
 def laid(seed: int) -> dict[str, Whitening]:
     """Whitenings of a search on chains of springs."""
     given = chains.readings(seed)
-    found = grounds.laid(given, noise(), NuisancePriors(), chains.start(given), at_once)
+    found = baseline.fit_baseline(given, noise(), NuisancePriors(), chains.start(given), at_once)
     return dict(found.setting.whitenings)
 
 

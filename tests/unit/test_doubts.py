@@ -18,7 +18,7 @@ from cohort_edge_cases import A
 
 from spinepipe import cohort as cohorts
 from spinepipe.problems import InputProblem
-from spinepipe.studies.doubts import suspicions
+from spinepipe.studies.plausibility import suspicions
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, draw_hidden, make
 from tests.generators.phantom import phantom

@@ -48,11 +48,11 @@ from spinepipe.statics import (
     declared,
     follow,
     free_parameters,
-    moved,
     observe,
     observed_by_parameters,
+    with_parameters,
 )
-from spinepipe.statics.holding import States
+from spinepipe.statics.joint_forces import States
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -123,7 +123,7 @@ def every_parameter(model: SpineModel) -> tuple[FreeParameter, ...]:
 
 def reported(system: System, free: tuple[FreeParameter, ...], x: Array) -> Array:
     """(T, J, 6) solved afresh and reported, with the unknowns moved by x."""
-    other = system.with_model(moved(system.model, free, x))
+    other = system.with_model(with_parameters(system.model, free, x))
     return np.stack([observe(other, step.equilibrium.q) for step in follow(other)])
 
 

@@ -24,7 +24,7 @@ from path_effect_cases import branches, creeping, friction, turning
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
-from spinepipe.statics import FreeParameter, System, follow, free_parameters, moved
+from spinepipe.statics import FreeParameter, System, follow, free_parameters, with_parameters
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -163,7 +163,7 @@ def test_friction_in_noisy_readings_is_found_within_its_error() -> None:
     assert found.status is Status.CONVERGED
     readings = problem.cases[0].measured.size
     assert 0.8 < found.cost / (readings - 5) < 1.2
-    truth = moved(problem.model, problem.free, found.x).effects[1].values[0]
+    truth = with_parameters(problem.model, problem.free, found.x).effects[1].values[0]
     away = [truth[0] - 0.5, np.log(truth[1] / np.deg2rad(1.0))]
     errors = found.uncertainty.standard_error[3:]
     assert (np.abs(away) < 3.5 * errors).all()

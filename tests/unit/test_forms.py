@@ -13,7 +13,7 @@ from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.supports import FREE, HELD, MEASURED, PRESCRIBED
 from spinepipe.documents.form import InputColumn, Rule, TableForm, read_forms
 from spinepipe.documents.rules import Listed, TableCheck
-from spinepipe.motion.hanging import ARMS
+from spinepipe.motion.head_and_arms import ARMS
 from spinepipe.motion.joint_tables import SIDES
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.muscles import regressions

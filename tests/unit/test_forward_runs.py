@@ -25,7 +25,15 @@ from spinepipe.calibrate.forward_runs import (
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
-from spinepipe.statics import Course, Program, System, follow, free_parameters, moved, settle
+from spinepipe.statics import (
+    Course,
+    Program,
+    System,
+    follow,
+    free_parameters,
+    settle,
+    with_parameters,
+)
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity import fit_by_method
 from spinepipe.tables import read_frame
@@ -44,7 +52,7 @@ def problem(model: SpineModel | None = None, truth: Array = TRUTH) -> Problem:
     model = spine(1) if model is None else model
     case = one_step(model)
     free = free_parameters(model, 0, ["superior_n_per_m", "extension_nm_per_rad"], "per_specimen")
-    stiffer = moved(model, free, truth)
+    stiffer = with_parameters(model, free, truth)
     pose = follow(System(Chain(stiffer), stiffer, case))[0].equilibrium.q.reshape(-1, 6)
     reach = np.full(2, np.log(1000.0))
     return Problem(model, (MeasuredCase(case, pose[None]),), free, np.ones(6), -reach, reach)

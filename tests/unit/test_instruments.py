@@ -23,8 +23,8 @@ from spinepipe.effects import EffectKind, PlaceSpread, create
 from spinepipe.effects.contract import MeasurementContext
 from spinepipe.model import LoadCase, ScopedEffect
 from spinepipe.statics import System, follow, observe
-from spinepipe.statics.instruments import passed
-from spinepipe.statics.many import Stack, poses_by, readings, readings_by
+from spinepipe.statics.batched import Stack, poses_by, readings, readings_by
+from spinepipe.statics.measurement_model import passed
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 

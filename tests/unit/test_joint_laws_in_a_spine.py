@@ -22,7 +22,7 @@ from spinepipe.statics import (
     declared,
     follow,
     free_parameters,
-    moved,
+    with_parameters,
 )
 from spinepipe.units import TRANSLATIONS
 from spinepipe.world import Chain
@@ -69,7 +69,7 @@ def unknowns(system: System) -> tuple[FreeParameter, ...]:
 
 
 def poses(system: System, free: tuple[FreeParameter, ...] = (), x: Array = NONE) -> Array:
-    solved = follow(system.with_model(moved(system.model, free, x)))
+    solved = follow(system.with_model(with_parameters(system.model, free, x)))
     assert all(step.usable for step in solved)
     return np.stack([step.equilibrium.q for step in solved])
 

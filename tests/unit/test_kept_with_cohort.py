@@ -12,7 +12,7 @@ from straight_chains import TESTS, write_cohort
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.kept import kept_with_cohort
+from spinepipe.cohort.memoize import kept_with_cohort
 from spinepipe.cohort.specimen import bodies
 from spinepipe.studies.cohort_stiffness.problem import specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness

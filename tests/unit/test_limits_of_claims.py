@@ -14,7 +14,7 @@ from sweeps import sweep
 
 from papers.engine import Claim, Evidence, claims_of, judge
 from papers.ranges import Limit, Range, factor_of_two
-from papers.run import NotComputed, Ours, StudyRun
+from papers.run import Computed, NotComputed, StudyRun
 from spinepipe.comparison import papers
 from spinepipe.report.page.document import judged as told
 from spinepipe.studies.tracking.tables import AGAINST_WANG_2021
@@ -78,7 +78,7 @@ def test_ours_outside_all_that_the_paper_prints_disagrees(value: float, verdict:
     """Printed are 1 (0.5 to 2) and 20 (10 to 40)."""
     claim = Claim(
         *("a", "Table 1", "something", "mm", 1.0, factor_of_two(1.0)),
-        ours=lambda run: Ours(value),
+        ours=lambda run: Computed(value),
         evidence=Evidence.CONTRADICTED,
         outside="for a reason",
         contradicted="A1: 1 is not 20",

@@ -17,7 +17,8 @@ from spinepipe.statics.equilibrium import (
     factor,
     newton,
 )
-from spinepipe.statics.settling import (
+from spinepipe.statics.system import Loading
+from spinepipe.statics.transient import (
     ALPHA,
     COUPLING,
     EMBEDDED,
@@ -30,7 +31,6 @@ from spinepipe.statics.settling import (
     _between,
     new_size,
 )
-from spinepipe.statics.system import Loading
 
 # Factors of a tangent
 

@@ -42,7 +42,7 @@ from spinepipe.statics import (
     declared,
     follow,
     free_parameters,
-    moved,
+    with_parameters,
 )
 from spinepipe.world import Chain
 
@@ -97,7 +97,7 @@ def unknowns(system: System, strengths_only: bool = False) -> tuple[FreeParamete
 
 def poses(system: System, free: tuple[FreeParameter, ...], x: Array) -> Array:
     """(T, n) solved afresh with the unknowns moved by x."""
-    solved = follow(system.with_model(moved(system.model, free, x)))
+    solved = follow(system.with_model(with_parameters(system.model, free, x)))
     assert all(step.usable for step in solved)
     return np.stack([step.equilibrium.q for step in solved])
 

@@ -33,8 +33,8 @@ from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
 from spinepipe.plausibility.warnings.postures import _stray_deg
 from spinepipe.problems import InputError
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.doubts import doubts, refusals, suspicions
 from spinepipe.studies.free import unmeasured
+from spinepipe.studies.plausibility import doubts, refusals, suspicions
 from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, make
 

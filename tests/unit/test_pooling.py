@@ -30,7 +30,7 @@ from spinepipe.calibrate.hierarchy import (
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
-from spinepipe.statics import System, follow, free_parameters, moved
+from spinepipe.statics import System, follow, free_parameters, with_parameters
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -280,7 +280,7 @@ def measured_problem(truth: Array, seed: int, sd: Array = READING_SD, steps: int
     """A specimen of two joints whose rotational stiffness is free level by level."""
     model = spine(2)
     free = free_parameters(model, 0, ROTATIONS, "per_joint")
-    case, true_model = loaded(model, steps), moved(model, free, truth)
+    case, true_model = loaded(model, steps), with_parameters(model, free, truth)
     solved = follow(System(Chain(true_model), true_model, case))
     poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
     read = poses + sd * np.random.default_rng(seed).normal(size=poses.shape)
@@ -308,7 +308,7 @@ def penalised_cost(x: Array, problems: list[Problem], prior: Array, scatter: flo
     """Squared errors of plain forward simulations and distance from the prior."""
     total = x @ np.linalg.solve(prior, x)
     for problem, own in zip(problems, x.reshape(len(problems), -1), strict=True):
-        model = moved(problem.model, problem.free, own)
+        model = with_parameters(problem.model, problem.free, own)
         for case in problem.cases:
             solved = follow(System(Chain(model), model, case.case))
             poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
@@ -348,7 +348,7 @@ def test_costs_counts_and_values_are_those_of_the_specimens() -> None:
         error = np.rad2deg(specimen.poses[0].reshape(3, 2, 6) - problem.cases[0].measured)
         assert specimen.cost == pytest.approx(np.sum(error[:, :, 3:] ** 2), rel=1e-9)
         assert specimen.n_readings == 3 * 2 * 3
-        springs = moved(problem.model, problem.free, specimen.x).effects[0].values
+        springs = with_parameters(problem.model, problem.free, specimen.x).effects[0].values
         np.testing.assert_allclose(specimen.values, springs[:, 3:].T.ravel(), rtol=1e-12)
     cost = sum(specimen.cost for specimen in found.specimens)
     each = [specimen.effective_parameters for specimen in found.specimens]
@@ -568,7 +568,9 @@ def test_zeroed_readings_need_their_correlation_for_declared_noise() -> None:
 
 def test_what_does_not_belong_together_is_refused() -> None:
     problems = cohort()
-    other = replace(problems[1], model=moved(problems[1].model, problems[1].free, np.full(6, 0.1)))
+    other = replace(
+        problems[1], model=with_parameters(problems[1].model, problems[1].free, np.full(6, 0.1))
+    )
     with pytest.raises(ValueError, match="another stiffness"):
         pool([problems[0], other])
     with pytest.raises(ValueError, match="unknowns differ"):

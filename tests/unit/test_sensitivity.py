@@ -23,7 +23,7 @@ from spinepipe.statics import (
     by_parameters,
     follow,
     free_parameters,
-    moved,
+    with_parameters,
 )
 from spinepipe.world import Chain
 
@@ -61,7 +61,7 @@ def test_stiffness_shared_by_joints_and_joint_by_joint() -> None:
     for column, unit in enumerate(np.eye(2)):
 
         def motion(h: float, along: Array = unit) -> Array:
-            return pose_of(moved(model, shared, h * along), case)
+            return pose_of(with_parameters(model, shared, h * along), case)
 
         assert_close(by_shared[:, column], slope(motion, 0.02))
 

@@ -12,7 +12,7 @@ from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
 from spinepipe.effects import Wrench
 from spinepipe.model import LoadCase, LoadStep, SpineModel
 from spinepipe.statics import Program, System, follow, settle
-from spinepipe.statics.settling import ALPHA, COUPLING, ERROR_WEIGHTS, GAMMA, WEIGHTS
+from spinepipe.statics.transient import ALPHA, COUPLING, ERROR_WEIGHTS, GAMMA, WEIGHTS
 from spinepipe.status import Status
 from spinepipe.world import Chain
 

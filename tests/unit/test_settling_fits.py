@@ -18,13 +18,13 @@ from spinepipe.statics import (
     FreeParameter,
     Loading,
     System,
+    batched,
     free_parameters,
-    many,
     move,
-    moved,
+    with_parameters,
 )
-from spinepipe.statics.many import Stack
-from spinepipe.statics.settling import END_ONLY
+from spinepipe.statics.batched import Stack
+from spinepipe.statics.transient import END_ONLY
 from spinepipe.status import Status
 from spinepipe.world import Chain
 from tests.reference import bridge
@@ -93,7 +93,9 @@ def test_the_derivative_of_the_end_is_that_of_fine_runs(course: Course) -> None:
     case, step = loaded(model, 1), 1e-3
     expected, mixtures = [], np.array([[1.0, 0.6, -0.8, 0.7], [-0.7, 0.9, 0.6, 1.0]])
     for x in step * mixtures:
-        after, before = (sampled(moved(model, free, s * x), case, course)[0] for s in (1, -1))
+        after, before = (
+            sampled(with_parameters(model, free, s * x), case, course)[0] for s in (1, -1)
+        )
         expected.append((after - before) / (2.0 * step))
     found = ends(model, case, free, course).by_x[0] @ mixtures.T
     for kind in (slice(0, 3), slice(3, 6)):
@@ -113,11 +115,11 @@ def tipping() -> tuple[SpineModel, LoadCase]:
 def test_a_run_that_cannot_take_the_steps_of_another_is_lost() -> None:
     standing, (tipping_over, case) = spine(1), tipping()
     stack = Stack.of([standing, tipping_over], [(0, case), (1, case)])
-    found = many.settle(stack, Course(3.0), np.array([0, 0]))
+    found = batched.settle(stack, Course(3.0), np.array([0, 0]))
     assert list(found.trouble) == [1]
     assert "tips over" in found.trouble[1]
     assert np.isnan(found.q[1]).all()
-    alone = many.settle(Stack.of([standing], [(0, case)]), Course(3.0), np.array([0]))
+    alone = batched.settle(Stack.of([standing], [(0, case)]), Course(3.0), np.array([0]))
     np.testing.assert_array_equal(found.q[0], alone.q[0])
     assert found.sizes == alone.sizes
 
@@ -191,7 +193,7 @@ def test_a_truth_made_by_settling_comes_back(course: Course) -> None:
     model = spine(2)
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
     truth, case = np.array([0.3, -0.2, 0.1]), loaded(model, 1)
-    measured = with_errors(sampled(moved(model, free, truth), case, course))
+    measured = with_errors(sampled(with_parameters(model, free, truth), case, course))
     found = fit(problem_of(model, twice(case), measured, free, course=course))
     assert found.status is Status.CONVERGED, found.message
     np.testing.assert_allclose(found.x, truth, rtol=0, atol=2e-3)
@@ -206,9 +208,9 @@ def test_fits_side_by_side_are_those_of_each_alone(course: Course | None) -> Non
     model = spine(2)
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
     case = loaded(model, 1)
-    truth = moved(model, free, np.array([0.3, -0.2, 0.1]))
+    truth = with_parameters(model, free, np.array([0.3, -0.2, 0.1]))
     measured = with_errors(sampled(truth, case, QUASI_STATIC))
-    other = replace(moved(model, free, np.full(3, 0.2)), damping=3.0 * model.damping)
+    other = replace(with_parameters(model, free, np.full(3, 0.2)), damping=3.0 * model.damping)
     problems = [
         problem_of(one, twice(case), measured, free, course=course) for one in (model, other)
     ]
@@ -224,7 +226,9 @@ def test_zeroed_readings_are_met_by_zeroed_ends() -> None:
     truth, case = np.array([0.3, -0.2, 0.1]), loaded(model, 1)
     steps = (LoadStep(0, ()), *(replace(s, step=s.step + 1) for s in twice(case).steps))
     zeroed = replace(case, steps=steps)
-    ends = sampled(moved(model, free, truth), replace(case, steps=steps[:2]), QUASI_STATIC)
+    ends = sampled(
+        with_parameters(model, free, truth), replace(case, steps=steps[:2]), QUASI_STATIC
+    )
     readings = np.concatenate([np.zeros((1, 2, 6)), with_errors(ends[1:] - ends[0])])
     problem = problem_of(model, zeroed, readings, free, course=QUASI_STATIC)
     problem = replace(problem, cases=(replace(problem.cases[0], zeroed=True),))
@@ -268,7 +272,7 @@ def test_an_optimum_without_cost_is_one() -> None:
     model, case = bridge.spine_model(chain), bridge.load_case(chain)
     free = free_parameters(model, 0, SAGITTAL, "per_specimen")
     truth = np.log(FACTORS[[0, 1, 3]])
-    measured = sampled(moved(model, free, truth), case, QUASI_STATIC).reshape(1, -1, 6)
+    measured = sampled(with_parameters(model, free, truth), case, QUASI_STATIC).reshape(1, -1, 6)
     problem = problem_of(model, case, measured, free, course=QUASI_STATIC)
     found = fit(replace(problem, weights=published_weights))
     np.testing.assert_allclose(found.x, truth, rtol=0, atol=1e-3)
@@ -280,7 +284,7 @@ def test_no_more_readings_than_unknowns_are_met_exactly() -> None:
     model = spine(1)
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
     truth, case = np.array([0.3, -0.2, 0.1]), loaded(model, 1)
-    measured = sampled(moved(model, free, truth), case, QUASI_STATIC).reshape(1, 1, 6)
+    measured = sampled(with_parameters(model, free, truth), case, QUASI_STATIC).reshape(1, 1, 6)
     measured[..., :3] = np.nan
     found = fit(problem_of(model, case, measured, free, course=QUASI_STATIC))
     np.testing.assert_allclose(found.x, truth, rtol=0, atol=2e-3)

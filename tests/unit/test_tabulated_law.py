@@ -23,7 +23,7 @@ from spinepipe.model.file import (
     write_model,
 )
 from spinepipe.statics import System, follow
-from spinepipe.statics.many import Stack
+from spinepipe.statics.batched import Stack
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 

@@ -17,7 +17,7 @@ from scipy.stats import t
 from spinepipe import cohort as cohorts
 from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.cohort import Cohort
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.units import COORDINATES
@@ -148,7 +148,7 @@ def _problem(design: Design, study: CohortStiffness, cohort: Cohort, specimen: s
 
 def _told(problem: Problem, found: Fit, truth: np.ndarray) -> list[dict[str, Any]]:
     """What is said of each stiffness beside the true one, (J, 6) N/m and N m/rad."""
-    values = moved(problem.model, problem.free, found.x).effects[0].values
+    values = with_parameters(problem.model, problem.free, found.x).effects[0].values
     limit = float(t.ppf(TAIL, max(found.uncertainty.degrees_of_freedom, 1)))
     rows = []
     for index, unknown in enumerate(problem.free):

@@ -22,8 +22,8 @@ from spinepipe.statics import (
     follow,
     free_parameters,
 )
+from spinepipe.statics.batched import Stack, poses_by
 from spinepipe.statics.equilibrium import factor
-from spinepipe.statics.many import Stack, poses_by
 from spinepipe.world import Chain
 from tests.cases import random_stacks as draw
 

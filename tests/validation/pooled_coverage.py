@@ -15,7 +15,7 @@ from scipy.stats import t
 
 from spinepipe import cohort as cohorts
 from spinepipe.calibrate import pool
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.units import COORDINATES
@@ -103,7 +103,7 @@ def _rows(seed: int, error: float, folder: Path) -> pd.DataFrame:
         )
     pooled = pool(problems)
     for number, (problem, own) in enumerate(zip(problems, pooled.specimens, strict=True)):
-        k = moved(problem.model, problem.free, own.x).effects[0].values
+        k = with_parameters(problem.model, problem.free, own.x).effects[0].values
         at = [(p.rows[0], p.column) for p in problem.free]
         off = [np.log(k[j, c]) - truth[number, j, c - 3] for j, c in at]
         frames.append(_frame(at, off, np.sqrt(np.diag(own.covariance))))

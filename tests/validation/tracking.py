@@ -25,11 +25,11 @@ from spinepipe.progress import Progress
 from spinepipe.statistics.outcome import mean_of
 from spinepipe.studies.tracking.approaches import asked_of, begun, fitting, found_by, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import BOTH
+from spinepipe.studies.tracking.error_metrics import Bones, errors_of
 from spinepipe.studies.tracking.kind import KIND
-from spinepipe.studies.tracking.moved import Moved
-from spinepipe.studies.tracking.off_truth import Bones, errors_of
 from spinepipe.studies.tracking.persons import TrackedPerson, person_of, ratio_sets
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, held_in, profiled, verdict
+from spinepipe.studies.tracking.reload_motions import ReloadedMotions
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.truth import Truth, truths
 from spinepipe.units import COORDINATES
@@ -102,7 +102,7 @@ class Made:
             ask = asked_of(SETTINGS, self.person, approach, law)
             seen = seen_in(SETTINGS, self.person, trial)
             found = found_by(approach, ask, seen, ratio_sets(self.cohort))
-            moved = Moved("", trial.name, approach, found.watched.grid.times_s, found.q)
+            moved = ReloadedMotions("", trial.name, approach, found.watched.grid.times_s, found.q)
             for off in errors_of(moved, self.truths[trial.name], self.bones):
                 if off.told.any():
                     mean = float(off.size[off.told].mean())

@@ -15,7 +15,7 @@ import pandas as pd
 
 from spinepipe.cohort import read
 from spinepipe.muscles.folder import SpecimenTables, source_of_folder
-from spinepipe.muscles.settle import held
+from spinepipe.muscles.muscle_equilibrium import held
 from spinepipe.muscles.trunk import Trunk
 from spinepipe.progress import Progress
 from spinepipe.studies.subjects import SUBJECTS, subject_of

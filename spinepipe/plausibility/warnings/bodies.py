@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort.answers import typical
 from spinepipe.cohort.check_geometry import INERTIA
 from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.load_response import typical
 from spinepipe.plausibility.score import BETTER, MistakeHypothesis, suspect, usual
 from spinepipe.plausibility.warnings.levels import least_kg
 from spinepipe.plausibility.warnings.neutral_pose import NeutralPose

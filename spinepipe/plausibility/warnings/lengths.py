@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort.answers import typical
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.exchanged_landmarks import FAR_MM, XYZ, column_mistakes
+from spinepipe.cohort.load_response import typical
+from spinepipe.cohort.swapped_landmarks import FAR_MM, XYZ, column_mistakes
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.plausibility.score import BETTER, hypotheses, suspect, usual

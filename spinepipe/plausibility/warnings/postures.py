@@ -12,15 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.exchanged_landmarks import (
+from spinepipe.cohort.specimen import landmarks
+from spinepipe.cohort.swapped_landmarks import (
     ACROSS,
     BEHIND_MM,
     XYZ,
     column_mistakes,
     exchange,
 )
-from spinepipe.cohort.exchanged_landmarks import suspect as suspect_landmarks
-from spinepipe.cohort.specimen import landmarks
+from spinepipe.cohort.swapped_landmarks import suspect as suspect_landmarks
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS, rotation_zxy, zxy_angles
 from spinepipe.plausibility.score import BETTER, usual

@@ -17,8 +17,8 @@ from math import log, sqrt
 import numpy as np
 
 from spinepipe.anatomy.stiffness_range import plausible, range_of_level
-from spinepipe.cohort.answers import LoadResponse, answers_of_test, typical
 from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.load_response import LoadResponse, answers_of_test, typical
 from spinepipe.cohort.load_tests import DRIVEN, PUSHED
 from spinepipe.cohort.loaded_cycles import LoadedCycle
 from spinepipe.plausibility.motion_size import geometric_mean, is_plausible, unit_like

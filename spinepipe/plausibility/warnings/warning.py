@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort.answers import of_specimens
 from spinepipe.cohort.cohort import Cohort, Group
 from spinepipe.cohort.columns import COHORT_YAML
+from spinepipe.cohort.load_response import of_specimens
 from spinepipe.documents.csv_table import read_rows
 from spinepipe.plausibility.score import has_range, table, usual
 from spinepipe.problems import InputProblem

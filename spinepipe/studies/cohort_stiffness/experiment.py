@@ -51,7 +51,7 @@ from spinepipe.studies.cohort_stiffness.tables import (
     SIMULATED,
 )
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.units import COORDINATES, DEG_PER_RAD, less_step_0
+from spinepipe.units import COORDINATES, DEG_PER_RAD, subtract_baseline
 
 Row = dict[str, Any]
 
@@ -155,7 +155,7 @@ def _slopes(problem: Problem, tests: SpecimenTests, x: Array, zeroed: bool) -> l
     """(T, J, 6, m) derivatives of the motion of each cycle by the unknowns; None without a pose."""
     cases = [one.case for one in tests.tested]
     (seen,) = AtRest(problem.model, cases, problem.free, problem.scale).solve([(0, x)])
-    return None if isinstance(seen, str) else [less_step_0(one, zeroed) for one in seen.by_x]
+    return None if isinstance(seen, str) else [subtract_baseline(one, zeroed) for one in seen.by_x]
 
 
 def _covariance(

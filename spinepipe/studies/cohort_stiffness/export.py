@@ -16,7 +16,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     tests_of,
 )
 from spinepipe.studies.exports import needed, problem, refuse, written
-from spinepipe.studies.kind import Wanted
+from spinepipe.studies.kind import WantedFiles
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
 
@@ -24,7 +24,7 @@ CRITERIA = ("left_out_specimen", "left_out_case", "fitted")
 """What recommends a representation: motion that no fit has seen, as far as any was held out."""
 
 
-def exported(study: CohortStiffness, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
     """OpenSim's document of the model, and in words which stiffness it has.
 
     Coordinates that were not fitted keep the published value.
@@ -56,7 +56,7 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: Wanted) -> tuple[st
     return written(model, f"the cohort's own joints, stiffness: {told}")
 
 
-def _recommended(wanted: Wanted, known: tuple[str, ...]) -> tuple[str, str]:
+def _recommended(wanted: WantedFiles, known: tuple[str, ...]) -> tuple[str, str]:
     """The representation that is best on held-out motion, and why it is taken, in words."""
     ranking = read_frame(needed(wanted.results / "ranking.parquet", "a computed study"))
     own = ranking[ranking["representation"].isin(known)]
@@ -70,7 +70,7 @@ def _recommended(wanted: Wanted, known: tuple[str, ...]) -> tuple[str, str]:
 
 
 def _fitted(
-    study: CohortStiffness, cohort: Cohort, wanted: Wanted, name: str, start: Array
+    study: CohortStiffness, cohort: Cohort, wanted: WantedFiles, name: str, start: Array
 ) -> Array:
     """(J, 6) the specimen's own fit to all its load cases, not fitted coordinates as at the start.
 

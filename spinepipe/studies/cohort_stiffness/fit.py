@@ -11,7 +11,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.fit_rows import (
     criteria,
@@ -140,7 +140,7 @@ def _stiffness(
 ) -> tuple[Any, list[Row]]:
     """Fitted stiffness (J, 6), None where the fit has none, and its rows."""
     usable = found.status.usable
-    model = moved(problem.model, problem.free, found.x)
+    model = with_parameters(problem.model, problem.free, found.x)
     k = model.effects[0].values
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)

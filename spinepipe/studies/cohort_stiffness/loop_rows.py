@@ -23,7 +23,7 @@ from spinepipe.studies.cohort_stiffness.tables import (
     UPPER_HALF,
     WHOLE,
 )
-from spinepipe.units import BORDER_PER_SI, COORDINATES, DEG_PER_RAD, MM_PER_M
+from spinepipe.units import COORDINATES, DEG_PER_RAD, DISPLAY_PER_SI, MM_PER_M
 
 Row = dict[str, Any]
 
@@ -237,6 +237,6 @@ def _sds(before: Array, after: Array, root: Array | None, free: Array | None) ->
 
 def noise_of_poses(sd_mm: float, sd_deg: float, root: Array) -> Array:
     """(12, 6 k) noise of two poses, whose steps share unit errors as ``root`` (2, k) says."""
-    sd: Array = np.array([sd_mm] * 3 + [sd_deg] * 3) / BORDER_PER_SI
+    sd: Array = np.array([sd_mm] * 3 + [sd_deg] * 3) / DISPLAY_PER_SI
     noise: Array = np.asarray(np.kron(root, np.diag(sd)), dtype=np.float64)
     return noise

@@ -18,7 +18,7 @@ from spinepipe.calibrate import Fit, Problem
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
-from spinepipe.statics import FreeParameter, declared, free_parameters, moved
+from spinepipe.statics import FreeParameter, declared, free_parameters, with_parameters
 from spinepipe.studies.cohort_stiffness.representations import EACH_JOINT, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -98,7 +98,7 @@ def from_plain(problem: Problem, plain: Fit) -> tuple[Problem, str]:
     note = f"held as without nuisances: {len(held)} of {len(stiffness)} stiffnesses"
     return replace(
         problem,
-        model=moved(problem.model, problem.free, x),
+        model=with_parameters(problem.model, problem.free, x),
         free=tuple(problem.free[index] for index in kept),
         lower=(problem.lower - x)[kept],
         upper=(problem.upper - x)[kept],
@@ -109,7 +109,7 @@ def from_plain(problem: Problem, plain: Fit) -> tuple[Problem, str]:
 def fitted_nuisances(problem: Problem, found: Fit) -> tuple[ScopedEffect, ...]:
     """The nuisance effects of a specimen with the values of its fit; none of a plain fit."""
     places = dict.fromkeys(unknown.effect for unknown in _unknowns(problem).values())
-    model = moved(problem.model, problem.free, found.x)
+    model = with_parameters(problem.model, problem.free, found.x)
     return tuple(model.effects[place] for place in places)
 
 

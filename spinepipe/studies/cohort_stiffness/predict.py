@@ -12,10 +12,10 @@ from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.statics.many import Stack, readings
+from spinepipe.statics.batched import Stack, readings
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven, stiff_model
-from spinepipe.units import COORDINATE_UNITS, COORDINATES, from_si, less_step_0
+from spinepipe.units import COORDINATE_UNITS, COORDINATES, from_si, subtract_baseline
 
 Row = dict[str, Any]
 
@@ -49,7 +49,7 @@ def predicted(
         if lost is not None:
             found.append((None, Status(poses.status[lost]), poses.messages[lost]))
         else:
-            motion = less_step_0(seen[first:end], cohort.zeroed_at_step_0)
+            motion = subtract_baseline(seen[first:end], cohort.zeroed_at_step_0)
             found.append((motion, Status.CONVERGED, ""))
     return found
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from spinepipe.calibrate import MeasuredCase, Problem
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.kept import kept_with_cohort
 from spinepipe.cohort.load_tests import coupled_range
 from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen, measured_specimen
+from spinepipe.cohort.memoize import kept_with_cohort
 from spinepipe.cohort.specimen import on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp

@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 from spinepipe.anatomy import published
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
-from spinepipe.cohort.kept import kept_with_cohort
+from spinepipe.cohort.memoize import kept_with_cohort
 from spinepipe.studies.base_model import Base
 from spinepipe.studies.cohort_stiffness.representations import FITTED, UNLESS_ASKED, named
 from spinepipe.studies.parts import (

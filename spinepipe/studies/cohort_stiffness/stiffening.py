@@ -17,7 +17,7 @@ from spinepipe.calibrate.fit import names_at_bound
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
-from spinepipe.statics import FreeParameter, free_parameters, moved
+from spinepipe.statics import FreeParameter, free_parameters, with_parameters
 from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.representations import STIFFENING_EFFECT, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
@@ -149,7 +149,7 @@ def fitted_growth(study: CohortStiffness, problem: Problem, found: Fit) -> Growt
     if not any(places):
         return None
     shape = len(problem.model.joints), len(COORDINATES)
-    model = moved(problem.model, problem.free, found.x)
+    model = with_parameters(problem.model, problem.free, found.x)
     growth = Growth.nowhere(shape)
     for index, (unknown, at) in enumerate(zip(problem.free, places, strict=True)):
         if at is None:

@@ -13,7 +13,7 @@ from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array, JointLaw, PathLaw
 from spinepipe.effects.field_numbers import NUMBERS, numbers_of, usual_load
 from spinepipe.studies.discrepancy.read_off import Laws, laws_at, mean_of, told
-from spinepipe.studies.discrepancy.search.hypothesis import Form
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.studies.discrepancy.verdict import EVERY, FieldNumber
@@ -66,7 +66,7 @@ def reaches(gap: Sequence[Row]) -> Reaches:
 
 
 def field_number_rows(
-    base: JointFit, final: JointFit, forms: Sequence[Form], tested: Reaches
+    base: JointFit, final: JointFit, forms: Sequence[CandidateForm], tested: Reaches
 ) -> list[Row]:
     """Numbers of both models where forms that stand change a curve that tests load.
 
@@ -94,14 +94,16 @@ def field_number_rows(
     ]
 
 
-def _specimens(fit: JointFit, forms: Sequence[Form], joint: int) -> Iterator[str]:
+def _specimens(fit: JointFit, forms: Sequence[CandidateForm], joint: int) -> Iterator[str]:
     """Specimens in which one of the forms acts on the joint."""
     for name in fit.models:
         if any(form.acts_in(name) and form.joint in (None, joint) for form in forms):
             yield name
 
 
-def numbers_at(rows: Sequence[Row], form: Form, joints: Sequence[str]) -> tuple[FieldNumber, ...]:
+def numbers_at(
+    rows: Sequence[Row], form: CandidateForm, joints: Sequence[str]
+) -> tuple[FieldNumber, ...]:
     """Means over specimens, with the effects, where a form acts."""
     own = joints if form.joint is None else (joints[form.joint],)
     on = form.variant.acts_on or COORDINATES
@@ -123,7 +125,7 @@ def numbers_at(rows: Sequence[Row], form: Form, joints: Sequence[str]) -> tuple[
 
 
 def _places(
-    form: Form, joints: Sequence[str], tested: Reaches
+    form: CandidateForm, joints: Sequence[str], tested: Reaches
 ) -> Iterator[tuple[tuple[int, str], float]]:
     """Joint and coordinate that a law may change and tests load, and the load to tell it at."""
     if not isinstance(form.variant.create(), JointLaw | PathLaw):
@@ -138,7 +140,7 @@ def _places(
             yield from (((j, coordinate), load) for j in own if (joints[j], coordinate) in tested)
 
 
-def _changes(fit: JointFit, form: Form, joint: int, coordinate: str, load: float) -> bool:
+def _changes(fit: JointFit, form: CandidateForm, joint: int, coordinate: str, load: float) -> bool:
     """Whether the curve is another one without the form's law."""
     if form.joint not in (None, joint):
         return False

@@ -8,13 +8,13 @@ from spinepipe.effects.contract import Array
 from spinepipe.model.file import effects_for, read_model
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.exports import needed, refuse, written
-from spinepipe.studies.kind import Wanted
+from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.parts import Damping
 
 MODEL = "model_with_effects.yaml"
 
 
-def exported(study: Discrepancy, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+def exported(study: Discrepancy, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
     """OpenSim's document of the model, and in words what it is and which effects it leaves out.
 
     Raises

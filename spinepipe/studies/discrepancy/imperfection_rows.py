@@ -3,15 +3,15 @@
 from collections.abc import Iterator
 from typing import Any
 
-from spinepipe.studies.discrepancy.design.withheld import Withheld
+from spinepipe.studies.discrepancy.design.masked_effects import MaskedEffects
 from spinepipe.studies.discrepancy.search.imperfections import (
     EVERYWHERE,
+    AbsorbedGap,
     Imperfection,
     InCommon,
     NuisancePlace,
-    TakenUp,
 )
-from spinepipe.studies.discrepancy.search.model_files import border
+from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.verdict_imperfections import (
     CommonImperfection,
     Imperfections,
@@ -30,7 +30,7 @@ SMALL_GAP = 0.1
 """A gap that imperfections change by less is as good as the same."""
 
 
-def imperfection_rows(taken: TakenUp, model: str) -> Iterator[Row]:
+def imperfection_rows(taken: AbsorbedGap, model: str) -> Iterator[Row]:
     """One row per imperfection, and one per mean over several."""
     for one in taken.each:
         yield _row(one.at, model, one.size, one.sd) | {
@@ -49,7 +49,7 @@ def imperfection_rows(taken: TakenUp, model: str) -> Iterator[Row]:
 
 
 def _row(at: NuisancePlace, model: str, size: float, sd: float) -> Row:
-    prior, unit = border(at.unit, at.sd)
+    prior, unit = display_value(at.unit, at.sd)
     return {
         "model": model,
         "specimen": at.specimen,
@@ -65,7 +65,7 @@ def _row(at: NuisancePlace, model: str, size: float, sd: float) -> Row:
     }
 
 
-def told_imperfections(taken: TakenUp) -> Imperfections:
+def told_imperfections(taken: AbsorbedGap) -> Imperfections:
     """The same in a few words and numbers."""
     common = tuple(_common(one) for one in taken.common if one.certain)
     largest = tuple(_large(one) for one in taken.largest[:MOST_TOLD])
@@ -78,20 +78,20 @@ def told_imperfections(taken: TakenUp) -> Imperfections:
     return Imperfections(without, taken.beside.gap, kinds, largest, common, message)
 
 
-def told_withheld(one: Withheld) -> WithheldEffect:
+def told_withheld(one: MaskedEffects) -> WithheldEffect:
     """An effect that an imperfection hides, and to what that would have to be known."""
-    allowed, unit = border(one.unit, one.prior)
+    allowed, unit = display_value(one.unit, one.prior)
     known = None if one.needed is None else one.needed * allowed
     return WithheldEffect(one.effect, one.kind, allowed, known, unit, one.now, one.at[0.0])
 
 
 def _large(one: Imperfection) -> LargeImperfection:
-    value, unit = border(one.at.unit, one.size * one.at.sd)
+    value, unit = display_value(one.at.unit, one.size * one.at.sd)
     return LargeImperfection(one.at.kind, where(one.at), one.size, value, unit)
 
 
 def _common(one: InCommon) -> CommonImperfection:
-    value, unit = border(one.at.unit, one.size * one.at.sd)
+    value, unit = display_value(one.at.unit, one.size * one.at.sd)
     return CommonImperfection(one.at.kind, where(one.at), one.size, one.sd, value, unit)
 
 
@@ -122,7 +122,7 @@ def _sizes(without: float | None, beside: float) -> str:
     )
 
 
-def _kinds(taken: TakenUp) -> str:
+def _kinds(taken: AbsorbedGap) -> str:
     """Which kinds took it up, where they took up much."""
     whole = taken.linear_chi2
     if taken.without is None or abs(taken.without.gap - taken.beside.gap) < SMALL_GAP:

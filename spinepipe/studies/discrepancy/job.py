@@ -23,8 +23,8 @@ from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.advice_rows import advice_csv, advice_rows
 from spinepipe.studies.discrepancy.curve_numbers import field_number_rows, reaches
 from spinepipe.studies.discrepancy.design.advice import advice, hidden_effects
+from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability, told_apart
 from spinepipe.studies.discrepancy.design.extra_tests import bench
-from spinepipe.studies.discrepancy.design.told_apart import ToldApart, told_apart
 from spinepipe.studies.discrepancy.imperfection_rows import (
     imperfection_rows,
     told_imperfections,
@@ -41,9 +41,8 @@ from spinepipe.studies.discrepancy.rows import (
     where_rows,
 )
 from spinepipe.studies.discrepancy.search.base import BUSHING
-from spinepipe.studies.discrepancy.search.beyond import Beyond, beyond
-from spinepipe.studies.discrepancy.search.grounds import NoBase
-from spinepipe.studies.discrepancy.search.imperfections import TakenUp, taken_up
+from spinepipe.studies.discrepancy.search.baseline import NoBase
+from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, taken_up
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
     Prepared,
@@ -53,6 +52,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import model_file
+from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, beyond
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner, Store
 from spinepipe.studies.discrepancy.table_rows import tabulated_rows
@@ -245,12 +245,12 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     )
 
 
-def _beyond(ended: Investigation, run: PieceRunner) -> Beyond:
+def _beyond(ended: Investigation, run: PieceRunner) -> ResidualModel:
     """What no effect explains, described; nothing where nothing is left, or the data look wrong."""
     final, outcome = ended.found.final, ended.ended
     told = outcome.verdict in (Conclusion.UNKNOWN, Conclusion.PART)
     if not told or outcome.reason is Reason.DATA_ERRORS:
-        return Beyond(None, None, final)
+        return ResidualModel(None, None, final)
     stays = beyond(final, ended.rules, run)
     if stays.table is not None:
         on_record([stays.grounds.fit], final.readings, run)
@@ -259,7 +259,7 @@ def _beyond(ended: Investigation, run: PieceRunner) -> Beyond:
 
 def _imperfections(
     joints: Sequence[str], ended: Investigation, run: PieceRunner
-) -> Mapping[str, TakenUp]:
+) -> Mapping[str, AbsorbedGap]:
     """What imperfections took up beside the base, and beside the model with the effects."""
     found = ended.found
     base = taken_up(found.base, found.base.fit, joints, run)
@@ -268,7 +268,7 @@ def _imperfections(
     return {"base": base, "with_effects": final}
 
 
-def _tabulated(ended: Investigation, stays: Beyond) -> Sequence[Row]:
+def _tabulated(ended: Investigation, stays: ResidualModel) -> Sequence[Row]:
     """The tables of what has no name, point by point."""
     if stays.table is None:
         return ()
@@ -276,7 +276,7 @@ def _tabulated(ended: Investigation, stays: Beyond) -> Sequence[Row]:
 
 
 def _rows(
-    joints: Sequence[str], ended: Investigation, told: ToldApart, stays: Beyond
+    joints: Sequence[str], ended: Investigation, told: Distinguishability, stays: ResidualModel
 ) -> Mapping[str, Sequence[Row]]:
     found, proof = ended.found, ended.proof
     return {

@@ -13,7 +13,7 @@ from spinepipe.calibrate.profile import NORMAL_95
 from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array, JointLaw, PathLaw
 from spinepipe.model import SpineModel
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.studies.discrepancy.verdict import EVERY
@@ -82,14 +82,16 @@ def told(
         member = fit.hypothesis.members[specimen]
         at = fit.models[specimen].joints.index(joint)
         own = fit.x[list(member.numbers)]
-        here = laws_at(moved(member.model, member.free, own), at)
+        here = laws_at(with_parameters(member.model, member.free, own), at)
         asked.append((specimen, None, 0.0))
         curves.append(here)
         for place, unknown in enumerate(member.numbers):
             limits = fit.hypothesis.unknowns[unknown]
             for side in (-1.0, 1.0):
                 to = np.clip(own[place] + side * STEP * errors[unknown], limits.low, limits.high)
-                there = laws_at(moved(member.model, member.free, _with(own, place, to)), at)
+                there = laws_at(
+                    with_parameters(member.model, member.free, _with(own, place, to)), at
+                )
                 if any(np.any(a != b) for (_, a), (_, b) in zip(here, there, strict=True)):
                     asked.append((specimen, unknown, float(to - own[place])))
                     curves.append(there)

@@ -10,19 +10,19 @@ from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep, Support
 from spinepipe.status import Status
-from spinepipe.studies.discrepancy.design.told_apart import ToldApart
+from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
 from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, GapPlace, places, residual_frame
-from spinepipe.studies.discrepancy.search.hypothesis import Form, shape_at
-from spinepipe.studies.discrepancy.search.inquiry import SearchResult, SearchStage
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, shape_at
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
-from spinepipe.studies.discrepancy.search.model_files import border, fitted_values
+from spinepipe.studies.discrepancy.search.model_files import display_value, fitted_values
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import Refit
-from spinepipe.studies.discrepancy.search.screen import Tried
+from spinepipe.studies.discrepancy.search.screen import ScreenedVariant
+from spinepipe.studies.discrepancy.search.search_state import SearchResult, SearchStage
 from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
 from spinepipe.studies.discrepancy.verdict import share_of_gap
-from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES, LOAD_UNITS
+from spinepipe.units import COORDINATE_UNITS, COORDINATES, DISPLAY_PER_SI, LOAD_UNITS
 
 Row = dict[str, Any]
 
@@ -73,9 +73,9 @@ def _rows_of(
     loads = readings.applied
     for number, test in enumerate(readings.tests):
         size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))  # zeroing adds to the SD
-        sd = size[:, None] * noise.sd * BORDER_PER_SI
+        sd = size[:, None] * noise.sd * DISPLAY_PER_SI
         for t, j, c in zip(*np.nonzero(test.count), strict=True):
-            factor, count = BORDER_PER_SI[c], int(test.count[t, j, c])
+            factor, count = DISPLAY_PER_SI[c], int(test.count[t, j, c])
             fold, out_base, out_final = ("", None, None)
             if held_out is not None:
                 folds, of_base, of_final = held_out[number]
@@ -111,11 +111,11 @@ def _rig(step: LoadStep, joint: int, coordinate: int) -> Support | None:
 def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
     """A row of a reaction, in loads: what is listed, and what the models hold at that motion."""
     assert rig.read_as is not None
-    per, load = float(BORDER_PER_SI[coordinate]) * rig.read_as, row["load"]
+    per, load = float(DISPLAY_PER_SI[coordinate]) * rig.read_as, row["load"]
     told: Row = {"noise_sd": row["noise_sd"] / per}
     for name in _MODELLED:
         told[name] = None if row.get(name) is None else load + row[name] / per
-    held_at = rig.value * float(BORDER_PER_SI[coordinate])
+    held_at = rig.value * float(DISPLAY_PER_SI[coordinate])
     return row | told | {"unit": LOAD_UNITS[COORDINATES[coordinate]], "held_at": held_at}
 
 
@@ -191,7 +191,7 @@ def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[
     return rows
 
 
-def _form_row(stage: str, beside: Sequence[str], form: Form, joints: Sequence[str]) -> Row:
+def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, joints: Sequence[str]) -> Row:
     return {
         "stage": stage,
         "beside": ", ".join(beside),
@@ -205,10 +205,10 @@ def _form_row(stage: str, beside: Sequence[str], form: Form, joints: Sequence[st
     }
 
 
-def _of_screen(tried: Tried) -> Row:
+def _of_screen(tried: ScreenedVariant) -> Row:
     effect = tried.form.variant.create()
     shapes = {
-        effect.parameters[column].name: border(
+        effect.parameters[column].name: display_value(
             effect.parameters[column].unit, shape_at(effect.parameters[column], sds)
         )[0]
         for column, sds in zip(tried.form.variant.shapes, tried.sds, strict=True)
@@ -223,7 +223,7 @@ def _of_screen(tried: Tried) -> Row:
     }
 
 
-def _estimate(effect: Effect, tried: Tried) -> tuple[float | None, str]:
+def _estimate(effect: Effect, tried: ScreenedVariant) -> tuple[float | None, str]:
     """A single strength in the unit of tables."""
     if len(tried.estimate) != 1:
         return None, ""
@@ -231,7 +231,7 @@ def _estimate(effect: Effect, tried: Tried) -> tuple[float | None, str]:
     assert p.off is not None
     away = float(tried.estimate[0]) * p.prior_scale
     value = p.off * float(np.exp(np.clip(away, -50.0, 50.0))) if p.logarithmic else p.off + away
-    return border(p.unit, value)
+    return display_value(p.unit, value)
 
 
 def _share(drop: float, excess: float) -> float | None:
@@ -280,7 +280,7 @@ def _of_refit(one: Refit, excess: float) -> Row:
     return row
 
 
-def design_rows(told: ToldApart) -> list[Row]:
+def design_rows(told: Distinguishability) -> list[Row]:
     """Rows of the table candidates: what the tests could tell of each effect."""
     return [
         {
@@ -308,7 +308,7 @@ def design_rows(told: ToldApart) -> list[Row]:
     ]
 
 
-def confusion_rows(told: ToldApart) -> list[Row]:
+def confusion_rows(told: Distinguishability) -> list[Row]:
     """One row per pair of effects."""
     return [
         {
@@ -372,7 +372,7 @@ def held_out_readings(
     }
 
 
-def scope_words(form: Form, joints: Sequence[str]) -> str:
+def scope_words(form: CandidateForm, joints: Sequence[str]) -> str:
     """Where a form acts, in words; ``*`` for everywhere."""
     words = [joints[form.joint]] if form.joint is not None else []
     words += [form.specimen] if form.specimen is not None else []

@@ -12,7 +12,7 @@ from spinepipe.studies.discrepancy.read_off import Laws, laws_at, mean_of, told
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.studies.discrepancy.verdict import EVERY
-from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES, LOAD_UNITS
+from spinepipe.units import COORDINATE_UNITS, COORDINATES, DISPLAY_PER_SI, LOAD_UNITS
 
 Row = dict[str, Any]
 
@@ -59,7 +59,7 @@ def _of_joint(
                 "joint": joint,
                 "coordinate": law.coordinate,
                 "over": law.along,
-                "motion": float(motion * BORDER_PER_SI[along]),
+                "motion": float(motion * DISPLAY_PER_SI[along]),
                 "motion_unit": COORDINATE_UNITS[law.along],
                 "load": value,
                 "low": value - away,

@@ -8,17 +8,17 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.curve_numbers import numbers_at
-from spinepipe.studies.discrepancy.design.told_apart import ToldApart
+from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
-from spinepipe.studies.discrepancy.search.beyond import Beyond
 from spinepipe.studies.discrepancy.search.gaps import GapPlace, places, residual_frame, worst
-from spinepipe.studies.discrepancy.search.hypothesis import Form
-from spinepipe.studies.discrepancy.search.inquiry import SearchResult, SelectedTerm
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
 from spinepipe.studies.discrepancy.search.investigation import Investigation, Prepared
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.regions import ValueWithRegion, estimated
+from spinepipe.studies.discrepancy.search.residual_model import ResidualModel
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
+from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
@@ -36,7 +36,7 @@ from spinepipe.studies.discrepancy.verdict import (
     share_of_gap,
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import UnnamedMisfit, UnnamedRest
-from spinepipe.units import BORDER_PER_SI
+from spinepipe.units import DISPLAY_PER_SI
 
 Row = dict[str, Any]
 
@@ -46,8 +46,8 @@ MOST_RIVALS, MOST_PLACES = 5, 3
 def verdict_found(
     ready: Prepared,
     investigation: Investigation,
-    told: ToldApart,
-    stays: Beyond,
+    told: Distinguishability,
+    stays: ResidualModel,
     numbers: Sequence[Row],
     run: PieceRunner,
 ) -> Verdict:
@@ -171,7 +171,7 @@ def _estimate(value: ValueWithRegion) -> Estimate:
     )
 
 
-def _scope(form: Form, cohort: Cohort) -> VerdictScope:
+def _scope(form: CandidateForm, cohort: Cohort) -> VerdictScope:
     return VerdictScope(
         joints=EVERY if form.joint is None else (cohort.joint_names[form.joint],),
         coordinates=form.variant.acts_on or EVERY,
@@ -181,7 +181,7 @@ def _scope(form: Form, cohort: Cohort) -> VerdictScope:
 
 def noise_told(noise: FittedNoise) -> ReportedNoise:
     """SDs of one reading in the units of tables, and how they are known."""
-    sd = noise.sd * BORDER_PER_SI
+    sd = noise.sd * DISPLAY_PER_SI
     return ReportedNoise(
         source=noise.source,
         rotation_sd_deg=_rms(sd[3:]),
@@ -198,7 +198,7 @@ def _rms(sd: Array) -> float | None:
 
 
 def _unknown(
-    found: SearchResult, ended: Outcome, final: Sequence[GapPlace], stays: Beyond
+    found: SearchResult, ended: Outcome, final: Sequence[GapPlace], stays: ResidualModel
 ) -> UnnamedMisfit | None:
     if ended.reason is None:
         return None
@@ -208,7 +208,7 @@ def _unknown(
 
 
 def _part(
-    found: SearchResult, ended: Outcome, final: Sequence[GapPlace], stays: Beyond
+    found: SearchResult, ended: Outcome, final: Sequence[GapPlace], stays: ResidualModel
 ) -> UnnamedRest | None:
     """What stays beside the effects that are certain; None where nothing is said to."""
     if not ended.left:

@@ -19,23 +19,23 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.schema import Table
-from spinepipe.statics.many import Cases, Spines, solve_many
+from spinepipe.statics.batched import Cases, Spines, solve_many
 from spinepipe.status import Status
-from spinepipe.studies.asked_tests import AskedTest
 from spinepipe.studies.global_sensitivity.loaded import loaded
 from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, asked_tests, start_of
 from spinepipe.studies.global_sensitivity.tables import BASE_MOTION, BASE_STIFFNESS, EVERY
 from spinepipe.studies.parts import stiffness_of_joints
+from spinepipe.studies.selected_tests import AskedTest
 from spinepipe.tables import from_rows, write
 from spinepipe.units import (
-    BORDER_PER_SI,
     COORDINATE_UNITS,
     COORDINATES,
+    DISPLAY_PER_SI,
     STIFFNESS_UNITS,
     from_si,
-    less_step_0,
+    subtract_baseline,
 )
 
 Rows = list[dict[str, Any]]
@@ -191,7 +191,7 @@ def _rows_of_test(
 ) -> Iterator[dict[str, Any]]:
     """Rows of one test; measured (J, 6) and noise (6,) in mm and deg."""
     solved = solve_many(Spines.of(model, 1), Cases.of(test.case, 1))
-    predicted = from_si(less_step_0(solved.q[0], test.from_first))[-1]
+    predicted = from_si(subtract_baseline(solved.q[0], test.from_first))[-1]
     last = len(test.case.steps) - 1
     driven = loaded(cohort, test.case.test, model.specimen)
     for column, coordinate in enumerate(COORDINATES):
@@ -252,6 +252,6 @@ def _noise(cohort: Cohort, zeroed: bool) -> Array:
     """(6,) mm and deg, SD of one number of ``motion.csv``; zeroing adds the error of step 0."""
     sd = cohort.measurement_sd
     if sd is None:
-        return np.zeros(len(BORDER_PER_SI))
+        return np.zeros(len(DISPLAY_PER_SI))
     once = np.array([sd.translation_mm] * 3 + [sd.rotation_deg] * 3)
     return once * (np.sqrt(2.0) if zeroed else 1.0)

@@ -8,7 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, made_of_batches
 from spinepipe.studies.global_sensitivity.problem import problem_of
@@ -76,7 +76,7 @@ def _problem(settings: GlobalSensitivity, cohort: Cohort, batch: Batch, place: i
 
 def _row(sample: int, problem: Problem, found: Fit) -> dict[str, Any]:
     solved = found.status.usable
-    values = moved(problem.model, problem.free, found.x).effects[0].values[0]
+    values = with_parameters(problem.model, problem.free, found.x).effects[0].values[0]
     row: dict[str, Any] = {
         name: float(value) if solved else None
         for name, value in zip(STIFFNESS_COLUMNS, values, strict=True)

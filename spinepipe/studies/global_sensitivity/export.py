@@ -9,13 +9,13 @@ from spinepipe.problems import InputError
 from spinepipe.status import USABLE
 from spinepipe.studies.exports import needed, problem, refuse, written
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.kind import Wanted
+from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
 
 
-def exported(study: GlobalSensitivity, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+def exported(study: GlobalSensitivity, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
     """OpenSim's document of the model, and in words what it is.
 
     Raises
@@ -36,7 +36,7 @@ def exported(study: GlobalSensitivity, cohort: Cohort, wanted: Wanted) -> tuple[
     return written(model, f"the cohort's own joints, stiffness: {told}")
 
 
-def _fitted(wanted: Wanted, start: Array) -> Array:
+def _fitted(wanted: WantedFiles, start: Array) -> Array:
     """(J, 6) what the study's results have of the specimen, all joints alike."""
     rows = read_frame(needed(wanted.results / "base_stiffness.parquet", "a computed study"))
     own = rows[rows["specimen"] == wanted.specimen]

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.statics.many import ManySolved, solve_many
+from spinepipe.statics.batched import ManySolved, solve_many
 from spinepipe.status import Status
-from spinepipe.studies.asked_tests import AskedTest
 from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, made_of_batches
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
+from spinepipe.studies.selected_tests import AskedTest
 from spinepipe.tables import to_arrow, write
-from spinepipe.units import COORDINATE_COLUMNS, from_si, less_step_0
+from spinepipe.units import COORDINATE_COLUMNS, from_si, subtract_baseline
 
 TABLE = RESPONSES.without("specimen")
 """A job file: the specimen is in its folder's name."""
@@ -78,7 +78,7 @@ class _Rows:
 
 def _rows(batch: Batch, test: AskedTest, solved: ManySolved) -> _Rows:
     rows = _Rows(batch, test, solved.q.shape[2])
-    motion = less_step_0(solved.q.swapaxes(0, 1), test.from_first).swapaxes(0, 1)
+    motion = subtract_baseline(solved.q.swapaxes(0, 1), test.from_first).swapaxes(0, 1)
     kept, stored = batch.varied.kept, slice(-len(test.steps), None)
     rows.motion[kept] = from_si(motion)[:, stored]
     rows.load[kept] = solved.load[:, stored]

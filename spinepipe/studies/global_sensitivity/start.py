@@ -17,8 +17,8 @@ from spinepipe.cohort.specimen import (
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.model import SpineModel
-from spinepipe.studies.asked_tests import AskedTest, asked, first_cycles
 from spinepipe.studies.global_sensitivity.many_frames import INFERIOR, SUPERIOR, Flags
+from spinepipe.studies.selected_tests import AskedTest, asked, first_cycles
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.model import LoadCase, ScopedEffect
-from spinepipe.statics.many.spines import Cases, Spines
+from spinepipe.statics.batched.spines import Cases, Spines
 from spinepipe.studies.global_sensitivity.change import FactorChange, Of
 from spinepipe.studies.global_sensitivity.many_frames import many_joint_frames, why_none
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen

@@ -16,7 +16,7 @@ from spinepipe.designs import sample_log_uniform, specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import Course, moved
+from spinepipe.statics import Course, with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     specimen_inputs,
@@ -136,7 +136,7 @@ def _fitted(cohort: Cohort, problem: Problem, found: Fit, rests: bool) -> list[d
     """One row per joint: its stiffness and its own mean errors."""
     solved = found.status.usable
     message = "; ".join(filter(None, (found.message, "" if rests else NO_REST)))
-    values = moved(problem.model, problem.free, found.x).effects[0].values
+    values = with_parameters(problem.model, problem.free, found.x).effects[0].values
     rows = []
     for joint, errors in enumerate(np.moveaxis(absolute_errors(found.cases, found.poses), 1, 0)):
         known = np.isfinite(errors).any(axis=0)

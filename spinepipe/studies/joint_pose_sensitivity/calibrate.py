@@ -9,7 +9,7 @@ from spinepipe.calibrate import Fit, Problem, fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.fitted_stiffness import stiffness_cells
 from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
@@ -76,7 +76,7 @@ def _fitted(
     """One row, or one per joint where stiffness is per joint."""
     shared = settings.calibration.grouping == "per_specimen"
     solved = found.status.usable
-    model = moved(problem.model, problem.free, found.x)
+    model = with_parameters(problem.model, problem.free, found.x)
     common = {
         "specimen": specimen,
         "pose": pose,

@@ -10,7 +10,7 @@ from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.problems import InputError
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.exports import needed, problem, refuse, written
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
@@ -20,12 +20,12 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
 )
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.kind import Wanted
+from spinepipe.studies.kind import WantedFiles
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 
 
-def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
     """OpenSim's document of the model, and in words which frames and which stiffness it has.
 
     Of the cohort's own pose the fit is made here; those of sampled poses are results.
@@ -51,7 +51,7 @@ def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: Wanted) -> tup
     return written(model, f"joint pose {name}, stiffness: {origin}")
 
 
-def _fitted(study: JointPoseSensitivity, wanted: Wanted, frames: tuple[Pose, ...]) -> Array:
+def _fitted(study: JointPoseSensitivity, wanted: WantedFiles, frames: tuple[Pose, ...]) -> Array:
     """(J, 6) stiffness fitted in these frames, as the study fits.
 
     Raises
@@ -64,7 +64,7 @@ def _fitted(study: JointPoseSensitivity, wanted: Wanted, frames: tuple[Pose, ...
     if not found.status.usable:
         allowed, remedy = "a fit in the cohort's own joint pose", "add --start for the start"
         raise InputError([problem("SPECIMEN", f"no fit: {found.message}", allowed, remedy)])
-    values: Array = moved(asked.model, asked.free, found.x).effects[0].values
+    values: Array = with_parameters(asked.model, asked.free, found.x).effects[0].values
     return values
 
 

@@ -15,7 +15,7 @@ from spinepipe.calibrate.forward_runs import (
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import Course, moved
+from spinepipe.statics import Course, with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.filters import near_start
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
@@ -100,7 +100,7 @@ def _fit_exactly(settings: JointPoseSensitivity, problem: Problem) -> dict[str, 
 
 def _stiffness(settings: JointPoseSensitivity, problem: Problem, x: Array) -> dict[str, Any]:
     """Stiffness, and whether it is near its start."""
-    values = moved(problem.model, problem.free, x).effects[0].values[0]
+    values = with_parameters(problem.model, problem.free, x).effects[0].values[0]
     free = [COORDINATES.index(name) for name in settings.calibration.free]
     start = start_stiffness(settings)[free]
     near = near_start(values[None, free], start, settings.success.near_start_percent)[0]

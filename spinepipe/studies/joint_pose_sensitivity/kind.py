@@ -463,5 +463,5 @@ KIND = Kind(
     makes_models="start_model",
     exports="export:exported",
     settled=calibration_settled,
-    told_by_check="told_by_data:told",
+    told_by_check="identifiability_preview:told",
 )

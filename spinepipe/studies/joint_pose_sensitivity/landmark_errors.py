@@ -12,7 +12,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import absolute_errors, calibration_problem
@@ -73,7 +73,7 @@ def _nominal(
         return str(error), _row((), (), Status.REFUSED, str(error))
     if not found.status.usable:
         return found.message, _fitted(found)
-    values: Array = moved(problem.model, problem.free, found.x).effects[0].values
+    values: Array = with_parameters(problem.model, problem.free, found.x).effects[0].values
     return values, _fitted(found)
 
 

@@ -18,7 +18,7 @@ from spinepipe.cohort.measured import measured_specimen
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.fitted_stiffness import stiffness_cells
 from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
@@ -85,7 +85,7 @@ def _rows(
         for name in ("*",) if shared else study_and_cohort(root, settings.study)[1].joint_names:
             yield {**key, "joint": name, "cost": None, "degrees_of_freedom": 0, **ended}
         return
-    model = moved(problem.model, problem.free, found.x)
+    model = with_parameters(problem.model, problem.free, found.x)
     for joint in range(1) if shared else range(model.n_joints):
         yield {
             **key,

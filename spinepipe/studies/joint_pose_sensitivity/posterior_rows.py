@@ -14,13 +14,13 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
 from spinepipe.status import Status
 from spinepipe.units import (
-    BORDER_PER_SI,
     COORDINATE_UNITS,
     COORDINATES,
+    DISPLAY_PER_SI,
     STIFFNESS_COLUMNS,
     STIFFNESS_UNITS,
     TRANSLATIONS,
-    less_step_0,
+    subtract_baseline,
 )
 
 ENDS = (2.5, 97.5)
@@ -99,7 +99,7 @@ class PosteriorQuantity:
         cls, name: str, axis: int, draws: Array, near: tuple[float, float], prior: float
     ) -> Self:
         """Offset of a joint's centre or tilt of its axes, number ``axis`` of six; SI."""
-        coordinate, scale = COORDINATES[axis], float(BORDER_PER_SI[axis])
+        coordinate, scale = COORDINATES[axis], float(DISPLAY_PER_SI[axis])
         kind = "joint_centre" if coordinate in TRANSLATIONS else "joint_axes"
         place = {"quantity": kind, "joint": name, "unknown": coordinate}
         normal = (near[0] + near[1] * ndtri(_MIDS)) * scale
@@ -172,13 +172,13 @@ def motion_rows(
 ) -> list[dict[str, Any]]:
     """Bands of the motion, and of a new reading of it, beside what was measured."""
     rng = np.random.default_rng(seed)
-    scale = np.sqrt(problem.weights) * BORDER_PER_SI
+    scale = np.sqrt(problem.weights) * DISPLAY_PER_SI
     with np.errstate(divide="ignore", invalid="ignore"):
         sd = np.where(scale > 0.0, np.sqrt(noise.variance) / scale, np.nan)
     rows: list[dict[str, Any]] = []
     for number, case in enumerate(problem.cases):
-        motion = np.stack([less_step_0(one.readings[number], case.zeroed) for one in seen])
-        read = motion + less_step_0(
+        motion = np.stack([subtract_baseline(one.readings[number], case.zeroed) for one in seen])
+        read = motion + subtract_baseline(
             np.moveaxis(sd * rng.standard_normal(motion.shape), 0, 1), case.zeroed
         ).swapaxes(0, 1)
         rows += _case_rows(problem, case, motion, read)
@@ -189,14 +189,14 @@ def _case_rows(
     problem: Problem, case: MeasuredCase, motion: Array, read: Array
 ) -> list[dict[str, Any]]:
     """Of one cycle: motion (S, T, J, 6) m and rad, and readings of it, NaN where none is made."""
-    bands = np.percentile(motion, [ENDS[0], 50.0, ENDS[1]], axis=0) * BORDER_PER_SI
+    bands = np.percentile(motion, [ENDS[0], 50.0, ENDS[1]], axis=0) * DISPLAY_PER_SI
     rows = []
-    measured = case.readings * BORDER_PER_SI
+    measured = case.readings * DISPLAY_PER_SI
     for step, joint, axis in np.ndindex(*measured.shape):
         value, new = measured[step, joint, axis], read[:, step, joint, axis]
         ends: tuple[float | None, float | None] = (None, None)
         if np.isfinite(new).all():
-            low, high = np.percentile(new * BORDER_PER_SI[axis], ENDS).tolist()
+            low, high = np.percentile(new * DISPLAY_PER_SI[axis], ENDS).tolist()
             ends = (low, high)
         known = bool(np.isfinite(value))
         inside = None

@@ -29,7 +29,7 @@ from spinepipe.statics import FreeParameter, free_parameters
 from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import BORDER_PER_SI, MM_PER_M, TRANSLATIONS
+from spinepipe.units import DISPLAY_PER_SI, MM_PER_M, TRANSLATIONS
 
 _POINT = ["x_mm", "y_mm", "z_mm"]
 
@@ -201,7 +201,7 @@ def reading_sd(cohort: Cohort) -> Array:
     declared = cohort.measurement_sd
     if declared is None:
         return np.zeros(6)
-    return np.array([declared.translation_mm] * 3 + [declared.rotation_deg] * 3) / BORDER_PER_SI
+    return np.array([declared.translation_mm] * 3 + [declared.rotation_deg] * 3) / DISPLAY_PER_SI
 
 
 def problem_of(root: str, settings: JointPoseSensitivity, specimen: str) -> Problem:

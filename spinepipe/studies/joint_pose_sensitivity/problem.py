@@ -17,10 +17,10 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
 )
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import (
-    BORDER_PER_SI,
     COORDINATES,
+    DISPLAY_PER_SI,
     STIFFNESS_COLUMNS,
-    less_step_0,
+    subtract_baseline,
 )
 
 
@@ -69,11 +69,11 @@ def absolute_errors(cases: Sequence[MeasuredCase], poses: Sequence[Array]) -> Ar
     error = np.concatenate(
         [_predicted(case, q) - case.readings for q, case in zip(poses, cases, strict=True)]
     )
-    absolute: Array = np.abs(error) * BORDER_PER_SI
+    absolute: Array = np.abs(error) * DISPLAY_PER_SI
     return absolute
 
 
 def _predicted(measured: MeasuredCase, poses: Array) -> Array:
     """(T, J, 6) predicted motion by load step, zeroed at step 0 if the measurement is."""
     q = poses.reshape(len(poses), -1, 6)
-    return less_step_0(q, measured.zeroed)
+    return subtract_baseline(q, measured.zeroed)

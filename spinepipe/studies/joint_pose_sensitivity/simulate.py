@@ -15,7 +15,7 @@ from spinepipe.frames import Pose
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import Program, System, settle
-from spinepipe.statics.many import Stack
+from spinepipe.statics.batched import Stack
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,

@@ -5,12 +5,12 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames, on_bushings
 from spinepipe.studies.exports import refuse, written
-from spinepipe.studies.kind import Wanted
+from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 
 
-def exported(study: RangeOfMotion, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+def exported(study: RangeOfMotion, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
     """OpenSim's document of the model, and in words what it is.
 
     Raises

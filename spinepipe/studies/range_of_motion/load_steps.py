@@ -9,8 +9,8 @@ from spinepipe.cohort.load_tests import virtual_load_cases
 from spinepipe.cohort.specimen import followers, load_cases
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import LoadCase
-from spinepipe.studies.asked_tests import AskedTest, asked, first_cycles
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.selected_tests import AskedTest, asked, first_cycles
 
 
 @lru_cache(maxsize=256)

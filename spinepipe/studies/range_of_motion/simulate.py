@@ -17,12 +17,12 @@ from spinepipe.frames import Pose
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import KEPT_SPECIMENS, study_of_kind
 from spinepipe.model import RefusedModel, SpineModel
-from spinepipe.statics.many import Stack
+from spinepipe.statics.batched import Stack
 from spinepipe.status import Status
-from spinepipe.studies.asked_tests import AskedTest
 from spinepipe.studies.range_of_motion.load_steps import asked_tests, virtual_tensions
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
+from spinepipe.studies.selected_tests import AskedTest
 from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, from_si
 

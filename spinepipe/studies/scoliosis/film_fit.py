@@ -27,7 +27,7 @@ from spinepipe.model import SpineModel
 from spinepipe.statics.prescribed import Ask, PrescribedResult, alone, answered
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
-from spinepipe.studies.scoliosis.held_spine import BENDING, with_laws
+from spinepipe.studies.scoliosis.fixed_end_spine import BENDING, with_laws
 from spinepipe.studies.scoliosis.optima import FilmOptimum, Limits, best, optimum
 from spinepipe.studies.scoliosis.personal import Fitting, Patient, Personal
 from spinepipe.studies.scoliosis.population import PatientPrior, Population, assumed

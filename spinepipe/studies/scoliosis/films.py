@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.kept import kept_with_cohort
+from spinepipe.cohort.memoize import kept_with_cohort
 from spinepipe.documents.form import read_forms
 from spinepipe.effects.contract import Array
 from spinepipe.units import DEG_PER_RAD, MM_PER_M

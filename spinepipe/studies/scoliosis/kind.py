@@ -10,7 +10,7 @@ from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
-from spinepipe.studies.scoliosis.jalalian_2017 import stands_for
+from spinepipe.studies.scoliosis.jalalian_2017 import reproduces
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.study_files import Figure, StudyFiles
 
@@ -91,7 +91,7 @@ class ScoliosisFiles(StudyFiles):
     @classmethod
     def of(cls, study: Scoliosis, cohort: Cohort) -> "ScoliosisFiles":
         """The files of a study of a cohort."""
-        rebuilt = stands_for(cohort.name) and beside()
+        rebuilt = reproduces(cohort.name) and beside()
         return cls(study, cohort.specimen_names, rebuilt)
 
     @property
@@ -152,7 +152,7 @@ KIND = Kind(
         *_ANALYSES,
     ),
     forms=(FILMS, PATIENTS),
-    doubts="doubts:doubts",
+    doubts="plausibility:doubts",
     why_no_export="films show rotations in one plane, without loads and masses, which a file of "
     "OpenSim needs: take the personal laws from laws.parquet",
 )

@@ -25,7 +25,7 @@ from spinepipe.studies.scoliosis.film_fit import (
 )
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import Population, assumed, learned
-from spinepipe.studies.scoliosis.population_table import Learned, population_rows
+from spinepipe.studies.scoliosis.population_table import PopulationEstimate, population_rows
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import POPULATION
@@ -61,7 +61,7 @@ def weights(settings: Scoliosis, cohort: Cohort) -> Array:
     return weighed_with(*seen, settings.model_sd_mm, settings.model_sd_deg)
 
 
-def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) -> Learned:
+def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) -> PopulationEstimate:
     """Rounds of fits of all patients, until the population stands still."""
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
     population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, FittedFilms]()
@@ -74,7 +74,7 @@ def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) ->
         if change < LAST_ROUND or not fits:
             break
     unfitted = tuple(name for name in patients if name not in fits)
-    return Learned(population, rounds, change, len(fits), unfitted, change < LAST_ROUND)
+    return PopulationEstimate(population, rounds, change, len(fits), unfitted, change < LAST_ROUND)
 
 
 def _fits(

@@ -12,7 +12,7 @@ from spinepipe.report.page.document import (
 from spinepipe.studies.scoliosis.films import HELD_OUT
 from spinepipe.studies.scoliosis.findings import findings
 from spinepipe.studies.scoliosis.headline import headline
-from spinepipe.studies.scoliosis.jalalian_2017 import stands_for
+from spinepipe.studies.scoliosis.jalalian_2017 import reproduces
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import (
     ACCURACY,
@@ -60,7 +60,7 @@ def document(study: Scoliosis, cohort: Cohort, results: ResultTables) -> Documen
         metadata=results.metadata,
         left_out=(
             *left_out(study, cohort),
-            *papers.left_out("Jalalian et al. 2017", stands_for(cohort.name)),
+            *papers.left_out("Jalalian et al. 2017", reproduces(cohort.name)),
         ),
         headline=Headline(_joined(found.words), _joined(found.how_sure), found.warnings),
     )

@@ -24,7 +24,7 @@ from spinepipe.statics.prescribed import PrescribedResult
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.curve_angles import SpinalCurve, curves, lumbar_apex
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, Film, Read, read_films
-from spinepipe.studies.scoliosis.held_spine import (
+from spinepipe.studies.scoliosis.fixed_end_spine import (
     BENDING,
     HeldSpine,
     geometry,

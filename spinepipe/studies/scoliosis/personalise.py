@@ -15,10 +15,10 @@ from spinepipe.studies.scoliosis.curve_angles import region
 from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.film_regions import regions
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
-from spinepipe.studies.scoliosis.held_spine import Posed
-from spinepipe.studies.scoliosis.misses import POSED, miss_of
+from spinepipe.studies.scoliosis.fixed_end_spine import Posed
 from spinepipe.studies.scoliosis.personal import WAYS, Patient, Personal, patient_of
 from spinepipe.studies.scoliosis.population_table import population_of
+from spinepipe.studies.scoliosis.residuals import POSED, miss_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
 from spinepipe.studies.scoliosis.tangent_laws import ends_of

@@ -15,7 +15,7 @@ from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 
 @dataclass(frozen=True)
-class Learned:
+class PopulationEstimate:
     """A population, and how it was come by.
 
     Attributes
@@ -32,7 +32,9 @@ class Learned:
     settled: bool
 
 
-def population_rows(found: Learned, joints: Sequence[str], sd: Array) -> Iterator[dict[str, Any]]:
+def population_rows(
+    found: PopulationEstimate, joints: Sequence[str], sd: Array
+) -> Iterator[dict[str, Any]]:
     """A row for each quantity and joint."""
     population = found.population
     means = population.mean.reshape(len(PER_SEGMENT), -1)
@@ -62,7 +64,7 @@ def population_rows(found: Learned, joints: Sequence[str], sd: Array) -> Iterato
             }
 
 
-def _moving(found: Learned) -> str:
+def _moving(found: PopulationEstimate) -> str:
     if not found.patients:
         return ""
     return f"after {found.rounds} rounds a logarithm still changed by {found.change:.2g}"

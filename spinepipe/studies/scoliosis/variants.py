@@ -16,9 +16,9 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import SpineModel
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
-from spinepipe.studies.scoliosis.held_spine import HeldSpine, Posed, with_laws
-from spinepipe.studies.scoliosis.misses import POSED, miss_of
+from spinepipe.studies.scoliosis.fixed_end_spine import HeldSpine, Posed, with_laws
 from spinepipe.studies.scoliosis.personal import Patient, patient_of, tangent
+from spinepipe.studies.scoliosis.residuals import POSED, miss_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import SINGULAR, VARIANTS
 from spinepipe.studies.scoliosis.tangent_laws import characterise, ends_of

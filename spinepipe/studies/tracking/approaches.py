@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.asked import SHAPE, Ask, ResidualScales, Watched, watched
+from spinepipe.motion.objective import SHAPE, Ask, ResidualScales, Watched, watched
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.passive_elements import PassiveElements
 from spinepipe.motion.points import COUNT

@@ -2,7 +2,7 @@
 
 from spinepipe.cohort import Cohort
 from spinepipe.studies.tracking.forms import STANCE
-from spinepipe.studies.tracking.moved import kinds_of_trials
+from spinepipe.studies.tracking.reload_motions import kinds_of_trials
 from spinepipe.studies.tracking.settings import LEARNT, OWN, Approach, Tracking
 
 SMOOTH: Approach = "ik_smooth"

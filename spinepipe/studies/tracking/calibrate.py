@@ -7,13 +7,13 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.asked import Watched
+from spinepipe.motion.objective import Watched
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.trajectory import OptimalMotions, solve
 from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import trials_of_law
+from spinepipe.studies.tracking.extra_inputs import marks_of
 from spinepipe.studies.tracking.laws import highest, stiffness_rows, without
-from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.persons import person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import STIFFNESS

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.motion.skeleton import PELVIS
 from spinepipe.problems import InputProblem
-from spinepipe.studies.tracking.look import LoadedTrial, runs
+from spinepipe.studies.tracking.trial_preview import LoadedTrial, runs
 from spinepipe.units import MM_PER_M
 
 LONGEST_GAP_S = 0.5

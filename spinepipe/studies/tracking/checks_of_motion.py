@@ -11,7 +11,7 @@ from spinepipe.motion.reading import axes_of
 from spinepipe.problems import InputProblem
 from spinepipe.studies.tracking.checks_of_markers import marker_problems
 from spinepipe.studies.tracking.forms import MOVING, STANCE
-from spinepipe.studies.tracking.look import LoadedTrial
+from spinepipe.studies.tracking.trial_preview import LoadedTrial
 from spinepipe.units import DEG_PER_RAD
 
 LIKE_THE_SET = (0.4, 2.5)

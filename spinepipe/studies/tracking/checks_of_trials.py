@@ -17,7 +17,6 @@ from spinepipe.problems import InputError, InputProblem, Spelling
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.checks_of_motion import motion_problems
 from spinepipe.studies.tracking.forms import MARKER_SET, STANCE, TRIALS
-from spinepipe.studies.tracking.look import LoadedTrial
 from spinepipe.studies.tracking.persons import (
     Row,
     marker_set,
@@ -27,6 +26,7 @@ from spinepipe.studies.tracking.persons import (
     trial_of,
     trial_rows,
 )
+from spinepipe.studies.tracking.trial_preview import LoadedTrial
 from spinepipe.units import COORDINATES
 
 LISTED = 4

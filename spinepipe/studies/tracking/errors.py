@@ -8,11 +8,11 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.studies.tracking.error_metrics import Bones, ErrorFromTruth, bones_of, errors_of
 from spinepipe.studies.tracking.forms import STANCE
-from spinepipe.studies.tracking.moved import Moved, kinds_of_trials, motions
-from spinepipe.studies.tracking.off_truth import Bones, Off, bones_of, errors_of
+from spinepipe.studies.tracking.reload_motions import ReloadedMotions, kinds_of_trials, motions
+from spinepipe.studies.tracking.scaled_persons import factors_in
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.sizes import factors_in
 from spinepipe.studies.tracking.tables import ERRORS
 from spinepipe.studies.tracking.truth import Truth, truths
 from spinepipe.tables import from_rows, read_frames, write
@@ -50,7 +50,7 @@ def error_rows(
             yield from _rows(moved, off)
 
 
-def _rows(moved: Moved, off: Off) -> Iterator[dict[str, Any]]:
+def _rows(moved: ReloadedMotions, off: ErrorFromTruth) -> Iterator[dict[str, Any]]:
     for k, level in enumerate(off.levels):
         size = off.size[off.told[:, k], k]
         if not len(size):

@@ -10,11 +10,11 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.measures import rigidity
 from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
-from spinepipe.studies.tracking.marks import marks_of
+from spinepipe.studies.tracking.extra_inputs import marks_of
 from spinepipe.studies.tracking.persons import TrackedPerson, person_of, size_of
 from spinepipe.studies.tracking.remarks import Remark, repairs_of, warnings_of
+from spinepipe.studies.tracking.scaled_persons import ScaledPerson, size_rows
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.sizes import Sized, size_rows
 from spinepipe.studies.tracking.tables import CLUSTERS, REMARKS, SIZES
 from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M
@@ -35,7 +35,9 @@ def run(root: str, study: str, specimen: str, clusters: str, remarks: str, sizes
     write(from_rows(SIZES, list(size_rows(specimen, found))), sizes, made_by)
 
 
-def remark_rows(cohort: Cohort, person: TrackedPerson, found: Sized) -> Iterator[dict[str, Any]]:
+def remark_rows(
+    cohort: Cohort, person: TrackedPerson, found: ScaledPerson
+) -> Iterator[dict[str, Any]]:
     """Rows of table `remarks`: what is so, then what was put right, each once."""
     remarks = [*warnings_of(person), *repairs_of(cohort, person.name)]
     if found.message:

@@ -17,7 +17,7 @@ from spinepipe.report.words import capital, count, listed, number
 from spinepipe.statistics.outcome import Mean, corrected, mean_of
 from spinepipe.status import Status
 from spinepipe.studies.tracking.forms import STANCE
-from spinepipe.studies.tracking.moved import kinds_of_trials
+from spinepipe.studies.tracking.reload_motions import kinds_of_trials
 from spinepipe.studies.tracking.settings import LEARNT, Tracking
 from spinepipe.studies.tracking.tables import MARKER_OFF, MEASURES
 from spinepipe.studies.tracking.words import in_order, short_of, sized, told

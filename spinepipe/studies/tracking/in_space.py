@@ -18,7 +18,7 @@ from spinepipe.studies.tracking.in_space_motions import (
     MEASURED,
     MODELLED,
     Frame,
-    Shown,
+    MotionInSpace,
     motions_of,
 )
 from spinepipe.studies.tracking.in_space_still import still
@@ -71,11 +71,11 @@ def spine_in_space(drawn: pd.DataFrame) -> Space:
     )
 
 
-def bounded(every: list[Shown]) -> list[Shown]:
+def bounded(every: list[MotionInSpace]) -> list[MotionInSpace]:
     """As many of the first motions as the page can hold, what moves before what stands."""
     moving = [one for one in every if len(one.frames) > 1]
     standing = [one for one in every if len(one.frames) < 2]
-    kept: list[Shown] = []
+    kept: list[MotionInSpace] = []
     for one in [*moving, *standing]:
         frames = sum(len(other.frames) for other in kept) + len(one.frames)
         if len(kept) < MOST_SCENES and frames <= MOST_FRAMES:
@@ -83,7 +83,7 @@ def bounded(every: list[Shown]) -> list[Shown]:
     return kept
 
 
-def boxes(one: Shown, frame: Frame) -> Array:
+def boxes(one: MotionInSpace, frame: Frame) -> Array:
     """(8 B, 3) mm, corners of a box for each body, as large in all frames as in the first."""
     start = one.frames[0].places
     apart = np.linalg.norm(np.diff(start, axis=0), axis=1)
@@ -97,7 +97,7 @@ def boxes(one: Shown, frame: Frame) -> Array:
     return np.concatenate(corners)
 
 
-def _scene(one: Shown) -> Any:
+def _scene(one: MotionInSpace) -> Any:
     """The first frame as a figure; of a motion with what changes from frame to frame."""
     parts = list(_parts(one))
     low, high = _reach(one)
@@ -122,7 +122,7 @@ def _scene(one: Shown) -> Any:
     return scene
 
 
-def _reach(one: Shown) -> tuple[list[float], list[float]]:
+def _reach(one: MotionInSpace) -> tuple[list[float], list[float]]:
     """Ends of the box that holds all frames, mm."""
     clouds = [np.concatenate([boxes(one, f), f.modelled, f.measured]) for f in one.frames]
     points = np.concatenate(clouds)
@@ -130,7 +130,7 @@ def _reach(one: Shown) -> tuple[list[float], list[float]]:
     return low.round().tolist(), high.round().tolist()
 
 
-def _parts(one: Shown) -> Iterator[Any]:
+def _parts(one: MotionInSpace) -> Iterator[Any]:
     """Traces of the first frame, in the order of what `_moved` changes."""
     first = _moved(one, one.frames[0])
     corners, links, measured, modelled, apart = (
@@ -169,7 +169,7 @@ def _markers(
     )
 
 
-def _moved(one: Shown, frame: Frame) -> dict[str, list[Any]]:
+def _moved(one: MotionInSpace, frame: Frame) -> dict[str, list[Any]]:
     """Places of every trace by axis: corners, joints, markers, and lines between markers."""
     gap = np.full_like(frame.modelled, np.nan)
     apart = np.stack([frame.modelled, frame.measured, gap], axis=1).reshape(-1, 3)

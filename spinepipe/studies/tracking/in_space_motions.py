@@ -37,7 +37,7 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class MotionInSpace:
     """One motion as it is drawn.
 
     Attributes
@@ -51,7 +51,7 @@ class Shown:
     frames: tuple[Frame, ...]
 
 
-def motions_of(drawn: pd.DataFrame) -> Iterator[Shown]:
+def motions_of(drawn: pd.DataFrame) -> Iterator[MotionInSpace]:
     """Every person, trial and approach of the table drawn, dynamics before the other approaches."""
     if drawn.empty:
         return
@@ -66,7 +66,7 @@ def motions_of(drawn: pd.DataFrame) -> Iterator[Shown]:
         yield _shown(", ".join([str(person), *words] if several else words), rows)
 
 
-def _shown(name: str, rows: pd.DataFrame) -> Shown:
+def _shown(name: str, rows: pd.DataFrame) -> MotionInSpace:
     of_kind = {kind: rows[rows["kind"] == kind] for kind in ("body", MODELLED, MEASURED)}
     there = set(of_kind["body"]["name"])
     bodies = tuple(body for body in BODIES if body in there)
@@ -79,7 +79,7 @@ def _shown(name: str, rows: pd.DataFrame) -> Shown:
         Frame(time, _rotations(turned[k]), places[k], cells[0][k], cells[1][k])
         for k, time in enumerate(times.astype(float).tolist())
     )
-    return Shown(name, bodies, markers, tuple(frames))
+    return MotionInSpace(name, bodies, markers, tuple(frames))
 
 
 def _grid(

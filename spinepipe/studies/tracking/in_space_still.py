@@ -20,20 +20,20 @@ from spinepipe.report.style import (
     style,
 )
 from spinepipe.report.words import fixed
-from spinepipe.studies.tracking.in_space_motions import Frame, Shown
+from spinepipe.studies.tracking.in_space_motions import Frame, MotionInSpace
 
 _VIEWS = (("From the right", 0, "forwards (mm)"), ("From behind", 2, "to the right (mm)"))
 _WIDTH_MM, _AROUND_MM, _KEY_MM, _MARGIN_MM, _LARGEST = 130.0, 20.0, 12.0, 12.0, 0.3
 """Width of both views on paper, what is around them, margin in the body, scale at most."""
 
 
-def still(one: Shown) -> bytes:
+def still(one: MotionInSpace) -> bytes:
     """A motion from the right and from behind."""
     with style():
         return picture(still_figure(one), "svg")
 
 
-def still_figure(one: Shown) -> Figure:
+def still_figure(one: MotionInSpace) -> Figure:
     """The same as a figure: the first frame light, the farthest one dark."""
     far = farthest(one)
     figure, axes = _views(one, far)
@@ -57,7 +57,7 @@ def still_figure(one: Shown) -> Figure:
     return figure
 
 
-def farthest(one: Shown) -> Frame:
+def farthest(one: MotionInSpace) -> Frame:
     """The frame whose joints are farthest from those of the first, on average."""
     start = one.frames[0].places
     apart = [float(np.linalg.norm(f.places - start, axis=1).mean()) for f in one.frames]
@@ -82,7 +82,7 @@ def _draw(axis: Axes, frame: Frame, across: int, color: str) -> None:
     axis.plot(frame.modelled[:, across], frame.modelled[:, 1], "o", **dots)
 
 
-def _views(one: Shown, far: Frame) -> tuple[Figure, list[Axes]]:
+def _views(one: MotionInSpace, far: Frame) -> tuple[Figure, list[Axes]]:
     """Two panels as wide as what they show, so that both have one scale."""
     first = one.frames[0]
     clouds = [cloud for f in (first, far) for cloud in (f.places, f.modelled, f.measured)]

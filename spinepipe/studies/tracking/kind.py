@@ -13,12 +13,12 @@ from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.approaches_of_trials import calibrated_in, tried
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
-from spinepipe.studies.tracking.forms import FORMS
-from spinepipe.studies.tracking.marks import (
+from spinepipe.studies.tracking.extra_inputs import (
     marks_of_export,
     marks_of_motion,
     marks_of_tracking,
 )
+from spinepipe.studies.tracking.forms import FORMS
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, profiled_persons
 from spinepipe.studies.tracking.settings import Tracking
 
@@ -232,5 +232,5 @@ KIND = Kind(
     ),
     exports="opensim:exported",
     forms=(SUBJECTS, *FORMS),
-    doubts="doubts:doubts",
+    doubts="plausibility:doubts",
 )

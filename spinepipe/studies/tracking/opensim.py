@@ -14,10 +14,10 @@ from spinepipe.marks import KEY, write_marked
 from spinepipe.motion.export import mot, osim, usable
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.studies.exports import refuse
-from spinepipe.studies.kind import Wanted
-from spinepipe.studies.tracking.marks import marks_of
-from spinepipe.studies.tracking.moved import motions
+from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.tracking.extra_inputs import marks_of
 from spinepipe.studies.tracking.persons import TrackedPerson, person_of
+from spinepipe.studies.tracking.reload_motions import motions
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
@@ -55,7 +55,7 @@ def document(person: TrackedPerson) -> str:
     return osim(person.skeleton, markers, name)
 
 
-def exported(study: Tracking, cohort: Cohort, wanted: Wanted) -> tuple[str, str]:
+def exported(study: Tracking, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
     """OpenSim's model of a person, and in words what it is: a skeleton, without stiffness.
 
     Raises

@@ -23,7 +23,7 @@ from spinepipe.motion import bounds as ranges
 from spinepipe.motion import passive_elements as laws
 from spinepipe.motion import ratios
 from spinepipe.motion.bounds import Bounds
-from spinepipe.motion.hanging import ARMS, hung
+from spinepipe.motion.head_and_arms import ARMS, hung
 from spinepipe.motion.passive_elements import PassiveElements
 from spinepipe.motion.ratios import RatioSet
 from spinepipe.motion.reading import DEFAULT_AXES, NoFrameError, read_motion
@@ -44,8 +44,8 @@ from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.forms import BOUNDS, PASSIVE, RATIOS, STANCE, TRIALS
+from spinepipe.studies.tracking.scaled_persons import ScaledPerson, sized_by
 from spinepipe.studies.tracking.settings import Scaling
-from spinepipe.studies.tracking.sizes import Sized, sized_by
 from spinepipe.units import MM_PER_M
 
 PELVIS_BELOW_M = 0.05
@@ -107,7 +107,7 @@ def person_of(
     return told if fit is None else as_large(told, fit.factors)
 
 
-def size_of(person: TrackedPerson) -> Sized:
+def size_of(person: TrackedPerson) -> ScaledPerson:
     """How large a person is beside the skeleton, by the static trial."""
     trial = next((trial for trial in person.trials if trial.name == person.static), None)
     return sized_by(person.skeleton, person.markers, trial)

@@ -14,12 +14,12 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.asked import Ask, Watched
+from spinepipe.motion.objective import Ask, Watched
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.trajectory import solve
 from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
 from spinepipe.studies.tracking.approaches_of_trials import BOTH
-from spinepipe.studies.tracking.marks import marks_of
+from spinepipe.studies.tracking.extra_inputs import marks_of
 from spinepipe.studies.tracking.persons import TrackedPerson, person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import LIMIT, PROFILE_POINTS, PROFILES

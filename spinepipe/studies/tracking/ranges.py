@@ -9,11 +9,11 @@ import pandas as pd
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.skeleton import JOINTS, PELVIS
-from spinepipe.studies.tracking.moved import motions
+from spinepipe.studies.tracking.reload_motions import motions
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import RANGES
 from spinepipe.tables import from_rows, read_frames, write
-from spinepipe.units import BORDER_PER_SI, COORDINATE_UNITS, COORDINATES
+from spinepipe.units import COORDINATE_UNITS, COORDINATES, DISPLAY_PER_SI
 
 
 def run(root: str, study: str, tables: list[str], output: str) -> None:
@@ -28,7 +28,7 @@ def range_rows(tracked: pd.DataFrame) -> Iterator[dict[str, Any]]:
     for moved in motions(tracked):
         if len(moved.q) < 2:
             continue
-        reach = np.ptp(moved.q[:, PELVIS + 1 :], axis=0) * BORDER_PER_SI
+        reach = np.ptp(moved.q[:, PELVIS + 1 :], axis=0) * DISPLAY_PER_SI
         for joint, of_joint in zip(JOINTS, reach.tolist(), strict=True):
             for coordinate, value in zip(COORDINATES, of_joint, strict=True):
                 yield {

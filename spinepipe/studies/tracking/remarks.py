@@ -8,8 +8,8 @@ import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import BODIES
-from spinepipe.studies.tracking.look import runs
 from spinepipe.studies.tracking.persons import TrackedPerson, marker_set, recording, trial_rows
+from spinepipe.studies.tracking.trial_preview import runs
 
 LONGEST_CHAIN = 5
 """Levels in a row without a marker between them; motion cannot be shared out among more."""

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 
 from spinepipe.motion.points import marker_places
+from spinepipe.motion.residual_terms import Markers, MuscleDemand
 from spinepipe.motion.skeleton import PELVIS
-from spinepipe.motion.terms import Markers, MuscleDemand
 from spinepipe.status import Status
 from spinepipe.studies.tracking.approaches import ApproachMotion
-from spinepipe.studies.tracking.moved import IN_ORDER
+from spinepipe.studies.tracking.reload_motions import IN_ORDER
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import FITS, MARKER_OFF
-from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, DEG_PER_RAD, MM_PER_M
+from spinepipe.units import COORDINATE_COLUMNS, DEG_PER_RAD, DISPLAY_PER_SI, MM_PER_M
 
 Row = dict[str, Any]
 
@@ -23,7 +23,7 @@ _TURNS = slice(3, 6)
 def motion_rows(found: ApproachMotion) -> Iterator[Row]:
     """All joints and the pelvis at all nodes."""
     times = found.watched.grid.times_s
-    shown = found.q * BORDER_PER_SI
+    shown = found.q * DISPLAY_PER_SI
     for frame, now in enumerate(shown):
         for name, values in zip(IN_ORDER, now.tolist(), strict=True):
             yield {

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.skeleton import JOINTS, LUMBAR, PELVIS
-from spinepipe.studies.tracking.moved import AXIS, Moved
+from spinepipe.studies.tracking.reload_motions import AXIS, ReloadedMotions
 
 LEAST_RAD = float(np.deg2rad(2.0))
 LUMBAR_JOINTS = JOINTS[LUMBAR]
@@ -44,7 +44,9 @@ class MotionShares:
         return (self.cycle >= low - _TRIFLE) & (self.cycle <= high + _TRIFLE)
 
 
-def shares_of(moved: Moved, kind: str, instants: int | None = None) -> MotionShares | None:
+def shares_of(
+    moved: ReloadedMotions, kind: str, instants: int | None = None
+) -> MotionShares | None:
     """Shares of a motion, at its frames or at so many instants; None where nothing is moved.
 
     Parameters

@@ -14,7 +14,7 @@ import pandas as pd
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statistics.waveforms import MultipleCorrelation, multiple_correlation
-from spinepipe.studies.tracking.moved import kinds_of_trials, motions
+from spinepipe.studies.tracking.reload_motions import kinds_of_trials, motions
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.shares import INSTANTS, MotionShares, shares_of
 from spinepipe.studies.tracking.tables import SIMILARITY, WINDOWS

@@ -9,6 +9,7 @@ import numpy as np
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.passive import PassiveLaw
+from spinepipe.studies.tracking.animation_rows import drawn_rows
 from spinepipe.studies.tracking.approaches import (
     ApproachMotion,
     asked_of,
@@ -16,9 +17,8 @@ from spinepipe.studies.tracking.approaches import (
     learns,
     seen_in,
 )
-from spinepipe.studies.tracking.drawn import drawn_rows
+from spinepipe.studies.tracking.extra_inputs import marks_of
 from spinepipe.studies.tracking.laws import law_in
-from spinepipe.studies.tracking.marks import marks_of
 from spinepipe.studies.tracking.persons import TrackedPerson, person_of, ratio_sets
 from spinepipe.studies.tracking.rows import Row, failed_row, fit_row, motion_rows
 from spinepipe.studies.tracking.settings import Approach, Tracking

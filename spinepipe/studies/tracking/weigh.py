@@ -10,10 +10,10 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.skeleton import MarkerTrial
 from spinepipe.studies.tracking.approaches import ApproachMotion, asked_of, found_by, seen_in
-from spinepipe.studies.tracking.marks import marks_of
-from spinepipe.studies.tracking.moved import Moved
-from spinepipe.studies.tracking.off_truth import Bones, errors_of
+from spinepipe.studies.tracking.error_metrics import Bones, errors_of
+from spinepipe.studies.tracking.extra_inputs import marks_of
 from spinepipe.studies.tracking.persons import TrackedPerson, person_of
+from spinepipe.studies.tracking.reload_motions import ReloadedMotions
 from spinepipe.studies.tracking.rows import Row, failed_row, fit_row
 from spinepipe.studies.tracking.settings import Approach, Tracking
 from spinepipe.studies.tracking.tables import WEIGHTS
@@ -67,7 +67,7 @@ def _errors(
     sizes: dict[str, float | None] = dict.fromkeys(MEASURED)
     if truth is None:
         return sizes
-    moved = Moved(person.name, trial, APPROACH, found.watched.grid.times_s, found.q)
+    moved = ReloadedMotions(person.name, trial, APPROACH, found.watched.grid.times_s, found.q)
     for off in errors_of(moved, truth, Bones(person.skeleton, person.centres)):
         if off.measure in MEASURED and off.told.any():
             sizes[off.measure] = float(off.size[off.told].mean())

@@ -4,6 +4,6 @@ COHORTS = ("trunk_volunteers",)
 """Persons and tasks of its captions and of its Table 1."""
 
 
-def stands_for(cohort: str) -> bool:
+def reproduces(cohort: str) -> bool:
     """Whether a cohort has the paper's volunteers: only then are results set beside its numbers."""
     return cohort in COHORTS

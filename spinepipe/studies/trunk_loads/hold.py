@@ -9,18 +9,19 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.muscles.co_contraction import least_stable
 from spinepipe.muscles.masses import ARM, shares
+from spinepipe.muscles.muscle_equilibrium import SolverOptions, held
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.scaling import applied_ratios
-from spinepipe.muscles.settle import How, held
 from spinepipe.muscles.stability import smallest_eigenvalue
 from spinepipe.muscles.strength import capacity_left, load_factor
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
-from spinepipe.muscles.tone import least_stable
 from spinepipe.muscles.trunk import BODIES
 from spinepipe.progress import Progress
 from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.trunk_loads.extra_inputs import marks_of
 from spinepipe.studies.trunk_loads.persons import (
     UprightPerson,
     how_of,
@@ -39,7 +40,6 @@ from spinepipe.studies.trunk_loads.rows import (
     task_row,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.source_marks import marks_of
 from spinepipe.studies.trunk_loads.tables import (
     ITERATIONS,
     LEVELS_TABLE,
@@ -113,7 +113,7 @@ def outcome_of(settings: TrunkLoads, person: Person, task: Task) -> TaskOutcome:
 
 
 def _outcome(
-    settings: TrunkLoads, person: Person, task: Task, how: How, gain: float
+    settings: TrunkLoads, person: Person, task: Task, how: SolverOptions, gain: float
 ) -> TaskOutcome:
     message, tone = "", task.tone_share if task.tone == "stated" else 0.0
     found = None

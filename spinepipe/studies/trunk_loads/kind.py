@@ -11,12 +11,12 @@ from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
+from spinepipe.studies.trunk_loads.extra_inputs import marks_of_source
 from spinepipe.studies.trunk_loads.forms import GEOMETRY_FORMS
 from spinepipe.studies.trunk_loads.forms import TASKS as TASK_FORM
-from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
+from spinepipe.studies.trunk_loads.ghezelbash_2016 import reproduces
 from spinepipe.studies.trunk_loads.sampling import batches, sampled
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.source_marks import marks_of_source
 from spinepipe.studies.trunk_loads.tables import (
     ITERATIONS,
     LEVELS_TABLE,
@@ -115,7 +115,7 @@ class TrunkFiles(StudyFiles):
     @classmethod
     def of(cls, study: TrunkLoads, cohort: Cohort) -> "TrunkFiles":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, stands_for(cohort.name) and beside())
+        return cls(study, cohort.specimen_names, reproduces(cohort.name) and beside())
 
     @property
     def tables(self) -> tuple[str, ...]:
@@ -190,7 +190,7 @@ KIND = Kind(
         _AGAINST,
     ),
     forms=(SUBJECTS, TASK_FORM, *GEOMETRY_FORMS),
-    doubts="doubts:doubts",
+    doubts="plausibility:doubts",
     why_no_export="a task is solved for muscle forces in a given posture, and muscles are not "
     "written: the source package of the trunk is the model to take elsewhere",
 )

@@ -10,7 +10,7 @@ from spinepipe.report.page.document import (
     page_tables,
 )
 from spinepipe.studies.trunk_loads.findings import findings
-from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
+from spinepipe.studies.trunk_loads.ghezelbash_2016 import reproduces
 from spinepipe.studies.trunk_loads.headline import headline
 from spinepipe.studies.trunk_loads.in_space import trunk_in_space
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
@@ -71,7 +71,7 @@ def document(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Docume
         metadata=results.metadata,
         left_out=(
             *left_out(study),
-            *papers.left_out("Ghezelbash et al. 2016", stands_for(cohort.name)),
+            *papers.left_out("Ghezelbash et al. 2016", reproduces(cohort.name)),
         ),
         headline=Headline(_joined(found.words), _joined(found.how_sure), found.warnings),
         space=trunk_in_space(cohort, results.table(PATHS.name), results.table("levels")),

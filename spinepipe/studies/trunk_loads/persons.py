@@ -16,6 +16,7 @@ from spinepipe.muscles.fascicles import Source
 from spinepipe.muscles.folder import SpecimenTables, source_of_folder
 from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, JointLaws
 from spinepipe.muscles.masses import masses_of
+from spinepipe.muscles.muscle_equilibrium import SolverOptions
 from spinepipe.muscles.myo_sim import origin_of_myo_sim, source_of_myo_sim
 from spinepipe.muscles.passive_muscle import PassiveMuscle
 from spinepipe.muscles.paths import Lines, Standoff
@@ -23,7 +24,6 @@ from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import JointCentres
 from spinepipe.muscles.regressions import Regressions, packaged, read_regressions
 from spinepipe.muscles.scaling import Choices, scaled
-from spinepipe.muscles.settle import How
 from spinepipe.muscles.subject import CM_PER_M, REFERENCE, Subject
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import BODIES, LEVELS, Trunk
@@ -199,10 +199,10 @@ def laws_of(settings: TrunkLoads, source: Trunk, size: Stiffening, values: Value
     )
 
 
-def how_of(settings: TrunkLoads, twice: bool = False) -> How:
+def how_of(settings: TrunkLoads, twice: bool = False) -> SolverOptions:
     """When rounds have settled; `twice`: whether to look for a second answer."""
     solving = settings.solving
-    return How(
+    return SolverOptions(
         solving.change,
         solving.residual_nm,
         solving.slack_nm,

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.muscles.settle import held
+from spinepipe.muscles.muscle_equilibrium import held
 from spinepipe.progress import Progress
 from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.trunk_loads.extra_inputs import marks_of
 from spinepipe.studies.trunk_loads.persons import (
     changed_task,
     how_of,
@@ -20,7 +21,6 @@ from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, task_row
 from spinepipe.studies.trunk_loads.sampling import drawn, of_batch
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.source_marks import marks_of
 from spinepipe.studies.trunk_loads.tables import QUANTITIES, RESPONSES
 from spinepipe.tables import from_rows, read_frame, write
 

@@ -10,8 +10,8 @@ from spinepipe.anatomy.segments import MASS_PERCENT
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.disc_pressure import DiscPressure, disc_pressure
 from spinepipe.muscles.masses import ARM
+from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import L4L5, SolvedTask
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.status import Balanced

@@ -8,15 +8,15 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.muscles.muscle_equilibrium import SolvedTask, SolverOptions, acted_on, held
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.settle import How, SolvedTask, acted_on, held
 from spinepipe.muscles.task import Task
 from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.trunk_loads.extra_inputs import marks_of
 from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, task_row
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.source_marks import marks_of
 from spinepipe.studies.trunk_loads.tables import SIMPLIFICATIONS, SIMPLIFIED
 from spinepipe.tables import from_rows, write
 
@@ -57,7 +57,7 @@ def rows_of(settings: TrunkLoads, cohort: Cohort, specimen: str) -> Iterator[Row
             }
 
 
-def _how(how: How, simplification: str) -> How:
+def _how(how: SolverOptions, simplification: str) -> SolverOptions:
     changed = {
         "no_feedback": {"feedback": False},
         "rigid_translations": {"translates": False},
@@ -66,7 +66,7 @@ def _how(how: How, simplification: str) -> How:
     return replace(how, **changed.get(simplification, {}))
 
 
-def _outcome(person: Person, task: Task, how: How) -> TaskOutcome:
+def _outcome(person: Person, task: Task, how: SolverOptions) -> TaskOutcome:
     try:
         found = held(person, task, how)
     except ValueError as why:

@@ -16,13 +16,14 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.muscles.settle import held
+from spinepipe.muscles.muscle_equilibrium import held
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import Trunk
 from spinepipe.muscles.upright import Upright
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
 from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.trunk_loads.extra_inputs import marks_of
 from spinepipe.studies.trunk_loads.measured import PairedPressure, beside_tasks
 from spinepipe.studies.trunk_loads.persons import (
     NOMINAL,
@@ -35,7 +36,6 @@ from spinepipe.studies.trunk_loads.persons import (
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.source_marks import marks_of
 from spinepipe.studies.trunk_loads.tables import AGREEMENT, PRESSURES, REGION, TUNING
 from spinepipe.tables import from_rows, write
 

@@ -12,7 +12,7 @@ from spinepipe.studies.discrepancy.design.extra_tests import MENU
 from spinepipe.studies.discrepancy.design.plans import (
     PRELOAD_N,
     Plan,
-    Planned,
+    PlannedTest,
     as_made,
     comes_back,
     thinned,
@@ -24,7 +24,7 @@ from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadi
 
 def plan_of(*cases: LoadCase, zeroed: bool = True) -> Plan:
     count = np.tile([0, 0, 0, 3, 3, 3], (2, 1))
-    return Plan(tuple(Planned(case, count) for case in cases), zeroed, "per_joint")
+    return Plan(tuple(PlannedTest(case, count) for case in cases), zeroed, "per_joint")
 
 
 def added(words: str, plan: Plan) -> Plan | None:

@@ -11,13 +11,13 @@ from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.progress import Progress
-from spinepipe.studies.discrepancy.search import inquiry as inquiries
 from spinepipe.studies.discrepancy.search import search as searches
+from spinepipe.studies.discrepancy.search import search_state as inquiries
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Rules, SearchStage
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened
+from spinepipe.studies.discrepancy.search.search_state import Rules, SearchStage, SearchState
 
 NEEDED = 5.0
 READ = ("extension", "right_bending")
@@ -42,8 +42,8 @@ class At:
         return At(fit.names)
 
 
-def form(name: str, coordinate: str = "extension") -> Form:
-    return Form(Variant(name, (("coordinate", coordinate),)), PlaceSpread.SHARED)
+def form(name: str, coordinate: str = "extension") -> CandidateForm:
+    return CandidateForm(Variant(name, (("coordinate", coordinate),)), PlaceSpread.SHARED)
 
 
 def refitted(name: str, log_evidence: float, gain: float, coordinate: str = "extension") -> Refit:
@@ -103,7 +103,9 @@ def test_a_search_is_hopeless_where_the_generic_basis_has_that_many_times_the_ev
         own: Any = SimpleNamespace(log_evidence=900.0, at=at)
         best = refitted("a", 10.0, 0.0)
         assert searches._hopeless(best, number, own, rules()) is hopeless
-        everywhere = replace(best, form=Form(Variant("load_offset", ()), PlaceSpread.SHARED))
+        everywhere = replace(
+            best, form=CandidateForm(Variant("load_offset", ()), PlaceSpread.SHARED)
+        )
         whole: Any = SimpleNamespace(log_evidence=evidence, at=dict.fromkeys((), at["extension"]))
         assert searches._hopeless(everywhere, number, whole, rules()) is hopeless
 
@@ -189,10 +191,10 @@ class Runs:
         return SimpleNamespace(of=args)
 
 
-def inquiry(runs: Runs, monkeypatch: pytest.MonkeyPatch) -> Inquiry:
+def inquiry(runs: Runs, monkeypatch: pytest.MonkeyPatch) -> SearchState:
     monkeypatch.setattr(inquiries, "refits", lambda *_: ("refitted",))
     base: Any = At(())
-    return Inquiry(base, rules(), runs, Progress())
+    return SearchState(base, rules(), runs, Progress())
 
 
 @pytest.mark.parametrize(
@@ -256,9 +258,9 @@ def test_effects_alone_are_looked_for_ever_further_from_where_all_stand(
     runs = Runs(0.0, [False] * failures + [True] * (failures < 5))
     asked = inquiry(runs, monkeypatch)
     ratio = Variant("level_dependence", (("coordinate", "extension"),))
-    one = Supposed(Form(ratio, PlaceSpread.SHARED), np.array([16.0]))
+    one = ActiveTerm(CandidateForm(ratio, PlaceSpread.SHARED), np.array([16.0]))
 
-    def suppose(self: Any, supposed: tuple[Supposed, ...]) -> Any:
+    def suppose(self: Any, supposed: tuple[ActiveTerm, ...]) -> Any:
         (only,) = supposed
         return self.where, float(only.start[0])
 

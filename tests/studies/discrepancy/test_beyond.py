@@ -15,11 +15,11 @@ from spinepipe.cohort.specimen import spine_model
 from spinepipe.model.file import ModelFile, effects_for
 from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
 from spinepipe.studies.discrepancy.search.base import DAMPING
-from spinepipe.studies.discrepancy.search.beyond import tabulated
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
-from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
 from spinepipe.studies.discrepancy.search.prediction import Simulated
+from spinepipe.studies.discrepancy.search.residual_model import tabulated
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import Conclusion, plain_data, verdict_of
@@ -27,7 +27,7 @@ from spinepipe.studies.discrepancy.verdict_unnamed import Tabulated
 from spinepipe.units import ROTATIONS
 
 
-def tables(at: Grounds) -> tuple[Grounds, Tabulated | None]:
+def tables(at: BaselineFit) -> tuple[BaselineFit, Tabulated | None]:
     lack = lack_of_fit(at, ROTATIONS, DRAWS, 0)
     return tabulated(at, lack, found(at), FALSE_ALARM)
 

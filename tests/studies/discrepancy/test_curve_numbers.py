@@ -16,21 +16,21 @@ from spinepipe.studies.discrepancy.curve_numbers import (
     reaches,
     unit_of,
 )
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.units import DEG_PER_RAD
 
 RATE = 9.0
 LAWS: dict[str, Yield] = {"flexion": exponential(RATE)}
-STIFFENING = Form(
+STIFFENING = CandidateForm(
     Variant("nonlinear_stiffening", (("coordinate", "extension"), ("shape", "exponential"))),
     PlaceSpread.SHARED,
 )
-ASYMMETRY = Form(
+ASYMMETRY = CandidateForm(
     Variant("flexion_extension_asymmetry", (("coordinate", "extension"),)), PlaceSpread.SHARED
 )
-COUPLING = Form(
+COUPLING = CandidateForm(
     Variant("bending_rotation_coupling", (("pair", ("right_bending", "left_rotation")),)),
     PlaceSpread.SHARED,
 )
@@ -39,13 +39,13 @@ Found = dict[tuple[str, ...], dict[str, Any]]
 
 
 @cache
-def fits(form: Form, truth: str) -> tuple[JointFit, JointFit]:
+def fits(form: CandidateForm, truth: str) -> tuple[JointFit, JointFit]:
     """Without and with the form, of readings that stiffen or that differ by side."""
     hidden = LAWS if truth == "stiffening" else {"flexion": one_sided(0.3)}
     grounds = grounds_of(readings(3, hidden))
     off = form.variant.off((0.0,) * len(form.variant.shapes))
     start = np.where(off == 0.0, 0.05, off)
-    fit = joint_fit(grounds.suppose((Supposed(form, start),)), grounds.setting, grounds.fit.poses)
+    fit = joint_fit(grounds.suppose((ActiveTerm(form, start),)), grounds.setting, grounds.fit.poses)
     assert fit.usable
     return grounds.fit, fit
 
@@ -56,7 +56,7 @@ def loads(fit: JointFit, low: float, high: float) -> dict[tuple[str, str], LoadR
 
 
 def read(
-    form: Form, truth: str, low: float = -6.0, high: float = 6.0
+    form: CandidateForm, truth: str, low: float = -6.0, high: float = 6.0
 ) -> dict[tuple[str, ...], dict]:
     base, fit = fits(form, truth)
     rows = field_number_rows(base, fit, [form], loads(fit, low, high))

@@ -14,12 +14,12 @@ from spinepipe.cohort import read
 from spinepipe.model import LoadStep
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
 from spinepipe.studies.discrepancy.search.base import base_model, base_parameters
-from spinepipe.studies.discrepancy.search.grounds import BaselineModels, Grounds, laid
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit, BaselineModels, fit_baseline
 from spinepipe.studies.discrepancy.search.hypothesis import trials
-from spinepipe.studies.discrepancy.search.inquiry import look
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
+from spinepipe.studies.discrepancy.search.search_state import look
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import ROTATIONS
@@ -38,8 +38,8 @@ def noise(zeroed: bool = False) -> Noise:
     return Noise(SDS, 0.0, "declared", np.zeros(6, dtype=np.int64), 0, zeroed)
 
 
-def grounds(given: Sequence[SpecimenReadings], grouping: str = "per_specimen") -> Grounds:
-    return laid(given, noise(), NuisancePriors(), chains.start(given, grouping), at_once)
+def grounds(given: Sequence[SpecimenReadings], grouping: str = "per_specimen") -> BaselineFit:
+    return fit_baseline(given, noise(), NuisancePriors(), chains.start(given, grouping), at_once)
 
 
 # Laws that are physics -----------------------------------------------------------------------
@@ -260,7 +260,7 @@ def test_loose_markers_are_found_without_repeats() -> None:
 # Exchanged specimens -------------------------------------------------------------------------
 
 
-def grounds_of_folder(place: Path) -> Grounds:
+def grounds_of_folder(place: Path) -> BaselineFit:
     cohort = read(place)
     given = [
         specimen_readings(cohort, name, cohort.tests, ROTATIONS) for name in cohort.specimen_names
@@ -268,7 +268,9 @@ def grounds_of_folder(place: Path) -> Grounds:
     stiffness = np.array([1.5e5, 1.9e6, 1.35e5, *chains.STIFFNESS])
     models = {one.specimen: base_model(cohort, one, stiffness, None) for one in given}
     base = {name: base_parameters(m, "per_specimen", ROTATIONS) for name, m in models.items()}
-    return laid(given, noise(), NuisancePriors(), BaselineModels(models, base, 100.0), at_once)
+    return fit_baseline(
+        given, noise(), NuisancePriors(), BaselineModels(models, base, 100.0), at_once
+    )
 
 
 def test_an_exchange_that_stiffness_can_hide_is_not_reported() -> None:

@@ -16,21 +16,20 @@ from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread, registered
 from spinepipe.model import SpineModel
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit, fit_baseline
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.grounds import Grounds, laid
 from spinepipe.studies.discrepancy.search.hypothesis import (
     STRENGTH_SDS,
-    Form,
+    ActiveTerm,
+    CandidateForm,
     Hypothesis,
     HypothesisMember,
-    Supposed,
     Trials,
     Unknown,
     Variant,
     shape_grid,
     trials,
 )
-from spinepipe.studies.discrepancy.search.inquiry import look
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
@@ -54,6 +53,7 @@ from spinepipe.studies.discrepancy.search.screen import (
     screened,
     summed,
 )
+from spinepipe.studies.discrepancy.search.search_state import look
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS
 
@@ -169,7 +169,7 @@ def test_products_are_those_of_dense_projections(spread: PlaceSpread, shared: in
     signatures = {name: rng.normal(size=(30, 3)) for name in members}
     problem = problem_of(fit, signatures, 5)
     columns = [VariantColumn(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(3)]
-    form = Form(LAXITY, spread)
+    form = CandidateForm(LAXITY, spread)
     one = summed(EffectColumns(columns), problem, form, (), list(members), ())
 
     a, b = jacobians["a"], jacobians["b"]
@@ -199,7 +199,7 @@ def test_evidence_of_many_forms_at_once_is_that_of_each() -> None:
     ]
     places = [(None, None), (0, None), (1, "a"), (0, "b")]
     forms = tuple(
-        Form(variant, spread, joint, specimen)
+        CandidateForm(variant, spread, joint, specimen)
         for variant in variants
         for spread in (PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.EACH)
         for joint, specimen in places
@@ -234,7 +234,7 @@ def test_draws_of_the_null_have_the_covariance_of_the_products() -> None:
     signatures = {name: rng.normal(size=(40, 2)) for name in members}
     problem = problem_of(fit, signatures, 20000)
     columns = [VariantColumn(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(2)]
-    form = Form(LAXITY, PlaceSpread.BY_JOINT)
+    form = CandidateForm(LAXITY, PlaceSpread.BY_JOINT)
     one = summed(EffectColumns(columns), problem, form, (), list(members), ())
     found = np.cov(one.moments[:, 1:])
     np.testing.assert_allclose(found, one.gram, atol=5.0 * np.sqrt(2.0 / 20000) * one.gram.max())
@@ -265,10 +265,10 @@ def linear_problem(variant: Variant, size: float) -> tuple[JointFit, float, Arra
     x = np.linalg.lstsq(whole, y)[0]
     off = y - base @ np.linalg.lstsq(base, y)[0]
     on = y - whole @ x
-    form = Form(variant, PlaceSpread.SHARED)
+    form = CandidateForm(variant, PlaceSpread.SHARED)
     unknowns = (unknown(None, 3.0), unknown(None, 3.0), unknown(0, STRENGTH_SDS * scale, True))
     member = HypothesisMember(cast(SpineModel, None), (), (0, 1, 2))
-    supposed = (Supposed(form, np.zeros(1)),)
+    supposed = (ActiveTerm(form, np.zeros(1)),)
     hypothesis = Hypothesis({"a": member}, unknowns, supposed)
     bound = np.zeros(3, dtype=bool)
     fit = JointFit(hypothesis, x, {}, float(on @ on), {"a": -on}, {"a": -whole}, {}, {}, bound, "")
@@ -311,8 +311,8 @@ def noise() -> Noise:
     return Noise(sd, 0.0, "repeats", np.zeros(6, dtype=np.int64), 0, False)
 
 
-def grounds_of(given: list, priors: NuisancePriors) -> Grounds:  # type: ignore[type-arg]
-    return laid(given, noise(), priors, chains.start(given), at_once)
+def grounds_of(given: list, priors: NuisancePriors) -> BaselineFit:  # type: ignore[type-arg]
+    return fit_baseline(given, noise(), priors, chains.start(given), at_once)
 
 
 def test_a_fit_of_linear_springs_is_that_of_least_squares() -> None:

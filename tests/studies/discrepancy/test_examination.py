@@ -10,24 +10,31 @@ import pytest
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.examination import examined
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Trials, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Inquiry, SearchStage
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    ActiveTerm,
+    CandidateForm,
+    Trials,
+    Variant,
+)
 from spinepipe.studies.discrepancy.search.refit import Refit, preferred
-from spinepipe.studies.discrepancy.search.screen import Screen, Screened, Tried
+from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
+from spinepipe.studies.discrepancy.search.search_state import SearchStage, SearchState
 
 MARGIN, NEEDED = 3.0, 5.0
 NAMES = ("neutral_zone", "nonlinear_stiffening", "facet_contact")
 
 
-def supposed(name: str) -> Supposed:
+def supposed(name: str) -> ActiveTerm:
     variant = Variant(name, (("coordinate", "extension"),))
-    return Supposed(Form(variant, PlaceSpread.SHARED), variant.off((0.0,) * len(variant.shapes)))
+    return ActiveTerm(
+        CandidateForm(variant, PlaceSpread.SHARED), variant.off((0.0,) * len(variant.shapes))
+    )
 
 
-def on_screen(name: str, log_evidence: float) -> Tried:
-    return Tried(supposed(name).form, (), (), log_evidence, np.zeros(0), 0.0)
+def on_screen(name: str, log_evidence: float) -> ScreenedVariant:
+    return ScreenedVariant(supposed(name).form, (), (), log_evidence, np.zeros(0), 0.0)
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,7 @@ class Says:
     def first(self) -> SearchStage:
         return self.stage(Place(()))
 
-    def beside(self, current: Place, others: tuple[Supposed, ...]) -> Place | None:
+    def beside(self, current: Place, others: tuple[ActiveTerm, ...]) -> Place | None:
         names = tuple(one.form.name for one in others)
         return None if names in self.no_fit else Place(names)
 
@@ -77,7 +84,7 @@ class Says:
         )
         return SearchStage("", Screen(effects, NEEDED, 100), tried, bool(in_place_of))
 
-    def refit(self, place: Place, one: Supposed) -> Refit:
+    def refit(self, place: Place, one: ActiveTerm) -> Refit:
         return self._refit(place, one.form.name)
 
     def _refit(self, place: Place, name: str) -> Refit:
@@ -87,7 +94,7 @@ class Says:
 
 
 def examine(says: Says, *names: str, settled: bool = False) -> Any:
-    return examined(cast(Grounds, Place(names)), cast(Inquiry, says), settled=settled)
+    return examined(cast(BaselineFit, Place(names)), cast(SearchState, says), settled=settled)
 
 
 @sweep("lead, gives_way", [(0.5, False), (2.9, False), (3.1, True)])

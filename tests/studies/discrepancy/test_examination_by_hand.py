@@ -10,17 +10,17 @@ from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search import examination
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Rival, SearchStage
-from spinepipe.studies.discrepancy.search.screen import Screen, Screened, Tried
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant
+from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
+from spinepipe.studies.discrepancy.search.search_state import Rival, SearchStage
 
 MARGIN, NEEDED = 3.0, 5.0
 
 
 def form(
     name: str, spread: PlaceSpread = PlaceSpread.SHARED, coordinate: str = "extension"
-) -> Form:
-    return Form(Variant(name, (("coordinate", coordinate),)), spread)
+) -> CandidateForm:
+    return CandidateForm(Variant(name, (("coordinate", coordinate),)), spread)
 
 
 def refitted(
@@ -96,7 +96,12 @@ def test_rivals_have_the_evidence_of_their_best_refit_or_of_the_screen() -> None
         refitted("c", -np.inf),
     ]
     effects = [
-        Screened(name, evidence, np.zeros(1), (Tried(form(name), (), (), 0.0, np.zeros(0), 0.0),))
+        Screened(
+            name,
+            evidence,
+            np.zeros(1),
+            (ScreenedVariant(form(name), (), (), 0.0, np.zeros(0), 0.0),),
+        )
         for name, evidence in (("a", 44.0), ("b", 99.0), ("c", 20.0), ("d", 12.0))
     ]
     found = examination._rivals(own, tried, Screen(tuple(effects), NEEDED, 1))

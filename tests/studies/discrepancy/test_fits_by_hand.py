@@ -10,9 +10,9 @@ from sweeps import sweep
 
 from spinepipe.calibrate.descent import OFF_THE_PATH
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.search import grounds as grounded
+from spinepipe.studies.discrepancy.search import baseline as grounded
 from spinepipe.studies.discrepancy.search import joint_fit as fits
-from spinepipe.studies.discrepancy.search.grounds import NoBase
+from spinepipe.studies.discrepancy.search.baseline import NoBase
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Points, joint_fit
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium
 
@@ -253,7 +253,7 @@ def test_nuisances_are_taken_again_until_the_base_stays_within_a_tenth(
     noise: Any = SimpleNamespace(source=grounded.REPEATS, zeroed=False)
     start = grounded.BaselineModels({}, {}, 9.0)
     one: Any = SimpleNamespace(specimen="a", cases=())
-    found = grounded.laid([one], noise, None, start, None)  # type: ignore[arg-type]
+    found = grounded.fit_baseline([one], noise, None, start, None)  # type: ignore[arg-type]
     assert len(asked) == 1 + fitted
     assert found.fit.x[1] == moves[fitted - 1]
     assert found.start.models is found.fit.models

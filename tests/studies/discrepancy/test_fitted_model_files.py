@@ -13,13 +13,13 @@ from spinepipe.cohort.specimen import cables
 from spinepipe.effects import PlaceSpread
 from spinepipe.model import ScopedEffect
 from spinepipe.model.file import effects_for, read_model, write_model
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.studies.discrepancy.search.base import base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (
-    Form,
+    ActiveTerm,
+    CandidateForm,
     Hypothesis,
     HypothesisMember,
-    Supposed,
     Unknown,
     Variant,
     hypothesis,
@@ -35,14 +35,14 @@ ASYMMETRY = Variant("flexion_extension_asymmetry", ())
 OFFSET = Variant("load_offset", ())
 
 
-def fitted(*supposed: Supposed) -> JointFit:
+def fitted(*supposed: ActiveTerm) -> JointFit:
     """Models moved at random from where their fit starts, as if it had ended there."""
     models = {name: chains.model(name, chains.STIFFNESS, JOINTS) for name in NAMES}
     base = {name: base_parameters(model, "per_joint", ROTATIONS) for name, model in models.items()}
     started = hypothesis(models, base, supposed, tuple(chains.AXES), 100.0)
     x = np.random.default_rng(2).uniform(0.01, 0.05, len(started.unknowns))
     ended = {
-        name: moved(member.model, member.free, x[list(member.numbers)])
+        name: with_parameters(member.model, member.free, x[list(member.numbers)])
         for name, member in started.members.items()
     }
     bound = np.zeros(len(x), dtype=bool)
@@ -55,9 +55,9 @@ def motion(model: object) -> Array:
     return np.concatenate(simulated.at(np.zeros(0)).readings)
 
 
-def one(variant: Variant, spread: PlaceSpread, *place: object) -> Supposed:
+def one(variant: Variant, spread: PlaceSpread, *place: object) -> ActiveTerm:
     start = variant.off((0.0,) * len(variant.shapes))
-    return Supposed(Form(variant, spread, *place), start)  # type: ignore[arg-type]
+    return ActiveTerm(CandidateForm(variant, spread, *place), start)  # type: ignore[arg-type]
 
 
 SUPPOSED = {
@@ -145,7 +145,7 @@ def fit_of(variant: Variant, column: int, start: float, move: float, at_bound: b
     values = np.array([p.default for p in variant.create().parameters])
     values[column] = start
     u = Unknown("", 0, column, ("a", "L4L5"), True, -9.0, 9.0, 0.0, 1.0)
-    supposed = (Supposed(Form(variant, PlaceSpread.ONE, 1, "a"), values),)
+    supposed = (ActiveTerm(CandidateForm(variant, PlaceSpread.ONE, 1, "a"), values),)
     member = HypothesisMember(chains.model("a", chains.STIFFNESS), (), (0,))
     started = Hypothesis({"a": member}, (u,), supposed)
     bound = np.array([at_bound])

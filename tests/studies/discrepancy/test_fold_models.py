@@ -22,7 +22,7 @@ from spinepipe.studies.discrepancy.proof.folds import (
     folds_by_test,
     step_fold,
 )
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 
 pytestmark = pytest.mark.numeric
 
@@ -108,16 +108,16 @@ def test_all_that_was_read_counts_of_an_unseen_specimen() -> None:
 # Fits of a fold
 
 
-def lin(at: Grounds) -> LinearModel:
+def lin(at: BaselineFit) -> LinearModel:
     return tangent(at, 1.0)
 
 
 @pytest.fixture(scope="module")
-def two() -> Grounds:
+def two() -> BaselineFit:
     return grounds(read({"a": 40.0, "b": 60.0}, TESTS, zone=False))
 
 
-def everything(at: Grounds) -> FoldFit:
+def everything(at: BaselineFit) -> FoldFit:
     steps = {
         name: tuple(np.full(len(case.steps), True) for case in one.cases)
         for name, one in at.readings.items()
@@ -125,7 +125,7 @@ def everything(at: Grounds) -> FoldFit:
     return FoldFit(steps, steps)
 
 
-def test_a_fit_to_everything_ends_where_the_full_fit_did(two: Grounds) -> None:
+def test_a_fit_to_everything_ends_where_the_full_fit_did(two: BaselineFit) -> None:
     """Wherever it begins; what is held stays where it was put."""
     names, count = list(two.readings), len(two.fit.x)
     away = 0.2 * np.cos(np.arange(count))
@@ -139,7 +139,7 @@ def test_a_fit_to_everything_ends_where_the_full_fit_did(two: Grounds) -> None:
     assert x[own] == pytest.approx(np.zeros(len(own)), abs=1e-4)
 
 
-def test_a_fit_of_some_load_steps_reads_no_others(two: Grounds) -> None:
+def test_a_fit_of_some_load_steps_reads_no_others(two: BaselineFit) -> None:
     """By hand at one joint's coordinate: stiffness is moment over angle at the steps that train."""
     (part, _) = step_fold({"a": two.readings["a"]}).parts
     own = np.array(two.fit.hypothesis.members["a"].numbers)
@@ -154,7 +154,7 @@ def test_a_fit_of_some_load_steps_reads_no_others(two: Grounds) -> None:
     assert used == sum(int(steps.sum()) for steps in part.training["a"]) * 2 * 3
 
 
-def test_bounds_and_priors_stay_where_they_are_as_fits_start_elsewhere(two: Grounds) -> None:
+def test_bounds_and_priors_stay_where_they_are_as_fits_start_elsewhere(two: BaselineFit) -> None:
     """An unknown is its start and its move: what bounds one less far has that much more to go."""
     fit, model = two.fit, lin(two)
     away = 0.1 * np.sin(1.0 + np.arange(len(fit.x)))
@@ -176,7 +176,7 @@ def test_bounds_and_priors_stay_where_they_are_as_fits_start_elsewhere(two: Grou
         assert moved == pytest.approx(full * np.exp(away[number]))  # moves are of logarithms
 
 
-def test_unknowns_that_are_held_are_no_longer_free(two: Grounds) -> None:
+def test_unknowns_that_are_held_are_no_longer_free(two: BaselineFit) -> None:
     member = two.fit.hypothesis.members["a"]
     free = np.array(member.numbers)[[0, 2]]
     again = fold_models._again(two.fit, lin(two), ["a"], free, np.zeros(len(two.fit.x)))

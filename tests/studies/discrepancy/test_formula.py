@@ -13,8 +13,8 @@ from sweeps import sweep
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect
 from spinepipe.statics import FreeParameter
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.formula import formula, text_of
-from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, tell_time, term_columns
 from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.search.pursuit import (
@@ -49,14 +49,14 @@ def power(order: int, coefficient: float, only: int | None = None) -> Yield:
 @cache
 def grounds(
     seed: int, test: str = "", order: int = 2, size: float = 0.0, only: int = -1
-) -> Grounds:
+) -> BaselineFit:
     laws: Mapping[str, Yield] = {}
     if test:
         laws = {test: power(order, size, None if only < 0 else only)}
     return cases.grounds_of(cases.readings(seed, laws))
 
 
-def found(at: Grounds) -> Formula | None:
+def found(at: BaselineFit) -> Formula | None:
     return formula(at, ROTATIONS, DRAWS, 0, FALSE_ALARM)
 
 
@@ -123,7 +123,7 @@ def test_units_of_coefficients(coordinate: str, powers: tuple, unit: str, border
 # Columns, against the sensitivities of the simulator to an effect that is off
 
 
-def columns_at(seed: int) -> tuple[Grounds, str, Callable[[str, str, int], Array]]:
+def columns_at(seed: int) -> tuple[BaselineFit, str, Callable[[str, str, int], Array]]:
     at = grounds(seed)
     name = "a"
     model, cases_ = at.fit.models[name], at.readings[name].cases

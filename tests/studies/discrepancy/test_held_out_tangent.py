@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from held_out_cases import JOINTS, MOMENTS_NM, SD, found, grounds, read
 
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.studies.discrepancy.proof.fold_linear import surrogate, tangent
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import Simulated, SolvedSpecimen
@@ -21,7 +21,9 @@ def test_the_tangent_is_the_slope_of_re_solved_motion() -> None:
     for number in range(len(x)):
         ends = []
         for sign in (1.0, -1.0):
-            model = moved(member.model, member.free, x + sign * size * np.eye(len(x))[number])
+            model = with_parameters(
+                member.model, member.free, x + sign * size * np.eye(len(x))[number]
+            )
             ends.append(Simulated(model, readings[1].cases, False, ()).at(np.zeros(0)).readings)
         for by_x, high, low in zip(near.by_x, *ends, strict=True):
             slope = (high - low) / (2.0 * size)

@@ -11,9 +11,9 @@ from spinepipe.effects import Parameter, PlaceSpread, registered
 from spinepipe.model import SpineModel
 from spinepipe.statics import free_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (
-    Form,
+    ActiveTerm,
+    CandidateForm,
     Hypothesis,
-    Supposed,
     Trials,
     Unknown,
     Variant,
@@ -91,9 +91,9 @@ def test_shares_of_an_effect_are_equal_by_variant_way_and_place() -> None:
     shares = {form: np.exp(tried.log_share(form)) for form in tried.forms}
     assert sum(shares.values()) == pytest.approx(1.0)
     ways = len(tried.variants) * 6
-    assert shares[Form(ZONE, PlaceSpread.SHARED)] == pytest.approx(1.0 / ways)
-    assert shares[Form(ZONE, PlaceSpread.ONE_JOINT, 1)] == pytest.approx(1.0 / (3 * ways))
-    assert shares[Form(ZONE, PlaceSpread.ONE, 2, "b")] == pytest.approx(1.0 / (6 * ways))
+    assert shares[CandidateForm(ZONE, PlaceSpread.SHARED)] == pytest.approx(1.0 / ways)
+    assert shares[CandidateForm(ZONE, PlaceSpread.ONE_JOINT, 1)] == pytest.approx(1.0 / (3 * ways))
+    assert shares[CandidateForm(ZONE, PlaceSpread.ONE, 2, "b")] == pytest.approx(1.0 / (6 * ways))
 
 
 # Shapes
@@ -131,7 +131,7 @@ def test_coordinates_are_those_of_the_options_or_all() -> None:
 # Unknowns
 
 
-def supposed(*forms: Form, start: Mapping[str, float] | None = None) -> Hypothesis:
+def supposed(*forms: CandidateForm, start: Mapping[str, float] | None = None) -> Hypothesis:
     models = {name: chains.model(name, chains.STIFFNESS, JOINTS) for name in "ab"}
     base = {
         name: free_parameters(model, 0, ["extension_nm_per_rad"], "per_specimen")
@@ -141,7 +141,7 @@ def supposed(*forms: Form, start: Mapping[str, float] | None = None) -> Hypothes
     for form in forms:
         parameters = form.variant.create().parameters
         values = [(start or {}).get(p.name, p.default) for p in parameters]
-        ones.append(Supposed(form, np.array(values)))
+        ones.append(ActiveTerm(form, np.array(values)))
     return hypothesis(models, base, ones, TESTS, 100.0)
 
 
@@ -167,16 +167,21 @@ def test_base_stiffness_is_open_within_a_factor() -> None:
 @sweep(
     "form, expected",
     [
-        (Form(ZONE, PlaceSpread.SHARED), [()]),
-        (Form(ZONE, PlaceSpread.BY_JOINT), [("L5S1",), ("L4L5",), ("L3L4",)]),
-        (Form(ZONE, PlaceSpread.BY_SPECIMEN), [("a",), ("b",)]),
-        (Form(ZONE, PlaceSpread.EACH), [(s, j) for s in "ab" for j in ("L5S1", "L4L5", "L3L4")]),
-        (Form(ZONE, PlaceSpread.ONE_JOINT, 1), [("L4L5",)]),
-        (Form(ZONE, PlaceSpread.ONE, 2, "b"), [("b", "L3L4")]),
-        (Form(OFFSET, PlaceSpread.BY_TEST), [("flexion",), ("bending",)]),
+        (CandidateForm(ZONE, PlaceSpread.SHARED), [()]),
+        (CandidateForm(ZONE, PlaceSpread.BY_JOINT), [("L5S1",), ("L4L5",), ("L3L4",)]),
+        (CandidateForm(ZONE, PlaceSpread.BY_SPECIMEN), [("a",), ("b",)]),
+        (
+            CandidateForm(ZONE, PlaceSpread.EACH),
+            [(s, j) for s in "ab" for j in ("L5S1", "L4L5", "L3L4")],
+        ),
+        (CandidateForm(ZONE, PlaceSpread.ONE_JOINT, 1), [("L4L5",)]),
+        (CandidateForm(ZONE, PlaceSpread.ONE, 2, "b"), [("b", "L3L4")]),
+        (CandidateForm(OFFSET, PlaceSpread.BY_TEST), [("flexion",), ("bending",)]),
     ],
 )
-def test_strengths_are_of_their_places(form: Form, expected: list[tuple[str, ...]]) -> None:
+def test_strengths_are_of_their_places(
+    form: CandidateForm, expected: list[tuple[str, ...]]
+) -> None:
     found = of_effects(supposed(form))
     first = form.variant.strengths[0]
     assert {one.place for one in found if one.column == first} == set(expected)
@@ -185,7 +190,7 @@ def test_strengths_are_of_their_places(form: Form, expected: list[tuple[str, ...
 
 
 def test_shapes_are_the_same_at_all_places() -> None:
-    found = supposed(Form(ZONE, PlaceSpread.EACH))
+    found = supposed(CandidateForm(ZONE, PlaceSpread.EACH))
     shapes = [one for one in of_effects(found) if not one.is_strength]
     assert [one.column for one in shapes] == [1, 2]
     for one in shapes:
@@ -197,7 +202,7 @@ def test_shapes_are_the_same_at_all_places() -> None:
 
 
 def test_an_effect_of_one_place_stands_in_its_specimen_alone() -> None:
-    found = supposed(Form(ZONE, PlaceSpread.ONE, 2, "b"))
+    found = supposed(CandidateForm(ZONE, PlaceSpread.ONE, 2, "b"))
     assert effects_in(found, "a") == ["linear_bushing"]
     assert len(found.members["a"].numbers) == 1
     scoped = found.members["b"].model.effects[1]
@@ -205,7 +210,7 @@ def test_an_effect_of_one_place_stands_in_its_specimen_alone() -> None:
 
 
 def test_what_differs_by_test_acts_once_in_each() -> None:
-    for member in supposed(Form(OFFSET, PlaceSpread.BY_TEST)).members.values():
+    for member in supposed(CandidateForm(OFFSET, PlaceSpread.BY_TEST)).members.values():
         scoped = member.model.effects[1:]
         assert [one.tests for one in scoped] == [("flexion",), ("bending",)]
         assert [one.values.shape for one in scoped] == [(1, 3)] * 2
@@ -216,7 +221,7 @@ def test_what_differs_by_test_acts_once_in_each() -> None:
 def test_moves_are_bounded_as_declared_and_have_the_declared_prior(variant: Variant) -> None:
     """Of strengths five times as wide, about off; of shapes about the default."""
     start = {p.name: float(np.clip(0.7, p.low, p.high)) for p in variant.create().parameters}
-    for one in of_effects(supposed(Form(variant, PlaceSpread.SHARED), start=start)):
+    for one in of_effects(supposed(CandidateForm(variant, PlaceSpread.SHARED), start=start)):
         p = variant.create().parameters[one.column]
         assert one.is_strength == (p.off is not None)
         assert one.sd == pytest.approx(p.prior_scale * (5.0 if one.is_strength else 1.0))
@@ -230,7 +235,9 @@ def test_moves_are_bounded_as_declared_and_have_the_declared_prior(variant: Vari
 
 
 def test_effects_are_numbered_as_they_are_supposed() -> None:
-    found = supposed(Form(ZONE, PlaceSpread.SHARED), Form(LAXITY, PlaceSpread.ONE, 0, "a"))
+    found = supposed(
+        CandidateForm(ZONE, PlaceSpread.SHARED), CandidateForm(LAXITY, PlaceSpread.ONE, 0, "a")
+    )
     assert [one.supposed for one in found.unknowns].count(1) == 1
     assert effects_in(found, "a") == ["linear_bushing", "neutral_zone", "local_laxity"]
     assert effects_in(found, "b") == ["linear_bushing", "neutral_zone"]

@@ -10,10 +10,10 @@ from scipy import stats
 from sweeps import sweep
 
 from spinepipe.studies.discrepancy.imperfection_rows import imperfection_rows, told_imperfections
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.imperfections import (
+    AbsorbedGap,
     NuisancePlace,
-    TakenUp,
     _mean,
     in_common,
     labels_of,
@@ -30,12 +30,12 @@ AXES = ("anterior", "superior", "right")
 
 
 @pytest.fixture(scope="module")
-def shifted() -> tuple[Grounds, TakenUp]:
+def shifted() -> tuple[BaselineFit, AbsorbedGap]:
     grounds = grounds_of(off_centre(alike(SHIFT_M)))
     return grounds, taken_up(grounds, grounds.fit, JOINTS, at_once)
 
 
-def centres(taken: TakenUp) -> dict[tuple[str, str, str], tuple[float, float]]:
+def centres(taken: AbsorbedGap) -> dict[tuple[str, str, str], tuple[float, float]]:
     """Size and SD in m by specimen, joint and direction."""
     return {
         (one.at.specimen, one.at.joint, one.at.component): (one.size * PRIOR_M, one.sd * PRIOR_M)

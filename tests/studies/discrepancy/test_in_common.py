@@ -12,10 +12,10 @@ from sweeps import sweep
 from spinepipe.studies.discrepancy.search import imperfections
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.imperfections import (
+    AbsorbedGap,
     Imperfection,
     InCommon,
     NuisancePlace,
-    TakenUp,
     _mean,
     in_common,
 )
@@ -168,7 +168,7 @@ def test_what_is_taken_up_adds_up_by_kind_largest_first() -> None:
         Imperfection(GAIN, 1.0, 0.1, 9.0),
         Imperfection(replace(GAIN, kind="load_axis"), 0.1, 0.1, -1.0),
     ]
-    taken = TakenUp(None, Gap(1.0, 1.0, 1), tuple(every), ())
+    taken = AbsorbedGap(None, Gap(1.0, 1.0, 1), tuple(every), ())
     assert taken.linear_chi2 == 15.0
     assert list(taken.by_kind.items()) == [
         ("load_gain", 9.0),

@@ -16,7 +16,7 @@ from spinepipe.studies.discrepancy.search import lack_of_fit as basis
 from spinepipe.studies.discrepancy.search.lack_of_fit import (
     FAMILIES,
     GenericColumns,
-    Lack,
+    LackOfFitTest,
     Term,
     generic_columns,
 )
@@ -210,7 +210,7 @@ def test_evidence_is_averaged_over_families_and_ways_to_differ() -> None:
 
 
 def test_a_shape_is_told_in_words() -> None:
-    lack = Lack(0.0, np.zeros(0), "cross", "right_bending", PlaceSpread.SHARED, 0.0, {})
+    lack = LackOfFitTest(0.0, np.zeros(0), "cross", "right_bending", PlaceSpread.SHARED, 0.0, {})
     assert lack.shape == "load in right bending over the joint's other motions, shared"
 
 

@@ -25,12 +25,12 @@ from spinepipe.studies.discrepancy.design.expected import ExpectedReadings, Sums
 from spinepipe.studies.discrepancy.design.extra_tests import bench
 from spinepipe.studies.discrepancy.design.next_test import left_apart, offers
 from spinepipe.studies.discrepancy.design.patterns import RivalFits
-from spinepipe.studies.discrepancy.design.plans import Planned, at_times
+from spinepipe.studies.discrepancy.design.plans import PlannedTest, at_times
 from spinepipe.studies.discrepancy.design.runs import runs
 from spinepipe.studies.discrepancy.search.hypothesis import trials
-from spinepipe.studies.discrepancy.search.inquiry import Rules
 from spinepipe.studies.discrepancy.search.outcome import outcome
 from spinepipe.studies.discrepancy.search.search import search
+from spinepipe.studies.discrepancy.search.search_state import Rules
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.tables import NEXT_TESTS
 from spinepipe.studies.discrepancy.verdict import Conclusion
@@ -120,10 +120,10 @@ def test_what_stays_between_two_models_is_a_least_squares_problem():
     assert found > noncentrality({"a": Sums.of(old)}, sds)
 
 
-def planned(case, *, translations: bool = False) -> Planned:
+def planned(case, *, translations: bool = False) -> PlannedTest:
     count = np.ones((JOINTS, 6), dtype=np.int64)
     count[:, :3] = translations
-    return Planned(case, count)
+    return PlannedTest(case, count)
 
 
 def offered(tests, zeroed: bool = False) -> set[str]:

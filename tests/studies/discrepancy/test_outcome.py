@@ -10,17 +10,17 @@ from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut, Margin
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
-from spinepipe.studies.discrepancy.search.inquiry import (
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
+from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, LackOfFitTest
+from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
+from spinepipe.studies.discrepancy.search.search_state import (
     Rival,
     SearchResult,
     SearchStage,
     SelectedTerm,
 )
-from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, LackOfFit
-from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
 from spinepipe.studies.discrepancy.verdict import Candidate, Conclusion, SuspectedError
 from spinepipe.studies.discrepancy.verdict_found import near_alone
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
@@ -39,7 +39,7 @@ def stands(
     rivals_known: bool = True,
 ) -> SelectedTerm:
     variant = Variant(name, (("coordinate", coordinate),))
-    supposed = Supposed(Form(variant, PlaceSpread.SHARED), np.zeros(1))
+    supposed = ActiveTerm(CandidateForm(variant, PlaceSpread.SHARED), np.zeros(1))
     behind = tuple(Rival(*one) for one in rivals)
     return SelectedTerm(
         supposed, log_evidence, alone, 100.0, behind, over_stiffness, rivals_known=rivals_known
@@ -61,13 +61,15 @@ def ended(
     that of the neighbouring joints' motion for what the base lacks in extension.
     """
 
-    def grounds(chi2: float) -> Grounds:
-        return cast(Grounds, SimpleNamespace(fit=SimpleNamespace(chi2=chi2)))
+    def grounds(chi2: float) -> BaselineFit:
+        return cast(BaselineFit, SimpleNamespace(fit=SimpleNamespace(chi2=chi2)))
 
-    def of(evidence: float, coordinate: str) -> Lack:
+    def of(evidence: float, coordinate: str) -> LackOfFitTest:
         beside = neighbours if coordinate == "extension" else -2.0
         shapes = {"own": evidence, "neighbour": beside, "drift": -2.0}
-        return Lack(evidence, np.zeros(1), "own", coordinate, PlaceSpread.SHARED, 0.0, shapes)
+        return LackOfFitTest(
+            evidence, np.zeros(1), "own", coordinate, PlaceSpread.SHARED, 0.0, shapes
+        )
 
     at = {"extension": of(lack, "extension"), "right_bending": of(elsewhere, "right_bending")}
     whole = max(at.values(), key=lambda one: one.log_evidence)

@@ -11,11 +11,11 @@ from spinepipe.effects.contract import Array
 from spinepipe.statics import FreeParameter
 from spinepipe.studies.discrepancy.search import prediction
 from spinepipe.studies.discrepancy.search.prediction import (
+    JointPrediction,
     NoEquilibrium,
     Predicted,
     PredictedSpecimen,
     SolvedSpecimen,
-    Together,
     recorded,
 )
 
@@ -25,14 +25,14 @@ FREE = (FreeParameter("extension", 0, EXTENSION, (0, 1), True),)
 
 
 @pytest.fixture
-def together() -> Together:
+def together() -> JointPrediction:
     """Two specimens, an unknown of the first: the logarithm of its stiffness in extension."""
     free = {"a": FREE, "b": ()}
     subjects = {
         name: PredictedSpecimen(chain(name, k), cases(("extension",)), free[name])
         for name, k in STIFFNESS.items()
     }
-    return Together(subjects, False)
+    return JointPrediction(subjects, False)
 
 
 def at(move: float) -> dict[str, Array]:
@@ -50,14 +50,14 @@ def off(predicted: Predicted, by: float, step: int = 5) -> Predicted:
 @sweep("name", ["a", "b"])
 @sweep("by, same", [(9e-8, True), (-9e-8, True), (1.2e-7, False), (-1.2e-7, False)])
 def test_loads_lead_to_poses_that_are_a_ten_millionth_away(
-    name: str, by: float, same: bool, together: Together
+    name: str, by: float, same: bool, together: JointPrediction
 ) -> None:
     found = together.at(at(0.2))
     assert together.leads_to(at(0.2), found)
     assert together.leads_to(at(0.2), found | {name: off(found[name], by)}) is same
 
 
-def test_loads_of_a_stiffer_chain_lead_elsewhere(together: Together) -> None:
+def test_loads_of_a_stiffer_chain_lead_elsewhere(together: JointPrediction) -> None:
     assert not together.leads_to(at(0.3), together.at(at(0.2)))
 
 
@@ -66,13 +66,15 @@ def test_what_does_not_stand_is_led_to_by_nothing() -> None:
     model = chain("a", 40.0)
     heavy = tuple(replace(body, mass=30.0) for body in model.bodies)
     model = replace(model, bodies=heavy, gravity=np.array([0.0, -9.81, 0.0]))
-    together = Together({"a": PredictedSpecimen(model, cases(("extension",)), FREE)}, False)
+    together = JointPrediction({"a": PredictedSpecimen(model, cases(("extension",)), FREE)}, False)
     found = together.at({"a": np.zeros(1)})
     assert together.leads_to({"a": np.zeros(1)}, found)
     assert not together.leads_to({"a": np.array([-2.0])}, found)
 
 
-def test_readings_and_slopes_are_of_each_specimen_by_its_own_unknowns(together: Together) -> None:
+def test_readings_and_slopes_are_of_each_specimen_by_its_own_unknowns(
+    together: JointPrediction,
+) -> None:
     """Moments over stiffness; by the logarithm of stiffness the angle once more, downwards."""
     first = together.at(at(0.0))
     for name, k in STIFFNESS.items():
@@ -85,7 +87,7 @@ def test_readings_and_slopes_are_of_each_specimen_by_its_own_unknowns(together: 
     assert first["b"].by_x[0].shape == (6, JOINTS, 6, 0)
 
 
-def test_the_next_poses_are_looked_for_along_the_slope(together: Together) -> None:
+def test_the_next_poses_are_looked_for_along_the_slope(together: JointPrediction) -> None:
     """To first order from the last ones: for a step of 0.01, a fiftieth of a percent away."""
     assert together._guess(together._padded([np.zeros(1), np.zeros(0)])) is None
     together.at(at(0.1))
@@ -100,7 +102,7 @@ def test_the_next_poses_are_looked_for_along_the_slope(together: Together) -> No
 def test_first_poses_are_looked_for_near_those_that_are_told() -> None:
     near = [np.full((6, JOINTS * 6), 0.25), np.full((6, JOINTS * 6), 0.5)]
     subjects = {"a": PredictedSpecimen(chain("a", 40.0), cases(("extension", "bending")), ())}
-    told = Together(subjects, False, {"a": near})._guess(np.zeros((1, 0)))
+    told = JointPrediction(subjects, False, {"a": near})._guess(np.zeros((1, 0)))
     assert told is not None
     assert told.shape == (12, JOINTS, 6)
     assert (told[:6] == 0.25).all()
@@ -129,7 +131,7 @@ def test_zeroed_readings_begin_with_nought() -> None:
     (case,) = cases(("extension",))
     back = replace(case, steps=case.steps[:1:-1])
     plain, zeroed = (
-        Together({"a": PredictedSpecimen(chain("a", 40.0), (back,), FREE)}, z).at(
+        JointPrediction({"a": PredictedSpecimen(chain("a", 40.0), (back,), FREE)}, z).at(
             {"a": np.zeros(1)}
         )["a"]
         for z in (False, True)

@@ -10,7 +10,12 @@ from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search import refit as refits_of
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Trials, Variant
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    ActiveTerm,
+    CandidateForm,
+    Trials,
+    Variant,
+)
 from spinepipe.studies.discrepancy.search.refit import (
     Refit,
     leading,
@@ -19,7 +24,7 @@ from spinepipe.studies.discrepancy.search.refit import (
     started,
     weaker,
 )
-from spinepipe.studies.discrepancy.search.screen import Screen, Screened, Tried
+from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
 
 
 def variant(name: str, coordinate: str = "extension") -> Variant:
@@ -31,25 +36,25 @@ OFFSET = Variant("load_offset", ())
 
 
 def tried(
-    form: Form,
+    form: CandidateForm,
     log_evidence: float = 0.0,
     estimate: Sequence[float] = (),
     strengths: Sequence[int] = (),
     sds: tuple[float, ...] = (),
-) -> Tried:
-    return Tried(form, sds, tuple(strengths), log_evidence, np.array(estimate), 0.0)
+) -> ScreenedVariant:
+    return ScreenedVariant(form, sds, tuple(strengths), log_evidence, np.array(estimate), 0.0)
 
 
 def of(name: str, *evidence: float) -> Screened:
     """An effect whose variants, one for each evidence, act on different coordinates."""
     forms = [
-        tried(Form(variant(name, f"c{number}"), PlaceSpread.SHARED), one)
+        tried(CandidateForm(variant(name, f"c{number}"), PlaceSpread.SHARED), one)
         for number, one in enumerate(evidence)
     ]
     return Screened(name, max(evidence), np.zeros(1), tuple(forms))
 
 
-def leaders(*effects: Screened) -> list[Tried]:
+def leaders(*effects: Screened) -> list[ScreenedVariant]:
     return list(leading(Screen(effects, 5.0, 1)))
 
 
@@ -79,9 +84,9 @@ def test_an_effect_may_trail_by_three_quarters_and_six(best: float, least: float
 
 def test_the_form_of_equal_values_is_refitted_beside_the_best_of_its_variant() -> None:
     each, shared, joint = (
-        Form(ZONE, s) for s in (PlaceSpread.EACH, PlaceSpread.SHARED, PlaceSpread.BY_JOINT)
+        CandidateForm(ZONE, s) for s in (PlaceSpread.EACH, PlaceSpread.SHARED, PlaceSpread.BY_JOINT)
     )
-    other = Form(variant("neutral_zone", "right_bending"), PlaceSpread.SHARED)
+    other = CandidateForm(variant("neutral_zone", "right_bending"), PlaceSpread.SHARED)
     first = tried(each, 50.0), tried(joint, 45.0), tried(other, 42.0)
     for evidence, expected in ((40.0, [each, other, shared]), (6.0, [each, other])):
         forms = (*first, tried(shared, evidence))
@@ -95,14 +100,16 @@ def test_the_form_of_equal_values_is_refitted_beside_the_best_of_its_variant() -
 def test_a_fit_starts_at_the_mean_strength_and_the_shapes_of_the_screen() -> None:
     """Ratio of stiffness 1 when off, 0.5 less for a prior SD; the width one SD of its logarithm."""
     _, width, sharpness = ZONE.create().parameters
-    found = started(tried(Form(ZONE, PlaceSpread.BY_JOINT), 0.0, [-0.6, -1.0], [0, 0], (1.0, 0.0)))
+    found = started(
+        tried(CandidateForm(ZONE, PlaceSpread.BY_JOINT), 0.0, [-0.6, -1.0], [0, 0], (1.0, 0.0))
+    )
     expected = [1.0 - 0.8 * 0.5, width.default * np.exp(0.7), sharpness.default]
     assert found.start == pytest.approx(expected)
 
 
 def test_strengths_of_several_columns_start_each_at_its_own() -> None:
     estimate, columns = [1.0, -2.0, 0.5, 2.0, -4.0, 0.7], [0, 1, 2, 0, 1, 2]
-    found = started(tried(Form(OFFSET, PlaceSpread.BY_SPECIMEN), 0.0, estimate, columns))
+    found = started(tried(CandidateForm(OFFSET, PlaceSpread.BY_SPECIMEN), 0.0, estimate, columns))
     scales = np.array([p.prior_scale for p in OFFSET.create().parameters])
     assert found.start == pytest.approx(np.array([1.5, -3.0, 0.6]) * scales)
 
@@ -127,28 +134,28 @@ def test_a_strength_starts_on_its_side_and_inside_its_bounds(
     of_variant: Variant, sds: float, value: float
 ) -> None:
     """A fraction has SD 0.3 from 0 to 0.95, a ratio 0.5 in its logarithm from 0.01 to 100."""
-    found = started(tried(Form(of_variant, PlaceSpread.SHARED), 0.0, [sds], [0]))
+    found = started(tried(CandidateForm(of_variant, PlaceSpread.SHARED), 0.0, [sds], [0]))
     assert found.start[0] == pytest.approx(value, rel=1e-9)
 
 
 def test_a_moment_starts_off_both_its_bounds_by_a_fiftieth_of_its_prior_sd() -> None:
     """0.3 N m, of 10 N m to either side: a thousandth of the whole way is 0.02 N m."""
     for sds, value in ((90.0, 9.994), (-90.0, -9.994)):
-        found = started(tried(Form(OFFSET, PlaceSpread.SHARED), 0.0, [sds] * 3, [0, 1, 2]))
+        found = started(tried(CandidateForm(OFFSET, PlaceSpread.SHARED), 0.0, [sds] * 3, [0, 1, 2]))
         assert found.start == pytest.approx([value] * 3)
 
 
 def test_weaker_is_a_share_of_the_way_from_off() -> None:
     """Of a ratio the share of its logarithm; shapes stay."""
-    ratio = Supposed(Form(LEVELS, PlaceSpread.SHARED), np.array([4.0]))
-    zone = Supposed(Form(ZONE, PlaceSpread.SHARED), np.array([0.2, 0.03, 9.0]))
+    ratio = ActiveTerm(CandidateForm(LEVELS, PlaceSpread.SHARED), np.array([4.0]))
+    zone = ActiveTerm(CandidateForm(ZONE, PlaceSpread.SHARED), np.array([0.2, 0.03, 9.0]))
     assert weaker(ratio, 0.5).start == pytest.approx([2.0])
     assert weaker(zone, 0.25).start == pytest.approx([0.8, 0.03, 9.0])
     assert weaker(zone, 1.0).start == pytest.approx(zone.start)
     assert zone.start.tolist() == [0.2, 0.03, 9.0]  # itself is left alone
 
 
-def fit_of(moves: Sequence[tuple[int, int, float]], *supposed: Supposed) -> Any:
+def fit_of(moves: Sequence[tuple[int, int, float]], *supposed: ActiveTerm) -> Any:
     """A fit that moved unknowns: number of the effect, column, by how much."""
     unknowns = [SimpleNamespace(supposed=number, column=column) for number, column, _ in moves]
     hypothesis = SimpleNamespace(unknowns=unknowns, supposed=supposed)
@@ -156,8 +163,8 @@ def fit_of(moves: Sequence[tuple[int, int, float]], *supposed: Supposed) -> Any:
 
 
 def test_what_stands_starts_again_where_it_ended() -> None:
-    zone = Supposed(Form(ZONE, PlaceSpread.BY_JOINT), np.array([0.6, 0.02, 9.0]))
-    levels = Supposed(Form(LEVELS, PlaceSpread.SHARED), np.array([2.0]))
+    zone = ActiveTerm(CandidateForm(ZONE, PlaceSpread.BY_JOINT), np.array([0.6, 0.02, 9.0]))
+    levels = ActiveTerm(CandidateForm(LEVELS, PlaceSpread.SHARED), np.array([2.0]))
     moves = [(0, 0, -0.1), (0, 0, -0.3), (0, 1, np.log(2.0)), (1, 0, np.log(1.5))]
     first, second = standing(fit_of(moves, zone, levels))
     assert first.start == pytest.approx([0.4, 0.04, 9.0])  # the mean of two places
@@ -181,7 +188,7 @@ class Fits:
 
 
 def test_a_form_adds_the_unknowns_of_its_own() -> None:
-    form = Form(ZONE, PlaceSpread.SHARED)
+    form = CandidateForm(ZONE, PlaceSpread.SHARED)
     fit = fit_of([(0, 0, 0.0), (1, 0, 0.0), (1, 1, 0.0), (2, 0, 0.0)], *[None] * 2)  # type: ignore[list-item]
     assert Refit(form, fit, 0.0, 0.0).unknowns == 2  # of the last, the second
 
@@ -189,13 +196,13 @@ def test_a_form_adds_the_unknowns_of_its_own() -> None:
 def refit_with(fits: Fits, monkeypatch: pytest.MonkeyPatch, degenerate: bool = False) -> Any:
     monkeypatch.setattr(refits_of, "_degenerate", lambda fit, number: degenerate)
     monkeypatch.setattr(refits_of, "laplace", lambda fit, number, gain: 0.5 * gain)
-    form = Form(LEVELS, PlaceSpread.SHARED)
+    form = CandidateForm(LEVELS, PlaceSpread.SHARED)
     before = fit_of([])
     before.chi2, before.poses = 100.0, None
     grounds: Any = SimpleNamespace(fit=before, setting=None, suppose=lambda supposed: supposed)
     trials = Trials("", (LEVELS, ZONE), (form,))
     monkeypatch.setattr(refits_of, "joint_fit", fits)
-    return refit(grounds, Supposed(form, np.array([32.0])), trials)
+    return refit(grounds, ActiveTerm(form, np.array([32.0])), trials)
 
 
 @pytest.mark.parametrize("failures", [0, 1, 2])
@@ -218,19 +225,21 @@ def test_the_two_that_lead_are_refitted_with_equal_values_too() -> None:
     """Where the screen has that form and it was not tried yet."""
     spreads = PlaceSpread.EACH, PlaceSpread.BY_JOINT, PlaceSpread.SHARED
     effects = [
-        Screened(v.effect, 9.0, np.zeros(1), tuple(tried(Form(v, s)) for s in spreads))
+        Screened(v.effect, 9.0, np.zeros(1), tuple(tried(CandidateForm(v, s)) for s in spreads))
         for v in (ZONE, LEVELS, LAXITY)
     ]
     screen = Screen(tuple(effects), 5.0, 1)
 
     def found(v: Variant, log_evidence: float, spread: PlaceSpread = PlaceSpread.EACH) -> Any:
-        start = Supposed(Form(v, spread), v.off((0.0,) * len(v.shapes)))
+        start = ActiveTerm(CandidateForm(v, spread), v.off((0.0,) * len(v.shapes)))
         fit = fit_of([(0, 0, -0.25)], start)
         return SimpleNamespace(name=v.effect, form=start.form, log_evidence=log_evidence, fit=fit)
 
     ranked = [found(LAXITY, 5.0), found(LEVELS, 7.0), found(ZONE, 8.0)]
     simple = list(refits_of._simpler(ranked, screen, ()))
-    assert [one.form for one in simple] == [Form(v, PlaceSpread.SHARED) for v in (ZONE, LEVELS)]
+    assert [one.form for one in simple] == [
+        CandidateForm(v, PlaceSpread.SHARED) for v in (ZONE, LEVELS)
+    ]
     assert simple[0].start[0] == pytest.approx(0.75)  # from where the other form ended
     known = [found(ZONE, 8.0), found(ZONE, 3.0, PlaceSpread.SHARED), found(LEVELS, -np.inf)]
     assert list(refits_of._simpler(known, screen, ())) == []

@@ -15,7 +15,12 @@ from spring_chain_cases import SD, Array
 from spinepipe.calibrate.profile import NEAR, RegionEnds
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search.base import base_parameters
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant, hypothesis
+from spinepipe.studies.discrepancy.search.hypothesis import (
+    ActiveTerm,
+    CandidateForm,
+    Variant,
+    hypothesis,
+)
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.model_files import standard_errors
 from spinepipe.studies.discrepancy.search.noise import Noise
@@ -56,7 +61,7 @@ def read(turned: Turned, levels: Array = LEVELS, seed: int = 1) -> SpecimenReadi
 
 
 def fitted(
-    given: SpecimenReadings, supposed: Supposed, free_base: bool = False
+    given: SpecimenReadings, supposed: ActiveTerm, free_base: bool = False
 ) -> tuple[JointFit, Setting]:
     noise = Noise(np.full(6, SD), 0.0, REPEATS, np.full(6, 1000), 0, False)
     setting = Setting({"a": given}, {"a": whitening(given.tests, noise)}, False)
@@ -72,8 +77,8 @@ def by_name(found: Sequence[ValueWithRegion]) -> dict[str, ValueWithRegion]:
     return {one.name: one for one in found}
 
 
-def lax(joint: int) -> Supposed:
-    return Supposed(Form(LAXITY, PlaceSpread.ONE_JOINT, joint), np.array([0.3]))
+def lax(joint: int) -> ActiveTerm:
+    return ActiveTerm(CandidateForm(LAXITY, PlaceSpread.ONE_JOINT, joint), np.array([0.3]))
 
 
 def loosened(fraction: float, joint: int) -> Turned:
@@ -116,7 +121,7 @@ def test_with_the_base_fitted_along_it_is_fiellers() -> None:
 def test_where_all_is_straight_it_is_the_interval_of_the_standard_error() -> None:
     given = read(lambda _, moments: moments / K + 0.02)
     start = np.zeros(len(BIAS.create().parameters))
-    fit, setting = fitted(given, Supposed(Form(BIAS, PlaceSpread.SHARED), start))
+    fit, setting = fitted(given, ActiveTerm(CandidateForm(BIAS, PlaceSpread.SHARED), start))
     mean = float(np.nanmean(given.tests[0].mean[..., EXTENSION] - (LEVELS / K)[:, None]))
     way = Z * SD / np.sqrt(CYCLES * len(LEVELS) * JOINTS)
     every = by_name(estimated(fit, setting, 0))
@@ -128,11 +133,11 @@ def test_where_all_is_straight_it_is_the_interval_of_the_standard_error() -> Non
     assert (unread.low, unread.high, unread.identifiable) == (None, None, False)
 
 
-def zoned(width: float, ratio: float) -> Supposed:
+def zoned(width: float, ratio: float) -> ActiveTerm:
     values = ZONE.off((0.0,) * len(ZONE.shapes))
     names = [p.name for p in ZONE.create().parameters]
     values[names.index("width")], values[names.index("stiffness_ratio")] = width, ratio
-    return Supposed(Form(ZONE, PlaceSpread.SHARED), values)
+    return ActiveTerm(CandidateForm(ZONE, PlaceSpread.SHARED), values)
 
 
 def local(fit: JointFit, name: str) -> float:
@@ -185,7 +190,7 @@ def test_a_contact_as_rigid_as_a_wall_has_no_upper_end() -> None:
     values = CONTACT.off((0.0,) * len(CONTACT.shapes))
     names = [p.name for p in CONTACT.create().parameters]
     values[names.index("gap")], values[names.index("stiffness")] = 0.9 * gap, 500.0
-    fit, setting = fitted(given, Supposed(Form(CONTACT, PlaceSpread.SHARED), values))
+    fit, setting = fitted(given, ActiveTerm(CandidateForm(CONTACT, PlaceSpread.SHARED), values))
     stiffness = by_name(estimated(fit, setting, 0))["stiffness"]
     assert np.isfinite(local(fit, "stiffness"))
     assert (stiffness.high, stiffness.open_above) == (None, True)

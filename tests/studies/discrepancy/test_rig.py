@@ -17,7 +17,7 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
 from spinepipe.studies.discrepancy.checks import check_discrepancy
 from spinepipe.studies.discrepancy.rows import _as_load, _rig
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
     Prepared,
@@ -86,7 +86,7 @@ def written(
     return cohorts.read(folder), np.array(forces)
 
 
-def laid(cohort: Cohort) -> tuple[Prepared, Grounds]:
+def laid(cohort: Cohort) -> tuple[Prepared, BaselineFit]:
     ready = prepared(STUDY, cohort, None)
     return ready, base_fitted(ready, at_once)
 

@@ -14,7 +14,7 @@ from spinepipe.calibrate.profile import Best, profile_in_turn
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import regions
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.regions import OPEN, _Ruler
 
 STIFFNESS = 500.0
@@ -54,7 +54,7 @@ def ruled(name: str, start: float, moved: float, variant: Variant = CONTACT) -> 
     column = [p.name for p in parameters].index(name)
     values = np.array([p.default for p in parameters])
     values[column] = start
-    supposed = (Supposed(Form(variant, PlaceSpread.SHARED), values),)
+    supposed = (ActiveTerm(CandidateForm(variant, PlaceSpread.SHARED), values),)
     unknowns = (SimpleNamespace(supposed=0, column=column),)
     hypothesis = SimpleNamespace(unknowns=unknowns, supposed=supposed)
     return regions._ruler(SimpleNamespace(hypothesis=hypothesis, x=[moved]), 0)  # type: ignore[arg-type]

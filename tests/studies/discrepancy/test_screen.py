@@ -8,7 +8,7 @@ from scipy.stats import gumbel_r
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, Variant
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant
 from spinepipe.studies.discrepancy.search.projected import columns_of
 from spinepipe.studies.discrepancy.search.screen import (
     EffectColumns,
@@ -24,7 +24,7 @@ OFFSET = Variant("load_offset", ())
 LAXITY = Variant("local_laxity", (("coordinate", "extension"),))
 
 
-def strengths(*forms: Form) -> list[set[tuple[str, int | None, str, int]]]:
+def strengths(*forms: CandidateForm) -> list[set[tuple[str, int | None, str, int]]]:
     """Of each strength of the first form, all it sums: specimen, joint, test, column of values."""
     form = forms[0]
     index = EffectColumns(columns_of(Trials("", (form.variant,), forms), 2, TESTS))
@@ -39,7 +39,9 @@ def strengths(*forms: Form) -> list[set[tuple[str, int | None, str, int]]]:
 
 
 def test_what_differs_by_test_has_strengths_of_each_test_for_all_specimens() -> None:
-    found = strengths(Form(OFFSET, PlaceSpread.BY_TEST), Form(OFFSET, PlaceSpread.SHARED))
+    found = strengths(
+        CandidateForm(OFFSET, PlaceSpread.BY_TEST), CandidateForm(OFFSET, PlaceSpread.SHARED)
+    )
     expected = [
         {("a", None, test, axis), ("b", None, test, axis)} for axis in range(3) for test in TESTS
     ]
@@ -48,28 +50,32 @@ def test_what_differs_by_test_has_strengths_of_each_test_for_all_specimens() -> 
 
 
 def test_what_is_shared_has_one_strength_of_all_tests() -> None:
-    found = strengths(Form(OFFSET, PlaceSpread.SHARED), Form(OFFSET, PlaceSpread.BY_TEST))
+    found = strengths(
+        CandidateForm(OFFSET, PlaceSpread.SHARED), CandidateForm(OFFSET, PlaceSpread.BY_TEST)
+    )
     assert found == [{("a", None, "*", axis), ("b", None, "*", axis)} for axis in range(3)]
 
 
 @sweep(
     "form, expected",
     [
-        (Form(LAXITY, PlaceSpread.SHARED), [["a0", "a1", "b0", "b1"]]),
-        (Form(LAXITY, PlaceSpread.BY_JOINT), [["a0", "b0"], ["a1", "b1"]]),
-        (Form(LAXITY, PlaceSpread.BY_SPECIMEN), [["a0", "a1"], ["b0", "b1"]]),
-        (Form(LAXITY, PlaceSpread.EACH), [["a0"], ["a1"], ["b0"], ["b1"]]),
-        (Form(LAXITY, PlaceSpread.ONE_JOINT, 1), [["a1", "b1"]]),
-        (Form(LAXITY, PlaceSpread.ONE, 0, "b"), [["b0"]]),
+        (CandidateForm(LAXITY, PlaceSpread.SHARED), [["a0", "a1", "b0", "b1"]]),
+        (CandidateForm(LAXITY, PlaceSpread.BY_JOINT), [["a0", "b0"], ["a1", "b1"]]),
+        (CandidateForm(LAXITY, PlaceSpread.BY_SPECIMEN), [["a0", "a1"], ["b0", "b1"]]),
+        (CandidateForm(LAXITY, PlaceSpread.EACH), [["a0"], ["a1"], ["b0"], ["b1"]]),
+        (CandidateForm(LAXITY, PlaceSpread.ONE_JOINT, 1), [["a1", "b1"]]),
+        (CandidateForm(LAXITY, PlaceSpread.ONE, 0, "b"), [["b0"]]),
     ],
 )
-def test_each_way_to_differ_sums_its_places(form: Form, expected: list[list[str]]) -> None:
+def test_each_way_to_differ_sums_its_places(form: CandidateForm, expected: list[list[str]]) -> None:
     found = [sorted(f"{s}{joint}" for s, joint, _, _ in one) for one in strengths(form)]
     assert found == expected
 
 
 def test_columns_by_test_are_made_only_where_a_form_asks() -> None:
-    shared, by_test = (Form(OFFSET, spread) for spread in (PlaceSpread.SHARED, PlaceSpread.BY_TEST))
+    shared, by_test = (
+        CandidateForm(OFFSET, spread) for spread in (PlaceSpread.SHARED, PlaceSpread.BY_TEST)
+    )
     assert len(columns_of(Trials("", (OFFSET,), (shared,)), 2, TESTS)) == 3
     assert len(columns_of(Trials("", (OFFSET,), (shared, by_test)), 2, TESTS)) == 3 * 3
 
@@ -84,7 +90,8 @@ def test_bounds_tell_the_side_of_a_strength() -> None:
     stiffer = Variant("level_dependence", (("coordinate", "extension"),))
     zone = Variant("neutral_zone", (("coordinate", "extension"),))
     found = [
-        sides(Form(v, PlaceSpread.SHARED), v.strengths).tolist() for v in (LAXITY, zone, stiffer)
+        sides(CandidateForm(v, PlaceSpread.SHARED), v.strengths).tolist()
+        for v in (LAXITY, zone, stiffer)
     ]
     assert found == [[1.0], [-1.0], [0.0]]
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from sweeps import sweep
 
-from spinepipe.cohort.answers import joint_loads
+from spinepipe.cohort.load_response import joint_loads
 from spinepipe.effects import Wrench
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase, LoadStep

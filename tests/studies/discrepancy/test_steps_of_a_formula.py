@@ -196,7 +196,7 @@ def test_a_law_has_a_fit_that_is_better_and_ends_at_no_bound(
     fit = SimpleNamespace(chi2=100.0, poses=None)
     grounds: Any = SimpleNamespace(fit=fit, setting=None, suppose=lambda supposed: supposed)
     grounds.at = lambda fit: fit
-    one = formulas.Supposed(formulas.Form(variant, PlaceSpread.SHARED), np.array([8.0]))
+    one = formulas.ActiveTerm(formulas.CandidateForm(variant, PlaceSpread.SHARED), np.array([8.0]))
     at = formulas._fit_with(grounds, one)
     assert (at is not None) is found
     assert ends.starts == pytest.approx([8.0, 4.0, 1.6][:fits])

@@ -9,9 +9,9 @@ import pytest
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.search import beyond as tables
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Variant
-from spinepipe.studies.discrepancy.search.lack_of_fit import Lack
+from spinepipe.studies.discrepancy.search import residual_model as tables
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Variant
+from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFitTest
 
 JOINTS = ("L5S1", "L4L5")
 
@@ -37,12 +37,12 @@ def grounds(specimens: Mapping[str, Any] | None = None, joints: int = 2, **fit: 
 # Where
 
 
-def lack(evidence: float, null: Sequence[float], family: str = "own", **more: Any) -> Lack:
+def lack(evidence: float, null: Sequence[float], family: str = "own", **more: Any) -> LackOfFitTest:
     spread = more.get("spread", PlaceSpread.SHARED)
-    return Lack(evidence, np.array(null), family, "extension", spread, 0.0, {})
+    return LackOfFitTest(evidence, np.array(null), family, "extension", spread, 0.0, {})
 
 
-def forms(of: Lack | None = None, *terms: Any, at: Any = None) -> list[Form]:
+def forms(of: LackOfFitTest | None = None, *terms: Any, at: Any = None) -> list[CandidateForm]:
     basis: Any = SimpleNamespace(at={} if of is None else {"extension": of})
     found: Any = SimpleNamespace(terms=terms) if terms else None
     return list(tables._forms(at or grounds(), basis, found, 0.01))
@@ -130,9 +130,9 @@ def test_a_table_goes_as_far_as_all_specimens_move() -> None:
 
 def form(
     coordinate: str = "extension", spread: PlaceSpread = PlaceSpread.SHARED, **place: Any
-) -> Form:
+) -> CandidateForm:
     options = (("coordinate", coordinate), ("over", tables.ITSELF), ("reach", 0.2))
-    return Form(Variant("tabulated_law", options), spread, **place)
+    return CandidateForm(Variant("tabulated_law", options), spread, **place)
 
 
 def best(
@@ -141,7 +141,7 @@ def best(
     """Evidence of the table that is taken; by evidence, whether it beats the base and tells."""
     given = iter(evidence)
 
-    def fitted(grounds: Any, form: Form) -> Any:
+    def fitted(grounds: Any, form: CandidateForm) -> Any:
         one = next(given)
         return None if one is None else (one, one)
 
@@ -178,7 +178,7 @@ def test_three_tables_at_most_enter_one_for_each_law(
     ]
     asked: list[int] = []
 
-    def taken(at: Any, left: Sequence[Form]) -> Any:
+    def taken(at: Any, left: Sequence[CandidateForm]) -> Any:
         asked.append(len(left))
         after = SimpleNamespace(fit=None, number=len(asked))
         return (after, left[0]) if len(asked) <= worth else None
@@ -228,5 +228,5 @@ def test_where_a_table_is_is_told_in_words() -> None:
     each = form(spread=PlaceSpread.EACH)
     assert tables._where(at, each) == f"extension at every joint, {PlaceSpread.EACH.value}"
     options = (("coordinate", "extension"), ("over", "left_rotation"), ("reach", 0.2))
-    other = Form(Variant("tabulated_law", options), PlaceSpread.SHARED)
+    other = CandidateForm(Variant("tabulated_law", options), PlaceSpread.SHARED)
     assert tables._where(at, other) == "extension over left rotation at every joint"

@@ -7,12 +7,12 @@ from sweeps import sweep
 
 from spinepipe.studies.discrepancy.design.advice import ADVISED, advice
 from spinepipe.studies.discrepancy.design.extra_tests import bench
-from spinepipe.studies.discrepancy.design.withheld import Withheld, withheld
+from spinepipe.studies.discrepancy.design.masked_effects import MaskedEffects, withheld
 from spinepipe.studies.discrepancy.search.hypothesis import Trials, trials
-from spinepipe.studies.discrepancy.search.inquiry import Rules, look
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.outcome import outcome
 from spinepipe.studies.discrepancy.search.search import search
+from spinepipe.studies.discrepancy.search.search_state import Rules, look
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import Conclusion
 from spinepipe.units import COORDINATES
@@ -27,7 +27,7 @@ def all_trials() -> tuple[Trials, ...]:
 
 
 @pytest.fixture(scope="module")
-def hidden() -> Withheld:
+def hidden() -> MaskedEffects:
     """Centres 1 mm off in all joints, where 2 mm are allowed for."""
     found = withheld(grounds_of(off_centre(alike(SHIFT_M))), all_trials(), NEEDED, (), at_once)
     (one,) = found

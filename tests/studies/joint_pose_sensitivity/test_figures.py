@@ -13,7 +13,7 @@ from PIL import Image
 from study_cases import STUDY, Size, drawn, project, results
 from sweeps import sweep
 
-from spinepipe.report.marks import quartiles
+from spinepipe.report.glyphs import quartiles
 from spinepipe.report.panels import MOST_ROWS, rows_of
 from spinepipe.report.style import DPI, WIDTH_MM, save, saying, style
 from spinepipe.report.words import fixed, number, percent, tick

@@ -18,7 +18,7 @@ from spinepipe.studies.scoliosis.accuracy import accuracy_rows
 from spinepipe.studies.scoliosis.films import CORNERS, FILMS, PATIENTS, read_films
 from spinepipe.studies.scoliosis.personalise import rows_of
 from spinepipe.studies.scoliosis.population import assumed
-from spinepipe.studies.scoliosis.population_table import Learned, population_rows
+from spinepipe.studies.scoliosis.population_table import PopulationEstimate, population_rows
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import (
@@ -50,7 +50,7 @@ def cohort(tmp_path_factory: pytest.TempPathFactory) -> cohorts.Cohort:
 
 @pytest.fixture(scope="module")
 def tables(cohort: cohorts.Cohort) -> dict[str, pd.DataFrame]:
-    usual = Learned(assumed(len(cohort.joint_names)), 1, 0.0, 0, (), True)
+    usual = PopulationEstimate(assumed(len(cohort.joint_names)), 1, 0.0, 0, (), True)
     population = from_rows(
         POPULATION, list(population_rows(usual, cohort.joint_names, np.array([1e-3, 1e-3, 0.01])))
     )

@@ -29,8 +29,8 @@ from spinepipe.studies.scoliosis.films import (
     placed,
     read_films,
 )
-from spinepipe.studies.scoliosis.misses import miss_of
 from spinepipe.studies.scoliosis.reading_noise import reading_noise
+from spinepipe.studies.scoliosis.residuals import miss_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 
 STUDY = {"study": "s", "kind": "scoliosis", "cohort": "ais"}

@@ -14,7 +14,7 @@ from sweeps import sweep
 from spinepipe.plausibility.score import table
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PACKAGE
-from spinepipe.studies.scoliosis import checks, doubts
+from spinepipe.studies.scoliosis import checks, plausibility
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film
 
 LEVELS = ("L4", "L3", "L2", "L1")
@@ -152,14 +152,17 @@ def seen(up: float, across: float) -> Film:
 )
 def test_spines_that_lie_or_stand_on_their_heads(up: float, across: float, column: str) -> None:
     for columns, name in ((CENTRE, f"{column}_mm"), (CORNERS, f"upper_left_{column}_mm")):
-        found = fault(doubts._direction([seen(up, across)], *columns[:2]))
+        found = fault(plausibility._direction([seen(up, across)], *columns[:2]))
         assert found == (None if column is None else (name, True))
 
 
 def test_most_films_decide_which_way_a_spine_stands() -> None:
     films = [seen(0.3, 0.0), seen(-0.3, 0.0), seen(0.3, 0.0)]
-    assert doubts._direction(films, *CENTRE[:2]) is None
-    assert fault(doubts._direction([seen(-0.3, 0.0), *films[1:]], *CENTRE[:2])) == ("z_mm", True)
+    assert plausibility._direction(films, *CENTRE[:2]) is None
+    assert fault(plausibility._direction([seen(-0.3, 0.0), *films[1:]], *CENTRE[:2])) == (
+        "z_mm",
+        True,
+    )
 
 
 @sweep(
@@ -173,17 +176,17 @@ def test_vertebrae_are_as_far_apart_as_those_of_a_spine_to_a_factor(
     size: float, told: bool | None
 ) -> None:
     """From centre to centre half of both spacings of the levels; a unit makes it certain."""
-    usual = np.array([doubts.spacing_mm(name) for name in LEVELS]) / 1e3
+    usual = np.array([plausibility.spacing_mm(name) for name in LEVELS]) / 1e3
     up = size * np.concatenate([[0.0], np.cumsum((usual[1:] + usual[:-1]) / 2.0)])
     films = [Film(0.6 * up, 0.8 * up, np.zeros(4))] * 2
     for columns, column in ((CENTRE[:2], "y_mm"), (CORNERS, "upper_left_y_mm")):
-        found = fault(doubts._size(COHORT, films, columns))
+        found = fault(plausibility._size(COHORT, films, columns))
         assert found == (None if told is None else (column, told))
 
 
 def test_names_that_are_no_levels_have_no_size() -> None:
     cohort: Any = SimpleNamespace(vertebrae=("a", "b", "c", "d"))
-    assert doubts._size(cohort, [leaning(0, 0, 0, 0, apart=5.0)], CENTRE[:2]) is None
+    assert plausibility._size(cohort, [leaning(0, 0, 0, 0, apart=5.0)], CENTRE[:2]) is None
 
 
 def curved(size: float, factor: float, mixed: float = 0.0) -> list[Film]:
@@ -220,7 +223,7 @@ def curved(size: float, factor: float, mixed: float = 0.0) -> list[Film]:
     ],
 )
 def test_tilts_go_with_the_line_of_the_centres(films: list[Film], told: str | None) -> None:
-    found = doubts._tilts(films)
+    found = plausibility._tilts(films)
     if told is None:
         assert found is None
         return
@@ -254,12 +257,12 @@ def boxes(turn: float, mirror: float = 1.0) -> pd.DataFrame:
 )
 def test_corners_are_where_their_names_say(turn: float, mirror: float, column: str | None) -> None:
     """A body that leans by more than 60 deg lies on its side."""
-    found = fault(doubts._corners(boxes(turn, mirror)))
+    found = fault(plausibility._corners(boxes(turn, mirror)))
     assert found == (None if column is None else (column, True))
 
 
 def test_mirrored_corners_are_told_apart_from_bodies_on_their_sides() -> None:
-    told = doubts._corners(boxes(0, -1)), doubts._corners(boxes(61))
+    told = plausibility._corners(boxes(0, -1)), plausibility._corners(boxes(61))
     assert [one and one.warning for one in told] == ["corners_left_right", "corners_aside"]
 
 

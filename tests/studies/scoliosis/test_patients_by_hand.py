@@ -17,7 +17,7 @@ from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis import personal, personalise
 from spinepipe.studies.scoliosis.curve_angles import SpinalCurve
 from spinepipe.studies.scoliosis.films import Film
-from spinepipe.studies.scoliosis.held_spine import BENDING, geometry, with_laws, with_springs
+from spinepipe.studies.scoliosis.fixed_end_spine import BENDING, geometry, with_laws, with_springs
 from spinepipe.studies.scoliosis.personal import (
     Fitting,
     Patient,

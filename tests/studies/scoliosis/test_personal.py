@@ -16,7 +16,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.studies.scoliosis.film_fit import TOPS, FilmFit
 from spinepipe.studies.scoliosis.films import ERECT, FILMS, LEFT, PATIENTS, RIGHT, Read
-from spinepipe.studies.scoliosis.held_spine import geometry, with_laws
+from spinepipe.studies.scoliosis.fixed_end_spine import geometry, with_laws
 from spinepipe.studies.scoliosis.personal import (
     WAYS,
     Patient,

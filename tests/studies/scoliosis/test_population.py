@@ -19,7 +19,11 @@ from spinepipe.studies.scoliosis.population import (
     assumed,
     learned,
 )
-from spinepipe.studies.scoliosis.population_table import Learned, population_of, population_rows
+from spinepipe.studies.scoliosis.population_table import (
+    PopulationEstimate,
+    population_of,
+    population_rows,
+)
 from spinepipe.studies.scoliosis.tables import POPULATION
 from spinepipe.tables import from_rows
 
@@ -98,7 +102,7 @@ def test_patients_of_whom_nothing_is_known_change_no_spread() -> None:
 
 def test_a_population_comes_back_from_its_table() -> None:
     population, sd = made(), np.array([1.1e-3, 1.1e-3, 0.01])
-    told = Learned(population, 3, 0.01, 7, ("p05",), True)
+    told = PopulationEstimate(population, 3, 0.01, 7, ("p05",), True)
     rows = from_rows(POPULATION, list(population_rows(told, JOINTS, sd))).to_pandas()
     found, weights = population_of(rows)
     np.testing.assert_allclose(found.mean, population.mean, atol=1e-12)

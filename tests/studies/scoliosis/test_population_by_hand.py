@@ -26,7 +26,7 @@ from spinepipe.studies.scoliosis.film_fit import (
 )
 from spinepipe.studies.scoliosis.film_regions import _of_films, _usual, by_ratio
 from spinepipe.studies.scoliosis.population import PatientPrior, Population, assumed, learned
-from spinepipe.studies.scoliosis.population_table import Learned, population_rows
+from spinepipe.studies.scoliosis.population_table import PopulationEstimate, population_rows
 
 SILENT = Progress(lambda line: None)
 
@@ -114,7 +114,9 @@ def test_a_table_tells_means_with_the_interval_of_patients() -> None:
     """Of a normal logarithm: exp(mean -+ 1.96 SD); ends in degrees."""
     usual = assumed(2)
     rows = list(
-        population_rows(Learned(usual, 4, np.inf, 3, (), True), ("a", "b"), np.full(3, 0.002))
+        population_rows(
+            PopulationEstimate(usual, 4, np.inf, 3, (), True), ("a", "b"), np.full(3, 0.002)
+        )
     )
     assert [(row["quantity"], row["joint"]) for row in rows] == [
         (quantity, joint) for quantity in ("ratio", "lower_end", "upper_end") for joint in "ab"

@@ -13,7 +13,7 @@ from scoliosis_cases import write_shipped
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT
-from spinepipe.studies.scoliosis.held_spine import with_laws
+from spinepipe.studies.scoliosis.fixed_end_spine import with_laws
 from spinepipe.studies.scoliosis.personal import Patient, RegionFit, _regions, patient_of, tangent
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import VARIANTS, VARIATION

@@ -12,8 +12,8 @@ from spinepipe.cli import main
 from spinepipe.marks import read_mark
 from spinepipe.motion.export import COLUMNS, usable
 from spinepipe.motion.points import marker_places
-from spinepipe.studies.tracking.moved import motions
 from spinepipe.studies.tracking.persons import person_of
+from spinepipe.studies.tracking.reload_motions import motions
 from spinepipe.tables import read_frame
 from tests.reference.peers import opensim_motion as peer
 

@@ -19,7 +19,7 @@ from tracking_table_cases import BEND_DEG, ERROR, Size, cohort_of, study_of, tab
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.report.style import style
 from spinepipe.studies.tracking.figures.kinematics import courses_of, ends_of
-from spinepipe.studies.tracking.figures.looks import chosen, looks_of_approaches
+from spinepipe.studies.tracking.figures.line_styles import chosen, looks_of_approaches
 from spinepipe.studies.tracking.figures.stiffness_by_level import told_by
 from spinepipe.studies.tracking.in_space_motions import motions_of
 from spinepipe.studies.tracking.in_space_still import farthest, still_figure

@@ -10,11 +10,11 @@ from moving_spine import spine
 from spinepipe.frames import rotation_zxy
 from spinepipe.motion.skeleton import BODIES, JOINTS, body_poses
 from spinepipe.studies.tracking.accuracy import accuracy_rows
+from spinepipe.studies.tracking.error_metrics import Bones
 from spinepipe.studies.tracking.errors import error_rows
-from spinepipe.studies.tracking.moved import IN_ORDER, motions
-from spinepipe.studies.tracking.off_truth import Bones
 from spinepipe.studies.tracking.profile import verdict
 from spinepipe.studies.tracking.ranges import range_rows
+from spinepipe.studies.tracking.reload_motions import IN_ORDER, motions
 from spinepipe.studies.tracking.sharing import sharing_rows
 from spinepipe.studies.tracking.similarity import similarity_rows
 from spinepipe.studies.tracking.tables import (
@@ -26,7 +26,7 @@ from spinepipe.studies.tracking.tables import (
 )
 from spinepipe.studies.tracking.truth import truths
 from spinepipe.tables import from_rows
-from spinepipe.units import BORDER_PER_SI, COORDINATE_COLUMNS, DEG_PER_RAD, MM_PER_M
+from spinepipe.units import COORDINATE_COLUMNS, DEG_PER_RAD, DISPLAY_PER_SI, MM_PER_M
 
 FRAMES = 51
 TRIAL, APPROACH = "bends", "ik"
@@ -42,7 +42,7 @@ def still(frames: int = FRAMES) -> np.ndarray:
 def tracked(q: np.ndarray, specimen: str = "s01", span_s: float = 2.0) -> pd.DataFrame:
     """Rows of the table, in a random order."""
     frames = len(q)
-    shown = (q * BORDER_PER_SI).reshape(-1, 6)
+    shown = (q * DISPLAY_PER_SI).reshape(-1, 6)
     rows = pd.DataFrame(shown, columns=list(COORDINATE_COLUMNS))
     rows["joint"] = list(IN_ORDER) * frames
     rows["frame"] = np.repeat(np.arange(frames), 18)

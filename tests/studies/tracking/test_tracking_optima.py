@@ -10,7 +10,7 @@ import pytest
 
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.asked import Ask, Watched
+from spinepipe.motion.objective import Ask, Watched
 from spinepipe.motion.posture import postures
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.spline import KnotGrid

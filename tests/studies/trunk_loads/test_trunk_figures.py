@@ -21,8 +21,8 @@ from trunk_table_cases import BEYOND, ERRORS, MEASURED, Size, cohort_of, study_o
 from spinepipe.report.style import style
 from spinepipe.studies.trunk_loads.chosen import bends, of_person, relaxed, shown_person, some_tasks
 from spinepipe.studies.trunk_loads.figures.cost_of_simplifications import costs
+from spinepipe.studies.trunk_loads.figures.line_styles import look_of
 from spinepipe.studies.trunk_loads.figures.load_over_flexion import courses_of, extensor_forces
-from spinepipe.studies.trunk_loads.figures.looks import look_of
 from spinepipe.studies.trunk_loads.figures.muscle_force_bars import grouped_forces
 
 NAMES = (

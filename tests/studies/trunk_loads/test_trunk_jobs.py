@@ -14,7 +14,7 @@ from trunk_person import SETTINGS, volunteers
 
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.folder import SpecimenTables, source_of_folder
-from spinepipe.muscles.settle import held
+from spinepipe.muscles.muscle_equilibrium import held
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
 from spinepipe.studies.subjects import subject_of

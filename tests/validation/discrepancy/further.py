@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.studies.discrepancy.design.seen import seen_in
+from spinepipe.studies.discrepancy.design.fisher_information import seen_in
 from spinepipe.studies.discrepancy.design.testable import judgements
 from spinepipe.studies.discrepancy.proof.folds import SPECIMEN, TEST
 from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
-from spinepipe.studies.discrepancy.search.beyond import beyond
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.inquiry import Rules, SearchResult
 from spinepipe.studies.discrepancy.search.investigation import Investigation
+from spinepipe.studies.discrepancy.search.residual_model import beyond
+from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import Conclusion
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
@@ -98,7 +98,7 @@ def testable_told(found: SearchResult, rules: Rules, names: Sequence[str]) -> To
     }
 
 
-def repeats_of(grounds: Grounds) -> float:
+def repeats_of(grounds: BaselineFit) -> float:
     """Cycles that a mean reading is of: its SD is smaller by the root of that."""
     counts = [test.count[test.count > 0] for one in grounds.readings.values() for test in one.tests]
     return float(np.mean(np.concatenate(counts)))

@@ -12,9 +12,13 @@ from typing import Any
 import numpy as np
 
 from spinepipe import cohort as cohorts
-from spinepipe.studies.discrepancy.design.seen import CohortSignatures, candidates, seen_in
+from spinepipe.studies.discrepancy.design.distinguishability import confusions
+from spinepipe.studies.discrepancy.design.fisher_information import (
+    CohortSignatures,
+    candidates,
+    seen_in,
+)
 from spinepipe.studies.discrepancy.design.testable import judgements
-from spinepipe.studies.discrepancy.design.told_apart import confusions
 from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.investigation import base_fitted, prepared
 from spinepipe.studies.discrepancy.store import at_once

@@ -7,11 +7,11 @@ from typing import Any
 
 from spinepipe import cohort as cohorts
 from spinepipe.problems import InputError
-from spinepipe.studies.discrepancy.search.grounds import NoBase
-from spinepipe.studies.discrepancy.search.inquiry import SearchResult, SelectedTerm
+from spinepipe.studies.discrepancy.search.baseline import NoBase
 from spinepipe.studies.discrepancy.search.investigation import investigate, prepared
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.regions import estimated
+from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.settings import Discrepancy, DiscrepancyBase
 from spinepipe.studies.discrepancy.store import at_once
 from tests.generators.hidden import NoEquilibriumError, Recipe, Truth, make

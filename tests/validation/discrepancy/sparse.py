@@ -17,8 +17,8 @@ from sklearn.linear_model import LassoCV, LassoLarsIC, OrthogonalMatchingPursuit
 
 from spinepipe import cohort as cohorts
 from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.formula import formula, terms_of
-from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.investigation import base_fitted, prepared
 from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, pursuit_problem
 from spinepipe.studies.discrepancy.store import at_once
@@ -67,7 +67,7 @@ OTHERS: dict[str, Callable[[Array, Array], Array]] = {
 }
 
 
-def grounds_of(seed: int, hidden: str) -> Grounds:
+def grounds_of(seed: int, hidden: str) -> BaselineFit:
     """A base fitted to a cohort: springs, or springs and one thing more, with the usual dirt."""
     recipe = soiled(plain(seed), 0.5)
     if hidden:
@@ -78,7 +78,7 @@ def grounds_of(seed: int, hidden: str) -> Grounds:
     return base_fitted(prepared(STUDY, cohort, None), at_once)
 
 
-def counted(grounds: Grounds) -> Mapping[str, tuple[int, str]]:
+def counted(grounds: BaselineFit) -> Mapping[str, tuple[int, str]]:
     """Number of terms that each takes, and the words of its strongest."""
     coordinates = next(iter(grounds.readings.values())).coordinates
     ours = formula(grounds, coordinates, DRAWS, 0, FALSE_ALARM)

@@ -12,7 +12,7 @@ from matplotlib.image import AxesImage
 from matplotlib.patches import Patch, Rectangle
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import Array, finite
+from spinepipe.report.glyphs import Array, finite
 from spinepipe.report.panels import explain_marks, head_line, lines_of
 from spinepipe.report.style import BLACK, EMPTY, HATCH, TALLEST_MM, WHITE, WIDTH_MM, blank, saying
 from spinepipe.report.words import POSITIVE, SIGNS, after_number, case, count, fixed, short

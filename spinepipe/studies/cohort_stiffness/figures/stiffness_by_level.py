@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import draw_upright, finite, quartiles
+from spinepipe.report.glyphs import draw_upright, finite, quartiles
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BEST, BLACK, GREY, OURS, THEIRS, WHITE, blank, saying
 from spinepipe.report.words import AXIS, count, listed, number, short, stiffness_unit

@@ -9,22 +9,22 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from spinepipe.studies.discrepancy.design.extra_tests import Bench
-from spinepipe.studies.discrepancy.design.next_test import Offer, left_apart, offers
-from spinepipe.studies.discrepancy.design.patterns import RivalFits, generic, strengths
-from spinepipe.studies.discrepancy.design.withheld import (
+from spinepipe.studies.discrepancy.design.masked_effects import (
     FACTORS,
-    Withheld,
+    MaskedEffects,
     kinds_of,
     narrowed,
     withheld,
 )
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials
-from spinepipe.studies.discrepancy.search.inquiry import Rules, SearchResult
+from spinepipe.studies.discrepancy.design.next_test import Offer, left_apart, offers
+from spinepipe.studies.discrepancy.design.patterns import RivalFits, generic, strengths
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials
 from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
-from spinepipe.studies.discrepancy.search.model_files import border
+from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.refit import Refit
+from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.tables import ADVICE
 from spinepipe.studies.discrepancy.verdict import Conclusion
@@ -75,7 +75,7 @@ def advice(
     rules: Rules,
     place: Bench,
     run: PieceRunner,
-    hidden: Sequence[Withheld] | None = None,
+    hidden: Sequence[MaskedEffects] | None = None,
 ) -> tuple[Advice, ...]:
     """All advice; nothing where data are wrong or everything is named.
 
@@ -102,7 +102,7 @@ def advice(
 
 def hidden_effects(
     found: SearchResult, ended: Outcome, rules: Rules, run: PieceRunner
-) -> tuple[Withheld, ...]:
+) -> tuple[MaskedEffects, ...]:
     """Effects that are no larger than the imperfections allowed for; none where data are wrong."""
     if ended.reason is Reason.DATA_ERRORS:
         return ()
@@ -111,7 +111,7 @@ def hidden_effects(
     return withheld(_standing_on(found, ended), rules.trials, threshold, sorted(named), run)
 
 
-def _standing_on(found: SearchResult, ended: Outcome) -> Grounds:
+def _standing_on(found: SearchResult, ended: Outcome) -> BaselineFit:
     return found.final if ended.named or ended.tied else found.base
 
 
@@ -218,7 +218,7 @@ def _how(one: Offer, checked: dict[str, float]) -> str:
     return one.message or (BY_REFIT if one.words in checked else TO_FIRST_ORDER)
 
 
-def _of_unnamed(grounds: Grounds, rules: Rules, place: Bench) -> list[Advice]:
+def _of_unnamed(grounds: BaselineFit, rules: Rules, place: Bench) -> list[Advice]:
     """Runs that show more of what the generic basis sees."""
     lack = lack_of_fit(grounds, rules.coordinates, 0, rules.seed)
     pattern = generic(grounds, rules.coordinates, lack)
@@ -249,7 +249,7 @@ def _times(count: int) -> str:
     return "once" if count == 1 else f"about {count} times"
 
 
-def _of_withheld(grounds: Grounds, one: Withheld, threshold: float) -> Iterator[Advice]:
+def _of_withheld(grounds: BaselineFit, one: MaskedEffects, threshold: float) -> Iterator[Advice]:
     """What an imperfection would have to be known to, for an effect that is no larger."""
     tests = sum(len({case.test for case in r.cases}) for r in grounds.readings.values())
     kind = one.kind
@@ -291,18 +291,18 @@ def _set_ups(kind: str, factor: float) -> int:
     return ceil(factor**-2.0) - 1 if kind in SET_UP and factor > 0.0 else 0
 
 
-def _to(one: Withheld, factor: float) -> str:
+def _to(one: MaskedEffects, factor: float) -> str:
     """``to 0.5 mm instead of 2 mm``."""
     if not factor:
         return "exactly"
     if one.unit == "1":
         return f"to {100.0 * factor * one.prior:.2g} % instead of {100.0 * one.prior:.2g} %"
-    new, unit = border(one.unit, factor * one.prior)
-    return f"to {new:.2g} {unit} instead of {border(one.unit, one.prior)[0]:.2g} {unit}"
+    new, unit = display_value(one.unit, factor * one.prior)
+    return f"to {new:.2g} {unit} instead of {display_value(one.unit, one.prior)[0]:.2g} {unit}"
 
 
 def _of_effect(
-    grounds: Grounds, trials: Trials, form: Form, sds: tuple[float, ...], place: Bench
+    grounds: BaselineFit, trials: Trials, form: CandidateForm, sds: tuple[float, ...], place: Bench
 ) -> list[Advice]:
     """Runs that would show a withheld effect in spite of the imperfections.
 

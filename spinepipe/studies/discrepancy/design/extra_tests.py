@@ -13,6 +13,11 @@ import numpy as np
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, RefusedModel
+from spinepipe.studies.discrepancy.design.fisher_information import (
+    SpecimenSignatures,
+    candidates,
+    seen,
+)
 from spinepipe.studies.discrepancy.design.plans import (
     HELD_S,
     LARGER,
@@ -20,7 +25,7 @@ from spinepipe.studies.discrepancy.design.plans import (
     SLOWER,
     STEP_S,
     Plan,
-    Planned,
+    PlannedTest,
     as_made,
     at_times,
     back_down,
@@ -34,10 +39,9 @@ from spinepipe.studies.discrepancy.design.plans import (
     times,
     with_preloads,
 )
-from spinepipe.studies.discrepancy.design.seen import SpecimenSignatures, candidates, seen
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
 from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_parameters
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
@@ -73,7 +77,7 @@ class Bench:
     sd : (6,) m and rad, of coordinates that were not read as well.
     """
 
-    grounds: Grounds
+    grounds: BaselineFit
     specimen: str
     sd: Array
 
@@ -115,7 +119,7 @@ def not_testable(
     )
 
 
-def bench(grounds: Grounds, declared: Array | None) -> Bench:
+def bench(grounds: BaselineFit, declared: Array | None) -> Bench:
     """The first specimen, with declared SDs (6,) m and rad of what was not read."""
     specimen = next(iter(grounds.readings))
     usual = np.full(6, TRANSLATION_SD) if declared is None else declared
@@ -169,7 +173,7 @@ def _translations_too(plan: Plan) -> Plan | None:
     return replace(plan, tests=tuple(map(_with_translations, plan.tests)))
 
 
-def _with_translations(one: Planned) -> Planned:
+def _with_translations(one: PlannedTest) -> PlannedTest:
     count: Indices = one.count.copy()
     count[:, :3] = one.count.max(axis=1, keepdims=True)
     return replace(one, count=count)

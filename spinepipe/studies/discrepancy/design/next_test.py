@@ -37,7 +37,7 @@ from spinepipe.studies.discrepancy.search.projected import EVERY_TEST
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.whitening import Whitening, joined, whitening
-from spinepipe.units import COORDINATES, less_step_0
+from spinepipe.units import COORDINATES, subtract_baseline
 
 MOST_SPECIMENS = 3
 """Specimens on which runs are tried: those that show most of the difference stand for all."""
@@ -197,7 +197,7 @@ def _solved(
     for run, difference, slopes, moves in zip(group, apart, by_x, moved, strict=True):
         white = _whitening(place, run)
         seen = [
-            white.noise_only([less_step_0(rows, run.zeroed)])
+            white.noise_only([subtract_baseline(rows, run.zeroed)])
             for rows in (difference, slopes, moves)
         ]
         own = [n for n, k in enumerate(keys) if k[-1] in (EVERY_TEST, run.test.case.test)]

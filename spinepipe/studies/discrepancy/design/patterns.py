@@ -13,11 +13,10 @@ import numpy as np
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials
-from spinepipe.studies.discrepancy.search.inquiry import linearised_for
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
-from spinepipe.studies.discrepancy.search.lack_of_fit import Lack, Term, generic_columns
+from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFitTest, Term, generic_columns
 from spinepipe.studies.discrepancy.search.prediction import Simulated, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
     VariantColumn,
@@ -27,13 +26,14 @@ from spinepipe.studies.discrepancy.search.projected import (
     taken_out,
 )
 from spinepipe.studies.discrepancy.search.screen import Group, summed
+from spinepipe.studies.discrepancy.search.search_state import linearised_for
 
 
 class Pattern(Protocol):
     """What another model predicts beyond that of ``fit``."""
 
     @property
-    def grounds(self) -> Grounds: ...
+    def grounds(self) -> BaselineFit: ...
     @property
     def fit(self) -> JointFit: ...
 
@@ -64,7 +64,7 @@ class ModelChange(Protocol):
 class RivalFits:
     """Two fits of the same readings; ``other`` would be true."""
 
-    grounds: Grounds
+    grounds: BaselineFit
     fit: JointFit
     other: JointFit
 
@@ -88,7 +88,7 @@ class RivalFits:
 class Strengths:
     """An effect beside the grounds' fit, to first order; ``weights`` (m,) by specimen."""
 
-    grounds: Grounds
+    grounds: BaselineFit
     columns: tuple[VariantColumn, ...]
     weights: Mapping[str, Array]
 
@@ -114,7 +114,9 @@ class Strengths:
         return [one @ self.weights[specimen] for one in signatures(solved, self.columns)]
 
 
-def strengths(grounds: Grounds, trials: Trials, form: Form, sds: tuple[float, ...]) -> Strengths:
+def strengths(
+    grounds: BaselineFit, trials: Trials, form: CandidateForm, sds: tuple[float, ...]
+) -> Strengths:
     """A form at one shape, as strong as the readings suggest."""
     alone = Trials(trials.effect, (form.variant,), (form,))
     ((index, problem),) = linearised_for(grounds, [alone], 0, 0)
@@ -140,7 +142,7 @@ def _beyond_noise(group: Group, gram: Array, moments: Array) -> Array:
 class Generic:
     """Generic terms beside the grounds' fit; ``weights`` (m,) of all terms by specimen."""
 
-    grounds: Grounds
+    grounds: BaselineFit
     coordinates: tuple[str, ...]
     weights: Mapping[str, Array]
 
@@ -166,7 +168,7 @@ class Generic:
         return [one @ self.weights[specimen] for one in moved]
 
 
-def generic(grounds: Grounds, coordinates: tuple[str, ...], lack: Lack) -> Generic:
+def generic(grounds: BaselineFit, coordinates: tuple[str, ...], lack: LackOfFitTest) -> Generic:
     """The terms that explain most, as strong as the readings suggest."""
     parts, taken = {}, taken_out(grounds.fit)
     terms: tuple[Term, ...] = ()
@@ -192,7 +194,7 @@ def generic(grounds: Grounds, coordinates: tuple[str, ...], lack: Lack) -> Gener
     return Generic(grounds, coordinates, {name: estimate @ one for name, one in onto.items()})
 
 
-def _onto(terms: Sequence[Term], lack: Lack, specimens: Sequence[str]) -> dict[str, Array]:
+def _onto(terms: Sequence[Term], lack: LackOfFitTest, specimens: Sequence[str]) -> dict[str, Array]:
     """(k, M) which strength each term of a specimen has; none where it is of another family."""
     keys: dict[tuple[object, ...], int] = {}
     owners: dict[str, list[tuple[int, int]]] = {name: [] for name in specimens}

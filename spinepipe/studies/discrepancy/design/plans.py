@@ -124,7 +124,7 @@ def largest_held(case: LoadCase) -> LoadCase:
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedTest:
     """A test: its loads, and how often each coordinate of each joint is read, ``count`` (J, 6).
 
     ``preload``: of a follower load through the joints' centres, N, beside that of the rig.
@@ -136,12 +136,12 @@ class Planned:
     preload: float = 0.0
     rig: str = ""
 
-    def renamed(self, case: LoadCase) -> "Planned":
+    def renamed(self, case: LoadCase) -> "PlannedTest":
         """A test of another name in the same rig."""
         return replace(self, case=case, rig=self.rig or self.case.test)
 
 
-def with_preloads(model: SpineModel, tests: Sequence[Planned]) -> SpineModel:
+def with_preloads(model: SpineModel, tests: Sequence[PlannedTest]) -> SpineModel:
     """The model under the follower load of each test that has one: it is known and not fitted.
 
     A follower load of the cohort acts in each test that is done in its rig.
@@ -164,7 +164,7 @@ def _in_rigs(scoped: ScopedEffect, rigs: Mapping[str, str]) -> ScopedEffect:
 class Plan:
     """The tests of a specimen, and the base that is fitted to them: ``grouping``."""
 
-    tests: tuple[Planned, ...]
+    tests: tuple[PlannedTest, ...]
     zeroed: bool
     grouping: str
 
@@ -175,19 +175,19 @@ class Plan:
 
 def as_made(one: SpecimenReadings, zeroed: bool, grouping: str) -> Plan:
     """The tests that a specimen has had; cycles whose loads differ a little are one test."""
-    planned: dict[str, Planned] = {}
+    planned: dict[str, PlannedTest] = {}
     for test in one.tests:
         name, count = test.case.test, test.count.max(axis=0)
         known = planned.get(name)
-        planned[name] = Planned(test.case, count) if known is None else _again(known, count)
+        planned[name] = PlannedTest(test.case, count) if known is None else _again(known, count)
     return Plan(tuple(planned.values()), zeroed, grouping)
 
 
-def _again(known: Planned, count: Indices) -> Planned:
+def _again(known: PlannedTest, count: Indices) -> PlannedTest:
     return replace(known, count=known.count + count)
 
 
-def _repeats(one: Planned, zeroed: bool) -> Repeats:
+def _repeats(one: PlannedTest, zeroed: bool) -> Repeats:
     number = np.arange(one.count.max())[:, None, None, None]
     read = np.broadcast_to(
         number < one.count, (len(number), len(one.case.steps), *one.count.shape)
@@ -201,7 +201,7 @@ def thinned(plan: Plan, steps: int) -> Plan:
     return replace(plan, tests=tuple(_thin(one, steps) for one in plan.tests))
 
 
-def _thin(one: Planned, steps: int) -> Planned:
+def _thin(one: PlannedTest, steps: int) -> PlannedTest:
     count = len(one.case.steps)
     if count <= steps:
         return one

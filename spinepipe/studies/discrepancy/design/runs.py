@@ -18,7 +18,7 @@ from spinepipe.studies.discrepancy.design.plans import (
     PRELOAD_N,
     SLOWER,
     STEP_S,
-    Planned,
+    PlannedTest,
     at_times,
     back_down,
     comes_back,
@@ -59,11 +59,11 @@ class ExtraCycle:
     """
 
     words: str
-    test: Planned
+    test: PlannedTest
     zeroed: bool
 
 
-def runs(tests: Sequence[Planned], zeroed: bool) -> list[ExtraCycle]:
+def runs(tests: Sequence[PlannedTest], zeroed: bool) -> list[ExtraCycle]:
     """The menu for a specimen that has had these tests; nothing that is there already but repeats.
 
     A run is offered once, however many ways lead to it.
@@ -75,7 +75,7 @@ def runs(tests: Sequence[Planned], zeroed: bool) -> list[ExtraCycle]:
     return list(found.values())
 
 
-def _has(test: Planned, zeroed: bool, one: ExtraCycle) -> bool:
+def _has(test: PlannedTest, zeroed: bool, one: ExtraCycle) -> bool:
     """Whether a test that was done is the added run already, about as slow where it has times."""
     loads, added = summed_loads(test.case), summed_loads(one.test.case)
     same = len(loads) == len(added) and np.allclose(loads, added)
@@ -99,12 +99,12 @@ def _same(one: ExtraCycle) -> tuple[object, ...]:
     return (test.case.test, loads, seconds, read, test.preload, one.zeroed)
 
 
-def _variations(tests: Sequence[Planned], zeroed: bool) -> Iterator[ExtraCycle]:
+def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCycle]:
     for one in tests:
         case, name = one.case, one.case.test
         once = replace(one, count=np.minimum(one.count, 1))
 
-        def run(words: str, changed: LoadCase, once: Planned = once) -> ExtraCycle:
+        def run(words: str, changed: LoadCase, once: PlannedTest = once) -> ExtraCycle:
             return ExtraCycle(words, replace(once, case=changed), zeroed)
 
         yield run(f"{name}: once more", case)
@@ -128,7 +128,7 @@ def _variations(tests: Sequence[Planned], zeroed: bool) -> Iterator[ExtraCycle]:
             yield ExtraCycle(f"{name}: readings kept as they are, not zeroed", once, False)
 
 
-def _read_more(one: Planned, zeroed: bool) -> Iterator[ExtraCycle]:
+def _read_more(one: PlannedTest, zeroed: bool) -> Iterator[ExtraCycle]:
     """The test with translations, or rotations, read as well."""
     for part, what in ((slice(0, 3), "translations"), (slice(3, 6), "rotations")):
         if not one.count[:, part].any():
@@ -164,7 +164,7 @@ def _between(before: LoadStep, after: LoadStep) -> LoadStep:
     return replace(before, wrenches=wrenches, time=time)
 
 
-def _directions(tests: Sequence[Planned], zeroed: bool) -> Iterator[ExtraCycle]:
+def _directions(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCycle]:
     """The largest moment, and the largest force, of any test along axes that no test has."""
     loads = [load for one in tests for load in _large(one.case)]
     for start in (3, 0):

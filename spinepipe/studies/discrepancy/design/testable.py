@@ -15,19 +15,19 @@ from scipy.optimize import brentq
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.studies.discrepancy.design.seen import (
+from spinepipe.studies.discrepancy.design.fisher_information import (
     CohortSignatures,
     SpecimenSignatures,
     candidates,
 )
 from spinepipe.studies.discrepancy.search.hypothesis import (
-    Form,
+    CandidateForm,
     Trials,
     Variant,
     shape_grid,
     usual_shapes,
 )
-from spinepipe.studies.discrepancy.search.model_files import border
+from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.search.screen import Group, Places, sides
 
 NO_TRACE = 1e-6
@@ -64,7 +64,7 @@ class Typical:
     raw, refitted, left : (k, k) products of the strengths' signatures; see `SpecimenSignatures`.
     """
 
-    form: Form
+    form: CandidateForm
     places: Places
     mean: Array
     sd: Array
@@ -243,7 +243,7 @@ def _values(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...
             value = p.off * (p.default / p.off) ** times
         else:
             value = p.off + times * (p.default - p.off)
-        outside, unit = border(p.unit, float(value))
+        outside, unit = display_value(p.unit, float(value))
         found.append((p.name, outside, unit))
     return tuple(found)
 
@@ -268,7 +268,7 @@ def _why(one: Typical, least: Detectable | None) -> str:
     return f"{taken}; it would be found only at {least.times:.1f} times its typical strength"
 
 
-def typical(design: CohortSignatures, number: int, form: Form) -> Typical:
+def typical(design: CohortSignatures, number: int, form: CandidateForm) -> Typical:
     """A form of effect ``number`` under a design."""
     index, start = design.those.indices[number], design.those.starts[number]
     middle = usual_shapes(form.variant)

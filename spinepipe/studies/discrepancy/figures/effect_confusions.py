@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import Array, finite
+from spinepipe.report.glyphs import Array, finite
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLUE, GREY, blank, note, saying
 from spinepipe.report.words import fixed

@@ -20,7 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import Array
+from spinepipe.report.glyphs import Array
 from spinepipe.report.panels import explain_marks
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, WHITE, blank, saying
 from spinepipe.report.words import count, fixed, number, short, tick

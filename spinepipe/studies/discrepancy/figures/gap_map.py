@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import Array, finite
+from spinepipe.report.glyphs import Array, finite
 from spinepipe.report.panels import explain_marks, head, head_line, lines_of, sections
 from spinepipe.report.style import (
     BLACK,

@@ -19,14 +19,14 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import Array
+from spinepipe.report.glyphs import Array
 from spinepipe.report.panels import explain_marks, head, sections
 from spinepipe.report.style import BLACK, GREY, INK, OURS, SMALL_PT, THEIRS, WHITE, saying
 from spinepipe.report.words import case, count, fixed, short, unit
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.words import load_axis, motion_of
 from spinepipe.tables import StudyTables
-from spinepipe.units import BORDER_PER_SI, COORDINATES
+from spinepipe.units import COORDINATES, DISPLAY_PER_SI
 
 MOST_PANELS, FEWEST_PANELS = 12, 6
 CLEARLY = 1.5
@@ -118,7 +118,7 @@ def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[JointTestCu
 
 def driven(gap: pd.DataFrame) -> set[tuple[str, str, str]]:
     """Test, joint and the coordinate in which the load does the most work there, over specimens."""
-    factors = dict(zip(COORDINATES, BORDER_PER_SI, strict=True))
+    factors = dict(zip(COORDINATES, DISPLAY_PER_SI, strict=True))
     per_si = gap["coordinate"].map(factors).astype(float)
     motion = gap["held_at"].fillna(gap["measured"])  # on a rig that moves it, a load is measured
     work = (gap["load"] * motion / per_si).abs()

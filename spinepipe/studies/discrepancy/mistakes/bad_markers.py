@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from spinepipe.cohort.answers import (
+from spinepipe.cohort.load_response import (
     joint_loads,
     of_specimens,
 )

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spinepipe.cohort.answers import LoadResponse, answers_of_test, joint_loads
+from spinepipe.cohort.load_response import LoadResponse, answers_of_test, joint_loads
 from spinepipe.effects.contract import Array
 from spinepipe.plausibility.score import CLEAR
 from spinepipe.studies.discrepancy.mistakes.bad_markers import (
@@ -16,19 +16,19 @@ from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     beside_the_curve,
     between_cycles,
 )
-from spinepipe.studies.discrepancy.mistakes.exchanged import exchanged
+from spinepipe.studies.discrepancy.mistakes.swapped_specimens import exchanged
 from spinepipe.studies.discrepancy.mistakes.wrong_units_and_signs import wrong_signs, wrong_units
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
-from spinepipe.studies.discrepancy.search.inquiry import SearchResult
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
+from spinepipe.studies.discrepancy.search.search_state import SearchResult
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES
 
 
 def suspected_errors(
-    grounds: Grounds,
+    grounds: BaselineFit,
     measured: Sequence[SpecimenReadings],
     run: PieceRunner,
     trials: Sequence[Trials] = (),

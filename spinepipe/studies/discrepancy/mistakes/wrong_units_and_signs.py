@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from spinepipe.anatomy.stiffness_range import middle, published_range
-from spinepipe.cohort.answers import (
+from spinepipe.cohort.load_response import (
     ALL,
     LoadResponse,
     of_specimens,

@@ -15,7 +15,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from spinepipe.decomposition import bounded_lstsq
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.proof.folds import ChosenSteps, Flags, FoldFit
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import Unknown
 from spinepipe.studies.discrepancy.search.lack_of_fit import generic_columns
 from spinepipe.studies.discrepancy.search.whitening import Whitening
@@ -50,7 +50,7 @@ class LinearModel:
     high: Array
 
 
-def tangent(grounds: Grounds, nuisance_size: float) -> LinearModel:
+def tangent(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
     """The grounds' fit to first order; nuisances of that many prior SDs."""
     fit = grounds.fit
     unknowns: tuple[Unknown, ...] = fit.hypothesis.unknowns
@@ -258,7 +258,7 @@ def _se(by_x: Array, covariance: Array) -> Array:
     return found
 
 
-def surrogate(grounds: Grounds, nuisance_size: float) -> LinearModel:
+def surrogate(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
     """The base to first order, with generic terms that are the same in all specimens.
 
     A term's strength is that of all joints together plus a part of each joint's own, both with

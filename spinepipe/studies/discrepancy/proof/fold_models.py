@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.studies.discrepancy.proof.fold_linear import (
     FoldPrediction,
     LinearFolds,
@@ -30,7 +30,7 @@ from spinepipe.studies.discrepancy.proof.folds import (
     Masks,
     only,
 )
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis, HypothesisMember
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium
@@ -74,7 +74,9 @@ class FoldModels:
     refit : whether base and model with effects are fitted anew by the full simulator.
     """
 
-    def __init__(self, base: Grounds, final: Grounds, refit: bool, run: PieceRunner) -> None:
+    def __init__(
+        self, base: BaselineFit, final: BaselineFit, refit: bool, run: PieceRunner
+    ) -> None:
         self.grounds = (base, final)
         self.refit, self.run = refit, run
         self.named = bool(final.fit.hypothesis.supposed)
@@ -126,7 +128,7 @@ class FoldModels:
         return total
 
     def _placed(
-        self, grounds: Grounds, linear: LinearFolds, parts: Sequence[FoldFit]
+        self, grounds: BaselineFit, linear: LinearFolds, parts: Sequence[FoldFit]
     ) -> Sequence[FoldPrediction | str]:
         if self.refit:
             return self.run.map(refitted, [(grounds, linear.model, part) for part in parts])
@@ -168,7 +170,7 @@ class FoldModels:
         }
 
 
-def refitted(grounds: Grounds, linear: LinearModel, part: FoldFit) -> FoldPrediction | str:
+def refitted(grounds: BaselineFit, linear: LinearModel, part: FoldFit) -> FoldPrediction | str:
     """The scored specimens as fits to the training have them, or why one has no start.
 
     Parameters
@@ -181,7 +183,7 @@ def refitted(grounds: Grounds, linear: LinearModel, part: FoldFit) -> FoldPredic
         return str(trouble)
 
 
-def _refitted(grounds: Grounds, linear: LinearModel, part: FoldFit) -> FoldPrediction:
+def _refitted(grounds: BaselineFit, linear: LinearModel, part: FoldFit) -> FoldPrediction:
     hypothesis = grounds.fit.hypothesis
     count = len(hypothesis.unknowns)
     free, x = np.arange(count), np.zeros(count)
@@ -201,7 +203,7 @@ def _refitted(grounds: Grounds, linear: LinearModel, part: FoldFit) -> FoldPredi
 
 
 def _fitted(
-    grounds: Grounds,
+    grounds: BaselineFit,
     linear: LinearModel,
     part: FoldFit,
     specimens: Sequence[str],
@@ -235,7 +237,7 @@ def _again(
         one = fit.hypothesis.members[name]
         kept = [k for k, number in enumerate(one.numbers) if number in order]
         members[name] = HypothesisMember(
-            moved(fit.models[name], one.free, x[list(one.numbers)]),
+            with_parameters(fit.models[name], one.free, x[list(one.numbers)]),
             tuple(one.free[k] for k in kept),
             tuple(order[one.numbers[k]] for k in kept),
         )
@@ -252,7 +254,7 @@ def _again(
 
 
 def _nuisances(
-    grounds: Grounds, linear: LinearModel, part: FoldFit, specimen: str, fit: JointFit
+    grounds: BaselineFit, linear: LinearModel, part: FoldFit, specimen: str, fit: JointFit
 ) -> tuple[Array, ...]:
     """What the nuisances add per test (T, J, 6), at their most likely values in the training."""
     moves = linear.members[specimen].nuisances
@@ -269,7 +271,7 @@ def _nuisances(
     return tuple(moved_by @ z for moved_by in moves)
 
 
-def nuisance_size(grounds: Grounds) -> float:
+def nuisance_size(grounds: BaselineFit) -> float:
     """Most likely size of the nuisances beside the grounds' fit, in prior SDs."""
     likelihood = np.zeros(len(SIZES))
     for name, one in grounds.readings.items():

@@ -10,7 +10,7 @@ from spinepipe.studies.discrepancy.proof import folds
 from spinepipe.studies.discrepancy.proof.fold_linear import LinearFolds, LinearModel, tangent
 from spinepipe.studies.discrepancy.proof.fold_models import FoldModels, nuisance_size
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, proven
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.store import at_once
 
 
@@ -28,7 +28,9 @@ class ChosenTerm:
     sd: float
 
 
-def proof_of_terms(before: Grounds, after: Grounds, terms: Sequence[ChosenTerm] = ()) -> HeldOut:
+def proof_of_terms(
+    before: BaselineFit, after: BaselineFit, terms: Sequence[ChosenTerm] = ()
+) -> HeldOut:
     """Two fits, the second one with terms besides, on each test and specimen left out.
 
     Which terms was found with all readings; their coefficients are fitted without those left out.
@@ -40,7 +42,9 @@ def proof_of_terms(before: Grounds, after: Grounds, terms: Sequence[ChosenTerm] 
 class _WithTerms(FoldModels):
     """One fit as the base, another and terms besides as the model with effects."""
 
-    def __init__(self, before: Grounds, after: Grounds, terms: Sequence[ChosenTerm]) -> None:
+    def __init__(
+        self, before: BaselineFit, after: BaselineFit, terms: Sequence[ChosenTerm]
+    ) -> None:
         self.grounds = (before, after)
         self.refit, self.run, self.named = False, at_once, True
         self.chosen = folds.ChosenSteps(before.readings, before.noise)

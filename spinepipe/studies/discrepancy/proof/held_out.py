@@ -25,10 +25,10 @@ from spinepipe.studies.discrepancy.proof.folds import (
     folds_by_test,
     step_fold,
 )
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.inquiry import SearchResult
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
+from spinepipe.studies.discrepancy.search.search_state import SearchResult
 from spinepipe.studies.discrepancy.store import PieceRunner, at_once
 
 SAME = 1e-6
@@ -180,12 +180,12 @@ def held_out(found: SearchResult, asked: Asked, run: PieceRunner) -> HeldOut:
     return run(to_first_order, found.base, found.final, asked)
 
 
-def to_first_order(base: Grounds, final: Grounds, asked: Asked) -> HeldOut:
+def to_first_order(base: BaselineFit, final: BaselineFit, asked: Asked) -> HeldOut:
     """The same by models that are straight about the fit to all readings."""
     return _proof(base, final, asked, at_once)
 
 
-def _proof(base: Grounds, final: Grounds, asked: Asked, run: PieceRunner) -> HeldOut:
+def _proof(base: BaselineFit, final: BaselineFit, asked: Asked, run: PieceRunner) -> HeldOut:
     models = FoldModels(base, final, asked.refit, run)
     return proven(models, base.readings, base.tests, asked)
 

@@ -12,9 +12,8 @@ from itertools import combinations
 import numpy as np
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
-from spinepipe.studies.discrepancy.search.inquiry import Inquiry, Rival, SearchStage, SelectedTerm
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.refit import (
     ANOTHER_FORM,
     Refit,
@@ -22,6 +21,12 @@ from spinepipe.studies.discrepancy.search.refit import (
     standing,
 )
 from spinepipe.studies.discrepancy.search.screen import Screen
+from spinepipe.studies.discrepancy.search.search_state import (
+    Rival,
+    SearchStage,
+    SearchState,
+    SelectedTerm,
+)
 from spinepipe.units import COORDINATES
 
 IMITATED = 0.3
@@ -41,11 +46,11 @@ class Examined:
     standing : the effects with their rivals; None where one left or gave way.
     """
 
-    grounds: Grounds
+    grounds: BaselineFit
     standing: tuple[SelectedTerm, ...] | None
 
 
-def examined(current: Grounds, inquiry: Inquiry, *, settled: bool = False) -> Examined:
+def examined(current: BaselineFit, inquiry: SearchState, *, settled: bool = False) -> Examined:
     """The effects of a fit with their rivals, or the grounds after the first change.
 
     Parameters
@@ -67,8 +72,8 @@ def examined(current: Grounds, inquiry: Inquiry, *, settled: bool = False) -> Ex
 
 
 def _one(
-    current: Grounds, number: int, one: Supposed, inquiry: Inquiry, settled: bool
-) -> Grounds | SelectedTerm:
+    current: BaselineFit, number: int, one: ActiveTerm, inquiry: SearchState, settled: bool
+) -> BaselineFit | SelectedTerm:
     """One effect with its rivals, or the grounds where it left or gave way."""
     without, stage = _tried_without(current, (number,), inquiry)
     if without is None or stage is None:
@@ -93,7 +98,7 @@ def _one(
     return SelectedTerm(one, own.log_evidence, alone, own.gain, rivals, over)
 
 
-def _better(form: Form, own: Refit, tried: Sequence[Refit], margin: float) -> Refit | None:
+def _better(form: CandidateForm, own: Refit, tried: Sequence[Refit], margin: float) -> Refit | None:
     """What takes the place of a form: another effect, or clearly a better form of the same."""
     best = max(tried, key=lambda other: other.log_evidence, default=own)
     if best.form == form:
@@ -109,13 +114,15 @@ def _of_effect(own: Refit, tried: Sequence[Refit]) -> float:
     return min(max([own.log_evidence, *same]), own.log_evidence + ANOTHER_FORM)
 
 
-def _alone(one: Supposed, inquiry: Inquiry) -> float:
+def _alone(one: ActiveTerm, inquiry: SearchState) -> float:
     """Evidence of its effect on the first screen, beside none."""
     effects = inquiry.first.screen.effects
     return next(e.log_evidence for e in effects if e.effect == one.form.name)
 
 
-def _without_rivals(current: Grounds, number: int, one: Supposed, inquiry: Inquiry) -> SelectedTerm:
+def _without_rivals(
+    current: BaselineFit, number: int, one: ActiveTerm, inquiry: SearchState
+) -> SelectedTerm:
     """An effect without which the others have no fit: nothing could be tried in its place."""
     trials = next(t for t in inquiry.rules.trials if t.effect == one.form.name)
     gain, log_evidence = in_place(current.fit, number)
@@ -124,8 +131,8 @@ def _without_rivals(current: Grounds, number: int, one: Supposed, inquiry: Inqui
 
 
 def _tried_without(
-    current: Grounds, left_out: tuple[int, ...], inquiry: Inquiry
-) -> tuple[Grounds | None, SearchStage | None]:
+    current: BaselineFit, left_out: tuple[int, ...], inquiry: SearchState
+) -> tuple[BaselineFit | None, SearchStage | None]:
     """The grounds without some of the effects, and all effects tried there; None without a fit."""
     supposed = standing(current.fit)
     others = tuple(one for number, one in enumerate(supposed) if number not in left_out)
@@ -137,11 +144,11 @@ def _tried_without(
 
 
 def _against_one(
-    current: Grounds,
+    current: BaselineFit,
     pair: tuple[int, ...],
     stood: Sequence[SelectedTerm],
-    inquiry: Inquiry,
-) -> tuple[Grounds | None, list[SelectedTerm]]:
+    inquiry: SearchState,
+) -> tuple[BaselineFit | None, list[SelectedTerm]]:
     """Two effects against each single one in their place: together two may imitate a third.
 
     Returns the grounds with the single one if it has clearly more evidence than both together, and
@@ -171,13 +178,13 @@ def _against_one(
 class _Two:
     """Two effects in the place of one, and the evidence by which they are ahead of it."""
 
-    grounds: Grounds
-    forms: tuple[Form, Form]
+    grounds: BaselineFit
+    forms: tuple[CandidateForm, CandidateForm]
     lead: float
 
 
 def _two_simpler(
-    without: Grounds, own: Refit, tried: Sequence[Refit], inquiry: Inquiry
+    without: BaselineFit, own: Refit, tried: Sequence[Refit], inquiry: SearchState
 ) -> _Two | None:
     """The best two effects in the place of one with more unknowns; None where none comes near.
 
@@ -215,13 +222,15 @@ def _nearest(rivals: Sequence[Rival], further: Rival) -> tuple[Rival, ...]:
     return tuple(sorted(nearest.values(), key=lambda one: one.margin))
 
 
-def _own(without: Grounds, one: Supposed, tried: Sequence[Refit], inquiry: Inquiry) -> Refit:
+def _own(
+    without: BaselineFit, one: ActiveTerm, tried: Sequence[Refit], inquiry: SearchState
+) -> Refit:
     """The effect itself beside the others: as tried already, or refitted from where it stands."""
     same = [other for other in tried if other.form == one.form]
     return same[0] if same else inquiry.refit(without, one)
 
 
-def _over_stiffness(without: Grounds, own: Refit, inquiry: Inquiry) -> float | None:
+def _over_stiffness(without: BaselineFit, own: Refit, inquiry: SearchState) -> float | None:
     """Evidence above that of plain stiffness, joint by joint and specimen by specimen.
 
     Forms that differ between joints can imitate it by their many strengths.
@@ -233,7 +242,7 @@ def _over_stiffness(without: Grounds, own: Refit, inquiry: Inquiry) -> float | N
         return None
     variant = Variant(LEVELS, (("coordinate", coordinate),))
     start = variant.off(()) * np.exp(0.01)
-    plain = inquiry.refit(without, Supposed(Form(variant, PlaceSpread.EACH), start))
+    plain = inquiry.refit(without, ActiveTerm(CandidateForm(variant, PlaceSpread.EACH), start))
     return own.log_evidence - plain.log_evidence if np.isfinite(plain.log_evidence) else None
 
 
@@ -242,7 +251,7 @@ def _rivals(own: Refit, tried: Sequence[Refit], screen: Screen) -> tuple[Rival, 
 
     Effects whose every refit was impossible are none.
     """
-    best: dict[str, tuple[float, Form]] = {}
+    best: dict[str, tuple[float, CandidateForm]] = {}
     for other in tried:
         if other.log_evidence > best.get(other.name, (-np.inf,))[0] or other.name not in best:
             best[other.name] = (other.log_evidence, other.form)

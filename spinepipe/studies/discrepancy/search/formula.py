@@ -15,8 +15,8 @@ import numpy as np
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.proof.formula_folds import ChosenTerm, proof_of_terms
 from spinepipe.studies.discrepancy.search.base import bushing_stiffness
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Supposed, Variant
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
 from spinepipe.studies.discrepancy.search.law_terms import (
     READING,
@@ -61,7 +61,7 @@ class _Term:
 class _FormulaState:
     """Terms so far, the fit with those that are laws, and the problem about it."""
 
-    grounds: Grounds
+    grounds: BaselineFit
     columns: Mapping[str, TermColumns]
     problem: PursuitProblem
     terms: tuple[_Term, ...]
@@ -73,7 +73,7 @@ class _FormulaState:
 
 
 def formula(
-    grounds: Grounds, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
+    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
 ) -> Formula | None:
     """What the grounds' fit leaves as a formula; None where no term passes.
 
@@ -93,11 +93,11 @@ def formula(
 
 
 def _pursued(
-    grounds: Grounds, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
+    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
 ) -> tuple[list[_FormulaState], float]:
     """States with no term, one and so on; and what the first term had to explain."""
 
-    def about(at: Grounds, terms: tuple[_Term, ...]) -> _FormulaState:
+    def about(at: BaselineFit, terms: tuple[_Term, ...]) -> _FormulaState:
         columns = terms_of(at, coordinates)
         return _FormulaState(at, columns, pursuit_problem(at, columns, draws, seed), terms)
 
@@ -115,7 +115,7 @@ def _pursued(
     return states, threshold
 
 
-def terms_of(grounds: Grounds, coordinates: Sequence[str]) -> dict[str, TermColumns]:
+def terms_of(grounds: BaselineFit, coordinates: Sequence[str]) -> dict[str, TermColumns]:
     """Columns of all terms where the models of a fit stand, by specimen."""
     timed = all(tell_time(one.cases) for one in grounds.readings.values())
     return {
@@ -133,7 +133,7 @@ def terms_of(grounds: Grounds, coordinates: Sequence[str]) -> dict[str, TermColu
 
 def _with_one_more(
     here: _FormulaState, ranked: Ranked, excess: float
-) -> tuple[Grounds, tuple[_Term, ...]]:
+) -> tuple[BaselineFit, tuple[_Term, ...]]:
     """The grounds with one term more: the law that fits best, or the leader as it is."""
     leader, drop = ranked.best[0], ranked.drops[0]
     above = max(excess, drop)
@@ -149,9 +149,9 @@ def _with_one_more(
     return here.grounds, (*here.terms, _Term(law, leader, None, drop / above))
 
 
-def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[Grounds, TermAtPlace] | None:
+def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[BaselineFit, TermAtPlace] | None:
     """The grounds with the law, of those that lead, that fits best by the full simulator."""
-    found: list[tuple[Grounds, TermAtPlace]] = []
+    found: list[tuple[BaselineFit, TermAtPlace]] = []
     tried = 0
     for place, drop, value in zip(ranked.best, ranked.drops, ranked.values, strict=True):
         variant = here.problem.terms[place.term].variant
@@ -160,7 +160,7 @@ def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[Grounds, TermAtPlace
         tried += 1
         (parameter,) = variant.create().parameters
         start = np.clip([value], 0.5 * parameter.low, 0.5 * parameter.high)
-        one = Supposed(_form(variant, place, tuple(here.grounds.readings)), start)
+        one = ActiveTerm(_form(variant, place, tuple(here.grounds.readings)), start)
         at = _fit_with(here.grounds, one)
         if at is not None:
             found.append((at, place))
@@ -169,7 +169,7 @@ def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[Grounds, TermAtPlace
     return min(found, key=lambda pair: pair[0].fit.chi2, default=None)
 
 
-def _fit_with(grounds: Grounds, one: Supposed) -> Grounds | None:
+def _fit_with(grounds: BaselineFit, one: ActiveTerm) -> BaselineFit | None:
     """The grounds with an effect more; None where it has no fit or ends at a bound."""
     before = grounds.fit
     for share in STARTS:
@@ -180,12 +180,12 @@ def _fit_with(grounds: Grounds, one: Supposed) -> Grounds | None:
     return None
 
 
-def _form(variant: Variant, place: TermAtPlace, specimens: Sequence[str]) -> Form:
+def _form(variant: Variant, place: TermAtPlace, specimens: Sequence[str]) -> CandidateForm:
     joint = None if place.joint == EVERYWHERE else place.joint
     specimen = None if place.specimen == EVERYWHERE else specimens[place.specimen]
     if joint is None:
-        return Form(variant, PlaceSpread.SHARED, None, specimen)
-    return Form(
+        return CandidateForm(variant, PlaceSpread.SHARED, None, specimen)
+    return CandidateForm(
         variant, PlaceSpread.ONE_JOINT if specimen is None else PlaceSpread.ONE, joint, specimen
     )
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import chndtr
 
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.units import COORDINATES
 
@@ -101,13 +101,13 @@ class GapPlace:
     gap: Gap
 
 
-def whole_gap(grounds: Grounds, fit: JointFit) -> Gap:
+def whole_gap(grounds: BaselineFit, fit: JointFit) -> Gap:
     """The gap over all readings."""
     left = left_over(grounds, fit).values()
     return gap_of([one.residual for one in left], [one.freedom for one in left])
 
 
-def gaps_at(grounds: Grounds, fit: JointFit) -> dict[str, Gap]:
+def gaps_at(grounds: BaselineFit, fit: JointFit) -> dict[str, Gap]:
     """The gap over the readings of each coordinate that was read."""
     left = left_over(grounds, fit).values()
     found = {}
@@ -122,7 +122,7 @@ def gaps_at(grounds: Grounds, fit: JointFit) -> dict[str, Gap]:
     return found
 
 
-def left_over(grounds: Grounds, fit: JointFit) -> dict[str, LeftOver]:
+def left_over(grounds: BaselineFit, fit: JointFit) -> dict[str, LeftOver]:
     """What a fit leaves of every reading, nuisances at their most likely values."""
     unknowns = len(fit.x)
     total = sum(float(w.freedom.sum()) for w in grounds.setting.whitenings.values())
@@ -159,7 +159,7 @@ def gap_of(residuals: list[tuple[Array, ...]], freedoms: list[tuple[Array, ...]]
     return Gap(float(np.sum(r[there] ** 2)), float(np.sum(f[there])), int(there.sum()))
 
 
-def residual_frame(grounds: Grounds, fit: JointFit, joints: Sequence[str]) -> pd.DataFrame:
+def residual_frame(grounds: BaselineFit, fit: JointFit, joints: Sequence[str]) -> pd.DataFrame:
     """One row per reading: where it is, squared residual in noise SD, freedom it keeps."""
     rows = [
         row
@@ -170,7 +170,7 @@ def residual_frame(grounds: Grounds, fit: JointFit, joints: Sequence[str]) -> pd
 
 
 def _rows(
-    grounds: Grounds, name: str, left: LeftOver, joints: Sequence[str]
+    grounds: BaselineFit, name: str, left: LeftOver, joints: Sequence[str]
 ) -> Iterator[tuple[object, ...]]:
     tests = grounds.readings[name].tests
     for test, residual, freedom in zip(tests, left.residual, left.freedom, strict=True):

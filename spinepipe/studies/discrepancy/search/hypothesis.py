@@ -66,7 +66,7 @@ class Variant:
 
 
 @dataclass(frozen=True)
-class Form:
+class CandidateForm:
     """A variant and how its values may differ; joint, specimen and test for one place only."""
 
     variant: Variant
@@ -90,9 +90,9 @@ class Trials:
 
     effect: str
     variants: tuple[Variant, ...]
-    forms: tuple[Form, ...]
+    forms: tuple[CandidateForm, ...]
 
-    def log_share(self, form: Form) -> float:
+    def log_share(self, form: CandidateForm) -> float:
         """Logarithm of a form's share of its effect: equal for variants, ways to differ, places."""
         spreads, places = self._alike
         return -float(np.log(len(self.variants) * spreads * places.get(_place(form), 1)))
@@ -103,7 +103,7 @@ class Trials:
         return len({one.spread for one in self.forms}), Counter(map(_place, self.forms))
 
 
-def _place(form: Form) -> tuple[Variant, PlaceSpread]:
+def _place(form: CandidateForm) -> tuple[Variant, PlaceSpread]:
     return form.variant, form.spread
 
 
@@ -195,12 +195,12 @@ def _possible(spreads: Sequence[PlaceSpread], specimens: int) -> list[PlaceSprea
 
 def _forms(
     variant: Variant, spread: PlaceSpread, specimens: Sequence[str], joints: int
-) -> list[Form]:
+) -> list[CandidateForm]:
     if spread is PlaceSpread.ONE_JOINT:
-        return [Form(variant, spread, joint) for joint in range(joints)]
+        return [CandidateForm(variant, spread, joint) for joint in range(joints)]
     if spread is PlaceSpread.ONE:
-        return [Form(variant, spread, j, s) for s in specimens for j in range(joints)]
-    return [Form(variant, spread)]
+        return [CandidateForm(variant, spread, j, s) for s in specimens for j in range(joints)]
+    return [CandidateForm(variant, spread)]
 
 
 def _columns(effect: Effect, *, strengths: bool) -> tuple[int, ...]:
@@ -215,7 +215,7 @@ STRENGTH_SDS = 5.0
 
 
 @dataclass(frozen=True)
-class Supposed:
+class ActiveTerm:
     """A form said to be there, with the values from which its fit starts.
 
     Attributes
@@ -223,7 +223,7 @@ class Supposed:
     start : (P,) values of all parameters, at each place the same.
     """
 
-    form: Form
+    form: CandidateForm
     start: Array
 
 
@@ -268,13 +268,13 @@ class Hypothesis:
 
     members: Mapping[str, HypothesisMember]
     unknowns: tuple[Unknown, ...]
-    supposed: tuple[Supposed, ...]
+    supposed: tuple[ActiveTerm, ...]
 
 
 def hypothesis(
     models: Mapping[str, SpineModel],
     base: Mapping[str, Sequence[FreeParameter]],
-    supposed: Sequence[Supposed],
+    supposed: Sequence[ActiveTerm],
     tests: Sequence[str],
     bound: float,
 ) -> Hypothesis:
@@ -320,7 +320,7 @@ def hypothesis(
     )
 
 
-def _scoped(one: Supposed, joints: int, tests: Sequence[str]) -> list[ScopedEffect]:
+def _scoped(one: ActiveTerm, joints: int, tests: Sequence[str]) -> list[ScopedEffect]:
     """The effect on its joints; one copy per test where it differs by test."""
     effect = one.form.variant.create()
     places = tuple(range(joints)) if one.form.joint is None else (one.form.joint,)
@@ -332,7 +332,7 @@ def _scoped(one: Supposed, joints: int, tests: Sequence[str]) -> list[ScopedEffe
 
 
 def _unknowns(
-    one: Supposed, number: int, model: SpineModel, specimen: str
+    one: ActiveTerm, number: int, model: SpineModel, specimen: str
 ) -> list[tuple[FreeParameter, Unknown]]:
     """Unknowns of the effect that stands last in the model."""
     index = len(model.effects) - 1

@@ -17,8 +17,8 @@ from scipy.stats import t as student
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.search.base import bushing_stiffness
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap, gap_of, left_over, whole_gap
-from spinepipe.studies.discrepancy.search.grounds import Grounds
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
 from spinepipe.studies.discrepancy.search.refit import standing
@@ -87,7 +87,7 @@ class InCommon:
 
 
 @dataclass(frozen=True)
-class TakenUp:
+class AbsorbedGap:
     """What imperfections took up in one fit.
 
     Attributes
@@ -120,12 +120,14 @@ class TakenUp:
         return tuple(sorted(self.each, key=lambda one: -abs(one.size)))
 
 
-def taken_up(grounds: Grounds, fit: JointFit, joints: Sequence[str], run: PieceRunner) -> TakenUp:
+def taken_up(
+    grounds: BaselineFit, fit: JointFit, joints: Sequence[str], run: PieceRunner
+) -> AbsorbedGap:
     """What imperfections took up of what a fit would leave without them."""
     places = _places(grounds, joints)
     parts = _parts(grounds, fit)
     posterior = _posterior(fit, parts)
-    return TakenUp(
+    return AbsorbedGap(
         run(gap_without, grounds, fit),
         whole_gap(grounds, fit),
         tuple(
@@ -138,7 +140,7 @@ def taken_up(grounds: Grounds, fit: JointFit, joints: Sequence[str], run: PieceR
     )
 
 
-def gap_without(grounds: Grounds, fit: JointFit) -> Gap | None:
+def gap_without(grounds: BaselineFit, fit: JointFit) -> Gap | None:
     """The gap with everything that was fitted fitted again, and no nuisance; None without a fit."""
     setting = Setting(grounds.readings, grounds.plain, grounds.noise.zeroed)
     again = joint_fit(grounds.suppose(standing(fit)), setting, fit.poses)
@@ -148,14 +150,14 @@ def gap_without(grounds: Grounds, fit: JointFit) -> Gap | None:
     return gap_of([one.residual for one in left], [one.freedom for one in left])
 
 
-def labels_of(grounds: Grounds, specimen: str) -> tuple[Label, ...]:
+def labels_of(grounds: BaselineFit, specimen: str) -> tuple[Label, ...]:
     """What the nuisances of a specimen's whitening are, in their order."""
     stiffness = bushing_stiffness(grounds.fit.models[specimen])
     one = grounds.readings[specimen]
     return nuisance_labels(grounds.priors, stiffness, one.cases, one.coordinates)
 
 
-def _places(grounds: Grounds, joints: Sequence[str]) -> tuple[NuisancePlace, ...]:
+def _places(grounds: BaselineFit, joints: Sequence[str]) -> tuple[NuisancePlace, ...]:
     return tuple(
         NuisancePlace(
             specimen,
@@ -181,7 +183,7 @@ class _SpecimenBlock:
     residual: Array
 
 
-def _parts(grounds: Grounds, fit: JointFit) -> list[_SpecimenBlock]:
+def _parts(grounds: BaselineFit, fit: JointFit) -> list[_SpecimenBlock]:
     found = []
     for name, member in fit.hypothesis.members.items():
         white = grounds.setting.whitenings[name]

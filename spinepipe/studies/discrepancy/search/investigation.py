@@ -13,10 +13,14 @@ from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
 from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_model, base_parameters
-from spinepipe.studies.discrepancy.search.grounds import BaselineModels, Grounds, NoBase, laid
+from spinepipe.studies.discrepancy.search.baseline import (
+    BaselineFit,
+    BaselineModels,
+    NoBase,
+    fit_baseline,
+)
 from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.indistinct import cannot_be_excluded
-from spinepipe.studies.discrepancy.search.inquiry import Rules, SearchResult
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.noise import (
     Noise,
@@ -28,6 +32,7 @@ from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
 from spinepipe.studies.discrepancy.search.prediction import recorded
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
+from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError
@@ -64,7 +69,7 @@ class Prepared:
 class Investigation:
     """What was found, what speaks for it, and what it comes to."""
 
-    grounds: Grounds
+    grounds: BaselineFit
     rules: Rules
     found: SearchResult
     errors: tuple[SuspectedError, ...]
@@ -180,7 +185,7 @@ def _declared_sd(study: Discrepancy, cohort: Cohort) -> Array | None:
     return np.array([sd.translation_mm / MM_PER_M] * 3 + [sd.rotation_deg / DEG_PER_RAD] * 3)
 
 
-def base_fitted(ready: Prepared, run: PieceRunner) -> Grounds:
+def base_fitted(ready: Prepared, run: PieceRunner) -> BaselineFit:
     """Grounds with the base fitted."""
     study = ready.study
     start = np.array(study.stiffness.in_order(), dtype=float)
@@ -192,7 +197,9 @@ def base_fitted(ready: Prepared, run: PieceRunner) -> Grounds:
         name: base_parameters(model, grouping, ready.coordinates) for name, model in models.items()
     }
     begin = BaselineModels(models, base, study.bound_factor)
-    grounds = laid(ready.readings, ready.noise, as_si(study.nuisance.model_dump()), begin, run)
+    grounds = fit_baseline(
+        ready.readings, ready.noise, as_si(study.nuisance.model_dump()), begin, run
+    )
     if grounds.noise.source == DECLARED and ready.declared is None:
         raise NoBase("too few repeated readings to tell the noise: state measurement_sd")
     return grounds

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from spinepipe.calibrate.descent import OFF_THE_PATH, DescentTolerances, descend
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
-from spinepipe.statics import moved
+from spinepipe.statics import with_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import Hypothesis
 from spinepipe.studies.discrepancy.search.prediction import (
+    JointPrediction,
     NoEquilibrium,
     Predicted,
     PredictedSpecimen,
-    Together,
 )
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening
@@ -89,7 +89,7 @@ class Points:
             name: PredictedSpecimen(member.model, setting.readings[name].cases, member.free)
             for name, member in hypothesis.members.items()
         }
-        self.together = Together(subjects, setting.zeroed, near)
+        self.together = JointPrediction(subjects, setting.zeroed, near)
         self.sd = np.array([u.sd for u in hypothesis.unknowns])
         self.mean = np.array([u.mean for u in hypothesis.unknowns])
         self.known: dict[
@@ -177,7 +177,7 @@ def _ended(points: Points, x: Array, at_bound: NDArray[np.bool_], status: str) -
         return _nowhere(points.hypothesis, x, OFF_THE_PATH)
     residuals, jacobians, predicted = found
     models = {
-        name: moved(member.model, member.free, x[list(member.numbers)])
+        name: with_parameters(member.model, member.free, x[list(member.numbers)])
         for name, member in points.hypothesis.members.items()
     }
     chi2 = float(sum(r @ r for r in residuals.values()))

@@ -19,7 +19,7 @@ from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.studies.discrepancy.search.base import BUSHING
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
@@ -30,7 +30,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     taken_out,
 )
 from spinepipe.studies.discrepancy.search.screen import Group
-from spinepipe.units import COORDINATES, less_step_0
+from spinepipe.units import COORDINATES, subtract_baseline
 
 SIZE = 0.1
 """Prior size of a term at the largest motion, as a share of the joint's load there."""
@@ -109,7 +109,7 @@ def generic_columns(
             by_step = _readings(np.hstack([ramp, shift]), SIZE * reach[:, at], at)
             moved[place].append(np.concatenate([by_load[place], by_step], axis=-1))
     stacked = [np.concatenate(columns, axis=-1) for columns in moved]
-    seen = [less_step_0(c, zeroed) for c in stacked]
+    seen = [subtract_baseline(c, zeroed) for c in stacked]
     return GenericColumns(tuple(terms), tuple(seen))
 
 
@@ -171,7 +171,7 @@ SPREADS = (PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.EACH)
 
 
 @dataclass(frozen=True)
-class Lack:
+class LackOfFitTest:
     """What speaks for some terms of the generic basis; averaged over families and ways to differ.
 
     Attributes
@@ -197,10 +197,10 @@ class Lack:
 
 
 @dataclass(frozen=True)
-class LackOfFit(Lack):
+class LackOfFit(LackOfFitTest):
     """The generic basis against what the fit leaves, as a whole and ``at`` each coordinate."""
 
-    at: Mapping[str, Lack]
+    at: Mapping[str, LackOfFitTest]
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,9 @@ class _SpecimenResiduals:
     explained: float
 
 
-def lack_of_fit(grounds: Grounds, coordinates: Sequence[str], draws: int, seed: int) -> LackOfFit:
+def lack_of_fit(
+    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
+) -> LackOfFit:
     """Evidence of the generic basis beside the grounds' fit."""
     terms, problem = _problem(grounds, coordinates, draws, seed)
     spreads = [s for s in SPREADS if not (s is PlaceSpread.EACH and len(grounds.readings) == 1)]
@@ -230,7 +232,7 @@ def lack_of_fit(grounds: Grounds, coordinates: Sequence[str], draws: int, seed: 
     return LackOfFit(**vars(whole), at=at)
 
 
-def _lack(parts: Sequence[_SpecimenResiduals]) -> Lack:
+def _lack(parts: Sequence[_SpecimenResiduals]) -> LackOfFitTest:
     logs = logsumexp(np.stack([part.logs for part in parts]), axis=0) - np.log(len(parts))
     best = max(parts, key=lambda part: part.logs[0])
     share = np.log(len(parts))
@@ -239,11 +241,11 @@ def _lack(parts: Sequence[_SpecimenResiduals]) -> Lack:
         for family in dict.fromkeys(part.family for part in parts)
     }
     where = (best.family, best.coordinate, best.spread)
-    return Lack(float(logs[0]), logs[1:], *where, best.explained, by_family)
+    return LackOfFitTest(float(logs[0]), logs[1:], *where, best.explained, by_family)
 
 
 def _problem(
-    grounds: Grounds, coordinates: Sequence[str], draws: int, seed: int
+    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
 ) -> tuple[tuple[Term, ...], Linearised]:
     parts: dict[str, Products] = {}
     terms: tuple[Term, ...] = ()

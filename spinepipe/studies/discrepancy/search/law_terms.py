@@ -15,7 +15,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.studies.discrepancy.search.hypothesis import Variant
 from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
-from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, TRANSLATIONS, less_step_0
+from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, TRANSLATIONS, subtract_baseline
 
 SUPERIOR = COORDINATES.index("superior")
 
@@ -138,13 +138,13 @@ def term_columns(
         sizes.append((springs / np.where(strongest > 0.0, strongest, np.inf)).T)
         terms += own
         for place, by_load in enumerate(solved.by_loads([_alone(one, at) for one in loads])):
-            moved[place].append(less_step_0(by_load, zeroed))
+            moved[place].append(subtract_baseline(by_load, zeroed))
     for name in coordinates:
         at = COORDINATES.index(name)
         terms.append(LawTerm(name, READING, "step / last step", (0, 0, 0, 0)))
         sizes.append(reach[None, :, at])
         for place, state in enumerate(states):
-            moved[place].append(less_step_0(_drift(state.q.shape, at), zeroed))
+            moved[place].append(subtract_baseline(_drift(state.q.shape, at), zeroed))
     columns = tuple(np.concatenate(of_test, axis=-1) for of_test in moved)
     return TermColumns(tuple(terms), columns, np.concatenate(sizes))
 

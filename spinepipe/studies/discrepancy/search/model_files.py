@@ -10,7 +10,7 @@ from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values
-from spinepipe.studies.discrepancy.search.hypothesis import Form
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.verdict import EVERY
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -120,7 +120,7 @@ def _row(specimen: str, joint: str, names: Sequence[str], values: Sequence[float
     return Values(specimen=specimen, joint=joint, **numbers)
 
 
-def _copies(form: Form, models: Mapping[str, SpineModel], after: Mapping[str, int]) -> int:
+def _copies(form: CandidateForm, models: Mapping[str, SpineModel], after: Mapping[str, int]) -> int:
     """One copy of the effect, or one per test that it tells apart."""
     if form.spread is not PlaceSpread.BY_TEST:
         return 1
@@ -134,7 +134,7 @@ def _copies(form: Form, models: Mapping[str, SpineModel], after: Mapping[str, in
     return len(tests)
 
 
-def _specimens(form: Form) -> tuple[str, ...]:
+def _specimens(form: CandidateForm) -> tuple[str, ...]:
     return EVERY if form.specimen is None else (form.specimen,)
 
 
@@ -159,10 +159,10 @@ def in_tables(fit: JointFit, index: int, move: float) -> tuple[float, str]:
     p, start = supposed.form.variant.create().parameters[unknown.column], supposed.start
     at = float(start[unknown.column])
     value = at * float(np.exp(move)) if p.logarithmic else at + float(move)
-    return border(p.unit, float(np.clip(value, p.low, p.high)))
+    return display_value(p.unit, float(np.clip(value, p.low, p.high)))
 
 
-def border(unit: str, value: float) -> tuple[float, str]:
+def display_value(unit: str, value: float) -> tuple[float, str]:
     """A value in the unit of tables, and that unit."""
     name, factor = BORDER.get(unit, (unit, 1.0))
     return value * factor, name

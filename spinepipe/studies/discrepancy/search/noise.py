@@ -17,7 +17,7 @@ from scipy.linalg import helmert
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.verdict import DECLARED, REPEATS
-from spinepipe.units import less_step_0
+from spinepipe.units import subtract_baseline
 
 FAR, FAR_CYCLE = 4.0, 5.0
 """Deviations from the median of the cycles beyond this many SDs are outliers.
@@ -65,7 +65,7 @@ class Noise:
         serial: Array = self.correlation**lag
         if not self.zeroed:
             return serial
-        left = less_step_0(np.eye(steps), self.zeroed)
+        left = subtract_baseline(np.eye(steps), self.zeroed)
         return left @ serial @ left.T
 
 

@@ -14,9 +14,9 @@ from scipy.special import logsumexp
 from spinepipe.studies.discrepancy.proof.folds import TEST
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.inquiry import Rival, SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.search.lack_of_fit import FAMILIES, OWN
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
+from spinepipe.studies.discrepancy.search.search_state import Rival, SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.verdict import Conclusion, SuspectedError, share_of_gap
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 

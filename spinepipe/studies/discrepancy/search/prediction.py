@@ -10,8 +10,8 @@ from spinepipe.calibrate.solvers import on_record
 from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.statics import FreeParameter, moved
-from spinepipe.statics.many import (
+from spinepipe.statics import FreeParameter, with_parameters
+from spinepipe.statics.batched import (
     Answering,
     Idle,
     Stack,
@@ -21,8 +21,8 @@ from spinepipe.statics.many import (
     readings,
     readings_by,
 )
-from spinepipe.statics.many.solve import carried
-from spinepipe.units import less_step_0
+from spinepipe.statics.batched.solve import carried
+from spinepipe.units import subtract_baseline
 
 SAME = 1e-7
 """m and rad by which a pose may differ when it is solved afresh from the neutral pose."""
@@ -53,7 +53,7 @@ class PredictedSpecimen:
     free: Sequence[FreeParameter]
 
 
-class Together:
+class JointPrediction:
     """Specimens under a model each, solved again and again from near poses."""
 
     def __init__(
@@ -101,7 +101,7 @@ class Together:
     def model(self, name: str, x: Array) -> SpineModel:
         """The model of a specimen with its unknowns moved by x (m,)."""
         one = self.subjects[name]
-        return moved(one.model, one.free, x)
+        return with_parameters(one.model, one.free, x)
 
     def _predicted(
         self, stack: Stack, number: int, q: Array, seen: Array, by_x: Array
@@ -111,8 +111,8 @@ class Together:
             for run in range(self._runs[number], self._runs[number + 1])
         ]
         return Predicted(
-            tuple(less_step_0(seen[lanes], self.zeroed) for lanes in tests),
-            tuple(less_step_0(by_x[lanes], self.zeroed) for lanes in tests),
+            tuple(subtract_baseline(seen[lanes], self.zeroed) for lanes in tests),
+            tuple(subtract_baseline(by_x[lanes], self.zeroed) for lanes in tests),
             tuple(q[lanes].reshape(len(q[lanes]), -1) for lanes in tests),
         )
 
@@ -169,7 +169,7 @@ class Simulated:
         zeroed: bool,
         free: Sequence[FreeParameter],
     ) -> None:
-        self._together = Together(
+        self._together = JointPrediction(
             {model.specimen: PredictedSpecimen(model, tuple(cases), free)}, zeroed
         )
         self._name = model.specimen
@@ -226,7 +226,7 @@ class SolvedSpecimen:
         else:
             dq = poses_by(stack, self._q, [free])
         found = self._by_test(readings_by(stack, self._q, dq, [free]))
-        return tuple(less_step_0(one, self.zeroed) for one in found)
+        return tuple(subtract_baseline(one, self.zeroed) for one in found)
 
     @cached_property
     def answering(self) -> Answering | None:
@@ -245,7 +245,7 @@ class SolvedSpecimen:
             every = np.moveaxis(by_strength, 1, 2)
             every = every.reshape(lanes, joints, 6, joints, *every.shape[3:])
             tests = self._by_test(every)
-            found.append(tuple(less_step_0(one, self.zeroed) for one in tests))
+            found.append(tuple(subtract_baseline(one, self.zeroed) for one in tests))
         return found
 
     def by_loads(self, loads: Sequence[Array]) -> tuple[Array, ...]:

@@ -20,7 +20,7 @@ from spinepipe.effects.contract import AcrossJoints, Array
 from spinepipe.effects.dead_load import DeadLoad
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import FreeParameter
-from spinepipe.statics.many import Acting, Idle, acts_here
+from spinepipe.statics.batched import Acting, Idle, acts_here
 from spinepipe.studies.discrepancy.search.hypothesis import Trials, Variant, shape_grid
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
@@ -35,7 +35,7 @@ EVERY_TEST = "*"
 
 
 @dataclass(frozen=True)
-class Taken:
+class ProjectedOut:
     """What is taken out of a specimen's whitened readings.
 
     Attributes
@@ -125,7 +125,7 @@ def linearised(of: Mapping[str, Products]) -> Linearised:
     return Linearised(of, gram, np.sum([part.moments_shared for part in parts], axis=0))
 
 
-def taken_out(fit: JointFit) -> dict[str, Taken]:
+def taken_out(fit: JointFit) -> dict[str, ProjectedOut]:
     """What a fit takes out of each specimen."""
     owners: dict[int, set[str]] = {}
     for name, member in fit.hypothesis.members.items():
@@ -138,7 +138,7 @@ def taken_out(fit: JointFit) -> dict[str, Taken]:
     }
 
 
-def _taken(fit: JointFit, name: str, numbers: Array, common: Sequence[int]) -> Taken:
+def _taken(fit: JointFit, name: str, numbers: Array, common: Sequence[int]) -> ProjectedOut:
     jacobian = fit.jacobians[name]
     is_common = np.isin(numbers, common)
     own = _basis(jacobian[:, ~is_common])
@@ -147,7 +147,7 @@ def _taken(fit: JointFit, name: str, numbers: Array, common: Sequence[int]) -> T
     np.add.at(shared.T, places, jacobian[:, is_common].T)
     shared -= own @ (own.T @ shared)
     residual = -fit.residuals[name]  # measured less predicted: what a signature is to make
-    return Taken(own, shared, residual - own @ (own.T @ residual))
+    return ProjectedOut(own, shared, residual - own @ (own.T @ residual))
 
 
 def _basis(columns: Array) -> Array:
@@ -160,12 +160,12 @@ def _basis(columns: Array) -> Array:
     return seen
 
 
-def drawn(taken: Taken, draws: int, rng: np.random.Generator) -> Array:
+def drawn(taken: ProjectedOut, draws: int, rng: np.random.Generator) -> Array:
     """(N, 1 + D) the data's residual, and residuals as the null would have them."""
     return np.column_stack([taken.residual, rng.standard_normal((len(taken.residual), draws))])
 
 
-def products(taken: Taken, white: Array, raw: Array, errors: Array) -> Products:
+def products(taken: ProjectedOut, white: Array, raw: Array, errors: Array) -> Products:
     """Products of whitened signatures (N, M) with themselves, the errors and what is shared."""
     left = taken.out_of(white)
     gram, moments = left.T @ left, left.T @ errors

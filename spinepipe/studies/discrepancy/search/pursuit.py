@@ -11,9 +11,9 @@ import numpy as np
 
 from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, TermColumns
-from spinepipe.studies.discrepancy.search.projected import SEEN, Taken, drawn, taken_out
+from spinepipe.studies.discrepancy.search.projected import SEEN, ProjectedOut, drawn, taken_out
 from spinepipe.studies.discrepancy.search.screen import exceeded
 
 LEAST_LEFT = 1e-4
@@ -162,7 +162,7 @@ class PursuitProblem:
 
 
 def pursuit_problem(
-    grounds: Grounds, columns: Mapping[str, TermColumns], draws: int, seed: int
+    grounds: BaselineFit, columns: Mapping[str, TermColumns], draws: int, seed: int
 ) -> PursuitProblem:
     """The problem about the grounds' fit, with draws of the null."""
     taken = taken_out(grounds.fit)
@@ -194,7 +194,9 @@ def _with_sums(one: TermColumns, joints: int) -> list[Array]:
     return found
 
 
-def _part(grounds: Grounds, name: str, moved: Sequence[Array], taken: Taken) -> _WhitenedColumns:
+def _part(
+    grounds: BaselineFit, name: str, moved: Sequence[Array], taken: ProjectedOut
+) -> _WhitenedColumns:
     plain = grounds.plain[name].noise_only(moved)
     white = grounds.setting.whitenings[name].shortened(plain)
     return _WhitenedColumns(taken.out_of(white), np.sum(plain**2, axis=0))

@@ -10,16 +10,16 @@ from scipy.special import log_ndtr, logsumexp
 from spinepipe.effects import Parameter, PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress
-from spinepipe.studies.discrepancy.search.grounds import Grounds
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import (
     STRENGTH_SDS,
-    Form,
-    Supposed,
+    ActiveTerm,
+    CandidateForm,
     Trials,
     Variant,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
-from spinepipe.studies.discrepancy.search.screen import SIZES, Screen, Screened, Tried
+from spinepipe.studies.discrepancy.search.screen import SIZES, Screen, Screened, ScreenedVariant
 from spinepipe.studies.discrepancy.store import PieceRunner
 
 SMALLEST_START = 0.02
@@ -48,7 +48,7 @@ class Refit:
     gain : drop of chi2.
     """
 
-    form: Form
+    form: CandidateForm
     fit: JointFit
     log_evidence: float
     gain: float
@@ -66,7 +66,7 @@ class Refit:
 
 
 def refits(
-    grounds: Grounds,
+    grounds: BaselineFit,
     screen: Screen,
     trials: Sequence[Trials],
     run: PieceRunner,
@@ -109,8 +109,8 @@ def preferred(found: Sequence[Refit]) -> tuple[Refit, ...]:
 
 
 def _simpler(
-    found: Sequence[Refit], screen: Screen, before: Sequence[Supposed]
-) -> Iterator[Supposed]:
+    found: Sequence[Refit], screen: Screen, before: Sequence[ActiveTerm]
+) -> Iterator[ActiveTerm]:
     """The leading refits of two effects with values the same everywhere, where not tried yet."""
     ranked = sorted(found, key=lambda one: -one.log_evidence)
     best = list({one.name: one for one in reversed(ranked)}.values())[::-1][:2]
@@ -177,7 +177,7 @@ def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
     return result
 
 
-def leading(screen: Screen) -> Iterator[Tried]:
+def leading(screen: Screen) -> Iterator[ScreenedVariant]:
     """Forms worth a refit."""
     least = _least(screen.effects[0].log_evidence)
     for place, one in enumerate(screen.effects[:MOST_EFFECTS]):
@@ -190,14 +190,14 @@ def _least(best: float) -> float:
     return max(0.0, best - SCREEN_MARGIN - SCREEN_SHARE * best)
 
 
-def _forms(one: Screened, most: int) -> list[Tried]:
+def _forms(one: Screened, most: int) -> list[ScreenedVariant]:
     """The best form of each leading variant, and that of equal values where it is another.
 
     Variants that are alike while weak (shapes of stiffening) part only in the refit.
     """
     best = one.forms[0]
     least = _least(best.log_evidence)
-    by_variant: dict[Variant, Tried] = {}
+    by_variant: dict[Variant, ScreenedVariant] = {}
     for tried in one.forms:
         if tried.log_evidence > least:
             by_variant.setdefault(tried.form.variant, tried)
@@ -209,7 +209,7 @@ def _forms(one: Screened, most: int) -> list[Tried]:
     return chosen
 
 
-def started(tried: Tried) -> Supposed:
+def started(tried: ScreenedVariant) -> ActiveTerm:
     """The form with the typical strengths and the shapes that the screen suggests."""
     variant = tried.form.variant
     parameters = variant.create().parameters
@@ -217,7 +217,7 @@ def started(tried: Tried) -> Supposed:
     for column in variant.strengths:
         of_column = [e for e, c in zip(tried.estimate, tried.strengths, strict=True) if c == column]
         values[column] = _value(parameters[column], float(np.mean(of_column)))
-    return Supposed(tried.form, values)
+    return ActiveTerm(tried.form, values)
 
 
 def _value(p: Parameter, sds: float) -> float:
@@ -230,7 +230,7 @@ def _value(p: Parameter, sds: float) -> float:
     return float(np.clip(value, p.low if p.logarithmic else p.low + margin, p.high - margin))
 
 
-def refit(grounds: Grounds, one: Supposed, trials: Trials) -> Refit:
+def refit(grounds: BaselineFit, one: ActiveTerm, trials: Trials) -> Refit:
     """One more form beside those of the grounds' fit.
 
     What tips the segment over where it starts is tried again closer to off.
@@ -262,7 +262,7 @@ def _degenerate(fit: JointFit, number: int) -> bool:
     return bool(fit.at_bound[shapes].any())
 
 
-def weaker(one: Supposed, share: float) -> Supposed:
+def weaker(one: ActiveTerm, share: float) -> ActiveTerm:
     """The same, started at a share of the way from off."""
     parameters, start = one.form.variant.create().parameters, one.start.copy()
     for column in one.form.variant.strengths:
@@ -273,7 +273,7 @@ def weaker(one: Supposed, share: float) -> Supposed:
     return replace(one, start=start)
 
 
-def standing(fit: JointFit) -> tuple[Supposed, ...]:
+def standing(fit: JointFit) -> tuple[ActiveTerm, ...]:
     """The effects of a fit, to start from again where it ended (places that differ: their mean)."""
     found = []
     for number, one in enumerate(fit.hypothesis.supposed):

@@ -19,7 +19,7 @@ from scipy.special import log_ndtr
 from spinepipe.decomposition import eigh
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.search.hypothesis import Form, Trials, shape_grid
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, shape_grid
 from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Linearised, VariantColumn
 
 SIZES = np.array([0.1, 0.3, 1.0, 3.0])
@@ -94,12 +94,12 @@ class Group:
         return np.where(self.signs * found < 0.0, 0.0, found)
 
 
-Point = tuple[Form, tuple[float, ...]]
+Point = tuple[CandidateForm, tuple[float, ...]]
 """A form, and the prior SDs of its shapes."""
 
 
 @dataclass(frozen=True, eq=False)
-class Alike:
+class IndistinctVariants:
     """Points whose columns are summed to strengths in the same way.
 
     Attributes
@@ -137,7 +137,7 @@ class Summed:
     strengths : (k,) column of the effect's values that each strength is of.
     """
 
-    form: Form
+    form: CandidateForm
     sds: tuple[float, ...]
     strengths: tuple[int, ...]
     gram: Array
@@ -154,11 +154,11 @@ class EffectColumns:
             places = self._at.setdefault((c.variant, c.sds), {})
             places.setdefault((c.test, c.joint, c.strength), []).append(number)
         self.columns = tuple(columns)
-        self._alike: dict[tuple[object, ...], tuple[Alike, ...]] = {}
+        self._alike: dict[tuple[object, ...], tuple[IndistinctVariants, ...]] = {}
 
     def alike(
         self, points: Sequence[Point], specimens: Sequence[str], tests: Sequence[str]
-    ) -> tuple[Alike, ...]:
+    ) -> tuple[IndistinctVariants, ...]:
         """Points in portions that are summed alike; known already where asked before."""
         key = (tuple(points), tuple(specimens), tuple(tests))
         if key not in self._alike:
@@ -167,7 +167,7 @@ class EffectColumns:
 
     def _portions(
         self, points: Sequence[Point], specimens: Sequence[str], tests: Sequence[str]
-    ) -> Iterator[Alike]:
+    ) -> Iterator[IndistinctVariants]:
         found = [self.places(form, sds, specimens, tests) for form, sds in points]
         members: dict[tuple[object, ...], list[int]] = {}
         for number, (places, strengths) in enumerate(found):
@@ -183,10 +183,14 @@ class EffectColumns:
                 columns = np.stack([found[number][0][place][1] for number in some])
                 every.append((specimen, columns, onto))
             signs_of = sides(points[some[0]][0], strengths)
-            yield Alike(np.array(some), strengths, signs_of, tuple(every))
+            yield IndistinctVariants(np.array(some), strengths, signs_of, tuple(every))
 
     def places(
-        self, form: Form, sds: tuple[float, ...], specimens: Sequence[str], tests: Sequence[str]
+        self,
+        form: CandidateForm,
+        sds: tuple[float, ...],
+        specimens: Sequence[str],
+        tests: Sequence[str],
     ) -> tuple[Places, tuple[int, ...]]:
         """Columns of a form in each specimen, and for each strength the value's column."""
         keys: dict[tuple[object, ...], int] = {}
@@ -201,7 +205,7 @@ class EffectColumns:
         return tuple(found), tuple(int(key[0]) for key in keys)  # type: ignore[call-overload]
 
     def _of(
-        self, form: Form, sds: tuple[float, ...], specimen: str, tests: Sequence[str]
+        self, form: CandidateForm, sds: tuple[float, ...], specimen: str, tests: Sequence[str]
     ) -> list[tuple[int, tuple[object, ...]]]:
         """Columns and which strength each belongs to."""
         spread = form.spread
@@ -224,7 +228,7 @@ class EffectColumns:
 
 
 @dataclass(frozen=True)
-class Tried:
+class ScreenedVariant:
     """One form of an effect on the screen, at its best shape.
 
     Attributes
@@ -234,7 +238,7 @@ class Tried:
     explained : drop of chi2 with its strengths free.
     """
 
-    form: Form
+    form: CandidateForm
     sds: tuple[float, ...]
     strengths: tuple[int, ...]
     log_evidence: float
@@ -252,7 +256,7 @@ class Screened:
     effect: str
     log_evidence: float
     null: Array
-    forms: tuple[Tried, ...]
+    forms: tuple[ScreenedVariant, ...]
 
 
 @dataclass(frozen=True)
@@ -285,7 +289,7 @@ def screened(
     """Evidence of one effect."""
     points = [(form, sds) for form in trials.forms for sds in shape_grid(form.variant)]
     logs = np.zeros((len(points), problem.moments_shared.shape[1]))
-    found: dict[int, Tried] = {}
+    found: dict[int, ScreenedVariant] = {}
     share = {form: trials.log_share(form) for form in trials.forms}
     for some in index.alike(points, specimens, tests):
         gram, moments = some.summed(problem)
@@ -297,7 +301,7 @@ def screened(
             (form, sds), gain = points[number], float(explained[row])
             log_evidence = float(logs[number, 0]) + share[form]
             told = (form, sds, some.strengths, log_evidence)
-            found[number] = Tried(*told, estimates[row], gain)
+            found[number] = ScreenedVariant(*told, estimates[row], gain)
     totals, tried, end = [], [], 0
     for form in trials.forms:
         start, end = end, end + len(shape_grid(form.variant))
@@ -318,7 +322,7 @@ def _explained(estimates: Array, moments: Array, gram: Array) -> Array:
 def summed(
     index: EffectColumns,
     problem: Linearised,
-    form: Form,
+    form: CandidateForm,
     sds: tuple[float, ...],
     specimens: Sequence[str],
     tests: Sequence[str],
@@ -329,7 +333,7 @@ def summed(
     return Summed(form, sds, alone.strengths, gram, moments, Group.of(gram, alone.signs))
 
 
-def sides(form: Form, strengths: Sequence[int]) -> Array:
+def sides(form: CandidateForm, strengths: Sequence[int]) -> Array:
     """(k,) side of off that the bounds of each strength allow, a column of the effect's values."""
     parameters = form.variant.create().parameters
     return np.array([parameters[column].side for column in strengths])

@@ -8,22 +8,22 @@ closes a real share of the gap; then again beside it. At the end each is examine
 from collections.abc import Mapping, Sequence
 
 from spinepipe.progress import Progress
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.examination import examined
 from spinepipe.studies.discrepancy.search.gaps import Gap, gaps_at, whole_gap
-from spinepipe.studies.discrepancy.search.grounds import Grounds
-from spinepipe.studies.discrepancy.search.inquiry import (
-    Inquiry,
-    Rules,
-    SearchResult,
-    SearchStage,
-    SelectedTerm,
-)
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import exceeded
+from spinepipe.studies.discrepancy.search.search_state import (
+    Rules,
+    SearchResult,
+    SearchStage,
+    SearchState,
+    SelectedTerm,
+)
 from spinepipe.studies.discrepancy.store import PieceRunner
 
-HOPELESS = (4.0, 2.5, 1.5)
+OUTSIDE_LIBRARY = (4.0, 2.5, 1.5)
 """Times the evidence of the first, second and further effect that the generic basis may have.
 
 With more, no known effect is what is missing, and adding them up would only imitate it.
@@ -39,10 +39,10 @@ MOST_CHANGES = 6
 
 
 def search(
-    base: Grounds, rules: Rules, run: PieceRunner, progress: Progress | None = None
+    base: BaselineFit, rules: Rules, run: PieceRunner, progress: Progress | None = None
 ) -> SearchResult:
     """Effects that the base lacks, each with its rivals."""
-    inquiry = Inquiry(base, rules, run, progress or Progress())
+    inquiry = SearchState(base, rules, run, progress or Progress())
     base_at, base_lack = gaps_at(base, base.fit), inquiry.lack(base)
     current, stood = _settled(_forward(base, inquiry, base_at), inquiry, base_at)
     lack = inquiry.lack(current)
@@ -64,8 +64,8 @@ def search(
 
 
 def _settled(
-    current: Grounds, inquiry: Inquiry, base_at: Mapping[str, Gap]
-) -> tuple[Grounds, tuple[SelectedTerm, ...]]:
+    current: BaselineFit, inquiry: SearchState, base_at: Mapping[str, Gap]
+) -> tuple[BaselineFit, tuple[SelectedTerm, ...]]:
     """The effects that stand after all changes; what took turns ends up among the rivals."""
     for _ in range(MOST_CHANGES):
         found = examined(current, inquiry)
@@ -75,7 +75,7 @@ def _settled(
     return current, examined(current, inquiry, settled=True).standing or ()
 
 
-def _forward(current: Grounds, inquiry: Inquiry, base_at: Mapping[str, Gap]) -> Grounds:
+def _forward(current: BaselineFit, inquiry: SearchState, base_at: Mapping[str, Gap]) -> BaselineFit:
     """Let effects enter; the grounds that are left."""
     while (number := len(current.fit.hypothesis.supposed)) < MOST_FORMS_NAMED:
         best = _admitted(current, inquiry.stage(current), inquiry, base_at)
@@ -86,7 +86,7 @@ def _forward(current: Grounds, inquiry: Inquiry, base_at: Mapping[str, Gap]) -> 
 
 
 def _admitted(
-    current: Grounds, stage: SearchStage, inquiry: Inquiry, base_at: Mapping[str, Gap]
+    current: BaselineFit, stage: SearchStage, inquiry: SearchState, base_at: Mapping[str, Gap]
 ) -> Refit | None:
     """The best refit, if it may enter."""
     rules, supposed = inquiry.rules, current.fit.hypothesis.supposed
@@ -111,5 +111,5 @@ def _hopeless(best: Refit, number: int, lack: LackOfFit, rules: Rules) -> bool:
     where: Sequence[float] = [lack.log_evidence]
     if len(coordinates) < len(rules.coordinates):
         where = [lack.at[name].log_evidence for name in coordinates]
-    times = HOPELESS[min(number, len(HOPELESS) - 1)]
+    times = OUTSIDE_LIBRARY[min(number, len(OUTSIDE_LIBRARY) - 1)]
     return max(where) > times * best.log_evidence

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import Array
+from spinepipe.report.glyphs import Array
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
 from spinepipe.report.style import BLUE, GREY, VERMILLION, blank, saying
 from spinepipe.report.words import capital, count, fixed, number

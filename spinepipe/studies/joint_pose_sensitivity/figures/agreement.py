@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import EXACT, exact, rounded
+from spinepipe.report.glyphs import EXACT, exact, rounded
 from spinepipe.report.panels import (
     PanelRows,
     explain,

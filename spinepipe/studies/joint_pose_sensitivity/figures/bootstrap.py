@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import STRIP_KEY, Array, draw_strip, finite, rounded
+from spinepipe.report.glyphs import STRIP_KEY, Array, draw_strip, finite, rounded
 from spinepipe.report.panels import (
     EVERY_JOINT,
     MOST_ACROSS,

@@ -10,7 +10,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import BAR_PT, EXACT, KEY, THIN_BAR_PT, draw_bar, exact, finite, rounded
+from spinepipe.report.glyphs import (
+    BAR_PT,
+    EXACT,
+    KEY,
+    THIN_BAR_PT,
+    draw_bar,
+    exact,
+    finite,
+    rounded,
+)
 from spinepipe.report.panels import PanelRows, explain, grid, head, label_rows, row_height, rows_of
 from spinepipe.report.style import BEST, GREY, INK, OURS, note, saying
 from spinepipe.report.words import AXIS, POSITIVE, count, fixed, percent, unit

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.frames import zxy_angles
-from spinepipe.report.marks import KEY, Quartiles, draw_bar, draw_density, draw_iqr, finite
+from spinepipe.report.glyphs import KEY, Quartiles, draw_bar, draw_density, draw_iqr, finite
 from spinepipe.report.panels import PanelRows, explain, grid, head, label_rows, row_height, rows_of
 from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, fixed, percent, unit

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import draw_interval
+from spinepipe.report.glyphs import draw_interval
 from spinepipe.report.panels import PanelRows, explain, head, label_rows, rows_of, sections
 from spinepipe.report.style import BEST, GREY, OURS, note, saying
 from spinepipe.report.words import AXIS, count, fixed, percent

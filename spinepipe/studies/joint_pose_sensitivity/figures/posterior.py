@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import draw_interval
+from spinepipe.report.glyphs import draw_interval
 from spinepipe.report.panels import (
     EVERY_JOINT,
     PanelRows,

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import (
+from spinepipe.report.glyphs import (
     KEY,
     Array,
     Quartiles,

@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import STRIP_KEY, draw_interval, draw_strip, finite
+from spinepipe.report.glyphs import STRIP_KEY, draw_interval, draw_strip, finite
 from spinepipe.report.panels import explain, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, INK, OURS, THEIRS, blank, note, saying
 from spinepipe.report.words import count, number, percent, tick

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import BAR_PT, KEY, THIN_BAR_PT, draw_bar
+from spinepipe.report.glyphs import BAR_PT, KEY, THIN_BAR_PT, draw_bar
 from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
 from spinepipe.report.style import BEST, BLACK, BLUE, GREEN, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, case, count

@@ -10,10 +10,10 @@ from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.report.marks import finite
+from spinepipe.report.glyphs import finite
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, blank, saying
-from spinepipe.studies.scoliosis.figures.looks import LOOKS, axis_lines
+from spinepipe.studies.scoliosis.figures.line_styles import LOOKS, axis_lines
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import BEYOND, GROUPS, RANGES
 from spinepipe.studies.scoliosis.words import IN_WORDS, OF_FILMS, in_order

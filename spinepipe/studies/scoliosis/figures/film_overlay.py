@@ -15,7 +15,7 @@ from spinepipe.report.panels import explain_marks
 from spinepipe.report.style import BLACK, GREY, WHITE, blank, note, saying
 from spinepipe.report.words import capital, fixed, number, plain, short
 from spinepipe.studies.scoliosis.errors import held_out_error
-from spinepipe.studies.scoliosis.figures.looks import LOOKS, axis_lines, key_of_lines
+from spinepipe.studies.scoliosis.figures.line_styles import LOOKS, axis_lines, key_of_lines
 from spinepipe.studies.scoliosis.films import ERECT, Film, read_films
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.words import in_order, positions_in_order

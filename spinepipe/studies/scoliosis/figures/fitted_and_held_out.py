@@ -10,13 +10,13 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.report.marks import spread_out
+from spinepipe.report.glyphs import spread_out
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, WHITE, blank, note, saying
 from spinepipe.report.words import count
 from spinepipe.statistics import mean_of
 from spinepipe.studies.scoliosis.errors import by_patient, of_group, squares
-from spinepipe.studies.scoliosis.figures.looks import LOOKS
+from spinepipe.studies.scoliosis.figures.line_styles import LOOKS
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import GROUPS
 from spinepipe.studies.scoliosis.words import IN_WORDS, in_order

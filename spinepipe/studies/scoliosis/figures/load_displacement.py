@@ -16,7 +16,7 @@ from spinepipe.report.style import BLACK, GREY, SMALL_PT, blank, saying
 from spinepipe.report.words import short
 from spinepipe.studies.scoliosis.errors import held_out_error
 from spinepipe.studies.scoliosis.figures.film_overlay import chosen
-from spinepipe.studies.scoliosis.figures.looks import LOOKS, axis_lines, key_of_lines
+from spinepipe.studies.scoliosis.figures.line_styles import LOOKS, axis_lines, key_of_lines
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import EndRotations

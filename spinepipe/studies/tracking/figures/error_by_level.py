@@ -8,11 +8,12 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import BODIES, JOINTS
-from spinepipe.report.looks import LineStyle
+from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
 from spinepipe.report.style import blank, saying
 from spinepipe.report.words import capital
-from spinepipe.studies.tracking.figures.looks import (
+from spinepipe.studies.tracking.error_metrics import SAGITTAL
+from spinepipe.studies.tracking.figures.line_styles import (
     chosen,
     key_of,
     looks_of_approaches,
@@ -21,7 +22,6 @@ from spinepipe.studies.tracking.figures.looks import (
     trial_words,
     trials_of,
 )
-from spinepipe.studies.tracking.off_truth import SAGITTAL
 from spinepipe.studies.tracking.settings import Tracking
 
 LEVELS = {"centre_mm": BODIES[1:], "angle_deg": JOINTS[SAGITTAL]}

@@ -14,11 +14,12 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
 from spinepipe.motion.measures import between_neighbours
 from spinepipe.motion.skeleton import JOINTS, PELVIS, body_poses
-from spinepipe.report.looks import LineStyle
+from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, lettered
 from spinepipe.report.style import BLACK, blank, saying
 from spinepipe.report.words import capital, listed
-from spinepipe.studies.tracking.figures.looks import (
+from spinepipe.studies.tracking.error_metrics import bones_of
+from spinepipe.studies.tracking.figures.line_styles import (
     about,
     chosen,
     key_of,
@@ -29,8 +30,12 @@ from spinepipe.studies.tracking.figures.looks import (
     turns_about,
     zero_line,
 )
-from spinepipe.studies.tracking.moved import AXIS, Moved, kinds_of_trials, motions
-from spinepipe.studies.tracking.off_truth import bones_of
+from spinepipe.studies.tracking.reload_motions import (
+    AXIS,
+    ReloadedMotions,
+    kinds_of_trials,
+    motions,
+)
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.shares import INSTANTS, LUMBAR_JOINTS
 from spinepipe.studies.tracking.truth import Truth, truths
@@ -148,7 +153,7 @@ def courses_of(cohort: Cohort, tracked: pd.DataFrame) -> dict[str, Courses]:
     return found
 
 
-def _by_approach(own: list[Moved], kind: str) -> dict[str, Array]:
+def _by_approach(own: list[ReloadedMotions], kind: str) -> dict[str, Array]:
     names = dict.fromkeys(one.approach for one in own)
     return {
         name: np.array([_turned(one, kind) for one in own if one.approach == name])
@@ -156,7 +161,7 @@ def _by_approach(own: list[Moved], kind: str) -> dict[str, Array]:
     }
 
 
-def _turned(one: Moved, kind: str) -> Array:
+def _turned(one: ReloadedMotions, kind: str) -> Array:
     """(101, 6) deg, lumbar joints about the axis of the motion."""
     times = one.time_s[0] + _CYCLE * (one.time_s[-1] - one.time_s[0])
     lumbar = one.at(times)[:, PELVIS + 1 : PELVIS + 1 + len(LUMBAR_JOINTS), 3 + AXIS[kind]]
@@ -164,7 +169,7 @@ def _turned(one: Moved, kind: str) -> Array:
 
 
 def _true(
-    cohort: Cohort, own: list[Moved], known: Mapping[tuple[str, str], Truth], kind: str
+    cohort: Cohort, own: list[ReloadedMotions], known: Mapping[tuple[str, str], Truth], kind: str
 ) -> Array:
     """(P, 101, 6) deg of persons whose lumbar joints are known at two instants or more."""
     spans = {one.specimen: one for one in own}

@@ -9,11 +9,11 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.report.looks import LineStyle
+from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
 from spinepipe.report.style import GREY, blank, saying
 from spinepipe.report.words import capital
-from spinepipe.studies.tracking.figures.looks import (
+from spinepipe.studies.tracking.figures.line_styles import (
     chosen,
     key_of,
     looks_of_approaches,

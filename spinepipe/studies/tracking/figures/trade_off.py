@@ -10,11 +10,11 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.report.looks import LineStyle
+from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, SMALL_PT, WHITE, blank, saying
 from spinepipe.report.words import tick
-from spinepipe.studies.tracking.figures.looks import (
+from spinepipe.studies.tracking.figures.line_styles import (
     looks_of,
     says,
     scale,

@@ -8,11 +8,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.looks import LineStyle
+from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, blank, saying
 from spinepipe.studies.trunk_loads.chosen import of_person, shown_person
-from spinepipe.studies.trunk_loads.figures.looks import HOLLOW_WORDS, key_of, look_of, task_label
+from spinepipe.studies.trunk_loads.figures.line_styles import (
+    HOLLOW_WORDS,
+    key_of,
+    look_of,
+    task_label,
+)
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import SIMPLIFIED, sound
 

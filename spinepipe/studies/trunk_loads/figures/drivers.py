@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.marks import draw_interval
+from spinepipe.report.glyphs import draw_interval
 from spinepipe.report.panels import explain_marks, head, sections
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, note, saying
 from spinepipe.report.words import count, fixed, listed
 from spinepipe.studies.trunk_loads.chosen import MOST_TASKS
-from spinepipe.studies.trunk_loads.figures.looks import task_label
+from spinepipe.studies.trunk_loads.figures.line_styles import task_label
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import factor
 

@@ -15,7 +15,7 @@ from spinepipe.report.panels import across_of, explain_marks, head, lines_of
 from spinepipe.report.style import BLUE, GREEN, GREY, WHITE, blank, saying
 from spinepipe.report.words import plain
 from spinepipe.studies.trunk_loads.chosen import grouped, of_person, shown_person, some_tasks
-from spinepipe.studies.trunk_loads.figures.looks import task_label
+from spinepipe.studies.trunk_loads.figures.line_styles import task_label
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import sound
 

@@ -14,7 +14,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.panels import explain_marks, head
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, WHITE, blank, note, saying
 from spinepipe.report.words import fixed, plain
-from spinepipe.studies.trunk_loads.figures.looks import scale, task_label
+from spinepipe.studies.trunk_loads.figures.line_styles import scale, task_label
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.tables import TIERS
 from spinepipe.studies.trunk_loads.words import ENDED, sound

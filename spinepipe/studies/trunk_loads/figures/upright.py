@@ -15,8 +15,8 @@ from spinepipe.muscles.trunk import BODIES
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, blank, saying
 from spinepipe.report.words import short
-from spinepipe.studies.trunk_loads.figures.looks import key_of, look_of
-from spinepipe.studies.trunk_loads.ghezelbash_2016 import stands_for
+from spinepipe.studies.trunk_loads.figures.line_styles import key_of, look_of
+from spinepipe.studies.trunk_loads.ghezelbash_2016 import reproduces
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
 _HEIGHT_MM, _KEY_MM = 68.0, 17.0
@@ -41,7 +41,7 @@ def upright_figure(study: TrunkLoads, cohort: Cohort, tables: Mapping[str, pd.Da
     turned.plot(first["start_deg"].astype(float), range(len(BODIES)), color=GREY, lw=0.8, zorder=1)
     before = first["moment_before_nm"].astype(float)
     moments.plot(before, range(len(BODIES)), color=GREY, lw=0.8, zorder=1)
-    printed = _printed(turned) if stands_for(cohort.name) else False
+    printed = _printed(turned) if reproduces(cohort.name) else False
     for axis, unit in ((turned, "from the source's pose (°)"), (moments, "extension (N m)")):
         axis.axvline(0.0, color=BLACK, lw=0.5, zorder=0)
         axis.set_xlabel(unit)

@@ -1,0 +1,307 @@
+"""Muscle forces that hold a task where the spine has moved to under them.
+
+Rotations are given; the joints' forces follow by adding up what is above each joint, and with them
+how far the vertebrae have moved on each other and how stiff the joints have become. That moves the
+fascicles, which changes the forces: the round is repeated until forces and spine agree.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.muscles.applied import Applied, applied
+from spinepipe.muscles.forces import Demand, Forces, least_stress
+from spinepipe.muscles.paths import Pulls
+from spinepipe.muscles.person import Person, above
+from spinepipe.muscles.pose import BodyPoses, posed, rotations_of
+from spinepipe.muscles.task import Task
+from spinepipe.muscles.trunk import LEVELS
+from spinepipe.status import Balanced
+
+L4L5 = LEVELS.index("L4L5")
+_SHORTEST, _LONGEST = 0.1, 5.0
+_HEAVY_N = 3000.0
+_LOWEST = 3
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """How rounds are repeated, and what wrong simplification is tried.
+
+    Attributes
+    ----------
+    change, residual_nm : of forces over their size, and out of balance; less than that at the end.
+    slack_nm : moment that may be left over before a task counts as beyond strength.
+    most : rounds.
+    feedback : whether forces move the spine at all. translates : whether joints do more than turn.
+    lowest_alone : whether L5S1 alone is balanced.
+    twice : whether to look for a second answer from another start.
+    """
+
+    change: float = 0.01
+    residual_nm: float = 0.1
+    slack_nm: float = 0.5
+    most: int = 60
+    feedback: bool = True
+    translates: bool = True
+    lowest_alone: bool = False
+    twice: bool = False
+
+
+@dataclass(frozen=True)
+class SolverRound:
+    """One round: change over size (None in the first), N m out of balance, compression of L4L5."""
+
+    change: float | None
+    residual_nm: float
+    compression_n: float
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedTask:
+    """A task, held.
+
+    Attributes
+    ----------
+    poses, pulls, applied : posture, fascicles and what acts from outside.
+    demand : what muscles have to do, 21 rows: joint by joint about x, y, z of ground.
+    found : their forces. stretched : (M,) N, share of them that comes of being stretched.
+    pushes : (7, 3) N of what is above on what is below, on the axes of the disc: forwards, up,
+        to the right; compression is the downward one.
+    joint_moments : (7, 3) N m of the joints on what is above, disc axes.
+    stiffening : (7,) factor of the joints' bending stiffness.
+    """
+
+    status: Balanced
+    message: str
+    poses: BodyPoses
+    pulls: Pulls
+    applied: Applied
+    demand: Demand
+    found: Forces
+    stretched: Array
+    pushes: Array
+    joint_moments: Array
+    stiffening: Array
+    rounds: tuple[SolverRound, ...] = field(default=())
+
+    @property
+    def compression(self) -> Array:
+        """(7,) N."""
+        found: Array = -self.pushes[:, 1]
+        return found
+
+    @property
+    def on_discs(self) -> Array:
+        """(7, 3) N m that muscles have to make on what is above, disc axes."""
+        return np.einsum("kji,kj->ki", self.poses.discs, self.demand.required.reshape(-1, 3))
+
+    @property
+    def slack_on_discs(self) -> Array:
+        """(7, 3) N m that no muscle holds, disc axes."""
+        return np.einsum("kji,kj->ki", self.poses.discs, self.found.slack.reshape(-1, 3))
+
+
+def angles_of(person: Person, task: Task) -> Array:
+    """(8, 3) rad, the bodies' angles in a task."""
+    return task.turned + person.upright if task.from_upright else task.turned
+
+
+@dataclass(frozen=True, eq=False)
+class TurnedPose:
+    """What of a posture forces do not change: the rotations are given.
+
+    Attributes
+    ----------
+    poses : without translations. unpressed : (7, 3) N m of joints without compression, disc axes.
+    """
+
+    poses: BodyPoses
+    unpressed: Array
+
+    @classmethod
+    def of(cls, person: Person, task: Task) -> "TurnedPose":
+        """Of a person in a task."""
+        rotations = rotations_of(person.chain, angles_of(person, task))
+        poses = posed(person.chain, rotations, np.zeros((len(LEVELS), 3)))
+        return cls(poses, person.laws.moments(poses.turned, np.zeros(len(LEVELS))))
+
+
+def held(
+    person: Person, task: Task, how: SolverOptions = SolverOptions(), tone: float | None = None
+) -> SolvedTask:
+    """Muscle forces of a task.
+
+    Parameters
+    ----------
+    tone : least activation of every muscle, share of its largest; the task's own by default.
+
+    Raises
+    ------
+    ValueError
+        For a load that the arms do not reach.
+    """
+    least = task.tone_share if tone is None and task.tone == "stated" else tone or 0.0
+    first = _rounds(person, task, how, least, np.zeros(len(LEVELS)))
+    if not (how.twice and how.feedback) or first.status is not Balanced.CONVERGED:
+        return first
+    again = _rounds(person, task, how, least, np.full(len(LEVELS), _HEAVY_N))
+    apart = _change(again.found.forces, first.found.forces)
+    if apart > 2.0 * how.change:
+        told = f"another start ends {100.0 * apart:.1f} % away"
+        return replace(first, status=Balanced.TWO_ANSWERS, message=told)
+    return first
+
+
+def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> SolvedTask:
+    """The task with given muscle forces (M,) N, where the spine has moved to under them."""
+    turned = TurnedPose.of(person, task)
+    pushes, how = np.zeros((len(LEVELS), 3)), SolverOptions()
+    for _ in range(rounds):
+        now = _at(person, task, how, 0.0, turned, pushes, given=forces)
+        pushes = now.pushes
+    return now
+
+
+def _rounds(
+    person: Person, task: Task, how: SolverOptions, tone: float, start: Array
+) -> SolvedTask:
+    """Rounds from a spine pressed by `start` (7,) N."""
+    turned = TurnedPose.of(person, task)
+    pushes = np.zeros((len(LEVELS), 3))
+    pushes[:, 1] = -start
+    rounds: list[SolverRound] = []
+    trail: list[Array] = []
+    step, last, found = 1.0, np.zeros_like(pushes), None
+    while True:
+        now = _at(person, task, how, tone, turned, pushes, nearby=found)
+        found = now.found
+        before = trail[-1] if trail else np.zeros_like(now.found.forces)
+        change = _change(now.found.forces, before) if trail else None
+        residual = _residual(now, before, how)
+        trail.append(now.found.forces)
+        rounds.append(
+            SolverRound(change, residual if change is not None else 0.0, now.compression[L4L5])
+        )
+        settled = change is not None and change < how.change and residual < how.residual_nm
+        if settled or not how.feedback or len(rounds) >= how.most:
+            done = settled or not how.feedback
+            status, message = _ended(now, how, rounds, trail, done)
+            return replace(now, status=status, message=message, rounds=tuple(rounds))
+        off = now.pushes - pushes
+        step, last = (_step(step, off, last) if len(rounds) > 1 else step), off
+        pushes = pushes + step * off
+
+
+def _step(step: float, off: Array, last: Array) -> float:
+    """How far to go towards what a round found: Aitken's rule, shorter where rounds swing, longer
+    where they creep."""
+    by = (off - last).ravel()
+    size = float(by @ by)
+    wanted = -step * float(last.ravel() @ by) / size if size > 0.0 else 1.0
+    return min(max(wanted, _SHORTEST), _LONGEST)
+
+
+def _residual(now: SolvedTask, before: Array, how: SolverOptions) -> float:
+    """N m by which the forces of the round before miss what this one asks of them.
+
+    Beyond strength they are held against those of this round, which miss it, too.
+    """
+    off = now.demand.required - now.demand.arms @ before
+    if not now.found.enough:
+        off = now.demand.arms @ (now.found.forces - before)
+    return float(np.abs(off[: _LOWEST if how.lowest_alone else None]).max())
+
+
+def _ended(
+    now: SolvedTask,
+    how: SolverOptions,
+    rounds: list[SolverRound],
+    trail: list[Array],
+    settled: bool,
+) -> tuple[Balanced, str]:
+    if not settled:
+        last = rounds[-1]
+        back = _change(trail[-1], trail[-3]) if len(trail) > 2 else np.inf
+        told = (
+            f"after {len(rounds)} rounds forces still change by {100.0 * (last.change or 0):.1f} %"
+        )
+        if back < 0.1 * (last.change or 0.0):
+            return Balanced.CYCLING, f"{told}, to and fro"
+        return Balanced.NOT_CONVERGED, told
+    if not now.found.enough:
+        slack = now.found.slack.reshape(-1, 3)
+        worst = int(np.argmax(np.abs(slack).max(axis=1)))
+        short, level = float(np.abs(slack).max()), LEVELS[worst]
+        if short > how.slack_nm:
+            return Balanced.BEYOND_STRENGTH, f"{short:.1f} N m too much for the muscles at {level}"
+        return Balanced.CONVERGED, f"{short:.2f} N m left over at {level}"
+    return Balanced.CONVERGED, ""
+
+
+def _at(
+    person: Person,
+    task: Task,
+    how: SolverOptions,
+    tone: float,
+    turned: TurnedPose,
+    pushes: Array,
+    given: Array | None = None,
+    nearby: Forces | None = None,
+) -> SolvedTask:
+    """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
+    moves = how.feedback and how.translates
+    translations = person.laws.translations(pushes) if moves else np.zeros_like(pushes)
+    poses = turned.poses.moved(translations)
+    pulls = person.lines.pulls(poses)
+    loads = applied(person, task, poses)
+    pressed = -pushes[:, 1]
+    stiffening = person.laws.stiffening(pressed)
+    joint = stiffening[:, None] * turned.unpressed
+    weights, turning = above(loads.forces, loads.moments, poses.centres)
+    required = -(turning + np.einsum("kij,kj->ki", poses.discs, joint))
+    drawn, arms = above(pulls.forces, pulls.moments, poses.centres)
+    muscles = person.lines.trunk.muscles
+    strength = task.stress_pa * muscles.pcsa
+    stretched = person.passive.forces(pulls.lengths, person.rest, person.fibres, strength)
+    demand = Demand(
+        np.ascontiguousarray(arms.reshape(len(muscles), -1).T),
+        required.ravel(),
+        stretched + tone * strength,
+        stretched + strength,
+        muscles.pcsa,
+        pulls.along_sheath,
+    )
+    if given is None:
+        found = least_stress(_lowest(demand) if how.lowest_alone else demand, nearby)
+        slack = demand.required - demand.arms @ found.forces
+        found = replace(found, slack=slack)
+    else:
+        found = Forces(given, demand.required - demand.arms @ given, True)
+    on_joints = weights + np.einsum("mki,m->ki", drawn, found.forces)
+    told = np.einsum("kji,kj->ki", poses.discs, on_joints)
+    return SolvedTask(
+        Balanced.CONVERGED,
+        "",
+        poses,
+        pulls,
+        loads,
+        demand,
+        found,
+        stretched,
+        told,
+        joint,
+        stiffening,
+    )
+
+
+def _lowest(demand: Demand) -> Demand:
+    """The same demand at L5S1 alone."""
+    return replace(demand, arms=demand.arms[:_LOWEST], required=demand.required[:_LOWEST])
+
+
+def _change(now: Array, before: Array) -> float:
+    size = float(np.sqrt(now @ now))
+    apart = now - before
+    return float(np.sqrt(apart @ apart)) / size if size > 0.0 else 0.0

@@ -1,0 +1,366 @@
+"""What is read of a stack at solved poses, and exact derivatives of poses and readings by unknowns.
+
+An instrument reads a coordinate; where a rig fixes that and its load is measured, it reads the
+reaction instead, in the coordinate's own unit (`Support.read_as`).
+
+Unknowns are a model's own, `FreeParameter`; arrays have as many columns as the model with most of
+them, and the columns that a model does not have stay zero.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from spinepipe.effects import MeasurementEffect
+from spinepipe.effects.contract import Array, Indices, MeasurementBeside, MeasurementContext
+from spinepipe.statics.batched.dead_loads import pushes
+from spinepipe.statics.batched.effects import Bound, Slopes
+from spinepipe.statics.batched.elimination import NONE, Changes, answers, missing
+from spinepipe.statics.batched.forward_kinematics import (
+    KinematicsAndLoads,
+    forward_kinematics,
+    part,
+)
+from spinepipe.statics.batched.lanes import Acting
+from spinepipe.statics.batched.stack import Stack
+from spinepipe.statics.measurement_model import Instrument, beside, followed, passed, read, read_by
+from spinepipe.statics.path import follow
+from spinepipe.statics.reactions import reaction
+from spinepipe.statics.reactions import reactions_by as engine_reactions_by
+from spinepipe.statics.sensitivity import FreeParameter, by_parameters
+from spinepipe.statics.system import System
+from spinepipe.world import Chain
+
+Unknowns = Sequence[Sequence[FreeParameter]]
+"""For each model of a stack, what moves."""
+
+
+def answered(stack: Stack, q: Array, sources: Array, observed: bool = False) -> Array:
+    """(L, J, 6, m) how what is read at poses q (L, J, 6) answers loads on the axes (L, J, 6, m).
+
+    States of laws that remember are as at the start.
+
+    Parameters
+    ----------
+    observed : read through the instruments' effects; without it nothing is between.
+    """
+    found, held = np.zeros(sources.shape), np.zeros(sources.shape)
+    for runs in stack.chunks(np.arange(len(stack.remembers))):
+        lanes = stack.lanes(runs)
+        bound = stack.bound(lanes, stack.initial_states())
+        tangents = bound.held(q[lanes]).tangent
+        seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q[lanes], tangents)
+        found[lanes], _ = answers(seen, Changes(sources[lanes]))
+        if stack.loads.supports.there:
+            held[lanes] = missing(seen, found[lanes], Changes(sources[lanes]))
+    if observed:
+        found = _observed(stack, q, found, None)
+    if stack.loads.supports.there:
+        found = _with_reactions(stack, np.arange(len(q)), found, held)
+    return found
+
+
+def answered_on_path(stack: Stack, q: Array, own: Array, shift: Array | None) -> Array:
+    """(L, J, 6, m) how what is read at poses q answers loads, laws that remember led along.
+
+    Parameters
+    ----------
+    own : (L, J, 6, m) what the joints would hold besides. shift : (L, J, 6, m) by how much what
+        the laws see would move, its load in ``own`` already; None for nothing.
+    """
+    found, held, still = np.zeros(own.shape), np.zeros(own.shape), Slopes.none(own.shape[3])
+    states, states_by_x = stack.initial_states(), stack.initial_states(still.m)
+    for runs in stack.chunks(np.arange(len(stack.remembers)), stepwise=True):
+        for _, lanes in stack.steps(runs):
+            bound, there = stack.bound(lanes, states), q[lanes]
+            before = {
+                n: states_by_x[n][places] for n, places in bound.places.items() if n in states
+            }
+            loads = own[lanes] + bound.held_by(there, still, before)
+            seen = forward_kinematics(
+                stack.chains, part(stack.loads, lanes), there, bound.held(there).tangent
+            )
+            dq = answers(seen, Changes(-loads))[0]
+            found[lanes] = dq
+            if stack.loads.supports.there:
+                held[lanes] = missing(seen, dq, Changes(-loads))
+            moved = None if shift is None else shift[lanes]
+            stack.remember(states_by_x, bound, bound.after_by(there, dq, still, before, moved))
+            stack.remember(states, bound, bound.after(there))
+    found = _observed(stack, q, found, None)
+    if stack.loads.supports.there:
+        found = _with_reactions(stack, np.arange(len(q)), found, held)
+    return found
+
+
+def _with_reactions(stack: Stack, lanes: Indices, read: Array, reactions: Array) -> Array:
+    """What is read on lanes (N, J, 6, ...), with reactions where they are read."""
+    read_as = stack.loads.supports.read_as[lanes]
+    read_as = read_as.reshape(read_as.shape + (1,) * (read.ndim - 3))
+    return np.where(read_as > 0.0, read_as * reactions, read)
+
+
+def _supported(stack: Stack) -> Iterator[Indices]:
+    """Lanes of runs whose rigs fix anything, in portions in which states may be advanced."""
+    if not stack.loads.supports.there:
+        return
+    fixed = np.logical_or.reduceat(stack.loads.supports.fixed.any(axis=(1, 2)), stack.first[:-1])
+    runs = fixed & ~stack.alone
+    for some in stack.chunks(np.flatnonzero(runs & ~stack.remembers)):
+        yield stack.lanes(some)
+    for some in stack.chunks(np.flatnonzero(runs & stack.remembers), stepwise=True):
+        for _, lanes in stack.steps(some):
+            yield lanes
+
+
+def reactions(stack: Stack, q: Array) -> Array:
+    """(L, J, 6) N and N m of rigs on what they fix at poses q (L, J, 6), zero elsewhere.
+
+    Positive in the direction of the coordinate.
+    """
+    found, states = np.zeros(q.shape), stack.initial_states()
+    for lanes in _supported(stack):
+        bound = stack.bound(lanes, states)
+        held = bound.held(q[lanes])
+        seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q[lanes], held.tangent)
+        found[lanes] = np.where(seen.fixed, held.load - seen.applied, 0.0)
+        stack.remember(states, bound, bound.after(q[lanes]))
+    for run in np.flatnonzero(stack.alone).tolist():
+        system = _system(stack, run)
+        for lane, step in enumerate(follow(system), int(stack.first[run])):
+            found[lane] = reaction(system, step).reshape(stack.joints, 6)
+    return found
+
+
+def reactions_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
+    """(L, J, 6, m) derivative of the reactions, from that of the poses (L, J, 6, m)."""
+    moved = _DerivedEffects(stack, unknowns)
+    found = np.zeros(dq.shape)
+    states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
+    for lanes in _supported(stack):
+        bound = stack.bound(lanes, states)
+        slopes = moved.on(bound)
+        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
+        found[lanes] = moved.reactions(lanes, bound, (q[lanes], dq[lanes]), slopes, before)
+        after = bound.after_by(q[lanes], dq[lanes], slopes, before)
+        stack.remember(states_by_x, bound, after)
+        stack.remember(states, bound, bound.after(q[lanes]))
+    for run in np.flatnonzero(stack.alone).tolist():
+        system, free = _system(stack, run), unknowns[int(stack.loads.chain[stack.first[run]])]
+        every = engine_reactions_by(system, follow(system), free)
+        for lane, by_x in enumerate(every, int(stack.first[run])):
+            found[lane, ..., : len(free)] = by_x.reshape(stack.joints, 6, len(free))
+    return found
+
+
+def _system(stack: Stack, run: int) -> System:
+    """A run as the engine of record takes it."""
+    model = stack.model(int(stack.loads.chain[stack.first[run]]))
+    return System(Chain(model), model, stack.case(run))
+
+
+def poses_by(stack: Stack, q: Array, unknowns: Unknowns) -> Array:
+    """(L, J, 6, m) derivative of all poses q (L, J, 6) by the unknowns."""
+    moved = _DerivedEffects(stack, unknowns)
+    found = np.zeros((*q.shape, moved.m))
+    states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
+    for runs in stack.chunks(np.flatnonzero(~stack.remembers & ~stack.alone)):
+        lanes = stack.lanes(runs)
+        bound = stack.bound(lanes, states)
+        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
+        found[lanes] = moved.poses(lanes, bound, q[lanes], moved.on(bound), before)
+    for runs in stack.chunks(np.flatnonzero(stack.remembers & ~stack.alone), stepwise=True):
+        _step_by_step(stack, runs, q, moved, found)
+    for run in np.flatnonzero(stack.alone).tolist():
+        _by_engine(stack, run, unknowns, found)
+    return found
+
+
+def _by_engine(stack: Stack, run: int, unknowns: Unknowns, found: Array) -> None:
+    """Enter the derivatives of a run with an effect that takes no stack."""
+    free = unknowns[int(stack.loads.chain[stack.first[run]])]
+    system = _system(stack, run)
+    by_x = by_parameters(system, follow(system), free)
+    for lane, dq in enumerate(by_x, int(stack.first[run])):
+        found[lane, ..., : len(free)] = dq.reshape(stack.joints, 6, len(free))
+
+
+def _step_by_step(
+    stack: Stack, runs: Indices, q: Array, moved: "_DerivedEffects", found: Array
+) -> None:
+    """Enter the derivatives of runs with laws that remember, step by step."""
+    states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
+    for _, lanes in stack.steps(runs):
+        bound = stack.bound(lanes, states)
+        slopes = moved.on(bound)
+        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
+        dq = moved.poses(lanes, bound, q[lanes], slopes, before)
+        found[lanes] = dq
+        stack.remember(states_by_x, bound, bound.after_by(q[lanes], dq, slopes, before))
+        stack.remember(states, bound, bound.after(q[lanes]))
+
+
+class _DerivedEffects:
+    """The effects of a stack with the derivatives of their values by m unknowns."""
+
+    def __init__(self, stack: Stack, unknowns: Unknowns) -> None:
+        self.stack = stack
+        self.m = max((len(free) for free in unknowns), default=0)
+        effects = stack.effects
+        self.laws, self.geometry, self.cables, self.dead = (
+            [(one, one.by_unknowns(unknowns, self.m)) for one in group]
+            for group in (effects.laws, effects.geometry, effects.cables, effects.dead)
+        )
+
+    def on(self, bound: Bound) -> Slopes:
+        """Derivatives of the values at each place on some lanes."""
+        every = (
+            (self.laws, bound.places),
+            (self.geometry, bound.geometry_places),
+            (self.cables, {n: cable.places for n, cable in bound.cables.items()}),
+        )
+        laws, geometry, cables = (
+            {n: group[n][1][group[n][0].row[at]] for n, at in places.items()}
+            for group, places in every
+        )
+        return Slopes(laws, geometry, cables, self.m)
+
+    def poses(
+        self,
+        lanes: Indices,
+        bound: Bound,
+        q: Array,
+        slopes: Slopes,
+        states_by_x: dict[int, Array],
+    ) -> Array:
+        """(N, J, 6, m) derivative of the poses of some lanes."""
+        stack = self.stack
+        sources = np.negative(bound.held_by(q, slopes, states_by_x))
+        seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
+        return answers(seen, Changes(sources, self._pushes(lanes, seen)))[0]
+
+    def _pushes(self, lanes: Indices, seen: KinematicsAndLoads) -> Array:
+        """(N, J, 6, m) derivative of the wrench on each vertebra, or none."""
+        if not self.dead:
+            return NONE
+        stack = self.stack
+        run, listed = stack.run[lanes], part(stack.listed, lanes)
+        return pushes(self.dead, stack.chains, listed, run, seen.turned, seen.shifted)
+
+    def reactions(
+        self,
+        lanes: Indices,
+        bound: Bound,
+        there: tuple[Array, Array],
+        slopes: Slopes,
+        states_by_x: dict[int, Array],
+    ) -> Array:
+        """(N, J, 6, m) derivative of the reactions of some lanes.
+
+        Parameters
+        ----------
+        there : poses q (N, J, 6) and their derivatives (N, J, 6, m).
+        """
+        stack, (q, dq) = self.stack, there
+        seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
+        own = bound.held_by(q, slopes, states_by_x)
+        by_x = missing(seen, dq, Changes(-own, self._pushes(lanes, seen)))
+        found: Array = np.where(seen.fixed[..., None], by_x, 0.0)
+        return found
+
+
+def observing(one: Acting) -> Instrument:
+    """The effect on what is measured."""
+    assert isinstance(one.effect, MeasurementEffect | MeasurementBeside)
+    return one.effect
+
+
+def _beside(
+    stack: Stack, effect: Instrument, seen: Array, flat: Indices
+) -> MeasurementContext | None:
+    """What stands beside joints at places ``flat`` of all (L J, 6), if the effect asks for it."""
+    if not isinstance(effect, MeasurementBeside):
+        return None
+    runs = range(len(stack.remembers))
+    along = np.concatenate([passed(stack.case(run)) for run in runs])
+    every = beside(seen.reshape(-1, stack.joints, 6), along)
+    return MeasurementContext(every.above[flat], every.below[flat], every.passed[flat])
+
+
+def _neighbours(stack: Stack, by_x: Array, flat: Indices) -> tuple[Array, Array]:
+    """Derivatives (K, 6, m) of the joints above and below, from those of all (L J, 6, m)."""
+    every = by_x.reshape(len(by_x) // stack.joints, stack.joints, *by_x.shape[1:])
+    above, below = np.zeros(every.shape), np.zeros(every.shape)
+    above[:, :-1], below[:, 1:] = every[:, 1:], every[:, :-1]
+    return above.reshape(by_x.shape)[flat], below.reshape(by_x.shape)[flat]
+
+
+def readings(stack: Stack, q: Array) -> Array:
+    """(L, J, 6) what is read at poses q (L, J, 6)."""
+    seen = reported(stack, q)
+    if not stack.loads.supports.there:
+        return seen
+    return _with_reactions(stack, np.arange(len(q)), seen, reactions(stack, q))
+
+
+def reported(stack: Stack, q: Array) -> Array:
+    """(L, J, 6) what the instruments make of poses q (L, J, 6)."""
+    seen = q.reshape(-1, 6).copy()
+    for one in stack.effects.measurement:
+        places, lanes = one.on(stack.run)
+        flat = stack.joints * lanes + one.joint[places]
+        effect = observing(one)
+        around = _beside(stack, effect, seen, flat)
+        seen[flat] = read(effect, seen[flat], one.values[one.row[places]], around).q
+    return seen.reshape(q.shape)
+
+
+def reported_by(stack: Stack, seen: Array, effect: Instrument, values: Array) -> Array:
+    """(S, L J, 6, P) how one more instrument, that is off, would change what is reported.
+
+    Parameters
+    ----------
+    seen : (L, J, 6) what those there report. values : (S, P) at S points of its shapes.
+    """
+    joints, every = seen.reshape(-1, 6), np.arange(seen.size // 6)
+    around = _beside(stack, effect, joints, every)
+    found = [
+        read_by(effect, joints, np.tile(one, (len(every), 1)), around)
+        for one in values  # few: instruments have no shapes, or one
+    ]
+    if stack.loads.supports.there:  # a load that is measured is none that instruments report
+        moves = stack.loads.supports.read_as.reshape(-1, 6, 1) <= 0.0
+        found = [one * moves for one in found]
+    return np.stack(found)
+
+
+def readings_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
+    """(L, J, 6, m) derivative of what is reported, from that of the poses (L, J, 6, m)."""
+    by_x = _observed(stack, q, dq, unknowns)
+    if not stack.loads.supports.there:
+        return by_x
+    every, held = np.arange(len(q)), reactions_by(stack, q, dq, unknowns)
+    return _with_reactions(stack, every, by_x, held)
+
+
+def _observed(stack: Stack, q: Array, dq: Array, unknowns: Unknowns | None) -> Array:
+    """(L, J, 6, m) what instruments make of the motion dq (L, J, 6, m) of poses q (L, J, 6).
+
+    ``unknowns`` that move the instruments' own effects besides; None for none.
+    """
+    if not stack.effects.measurement:
+        return dq
+    seen, by_x = q.reshape(-1, 6).copy(), dq.reshape(q.size // 6, *dq.shape[2:]).copy()
+    for one in stack.effects.measurement:
+        places, lanes = one.on(stack.run)
+        flat, rows = stack.joints * lanes + one.joint[places], one.row[places]
+        effect = observing(one)
+        around = _beside(stack, effect, seen, flat)
+        observed = read(effect, seen[flat], one.values[rows], around)
+        neighbours = None if around is None else _neighbours(stack, by_x, flat)
+        by_x[flat] = followed(observed, by_x[flat], neighbours)
+        if unknowns is not None:
+            slope = one.by_unknowns(unknowns, dq.shape[3])[rows]
+            by_x[flat] += read_by(effect, seen[flat], one.values[rows], around) @ slope
+        seen[flat] = observed.q
+    return by_x.reshape(dq.shape)

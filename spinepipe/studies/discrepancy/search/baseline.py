@@ -1,0 +1,159 @@
+"""The grounds a search stands on: readings, noise, and the base fitted nuisances allowed for."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spinepipe.effects.contract import Array
+from spinepipe.model import SpineModel
+from spinepipe.statics import FreeParameter
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, Hypothesis, hypothesis
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Near, Setting, joint_fit
+from spinepipe.studies.discrepancy.search.noise import Noise, noise_of_residuals
+from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
+from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, SolvedSpecimen
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
+from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening, with_nuisances
+from spinepipe.studies.discrepancy.store import PieceRunner
+from spinepipe.studies.discrepancy.verdict import REPEATS
+
+
+@dataclass(frozen=True)
+class BaselineModels:
+    """Models where fits start, their free base parameters, and the factor they may move by."""
+
+    models: Mapping[str, SpineModel]
+    base: Mapping[str, tuple[FreeParameter, ...]]
+    bound: float
+
+
+@dataclass(frozen=True)
+class BaselineFit:
+    """What every round of a search shares.
+
+    Attributes
+    ----------
+    plain : whitening without nuisances. setting : with them, linearised at the base fit before.
+    fit : the base, and effects named so far, in that setting.
+    """
+
+    readings: Mapping[str, SpecimenReadings]
+    noise: Noise
+    priors: NuisancePriors
+    start: BaselineModels
+    tests: tuple[str, ...]
+    plain: Mapping[str, Whitening]
+    setting: Setting
+    fit: JointFit
+
+    def suppose(self, supposed: Sequence[ActiveTerm]) -> Hypothesis:
+        """The base as started from, with these effects."""
+        start = self.start
+        return hypothesis(start.models, start.base, supposed, self.tests, start.bound)
+
+    def at(self, fit: JointFit) -> "BaselineFit":
+        """The same where another fit stands; nuisances stay as they move the base's readings.
+
+        Further fits start from the base as it is there: a load that was named may tip over a
+        spine as soft as the base was without it.
+        """
+        models = {
+            name: model.with_effects(model.effects[: len(self.start.models[name].effects)])
+            for name, model in fit.models.items()
+        }
+        return replace(self, fit=fit, start=replace(self.start, models=models))
+
+
+ARRIVED = 0.1
+"""Of the logarithm of stiffness: nuisances taken so near to the base need not be taken again."""
+
+MOST_NUISANCES = 5
+"""Times that they are taken."""
+
+MOST_BASE_FITS = 5
+"""Fits in a row, each from where the last one ended, until the base has arrived."""
+
+
+class NoBase(RuntimeError):
+    """The base model cannot be fitted: nothing can be said of what it lacks."""
+
+
+def fit_baseline(
+    readings: Sequence[SpecimenReadings],
+    noise: Noise,
+    priors: NuisancePriors,
+    start: BaselineModels,
+    run: PieceRunner,
+) -> BaselineFit:
+    """Fit the base, first with noise alone, then with nuisances where the last fit stands.
+
+    Nuisances move a spine as soft as the base says it is, and the base says so with nuisances
+    allowed for: fits go on until one has the base where its nuisances were taken.
+
+    Where cycles of a test differ in their loads, the noise is what their residuals differ by.
+
+    Raises
+    ------
+    NoBase
+        When the base has no fit.
+    """
+    by_name = {one.specimen: one for one in readings}
+    tests = tuple(dict.fromkeys(case.test for one in readings for case in one.cases))
+    plain = _plain(by_name, noise)
+    models = hypothesis(start.models, start.base, (), tests, start.bound)
+    first = _base_fit(models, Setting(by_name, plain, noise.zeroed), run)
+    if noise.source != REPEATS:
+        by_name, noise = noise_of_residuals(by_name, first.predicted, noise)
+        plain = _plain(by_name, noise)
+    fit = first
+    for _ in range(MOST_NUISANCES):
+        before = fit
+        whitenings = {
+            name: with_nuisances(
+                plain[name], _nuisances(before.models[name], one, noise.zeroed, priors)
+            )
+            for name, one in by_name.items()
+        }
+        setting = Setting(by_name, whitenings, noise.zeroed)
+        again = hypothesis(before.models, start.base, (), tests, start.bound)
+        fit = _base_fit(again, setting, run)
+        if np.abs(fit.x).max(initial=0.0) < ARRIVED:
+            break
+    start = replace(start, models=fit.models)
+    return BaselineFit(by_name, noise, priors, start, tests, plain, setting, fit)
+
+
+def _nuisances(
+    model: SpineModel, one: SpecimenReadings, zeroed: bool, priors: NuisancePriors
+) -> tuple[Array, ...]:
+    return nuisance_signatures(SolvedSpecimen(model, one.cases, zeroed), priors, one.coordinates)
+
+
+def _plain(readings: Mapping[str, SpecimenReadings], noise: Noise) -> dict[str, Whitening]:
+    return {name: whitening(one.tests, noise) for name, one in readings.items()}
+
+
+def _why_not(models: Hypothesis, setting: Setting) -> str:
+    """Why the models do not stand where their fit starts, by the engine of record; or nothing."""
+    for name, member in models.members.items():
+        try:
+            SolvedSpecimen(member.model, setting.readings[name].cases, setting.zeroed)
+        except NoEquilibrium as trouble:
+            return str(trouble)
+    return ""
+
+
+def _base_fit(models: Hypothesis, setting: Setting, run: PieceRunner) -> JointFit:
+    near: Near = None
+    for _ in range(MOST_BASE_FITS):
+        fit = run(joint_fit, models, setting, near)
+        if not fit.usable:
+            raise NoBase(_why_not(models, setting) or fit.status)
+        if not fit.status:
+            return fit
+        members = {
+            name: replace(member, model=fit.models[name]) for name, member in models.members.items()
+        }
+        models, near = replace(models, members=members), fit.poses
+    raise NoBase(fit.status)

@@ -1,0 +1,41 @@
+"""What is most likely wrong with a cohort: its files, and those that kinds of study read besides.
+
+Each kind judges its own files (`Kind.doubts`), whatever study is asked for.
+"""
+
+from importlib import import_module
+
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.memoize import kept_with_cohort
+from spinepipe.plausibility.warnings.judge import of_cohort
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning
+from spinepipe.problems import InputProblem
+from spinepipe.studies.registry import PACKAGE, every_kind
+
+
+@kept_with_cohort
+def suspicions(cohort: Cohort) -> tuple[PlausibilityWarning, ...]:
+    """All that looks wrong; kept, as warnings and refusals are asked one after the other."""
+    found = list(of_cohort(cohort))
+    for name, kind in every_kind().items():
+        if kind.doubts is not None and any(form.stem in cohort.further for form in kind.forms):
+            module, _, function = kind.doubts.partition(":")
+            found += getattr(import_module(f"{PACKAGE}.{name}.{module}"), function)(cohort)
+    return tuple(dict.fromkeys(found))
+
+
+def doubts(cohort: Cohort) -> tuple[InputProblem, ...]:
+    """What is most likely wrong with a validated cohort, and no run is stopped by.
+
+    That is all that cannot be certain, and what is but was meant.
+    """
+    return tuple(one.problem for one in suspicions(cohort) if not _refused(cohort, one))
+
+
+def refusals(cohort: Cohort) -> tuple[InputProblem, ...]:
+    """What cannot be right in a validated cohort, and is not said to be meant."""
+    return tuple(one.with_switch for one in suspicions(cohort) if _refused(cohort, one))
+
+
+def _refused(cohort: Cohort, one: PlausibilityWarning) -> bool:
+    return one.certain and one.group not in cohort.i_mean_it

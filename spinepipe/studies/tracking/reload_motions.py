@@ -1,0 +1,61 @@
+"""Tracked motions as arrays again, from rows of the table; and what a motion is about."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.effects.contract import Array
+from spinepipe.motion.skeleton import BODIES, JOINTS
+from spinepipe.studies.tracking.tables import PELVIS
+from spinepipe.units import COORDINATE_COLUMNS, DISPLAY_PER_SI
+
+IN_ORDER = (PELVIS, *JOINTS)
+"""Of the rows of a frame, as bodies are in a posture."""
+
+AXIS = {"flexion_extension": 0, "lateral_bending": 1, "axial_rotation": 2}
+"""Rotation that a kind of motion is about, among extension, right bending and left rotation."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReloadedMotions:
+    """A motion as an approach found it.
+
+    Attributes
+    ----------
+    specimen, trial, approach : of what. time_s : (F,). q : (F, 18, 6) m and rad.
+    """
+
+    specimen: str
+    trial: str
+    approach: str
+    time_s: Array
+    q: Array
+
+    def at(self, time_s: Array) -> Array:
+        """(N, 18, 6) between frames, straight; one frame alone holds for all times."""
+        flat = self.q.reshape(len(self.q), -1)
+        found = np.array([np.interp(time_s, self.time_s, column) for column in flat.T])
+        return found.T.reshape(len(time_s), *self.q.shape[1:])
+
+
+def motions(tracked: pd.DataFrame) -> Iterator[ReloadedMotions]:
+    """All motions of table `tracked`, in its order."""
+    number = {name: k for k, name in enumerate(IN_ORDER)}
+    for key, rows in tracked.groupby(["specimen", "trial", "approach"], sort=False, observed=True):
+        specimen, trial, approach = (str(part) for part in key)
+        order = np.lexsort((rows["joint"].map(number).to_numpy(), rows["frame"].to_numpy()))
+        q = rows[list(COORDINATE_COLUMNS)].to_numpy(float)[order] / DISPLAY_PER_SI
+        times = rows["time_s"].to_numpy(float)[order][:: len(BODIES)]
+        yield ReloadedMotions(
+            specimen, trial, approach, times, q.reshape(-1, len(BODIES), len(q.T))
+        )
+
+
+def kinds_of_trials(cohort: Cohort) -> dict[tuple[str, str], str]:
+    """Kind of motion by specimen and trial."""
+    rows = cohort.further["trials"]
+    named = zip(rows["specimen"], rows["trial"], rows["kind"], strict=True)
+    return {(str(who), str(trial)): str(kind) for who, trial, kind in named}
