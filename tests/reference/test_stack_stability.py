@@ -167,7 +167,7 @@ def test_no_mode_lies_below_the_rate_where_the_form_loses_its_sign(n_joints: int
             stack.chains, part(stack.loads, np.array([lane])), q[[lane]], tangents[[lane]]
         )
         for factor, apart in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
-            assert lanes.apart(np.array([factor * highest])).tolist() == [apart]
+            assert lanes.is_positive_definite(np.array([factor * highest])).tolist() == [apart]
 
 
 @sweep("n_joints", [1, 2, 5])

@@ -143,7 +143,7 @@ class Bound:
         flat = q.reshape(-1, 6)
         if not self.geometry:
             return JointKinematics(flat, NOTHING, NOTHING, {})
-        return place(flat, self.geometry, with_parameters=False)
+        return place(flat, self.geometry, by_parameters=False)
 
     def held(self, q: Array) -> Holding:
         """Loads (N, J, 6) and tangents (N, J, 6, 6) of the joints at q (N, J, 6)."""
