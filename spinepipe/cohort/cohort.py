@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pandas as pd
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
+from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 
 from spinepipe.documents.names import EVERYONE, LONGEST_NAME
 
 Group = Literal["lengths", "postures", "masses", "loads", "motion", "zeroing", "errors", "persons"]
-"""What can be meant though it looks wrong: ``i_mean_it`` in cohort.yaml."""
+"""What can be meant though it looks wrong: ``acknowledged_warnings`` in cohort.yaml."""
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
@@ -91,8 +91,9 @@ class CohortHeader(BaseModel):
     measurement_sd: MeasurementSd | None = Field(
         default=None, description="standard deviations of one reading, may be left out"
     )
-    i_mean_it: Annotated[tuple[Group, ...], Field(strict=False)] = Field(
+    acknowledged_warnings: Annotated[tuple[Group, ...], Field(strict=False)] = Field(
         default=(),
+        validation_alias=AliasChoices("acknowledged_warnings", "i_mean_it"),  # as files had it
         description="what looks impossible and is meant: lengths, postures, masses, loads, motion, "
         "zeroing, errors, persons; such refusals of the plausibility checks become warnings",
     )
@@ -128,7 +129,7 @@ class Cohort:
     made_up : whether nobody was measured.
     further : tables that a kind of study reads besides, by the stem of their file; rows keep the
         number of their line in it.
-    i_mean_it : groups of what looks impossible and is meant.
+    acknowledged_warnings : groups of what looks impossible and is meant.
     digest : sha256 over the names and bytes of the files that were read.
     """
 
@@ -151,7 +152,7 @@ class Cohort:
     supports: pd.DataFrame | None = None
     preload: pd.DataFrame | None = None
     made_up: bool = False
-    i_mean_it: tuple[Group, ...] = ()
+    acknowledged_warnings: tuple[Group, ...] = ()
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -254,7 +254,7 @@ def _cohort(
         supports=final.get("supports"),
         preload=final.get("preload"),
         made_up=header.made_up,
-        i_mean_it=header.i_mean_it,
+        acknowledged_warnings=header.acknowledged_warnings,
         digest=_digest(folder, forms),
         further={stem: table for stem, table in tables.items() if stem not in TABLES},
     )

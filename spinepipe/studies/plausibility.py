@@ -38,4 +38,4 @@ def refusals(cohort: Cohort) -> tuple[InputProblem, ...]:
 
 
 def _refused(cohort: Cohort, one: PlausibilityWarning) -> bool:
-    return one.certain and one.group not in cohort.i_mean_it
+    return one.certain and one.group not in cohort.acknowledged_warnings

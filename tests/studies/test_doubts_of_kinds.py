@@ -164,7 +164,7 @@ def test_lengths_of_films_are_refused_unless_meant(sound: dict[str, Path], tmp_p
         table[CENTRE[:2]] *= 0.1
         table.to_csv(folder / FILMS, index=False)
         header = yaml.safe_load((folder / "cohort.yaml").read_text())
-        header |= {"i_mean_it": ["lengths"]} if meant else {}
+        header |= {"acknowledged_warnings": ["lengths"]} if meant else {}
         (folder / "cohort.yaml").write_text(yaml.safe_dump(header))
         refused = refusals(cohorts.read(folder, every_form()))
         assert len(refused) == (0 if meant else 1)

@@ -149,7 +149,7 @@ def test_a_spine_of_another_unit_is_refused_with_its_factor(
     (refused,) = refusals(cohort)
     assert words in refused.remedy
     assert (refused.file, refused.row) == ("linear_spines/joints.csv", 2)
-    assert "i_mean_it: [lengths]" in refused.remedy
+    assert "acknowledged_warnings: [lengths]" in refused.remedy
 
 
 def test_what_is_meant_is_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -158,15 +158,25 @@ def test_what_is_meant_is_a_warning(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert main(["--root", str(tmp_path), "check", "linear_spines"]) == 1
     assert "FAIL" in capsys.readouterr().out
     header = yaml.safe_load((folder / "cohort.yaml").read_text())
-    (folder / "cohort.yaml").write_text(yaml.safe_dump({**header, "i_mean_it": ["lengths"]}))
+    (folder / "cohort.yaml").write_text(
+        yaml.safe_dump({**header, "acknowledged_warnings": ["lengths"]})
+    )
     assert main(["--root", str(tmp_path), "check", "linear_spines"]) == 0
     assert "multiplied by 10" in capsys.readouterr().out
-    (folder / "cohort.yaml").write_text(yaml.safe_dump({**header, "i_mean_it": ["masses"]}))
+    (folder / "cohort.yaml").write_text(yaml.safe_dump({**header, "i_mean_it": ["lengths"]}))
+    assert main(["--root", str(tmp_path), "check", "linear_spines"]) == 0, "the key's old name"
+    both = {**header, "i_mean_it": ["lengths"], "acknowledged_warnings": ["lengths"]}
+    (folder / "cohort.yaml").write_text(yaml.safe_dump(both))
+    assert main(["--root", str(tmp_path), "check", "linear_spines"]) == 1, "one key, two names"
+    (folder / "cohort.yaml").write_text(
+        yaml.safe_dump({**header, "acknowledged_warnings": ["masses"]})
+    )
     assert main(["--root", str(tmp_path), "check", "linear_spines"]) == 1, "another group"
 
 
-def test_an_unknown_group_is_refused(tmp_path: Path) -> None:
-    change = swap("cohort.yaml", "gravity: true", "gravity: true\ni_mean_it: [length]")
+@pytest.mark.parametrize("key", ["acknowledged_warnings", "i_mean_it"])
+def test_an_unknown_group_is_refused(key: str, tmp_path: Path) -> None:
+    change = swap("cohort.yaml", "gravity: true", f"gravity: true\n{key}: [length]")
     with pytest.raises(InputError) as caught:
         cohorts.read(write_small(tmp_path / "small", change))
     (problem,) = caught.value.problems

@@ -24,7 +24,7 @@ class PlausibilityWarning:
 
     Attributes
     ----------
-    group : what can be meant though it looks wrong: ``i_mean_it`` in cohort.yaml.
+    group : what can be meant though it looks wrong: ``acknowledged_warnings`` in cohort.yaml.
     certain : it cannot be right; no run starts with it unless the cohort says that it is meant.
     """
 
@@ -36,7 +36,9 @@ class PlausibilityWarning:
     def with_switch(self) -> InputProblem:
         """The problem, with what to write where it is meant."""
         told = self.problem
-        remedy = f"{told.remedy} (if you mean it: i_mean_it: [{self.group}] in cohort.yaml)"
+        remedy = (
+            f"{told.remedy} (if you mean it: acknowledged_warnings: [{self.group}] in cohort.yaml)"
+        )
         place = (told.file, told.row, told.column)
         return InputProblem(*place, told.found, told.allowed, remedy)
 
