@@ -14,6 +14,7 @@ from typing import Any
 from benchmarks import (
     cohort,
     commands,
+    digests,
     discrepancy,
     engine,
     equilibria,
@@ -43,6 +44,7 @@ def main() -> None:
         "lost_fits": lost_fits_parts,
         "whole_study": whole_study,
         "cohort": cohort_parts,
+        "digests": lambda: print(digests.sizes(), flush=True),
         "discrepancy": lambda: discrepancy_parts(options.small),
         "films": films_part,
         "many_spines": many_spines_part,

@@ -4,7 +4,8 @@ Imports are followed where they are written. Of a file that names the tables of 
 only the names that are imported count, and of that file the rows of these tables, without words: a
 result hangs on what its own columns are called and hold, not on what they mean to a reader. An
 effect counts where its name is written, or where all of them are asked for; a row of ``facts.csv``
-where its fact is named, without its source; ``forms.yaml`` without its words.
+where its fact is named, without its source; ``forms.yaml`` without its words. What reads and checks
+studies and cohorts does not count (`DIGESTED`).
 
 Snakemake does not see imported modules. What a file imports and means is worked out once and kept
 beside Snakemake's own state, known by size and time of change as Python knows its bytecode.
@@ -39,6 +40,14 @@ _ALL_DECLARED = "spinepipe.schema.all_declared"
 _TABLE = "#"
 """Between a folder and a table of its ``tables.csv``, or ``*`` for all of them."""
 
+DIGESTED = frozenset(
+    f"spinepipe.{name}" for name in ("studies.read", "cohort.read", "jobs.digest", "jobs.code")
+)
+"""Modules that are not followed: settings and cohort count as they were read, value by value, so
+that a check or its words may change and nothing is computed again. What tells digests decides of
+no result.
+"""
+
 _DATA_SUFFIXES = (".toml", ".csv", ".yaml", ".json", ".html", ".css")
 _KEPT = _ROOT / ".snakemake" / "spinepipe-used-code.json"
 """What is known of files; may be deleted at any time."""
@@ -67,7 +76,7 @@ def code_digest(module: str) -> str:
     found = closure(module)
     lines = [f"{name} {_meaning(name)}" for name in sorted(found)]
     words = {word for name in found if _TABLE not in name for word in _piece(name).uses}
-    for path in _data_files(found):
+    for path in _data_files(code_files(module)):
         lines += _facts_named(path, words) if path.name == FACTS else [_data_digest(path)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
@@ -86,6 +95,13 @@ def closure(module: str) -> frozenset[str]:
             found.add(name)
             waiting.extend(_used(name))
     return frozenset(found)
+
+
+def code_files(module: str) -> set[Path]:
+    """Files of code that the digest of a module holds, whole or in part."""
+    names = (name for name in closure(module) if _TABLE not in name)
+    found = (_source(name) or _source(name.rpartition(".")[0]) for name in names)
+    return {path for path in found if path is not None}
 
 
 @cache
@@ -139,6 +155,8 @@ def _used(name: str) -> frozenset[str]:
     found: set[str] = set()
     for used in _piece(name).uses:
         base, _, last = used.rpartition(".")
+        if used in DIGESTED or base in DIGESTED:
+            continue
         if _TABLE in used:
             found.add(used)
         elif used == _ALL_EFFECTS:
@@ -279,13 +297,9 @@ def _is_cosmetic(node: ast.stmt) -> bool:
     )
 
 
-def _data_files(names: frozenset[str]) -> list[Path]:
-    """Data files beside the modules, in a fixed order; of tables only those that are used count."""
-    modules = (name for name in names if _TABLE not in name)
-    sources = (_source(name) or _source(name.rpartition(".")[0]) for name in modules)
-    files = (
-        file for folder in {path.parent for path in sources if path} for file in folder.iterdir()
-    )
+def _data_files(sources: set[Path]) -> list[Path]:
+    """Data files beside modules, in a fixed order; of tables only those that are used count."""
+    files = (file for folder in {path.parent for path in sources} for file in folder.iterdir())
     return sorted(file for file in files if file.suffix in _DATA_SUFFIXES and file.name != FILE)
 
 

@@ -153,7 +153,7 @@ def provenance(
         "kind": study.kind,
         "seed": str(getattr(study, "seed", "")),
         "data_digest": _data_digest(cohort, specimens),
-        name: _data_digest(cohort, specimens),
+        name: cohort.digest if specimens is None else cohort.digest_of(specimens),
         "config_digest": value_digest(settings),
         "code_digest": _code(study, job),
         KEY: digest_of(job, study, cohort, specimens, others),
@@ -166,4 +166,7 @@ def _code(study: Study, job: str) -> str:
 
 
 def _data_digest(cohort: Cohort, specimens: Sequence[str] | None) -> str:
-    return cohort.digest if specimens is None else cohort.digest_of(specimens)
+    """Of the specimens' data as they were read; of a whole cohort its files too, words and all."""
+    if specimens is None:
+        return value_digest(cohort.digest, cohort.digest_of(cohort.specimen_names))
+    return cohort.digest_of(specimens)

@@ -45,6 +45,15 @@ def test_a_job_hangs_on_the_tables_that_it_writes_and_on_none_of_another_kind() 
             assert not {f"{own}*", f"spinepipe.studies.{kind}.tables"} & used, job.name
 
 
+def test_what_reads_and_checks_is_in_no_digest() -> None:
+    """Its values are: a rule of input that is added computes nothing again."""
+    reading = {"spinepipe.cohort.checks", "spinepipe.studies.read", "spinepipe.jobs.code"}
+    for kind, declared in every_kind().items():
+        for job in declared.jobs:
+            used = code.closure(place_of(kind, job.name).partition(":")[0])
+            assert not reading & used, job.name
+
+
 def test_what_was_kept_gives_the_same_digest(kept: Path) -> None:
     fresh = code.code_digest(MODULE)
     code.keep()

@@ -3,6 +3,7 @@
 Catches stale files that are joined, and files made anew though nothing of theirs changed.
 """
 
+import dataclasses
 import re
 import shutil
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from mistaken_cohorts import good
 from spinepipe.jobs import collect, inputs
 from spinepipe.jobs.block import run_joined
 from spinepipe.jobs.collect import StaleFile
+from spinepipe.jobs.digest import digest_of
 from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import DamagedFile, read_mark
@@ -172,6 +174,19 @@ def test_a_changed_number_of_a_specimen_changes_what_it_makes_and_is_joined_to(r
 def test_the_title_of_the_cohort_changes_no_job_file(root: Path) -> None:
     cohort = root / "config/cohorts/stack/cohort.yaml"
     assert changed(lambda: expected(root), lambda: replace(cohort, "stacked", "piled")) == set()
+
+
+def test_numbers_count_as_they_were_read(tmp_path: Path) -> None:
+    """Also of a whole cohort, where the code that reads them has changed and no byte of a file."""
+    shutil.copytree(ROOT / "config", tmp_path / "config")
+    study, cohort = check(tmp_path, "l4l5_disc")
+    assert cohort.motion is not None
+    other = cohort.motion.assign(extension_deg=cohort.motion["extension_deg"] * (1.0 + 1e-15))
+    marks = {
+        digest_of("search", study, dataclasses.replace(cohort, motion=motion))
+        for motion in (cohort.motion, other)
+    }
+    assert len(marks) == 2
 
 
 def test_what_all_specimens_share_changes_all(root: Path) -> None:
