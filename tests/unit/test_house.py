@@ -50,7 +50,7 @@ ROOMS = (
         "tables",
         "comparison",
     ),
-    *("studies", "report", "jobs", "kinds", "reference", "cli"),
+    *("studies", "report", "jobs", "kinds", "api", "reference", "cli"),
 )
 """Ground floor first; a room imports only itself and rooms before it.
 
