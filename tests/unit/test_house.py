@@ -205,7 +205,7 @@ def test_a_room_knows_only_rooms_before_it() -> None:
     wrong = []
     for path in MODULES:
         room = room_of(dotted(path))
-        allowed = ROOMS[: ROOMS.index(room) + 1] if room else ()
+        allowed = ROOMS[: ROOMS.index(room) + 1] if room else ROOMS  # what notebooks use
         wrong += [
             f"{dotted(path)}:{line}: {name}"
             for line, name in imports(path)
