@@ -272,8 +272,11 @@ def keep() -> None:
 
 
 def _parents(module: str) -> list[str]:
+    """The packages that a module is in, without ``spinepipe`` itself, which names what notebooks
+    use and does nothing.
+    """
     parts = module.split(".")
-    return [".".join(parts[:count]) for count in range(1, len(parts))]
+    return [".".join(parts[:count]) for count in range(2, len(parts))]
 
 
 def _absolute(module: str, node: ast.ImportFrom) -> str:

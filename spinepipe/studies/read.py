@@ -5,7 +5,7 @@ Whatever is wrong is told at once, with file, line, what was found, what is allo
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
 
@@ -57,6 +57,24 @@ def load(path: Path, root: Path) -> tuple[YamlDocument | None, Study | None, lis
         return None, None, problems
     study, faults = _validated(document)
     return document, study, [*problems, *faults, *_name_problems(document, path.stem)]
+
+
+def of_data(data: dict[str, Any], cohort: Cohort, called: str) -> Study:
+    """A study that no file holds, of a cohort that was read; ``called`` is its name in messages.
+
+    Raises
+    ------
+    InputError
+        With every problem of the settings, else with every way in which the two do not fit.
+    """
+    document = YamlDocument(called, data, {})
+    study, problems = _validated(document)
+    if study is not None and not problems:
+        study = _settled(study, cohort)
+        problems = _misfits(document, study, cohort, Path.cwd(), at_start=False)
+    if study is None or problems:
+        raise InputError(problems)
+    return study
 
 
 def displayed(path: Path, root: Path) -> str:

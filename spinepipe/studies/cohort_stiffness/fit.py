@@ -64,8 +64,29 @@ def run(
     And what was fitted beside: errors of joint centres and axes.
     """
     settings, cohort = study_of_kind(CohortStiffness, root, study)
-    tests = specimen_tests(settings, cohort, specimen)
     others = base_effects(root, settings, cohort, specimen)
+    rows = fitted(settings, cohort, specimen, representation, fitted_to, others)
+    made = origin("fit", root, settings, cohort, [specimen])
+    paths = {STIFFNESS: stiffness, FITS: fits, ERRORS: errors, NUISANCES: nuisances}
+    for table, path in paths.items():
+        write(from_rows(table.without(*IN_FOLDERS), rows[table.name]), path, made)
+
+
+def fitted(
+    settings: CohortStiffness,
+    cohort: Cohort,
+    specimen: str,
+    representation: str,
+    fitted_to: str,
+    others: tuple[ScopedEffect, ...] = (),
+) -> dict[str, list[Row]]:
+    """Rows of the tables ``stiffness``, ``fits``, ``errors`` and ``nuisances`` of one fit.
+
+    Parameters
+    ----------
+    fitted_to : a test, ``all``, or ``all_but_<test>``. others : effects besides the bushings.
+    """
+    tests = specimen_tests(settings, cohort, specimen)
     beside: tuple[ScopedEffect, ...] = ()
     told: list[Row] = []
     where = specimen, representation, fitted_to
@@ -83,11 +104,12 @@ def run(
     labelled = [
         {**row, "source": "own", "stage": tests.stage(row["test"], fitted_to)} for row in seen
     ]
-    made = origin("fit", root, settings, cohort, [specimen])
-    write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, made)
-    write(from_rows(FITS.without(*IN_FOLDERS), [record]), fits, made)
-    write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, made)
-    write(from_rows(NUISANCES.without(*IN_FOLDERS), told), nuisances, made)
+    return {
+        STIFFNESS.name: rows,
+        FITS.name: [record],
+        ERRORS.name: labelled,
+        NUISANCES.name: told,
+    }
 
 
 def _fit(

@@ -9,6 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.model import ScopedEffect
 from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
 from spinepipe.studies.cohort_stiffness.predict import error_rows
@@ -40,27 +41,47 @@ def run(
 ) -> None:
     """Write the median of the other specimens' stiffness and the errors it leaves."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
+    rows = predicted_by_others(
+        *(settings, cohort, specimen, representation, fitted_to),
+        [read_frame(path) for path in others],
+        base_effects(root, settings, cohort, specimen, left_out=True),
+        seen_note(root, settings, cohort, specimen),
+    )
+    read = [mark_of(path) for path in others]
+    made = origin("left_out", root, settings, cohort, [specimen], read)
+    for table, path in ((STIFFNESS, stiffness), (ERRORS, errors)):
+        write(from_rows(table.without(*IN_FOLDERS), rows[table.name]), path, made)
+
+
+def predicted_by_others(
+    settings: CohortStiffness,
+    cohort: Cohort,
+    specimen: str,
+    representation: str,
+    fitted_to: str,
+    others: list[pd.DataFrame],
+    beside: tuple[ScopedEffect, ...] = (),
+    note: str = "",
+) -> dict[str, list[dict[str, Any]]]:
+    """Rows of the tables ``stiffness`` and ``errors`` of a specimen that no fit has seen.
+
+    Parameters
+    ----------
+    others : rows of ``stiffness`` of each other specimen's own fit. beside : effects besides the
+        bushings. note : to be told of the stiffness.
+    """
     tests = specimen_tests(settings, cohort, specimen)
-    found = [read_frame(path) for path in others]
-    k, growth, used = _median(settings, cohort, representation, found)
-    note = seen_note(root, settings, cohort, specimen)
+    k, growth, used = _median(settings, cohort, representation, others)
     rows = _stiffness(settings, cohort, k, growth, used, len(others), note)
     within = {one.case.test for one in tests.fitted_to(fitted_to)}
-    effects = (
-        *laws(settings, growth),
-        *base_effects(root, settings, cohort, specimen, left_out=True),
-    )
+    effects = (*laws(settings, growth), *beside)
     seen = [] if not used else error_rows(cohort, specimen, tests, k, effects)
     labelled = [
         {**row, "source": SOURCE, "stage": "left_out_specimen"}
         for row in seen
         if row["test"] in within
     ]
-    made = origin(
-        "left_out", root, settings, cohort, [specimen], [mark_of(path) for path in others]
-    )
-    write(from_rows(STIFFNESS.without(*IN_FOLDERS), rows), stiffness, made)
-    write(from_rows(ERRORS.without(*IN_FOLDERS), labelled), errors, made)
+    return {STIFFNESS.name: rows, ERRORS.name: labelled}
 
 
 def _median(

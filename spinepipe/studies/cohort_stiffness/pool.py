@@ -68,16 +68,40 @@ def run(
 ) -> None:
     """Write what the pooled fit says of its specimens, or of the one that was left out."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
-    fitted = [name for name in cohort.specimen_names if name != without]
     others = {
         name: base_effects(root, settings, cohort, name, left_out=name == without)
         for name in cohort.specimen_names
     }
+    note = "" if without == NOBODY else seen_note(root, settings, cohort, without)
+    rows = pooled(settings, cohort, representation, fitted_to, without, others, note)
+    made = origin("pool", root, settings, cohort)
+    paths = {STIFFNESS: stiffness, ERRORS: errors, FITS: fits, POOLING: pooling}
+    for table, path in paths.items():
+        shape = table.without(*IN_POOLED, *(("without",) if table is POOLING else ()))
+        write(from_rows(shape, rows[table.name]), path, made)
+
+
+def pooled(
+    settings: CohortStiffness,
+    cohort: Cohort,
+    representation: str,
+    fitted_to: str,
+    without: str,
+    others: Mapping[str, tuple[ScopedEffect, ...]],
+    note: str = "",
+) -> dict[str, list[Row]]:
+    """Rows of the tables ``stiffness``, ``errors``, ``fits`` and ``pooling`` of one pooled fit.
+
+    Parameters
+    ----------
+    without : the specimen that is left out, of which alone the rows then are; or ``nobody``.
+    others : effects of each specimen besides the bushings. note : to be told of a newcomer's.
+    """
+    fitted = [name for name in cohort.specimen_names if name != without]
     problems, refusals = _problems(settings, cohort, representation, fitted, fitted_to, others)
     asked = list(problems.values())
     found = pooled_ended(asked, pool(asked)) if asked else None
     everyone = without == NOBODY
-    note = "" if everyone else seen_note(root, settings, cohort, without)
     rows = PooledRows(
         *(settings, cohort, representation, fitted_to, problems, refusals, found, others, note)
     )
@@ -87,12 +111,12 @@ def run(
     records = [rows.record(name) for name in told] if everyone else []
     source = "own" if everyone else "others_pooled"
     by = {"source": source}
-    made = origin("pool", root, settings, cohort)
-    shapes = [table.without(*IN_POOLED) for table in (STIFFNESS, ERRORS, FITS)]
-    write(from_rows(shapes[0], [{**row, **by} for row in values]), stiffness, made)
-    write(from_rows(shapes[1], [{**row, **by} for row in seen]), errors, made)
-    write(from_rows(shapes[2], records), fits, made)
-    write(from_rows(POOLING.without(*IN_POOLED, "without"), rows.pooling()), pooling, made)
+    return {
+        STIFFNESS.name: [{**row, **by} for row in values],
+        ERRORS.name: [{**row, **by} for row in seen],
+        FITS.name: records,
+        POOLING.name: rows.pooling(),
+    }
 
 
 def _problems(

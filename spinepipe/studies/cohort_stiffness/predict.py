@@ -11,7 +11,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.model import RefusedModel, ScopedEffect
+from spinepipe.model import LoadCase, RefusedModel, ScopedEffect, SpineModel
 from spinepipe.statics.batched import Stack, readings
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven, stiff_model
@@ -40,7 +40,19 @@ def predicted(
         model = stiff_model(cohort, specimen, frames, k, others)
     except RefusedModel as error:
         return [(None, Status.REFUSED, str(error)) for _ in tested]
-    stack = Stack.of([model], [(0, one.case) for one in tested])
+    return motions(model, [one.case for one in tested], cohort.zeroed_at_step_0)
+
+
+def motions(
+    model: SpineModel, cases: Sequence[LoadCase], zeroed: bool
+) -> list[tuple[Array | None, Status, str]]:
+    """(T, J, 6) m and rad of each case as it would be measured, or why there is none.
+
+    Parameters
+    ----------
+    zeroed : whether motion counts from step 0.
+    """
+    stack = Stack.of([model], [(0, case) for case in cases])
     poses = stack.solve()
     seen = readings(stack, poses.q)
     found: list[tuple[Array | None, Status, str]] = []
@@ -49,7 +61,7 @@ def predicted(
         if lost is not None:
             found.append((None, Status(poses.status[lost]), poses.messages[lost]))
         else:
-            motion = subtract_baseline(seen[first:end], cohort.zeroed_at_step_0)
+            motion = subtract_baseline(seen[first:end], zeroed)
             found.append((motion, Status.CONVERGED, ""))
     return found
 

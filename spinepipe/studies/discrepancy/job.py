@@ -126,7 +126,9 @@ def run(
     """
     settings, cohort = study_of_kind(Discrepancy, root, study)
     store = Store(Path(verdict).parent / STORE, __name__, threads)
-    results = searched(settings, cohort, root, store, Progress(partial(_say, study)))
+    base = settings.base.model
+    file = None if base is None else read_model(Path(root) / base)
+    results = searched(settings, cohort, file, store, Progress(partial(_say, study)))
     metadata = provenance(JOB, settings, cohort, None, base_marks(root, settings.base.model))
     files = {
         gap: GAP,
@@ -158,12 +160,16 @@ def _say(study: str, line: str) -> None:
 def searched(
     study: Discrepancy,
     cohort: Cohort,
-    root: str,
+    file: ModelFile | None,
     run: PieceRunner,
     progress: Progress | None = None,
 ) -> DiscrepancyResults:
-    """All that the files of a study hold, whether or not its base has a fit."""
-    file = None if study.base.model is None else read_model(Path(root) / study.base.model)
+    """All that the files of a study hold, whether or not its base has a fit.
+
+    Parameters
+    ----------
+    file : the model that the study starts from, where it is a file. run : of the pieces of work.
+    """
     ready = prepared(study, cohort, file)
     try:
         ended = investigate(ready, run, progress)

@@ -96,16 +96,28 @@ def run(
     read = [mark_of(path) for path in (design, *responses, *calibrated)]
     made_by = provenance("analyse", settings, cohort, [specimen], read)
     drawn = design_of(settings)
-    each = [_analysed(settings, drawn, one) for one in outputs]
-    for place, (table, path) in enumerate(((INDICES, indices), (CONVERGENCE, convergence))):
-        own = table.without("specimen")
-        parts = [part for found in each for part in found[place]]
-        names = [column.name for column in own.columns]
-        columns = {name: list(chain.from_iterable(part[name] for part in parts)) for name in names}
-        write(to_arrow(own, columns), path, made_by)
+    rows = analysed(settings, drawn, outputs)
+    for table, path in zip(rows, (indices, convergence), strict=True):
+        write(table, path, made_by)
     values = drawn_values(design, settings, slice(None)) * np.array(settings.per_si)
     failed = list(failed_rows(drawn, values, settings.units, responses, calibrated))
     write(from_rows(FAILED_RUNS.without("specimen"), failed), failed_runs, made_by)
+
+
+def analysed(
+    settings: GlobalSensitivity, design: Design, outputs: Sequence[OutputGroup]
+) -> tuple[pa.Table, pa.Table]:
+    """The tables ``indices`` and ``convergence`` of one specimen."""
+    each = [_analysed(settings, design, one) for one in outputs]
+    tables = []
+    for place, table in enumerate((INDICES, CONVERGENCE)):
+        own = table.without("specimen")
+        parts = [part for found in each for part in found[place]]
+        columns = {
+            name: list(chain.from_iterable(part[name] for part in parts)) for name in own.names
+        }
+        tables.append(to_arrow(own, columns))
+    return tables[0], tables[1]
 
 
 def _analysed(
@@ -170,14 +182,20 @@ def _repeated(count: int, **values: Any) -> Columns:
 
 def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[OutputGroup]:
     """Outputs of each test and step from the blocks of a specimen's responses."""
-    if not (study.outputs.motion or study.outputs.joint_load):
-        return
+    if study.outputs.motion or study.outputs.joint_load:
+        columns = [_MOTION[name] for name in study.outputs.motion]
+        columns += [_LOAD[name] for name in study.outputs.joint_load]
+        asked = ["sample", "test", "step", "joint", "status", *columns]
+        yield from outputs_of(_rows(blocks, asked), study)
+
+
+def outputs_of(rows: pa.Table, study: GlobalSensitivity) -> Iterator[OutputGroup]:
+    """Outputs of each test and step from all responses of a specimen, sample by sample."""
     kinds = {
         "motion": {name: _MOTION[name] for name in study.outputs.motion},
         "joint_load": {name: _LOAD[name] for name in study.outputs.joint_load},
     }
     columns = [column for kind in kinds.values() for column in kind.values()]
-    rows = _rows(blocks, ["sample", "test", "step", "joint", "status", *columns])
     head = rows.filter(pc.equal(rows["sample"], rows["sample"][0])).to_pylist()
     per_sample = len(head)
     good = np.array(pc.equal(rows["status"], Status.CONVERGED.value)).reshape(-1, per_sample)

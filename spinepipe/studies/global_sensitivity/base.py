@@ -53,6 +53,17 @@ NOISES = 2.0
 def run(root: str, study: str, specimen: str, base_stiffness: str, base_motion: str) -> None:
     """Write the stiffness of one specimen, and its motion beside the measured one."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
+    rows, moved = base(settings, cohort, specimen)
+    made_by = provenance("base", settings, cohort, [specimen])
+    for table, found, path in (
+        (BASE_STIFFNESS, rows, base_stiffness),
+        (BASE_MOTION, moved, base_motion),
+    ):
+        write(_table(table, found), path, made_by)
+
+
+def base(settings: GlobalSensitivity, cohort: Cohort, specimen: str) -> tuple[Rows, Rows]:
+    """Rows of the tables ``base_stiffness`` and ``base_motion`` of one specimen."""
     given = stiffness_of_joints(cohort, settings.start_stiffness, settings.level_stiffness)
     damping = np.array(settings.damping.in_order())
     tests = settings.chosen_tests(cohort)
@@ -62,13 +73,12 @@ def run(root: str, study: str, specimen: str, base_stiffness: str, base_motion: 
     if settings.is_fitted:
         stiffness[:] = [row["stiffness"] for row in rows]
     model = start_of(cohort, specimen, stiffness, damping, tests, all_steps=False).model
-    moved = list(_beside_measured(cohort, model, tests))
-    made_by = provenance("base", settings, cohort, [specimen])
-    for table, found, path in (
-        (BASE_STIFFNESS, rows, base_stiffness),
-        (BASE_MOTION, moved, base_motion),
-    ):
-        write(_table(table, found), path, made_by)
+    return rows, list(_beside_measured(cohort, model, tests))
+
+
+def stiffness_of(rows: Rows) -> Array:
+    """(6,) N/m and N m/rad of all joints, from rows of ``base_stiffness``."""
+    return np.array([row["stiffness"] for row in rows if row["joint"] == EVERY])
 
 
 def _table(table: Table, rows: Rows) -> Any:

@@ -5,9 +5,8 @@ import pyarrow as pa
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.sensitivity.global_indices.spread import values_of
-from spinepipe.studies.global_sensitivity.drawn import design_of
-from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
+from spinepipe.studies.global_sensitivity.drawn import drawn_in_units
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import DESIGN
 from spinepipe.tables import to_arrow, write
 
@@ -15,8 +14,7 @@ from spinepipe.tables import to_arrow, write
 def run(root: str, study: str, output: str) -> None:
     """Write ``design.parquet``: sample by sample, factor by factor."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
-    design = design_of(settings)
-    values = values_of(design, spreads_of(settings)) * np.array(settings.per_si)
+    values = drawn_in_units(settings)
     samples, count = values.shape
     columns = {
         "sample": np.repeat(np.arange(samples), count),

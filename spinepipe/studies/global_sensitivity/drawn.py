@@ -7,7 +7,8 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.sensitivity.global_indices.design import Design, draw
-from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.sensitivity.global_indices.spread import values_of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
 from spinepipe.tables import read
 
 
@@ -26,6 +27,12 @@ def design_of(study: GlobalSensitivity) -> Design:
         harmonics=own.harmonics,
         dummy=study.dummy,
     )
+
+
+def drawn_in_units(study: GlobalSensitivity) -> Array:
+    """(n, D) values of all samples as ``design.parquet`` has them: mm, deg or multipliers."""
+    values: Array = values_of(design_of(study), spreads_of(study)) * np.array(study.per_si)
+    return values
 
 
 def drawn_values(path: str, study: GlobalSensitivity, part: slice) -> Array:

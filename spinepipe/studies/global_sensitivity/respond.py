@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.statics.batched import ManySolved, solve_many
@@ -44,11 +45,7 @@ def run(
     every = settings.steps == "all"
     for path, place in parts.items():
         one = batch_of(root, settings, cohort, design, base, specimen, int(place["batch"]), every)
-        asked = tuple(zip(one.varied.cases, one.start.tests, strict=True))
-        found = [solve_many(one.varied.spines, cases, test.needed) for cases, test in asked]
-        solved = [_rows(one, *both) for both in zip(one.start.tests, found, strict=True)]
-        columns = _columns(one, cohort.joint_names, solved)
-        by_engine = np.concatenate([many.by_engine for many in found])
+        columns, by_engine = responses(one, cohort.joint_names)
         handed = {HANDED_OVER: f"{by_engine.sum() / max(len(by_engine), 1):.4f}"}
         if by_engine.any():
             print(
@@ -57,6 +54,15 @@ def run(
                 file=sys.stderr,
             )
         write(to_arrow(TABLE, columns), path, made_by | handed)
+
+
+def responses(batch: Batch, joints: Sequence[str]) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """Columns of the table ``responses`` of a batch, and which runs the engine of record solved."""
+    asked = tuple(zip(batch.varied.cases, batch.start.tests, strict=True))
+    found = [solve_many(batch.varied.spines, cases, test.needed) for cases, test in asked]
+    solved = [_rows(batch, *both) for both in zip(batch.start.tests, found, strict=True)]
+    by_engine = np.concatenate([many.by_engine for many in found])
+    return _columns(batch, joints, solved), by_engine
 
 
 class _Rows:

@@ -1,0 +1,144 @@
+"""Which physics a model of a cohort lacks."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import pandas as pd
+
+from spinepipe.api.result import Result, frame
+from spinepipe.api.study import Say, model_path, silent, study_of
+from spinepipe.cohort import Cohort
+from spinepipe.model.file import ModelFile, read_model
+from spinepipe.progress import Progress
+from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
+from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.store import at_once
+from spinepipe.studies.discrepancy.tables import CANDIDATES, GAP, HELD_OUT, NEXT_TESTS
+from spinepipe.studies.discrepancy.verdict import Verdict
+
+SENTENCES = {
+    "NAMED": "{names} is missing from the model.",
+    "PART": "{names} is missing from the model, and something without a name besides.",
+    "SET": "One of these is missing; the data do not tell which: {names}.",
+    "NULL": "Nothing is missing that these data could show.",
+    "UNKNOWN": "Something is missing, or wrong in the data, that no effect explains.",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class MissingEffects(Result):
+    """What a search for missing effects came to.
+
+    Attributes
+    ----------
+    table : the effects that are missing for certain: ``name``, ``log_evidence``, coordinates.
+    quality : what the verdict hangs on: noise, threshold, and the misfit with and without.
+    verdict : ``NAMED``, ``PART``, ``SET``, ``NULL`` or ``UNKNOWN``; ``why`` in a sentence.
+    alternatives : effects that the data cannot exclude. not_testable : effects that these tests
+        cannot show, and the test that would. next_tests : tests that would tell more.
+    misfit : measured and predicted motion, with and without the effects.
+    left_out : errors on tests and specimens that the fits did not see.
+    model : the base with its effects; it can be the ``base`` of `spinepipe.calibrate`.
+    """
+
+    verdict: str
+    why: str
+    alternatives: pd.DataFrame
+    not_testable: pd.DataFrame
+    next_tests: pd.DataFrame
+    candidates: pd.DataFrame
+    misfit: pd.DataFrame
+    left_out: pd.DataFrame
+    model: ModelFile
+
+    @property
+    def effects(self) -> pd.DataFrame:
+        """The same as ``table``."""
+        return self.table
+
+
+def find_missing_effects(
+    cohort: Cohort,
+    *,
+    base: Literal["per_specimen", "per_joint"] | ModelFile | Path = "per_specimen",
+    effects: Sequence[str] | None = None,
+    tests: Sequence[str] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    say: Say = silent,
+) -> MissingEffects:
+    """Find where a model and measured motion disagree, and name the effect that is missing.
+
+    The numbers are those of a study of kind ``discrepancy`` with these settings, to the bit.
+
+    Parameters
+    ----------
+    base : linear bushings of one stiffness per specimen or per joint, or a model.
+    effects : names that are tried; all by default, see docs/effects.md.
+    settings : any further keys of such a study, as in its file, such as
+        ``{"measurement_sd": {"rotation_deg": 0.1, "translation_mm": 0.1}}``; they come before the
+        others.
+    say : told how far the search is, such as `print`.
+
+    Raises
+    ------
+    InputError
+        With all that keeps these data from being searched.
+    """
+    words = base if isinstance(base, str) else None
+    with model_path(None if isinstance(base, str) else base) as path:
+        asked = {
+            "base": {"stiffness": words} if path is None else {"model": path},
+            "effects": None if effects is None else list(effects),
+            "tests": None if tests is None else list(tests),
+            **(settings or {}),
+        }
+        study = study_of(Discrepancy, cohort, asked)
+        file = None if path is None else read_model(path)
+    return _result(searched(study, cohort, file, at_once, Progress(say)))
+
+
+def _result(found: DiscrepancyResults) -> MissingEffects:
+    verdict = found.verdict
+    tables = {
+        one.name: frame(one, found.rows.get(one.name, ()))
+        for one in (CANDIDATES, GAP, HELD_OUT, NEXT_TESTS)
+    }
+    named = [
+        {"name": one.name, "log_evidence": one.log_evidence, "spread": one.spread, **one.variant}
+        for one in verdict.effects
+    ]
+    return MissingEffects(
+        headline=_headline(verdict),
+        table=pd.DataFrame(named, columns=None if named else ["name", "log_evidence", "spread"]),
+        quality=pd.DataFrame(_quality(verdict), columns=["quantity", "value", "unit"]),
+        verdict=verdict.verdict.value,
+        why=verdict.why,
+        alternatives=pd.DataFrame([asdict(one) for one in verdict.in_set]),
+        not_testable=pd.DataFrame([asdict(one) for one in verdict.not_testable]),
+        next_tests=tables[NEXT_TESTS.name],
+        candidates=tables[CANDIDATES.name],
+        misfit=tables[GAP.name],
+        left_out=tables[HELD_OUT.name],
+        model=found.model_with_effects,
+    )
+
+
+def _headline(verdict: Verdict) -> str:
+    names = verdict.named or tuple(dict.fromkeys(one.name for one in verdict.in_set))
+    words = ", ".join(name.replace("_", " ") for name in names)
+    sentence = SENTENCES[verdict.verdict.value].format(names=words)
+    return sentence[:1].upper() + sentence[1:]
+
+
+def _quality(verdict: Verdict) -> list[tuple[str, object, str]]:
+    return [
+        ("noise of a rotation", verdict.noise.rotation_sd_deg, "deg"),
+        ("noise of a translation", verdict.noise.translation_sd_mm, "mm"),
+        ("log evidence needed", verdict.threshold.log_evidence, ""),
+        ("misfit without the effects", verdict.rms_residual.base, verdict.rms_residual.unit),
+        ("misfit with them", verdict.rms_residual.with_effects, verdict.rms_residual.unit),
+        ("held out, without", verdict.rms_residual.held_out_base, verdict.rms_residual.unit),
+        ("held out, with", verdict.rms_residual.held_out_with_effects, verdict.rms_residual.unit),
+    ]

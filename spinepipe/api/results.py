@@ -1,0 +1,133 @@
+"""Results of a study that a run wrote: its tables as data frames, and how two runs differ."""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.api.result import with_units
+from spinepipe.jobs.expected import Expected
+from spinepipe.marks import mark_in
+from spinepipe.studies.kind import Kind
+from spinepipe.studies.read import check
+from spinepipe.studies.registry import kind_of
+from spinepipe.tables import read_frame, read_metadata
+
+
+class Results(Mapping[str, pd.DataFrame]):
+    """The tables of a study by name, each read when it is first asked for.
+
+    Attributes
+    ----------
+    path : folder of the results.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self._files = {one.stem: one for one in sorted(self.path.glob("*.parquet"))}
+        if not self._files:
+            self._files = {one.stem: one for one in sorted(self.path.glob("*/*.parquet"))}
+        if not self._files:
+            raise FileNotFoundError(f"{path}: no tables; has the study run?")
+        self._read: dict[str, pd.DataFrame] = {}
+
+    def __getitem__(self, name: str) -> pd.DataFrame:
+        """Rows of a table; units in ``attrs["units"]``."""
+        if name not in self._read:
+            self._read[name] = with_units(self.kind.table(name), read_frame(self._files[name]))
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._files)
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+    @cached_property
+    def kind(self) -> Kind:
+        """The declaration of the kind of study."""
+        return kind_of(self.provenance["kind"])
+
+    @cached_property
+    def provenance(self) -> Mapping[str, str]:
+        """Where the tables come from: study, kind, seed, digests, versions."""
+        return read_metadata(next(iter(self._files.values())))
+
+    @property
+    def tables(self) -> pd.DataFrame:
+        """A row per table: ``name``, ``rows``, and ``what`` a row stands for."""
+        told = [(name, len(self[name]), self.kind.table(name).about) for name in self]
+        return pd.DataFrame(told, columns=["name", "rows", "what"])
+
+    @property
+    def stale(self) -> list[str]:
+        """Tables that settings, data or code of now would make anew; none where all are current.
+
+        Raises
+        ------
+        InputError
+            Where the study or its cohort is not sound any more.
+        """
+        root, name = self.path.absolute().parents[1], self.provenance["study"]
+        expected = Expected(str(root), *check(root, name, starting=False))
+        return [n for n in self if mark_in(self._files[n]) != expected.of_result(n)]
+
+    def _repr_html_(self) -> str:
+        return str(self.tables.to_html(index=False))
+
+
+def open_results(path: str | Path) -> Results:
+    """The results of a study that a run wrote.
+
+    Parameters
+    ----------
+    path : ``results/<study>``.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there are none.
+    """
+    return Results(path)
+
+
+def compare(a: Results, b: Results) -> pd.DataFrame:
+    """What differs between two results of the same kind, cell by cell.
+
+    Rows are held together by the keys of their tables. A row that only one side has is told once,
+    with ``column`` empty.
+
+    Returns
+    -------
+    DataFrame
+        ``table``, ``key`` (``name=value, ...``), ``column``, ``a``, ``b``, ``difference`` (of
+        numbers, b less a); no rows where nothing differs.
+    """
+    told = [row for name in a if name in b for row in _differences(name, a, b)]
+    told += [(name, "", "", "only in a", "", np.nan) for name in a if name not in b]
+    told += [(name, "", "", "", "only in b", np.nan) for name in b if name not in a]
+    return pd.DataFrame(told, columns=["table", "key", "column", "a", "b", "difference"])
+
+
+def _differences(name: str, a: Results, b: Results) -> Iterator[tuple[object, ...]]:
+    key = list(a.kind.table(name).key)
+    left, right = (one[name].set_index(key) for one in (a, b))
+    for place in left.index.difference(right.index):
+        yield name, _words(key, place), "", "only in a", "", np.nan
+    for place in right.index.difference(left.index):
+        yield name, _words(key, place), "", "", "only in b", np.nan
+    both = left.index.intersection(right.index)
+    for label in map(str, left.columns.intersection(right.columns)):
+        here, there = left.loc[both, label], right.loc[both, label]
+        differs = ~((here == there) | (here.isna() & there.isna()))
+        numeric = pd.api.types.is_numeric_dtype(here) and not pd.api.types.is_bool_dtype(here)
+        for place in both[differs]:
+            change = there[place] - here[place] if numeric else np.nan
+            yield name, _words(key, place), label, here[place], there[place], change
+
+
+def _words(key: list[str], place: object) -> str:
+    values = place if isinstance(place, tuple) else (place,)
+    return ", ".join(f"{name}={value}" for name, value in zip(key, values, strict=True))

@@ -1,0 +1,232 @@
+"""Stiffness of the joints of a cohort, fitted to its measured motion."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import pandas as pd
+
+from spinepipe.api.result import Result, frame
+from spinepipe.api.simulation import simulate
+from spinepipe.api.study import NAME, Say, model_path, silent, study_of
+from spinepipe.cohort import Cohort
+from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, read_model
+from spinepipe.status import USABLE
+from spinepipe.studies.base_model import BUSHING, beside_bushings, own_values
+from spinepipe.studies.cohort_stiffness.fit import fitted
+from spinepipe.studies.cohort_stiffness.left_out import predicted_by_others
+from spinepipe.studies.cohort_stiffness.pool import pooled
+from spinepipe.studies.cohort_stiffness.problem import SEEN, start_stiffness
+from spinepipe.studies.cohort_stiffness.representations import POOLED
+from spinepipe.studies.cohort_stiffness.settings import (
+    NOBODY,
+    CohortStiffness,
+    joint_label,
+    load_sets,
+    tests_of,
+)
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, STIFFNESS
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+
+Row = dict[str, Any]
+Rows = dict[str, list[Row]]
+
+Representation = Literal["per_specimen", "level_ratio", "per_joint", "partially_pooled"]
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness(Result):
+    """Fitted stiffness.
+
+    Attributes
+    ----------
+    table : a row per specimen, joint and fitted coordinate: ``stiffness`` with ``low`` and ``high``
+        (95 % region), ``identifiable``, ``at_bound``, ``status``. Fitted to all tests.
+    quality : a row per specimen and what it was fitted to: readings, cost, optima, status.
+    stiffness, errors : all fits and predictions, as the tables of the same names of a run.
+    model : the fitted model, of the specimens that have a fit.
+    """
+
+    stiffness: pd.DataFrame
+    errors: pd.DataFrame
+    model: ModelFile
+    cohort: Cohort
+
+    @property
+    def predicted(self) -> pd.DataFrame:
+        """Motion under all loads of the cohort, see `spinepipe.simulate`."""
+        return simulate(self.model, self.cohort)
+
+    @property
+    def left_out(self) -> pd.DataFrame:
+        """Errors on motion that the fits did not see; ``stage`` says what was left out."""
+        unseen = self.errors["stage"].isin(("left_out_case", "left_out_specimen"))
+        return self.errors[unseen].reset_index(drop=True)
+
+
+def calibrate(
+    cohort: Cohort,
+    *,
+    stiffness: Representation = "per_specimen",
+    base: ModelFile | str | Path | None = None,
+    free: Sequence[str] | None = None,
+    tests: Sequence[str] | None = None,
+    leave_out: Literal["test", "specimen"] | None = "test",
+    settings: Mapping[str, Any] | None = None,
+    say: Say = silent,
+) -> Stiffness:
+    """Fit the stiffness of every specimen to its measured motion.
+
+    The numbers are those of a study of kind ``cohort_stiffness`` with these settings, to the bit.
+
+    Parameters
+    ----------
+    stiffness : ``per_specimen``, one value of all joints; ``level_ratio``, published ratios of
+        levels times one factor; ``per_joint``; ``partially_pooled``, each joint drawn towards its
+        specimen and its cohort as far as the data ask for it.
+    base : a model whose effects other than linear bushings act in every fit, such as
+        ``find_missing_effects(cohort).model``.
+    free : coordinates whose stiffness is fitted; the three rotations by default.
+    tests : load cases that are used; all that have motion by default.
+    leave_out : what is predicted without having been seen: each test, or each specimen.
+    settings : any further keys of such a study, as in its file; they come before the others.
+    say : told of each fit, such as `print`.
+
+    Raises
+    ------
+    InputError
+        With all that keeps these data from being fitted so.
+
+    Examples
+    --------
+    >>> import spinepipe as sp
+    >>> disc = sp.read_cohort("config/cohorts/l4l5_disc")
+    >>> fit = sp.calibrate(disc, free=["extension"], tests=["extension"], leave_out=None)
+    >>> list(fit.table.columns[:2]), fit.table["status"].unique().tolist()
+    (['specimen', 'representation'], ['converged'])
+    """
+    with model_path(base) as path:
+        asked = {
+            "representations": [stiffness],
+            "free": None if free is None else list(free),
+            "tests": None if tests is None else list(tests),
+            "base": None if path is None else {"model": path},
+            "cross_validation": {
+                "specimens": leave_out == "specimen",
+                "load_cases": leave_out == "test",
+            },
+            **(settings or {}),
+        }
+        study = study_of(CohortStiffness, cohort, asked)
+        file = None if path is None else read_model(path)
+    rows = _rows(study, cohort, stiffness, leave_out, file, say)
+    every = {one.name: frame(one, rows[one.name]) for one in (STIFFNESS, FITS, ERRORS)}
+    label = joint_label(tests_of(study, cohort))
+    own = every["stiffness"]
+    own = own[(own["fitted_to"] == label) & (own["source"] == "own")].reset_index(drop=True)
+    fits = every["fits"]
+    return Stiffness(
+        headline=_headline(own),
+        table=own,
+        quality=fits[fits["fitted_to"] == label].reset_index(drop=True),
+        stiffness=every["stiffness"],
+        errors=every["errors"],
+        model=_model(study, cohort, stiffness, own, file),
+        cohort=cohort,
+    )
+
+
+def _rows(
+    study: CohortStiffness,
+    cohort: Cohort,
+    name: str,
+    leave_out: str | None,
+    file: ModelFile | None,
+    say: Say,
+) -> Rows:
+    """Rows of all tables, of all fits."""
+    tests = tests_of(study, cohort)
+    whole = joint_label(tests)
+    labels = load_sets(study, tests) if leave_out == "test" else (whole,)
+    found: Rows = {one.name: [] for one in (STIFFNESS, FITS, ERRORS)}
+
+    def effects(specimen: str, left_out: bool) -> Any:
+        joints = cohort.joint_names
+        return () if file is None else beside_bushings(file, specimen, joints, left_out)
+
+    def add(rows: Mapping[str, list[Row]], **where: str) -> None:
+        for table, own in found.items():
+            own += [{**where, **row} for row in rows.get(table, ())]
+
+    newcomers = cohort.specimen_names if leave_out == "specimen" else ()
+    if name in POOLED:
+        folds = [*((label, NOBODY) for label in labels), *((whole, one) for one in newcomers)]
+        for label, without in folds:
+            say(f"pooled fit to {label}, without {without}")
+            others = {one: effects(one, one == without) for one in cohort.specimen_names}
+            note = "" if without == NOBODY else _note(file, cohort, without)
+            rows = pooled(study, cohort, name, label, without, others, note)
+            add(rows, representation=name, fitted_to=label)
+        return found
+    for specimen in cohort.specimen_names:
+        for label in labels:
+            say(f"{specimen}: fit to {label}")
+            rows = fitted(study, cohort, specimen, name, label, effects(specimen, False))
+            add(
+                rows,
+                specimen=specimen,
+                representation=name,
+                fitted_to=label,
+            )
+    of_all = [row for row in found["stiffness"] if row["fitted_to"] == whole]
+    for specimen in newcomers:
+        say(f"{specimen}: predicted from the others")
+        fits = [
+            frame(STIFFNESS, [row for row in of_all if row["specimen"] == one])
+            for one in cohort.specimen_names
+            if one != specimen
+        ]
+        beside, note = effects(specimen, True), _note(file, cohort, specimen)
+        rows = predicted_by_others(study, cohort, specimen, name, whole, fits, beside, note)
+        add(rows, specimen=specimen, representation=name, fitted_to=whole)
+    return found
+
+
+def _note(file: ModelFile | None, cohort: Cohort, specimen: str) -> str:
+    seen = file is not None and own_values(file, specimen, cohort.joint_names)
+    return SEEN if seen else ""
+
+
+def _model(
+    study: CohortStiffness, cohort: Cohort, name: str, own: pd.DataFrame, file: ModelFile | None
+) -> ModelFile:
+    """Bushings with the fitted values, published where nothing was fitted, and the base's effects.
+
+    Specimens without a fit are not in its scope.
+    """
+    start = start_stiffness(study, cohort, name)
+    usable = own[own["status"].isin(USABLE) & own["stiffness"].notna()]
+    specimens = tuple(dict.fromkeys(usable["specimen"]))
+    values = []
+    for specimen, rows in usable.groupby("specimen", sort=False):
+        k = start.copy()
+        for joint, coordinate, value in rows[["joint", "coordinate", "stiffness"]].itertuples(
+            index=False
+        ):
+            k[cohort.joint_names.index(joint), COORDINATES.index(coordinate)] = value
+        for joint, row in zip(cohort.joint_names, k.tolist(), strict=True):
+            given = dict(zip(STIFFNESS_COLUMNS, row, strict=True))
+            values.append(Values(specimen=str(specimen), joint=joint, **given))
+    bushing = EffectEntry(
+        effect=BUSHING, scope=Scope(specimens=specimens or ("*",)), values=tuple(values)
+    )
+    others = () if file is None else (one for one in file.effects if one.effect != BUSHING)
+    return ModelFile(model=f"{NAME}_{name}", cohort=cohort.name, effects=(bushing, *others))
+
+
+def _headline(own: pd.DataFrame) -> str:
+    """How many stiffnesses the data hold, and of how many specimens."""
+    held, every = int(own["identifiable"].fillna(False).astype(bool).sum()), len(own)
+    specimens = own["specimen"].nunique()
+    return f"The data hold {held} of {every} stiffnesses of {specimens} specimens."

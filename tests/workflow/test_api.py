@@ -1,0 +1,146 @@
+"""What a notebook gives and what a run writes agree to the last bit; examples in docstrings run."""
+
+import doctest
+from importlib import import_module
+from pathlib import Path
+
+import matplotlib as mpl
+import pandas as pd
+import pytest
+import stiffening_chains
+import straight_chains
+from small_project import Project
+
+import spinepipe as sp
+from spinepipe.cohort import Cohort
+
+ROOT = Path(__file__).parents[2]
+MODULES = ("cohorts", "stiffness", "simulation", "missing_effects", "sensitivity", "results")
+
+
+def cohort_of(project: Project, name: str) -> Cohort:
+    return sp.read_cohort(project.path(f"config/cohorts/{name}"))
+
+
+def same(found: pd.DataFrame, results: pd.DataFrame, **where: str) -> None:
+    """Rows of a run that have these values, whatever their order, are those of the notebook."""
+    for column, value in where.items():
+        results, found = results[results[column] == value], found[found[column] == value]
+    assert len(found)
+    keys = [name for name in found if found[name].dtype == object]
+    ours, theirs = (one.sort_values(keys).reset_index(drop=True) for one in (found, results))
+    pd.testing.assert_frame_equal(ours, theirs, check_exact=True, check_dtype=False)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_examples_say_what_is_so(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    found = doctest.testmod(import_module(f"spinepipe.api.{module}"), report=True)
+    assert not found.failed
+
+
+def test_stiffness_is_that_of_a_run(eight: Project) -> None:
+    cohort, run = (
+        cohort_of(eight, straight_chains.NAME),
+        sp.open_results(eight.path("results/cohort_stiffness")),
+    )
+    for name in ("per_joint", "partially_pooled"):
+        by_test = sp.calibrate(cohort, stiffness=name, leave_out="test")
+        for table in ("stiffness", "errors"):
+            mine = getattr(by_test, table)
+            same(mine, run[table], representation=name, source="own")
+        by_specimen = sp.calibrate(cohort, stiffness=name, leave_out="specimen")
+        source = "others_median" if name == "per_joint" else "others_pooled"
+        whole = {"representation": name, "source": source, "fitted_to": "all"}
+        same(by_specimen.errors, run["errors"], **whole)
+        assert set(by_specimen.left_out["stage"]) == {"left_out_specimen"}
+
+
+def test_a_model_moves_as_its_errors_say(eight: Project) -> None:
+    """Mean error of a joint, from predicted less measured motion, is the one that the fit tells."""
+    cohort = cohort_of(eight, straight_chains.NAME)
+    fit = sp.calibrate(cohort, stiffness="per_joint", leave_out=None)
+    keys = ["specimen", "test", "cycle", "step", "joint"]
+    both = fit.predicted.merge(cohort.motion, on=keys, suffixes=("", "_measured"))
+    off = (both["extension_deg"] - both["extension_deg_measured"]).abs()
+    mean = off.groupby([both["specimen"], both["test"], both["joint"]]).mean().dropna()
+    told = fit.errors[fit.errors["coordinate"] == "extension"]
+    told = told.set_index(["specimen", "test", "joint"])["mae"]
+    assert mean.loc[told.index].to_numpy() == pytest.approx(told.to_numpy(), abs=1e-9)
+
+
+def test_missing_effects_are_those_of_a_run(eight: Project) -> None:
+    found = sp.find_missing_effects(
+        cohort_of(eight, "chains"),
+        effects=["nonlinear_stiffening", "hysteresis"],
+        settings={"bootstrap": 100},
+    )
+    run = sp.open_results(eight.path("results/discrepancy"))
+    assert (found.verdict, found.table["name"].tolist()) == ("NAMED", ["nonlinear_stiffening"])
+    same(found.misfit, run["gap"])
+    same(found.candidates, run["candidates"])
+    assert stiffening_chains.STIFFNESS.keys() == set(found.misfit["specimen"])
+    # the model goes on into a fit
+    fit = sp.calibrate(cohort_of(eight, "chains"), base=found.model, leave_out=None)
+    plain = sp.calibrate(cohort_of(eight, "chains"), leave_out=None)
+    assert fit.quality["cost"].sum() < 0.5 * plain.quality["cost"].sum()
+
+
+def test_indices_are_those_of_a_run(eight: Project) -> None:
+    factors = {
+        "load_point_x": {"of": "load_point", "axis": "x", "offset_mm": {"sd": 5}},
+        "load_point_y": {"of": "load_point", "axis": "y", "offset_mm": {"sd": 5}},
+        "bending": {
+            "of": "stiffness",
+            "coordinate": "right_bending",
+            "times": {"low": 0.5, "high": 2},
+        },
+    }
+    settings = {
+        "design": {"method": "sobol", "samples": 64, "second_order": False},
+        "outputs": {"motion": ["extension"], "joint_load": ["extension"]},
+        "bootstraps": 200,
+        "samples_per_target": 100,
+    }
+    found = sp.sensitivity(cohort_of(eight, "lever"), factors, settings=settings)
+    run = sp.open_results(eight.path("results/global_sensitivity"))
+    same(found.table, run["indices"])
+    same(found.responses, run["responses"])
+
+
+def test_results_tell_what_they_hold_and_what_differs(eight: Project, tmp_path: Path) -> None:
+    run = sp.open_results(eight.path("results/cohort_stiffness"))
+    assert set(run.tables["name"]) == set(run)
+    assert run["stiffness"].attrs["units"]["standard_error"]
+    assert run.stale == []
+    assert sp.compare(run, run).empty
+    other = sp.open_results(eight.path("results/cohort_stiffness"))
+    changed = run["stiffness"].copy()
+    changed.loc[0, "stiffness"] += 1.0
+    other._read["stiffness"] = changed.drop(index=1)
+    told = sp.compare(run, other)
+    assert told["column"].tolist() == ["", "stiffness"]
+    assert told["difference"].iloc[1] == pytest.approx(1.0)
+    with pytest.raises(FileNotFoundError, match="no tables"):
+        sp.open_results(tmp_path)
+
+
+def test_what_cannot_be_fitted_is_told_as_in_a_study_file(eight: Project) -> None:
+    cohort = cohort_of(eight, straight_chains.NAME)
+    with pytest.raises(sp.InputError, match="free"):
+        sp.calibrate(cohort, free=["flexion"])
+    assert set(sp.check(cohort)["severity"]) <= {"warning"}
+    told = sp.check(eight.path("config/cohorts/nowhere"))
+    assert told["severity"].tolist() == ["problem"]
+
+
+def test_figures_and_pages_can_be_made(eight: Project, tmp_path: Path) -> None:
+    mpl.use("Agg")
+    cohort = cohort_of(eight, straight_chains.NAME)
+    fit = sp.calibrate(cohort, stiffness="per_joint")
+    shown = sp.plot.curves(cohort, cohort.tests[0], predicted=fit.predicted)
+    assert {one.get_label() for one in shown.lines} >= {"measured, cycle 1", "predicted, cycle 1"}
+    assert len(sp.plot.stiffness(fit).lines) == len(cohort.specimen_names)
+    assert len(sp.plot.left_out(fit).patches) == len(cohort.tests)
+    fit.report(tmp_path / "fit.html")
+    assert fit.headline in (tmp_path / "fit.html").read_text()
