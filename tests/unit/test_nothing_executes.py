@@ -58,7 +58,7 @@ PROGRAMS = {
 BY_NAME = {
     "effects/__init__.py": "every file of its own folder",
     "comparison/papers.py": "the engine in the folder beside the package",
-    "studies/doubts.py": "the doubts of a kind",
+    "studies/plausibility.py": "the doubts of a kind",
     "studies/registry.py": "folders of kinds, by a name that is one of them",
     "jobs/block.py": "the job of a kind that makes the files of a block",
     "jobs/pool.py": "jobs, by names that the rules write",

@@ -77,8 +77,8 @@ def setting() -> Any:
 
 @pytest.fixture(autouse=True)
 def straight(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fits, "Together", Straight)
-    monkeypatch.setattr(fits, "moved", lambda model, free, x: (model, tuple(x)))
+    monkeypatch.setattr(fits, "JointPrediction", Straight)
+    monkeypatch.setattr(fits, "with_parameters", lambda model, free, x: (model, tuple(x)))
 
 
 def stacked() -> tuple[Array, Array]:
@@ -167,7 +167,7 @@ def test_without_a_pose_or_off_the_load_path_there_is_no_fit(
             self.leads = False
 
     for kind, why in ((Falls, "falls"), (Snaps, OFF_THE_PATH)):
-        monkeypatch.setattr(fits, "Together", kind)
+        monkeypatch.setattr(fits, "JointPrediction", kind)
         fit = joint_fit(hypothesis(), setting())
         assert (fit.usable, fit.status, fit.chi2) == (False, why, np.inf)
         assert fit.models == {"a": "a", "b": "b"}
