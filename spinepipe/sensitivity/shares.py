@@ -164,7 +164,10 @@ def _shares_of_table(values: Array, hypercubes: bool) -> VarianceShares:
     values = (values - values.mean()) / np.abs(values - values.mean()).max()
     of = _shares_of_hypercubes if hypercubes else _raw_shares
     raw = of(mean_squares(values), rows, columns)
-    estimates = _estimates(raw)
+    # negative components are set to 0; rounding may leave a sum above 1
+    parts = np.maximum(raw[:3], 0.0)
+    row, column, rest = parts / parts.sum()
+    estimates = np.minimum([row, column, rest, row + rest, column + rest], 1.0)
     by_row = of(_leaving_out_rows(values), rows - 1, columns)
     swapped = _leaving_out_rows(values.T)
     by_column = (
@@ -176,7 +179,9 @@ def _shares_of_table(values: Array, hypercubes: bool) -> VarianceShares:
     # an estimate set to 0 changes the others a little
     low, high = np.minimum(low, estimates), np.maximum(high, estimates)
     found = [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
-    return VarianceShares(rows, columns, ComputationStatus.DONE, _message(raw), *found)
+    names = [name for name, share in zip(("row", "column"), raw[:2], strict=True) if share < 0.0]
+    message = f"negative {' and '.join(names)} component set to 0" if names else ""
+    return VarianceShares(rows, columns, ComputationStatus.DONE, message, *found)
 
 
 def mean_squares(values: Array) -> MeanSquares:
@@ -195,6 +200,8 @@ def _leaving_out_rows(values: Array) -> MeanSquares:
     """Mean squares (P,) of the P grids that lack one row each."""
     rows, columns = values.shape
     left = rows - 1
+    # without row p: means of columns (P, S) and of all (P,), then sums of squares as differences of
+    # sums over the whole grid, so that no grid is copied
     by_row = values.mean(axis=1)
     by_column = (values.sum(axis=0) - values) / left
     mean = by_column.mean(axis=1)
@@ -232,18 +239,6 @@ def _of_parts(row: Array, column: Array, rest: Array) -> Array:
     parts = np.stack([row, column, rest, row + rest, column + rest], axis=-1)
     shares: Array = parts / (row + column + rest)[..., None]
     return shares
-
-
-def _estimates(raw: Array) -> Array:
-    """(5,) shares with negative components set to 0."""
-    parts = np.maximum(raw[:3], 0.0)
-    row, column, rest = parts / parts.sum()
-    return np.minimum([row, column, rest, row + rest, column + rest], 1.0)  # rounding
-
-
-def _message(raw: Array) -> str:
-    names = [name for name, share in zip(("row", "column"), raw[:2], strict=True) if share < 0.0]
-    return f"negative {' and '.join(names)} component set to 0" if names else ""
 
 
 @dataclass(frozen=True)

@@ -170,9 +170,3 @@ def test_a_factor_is_negligible_only_by_the_end_of_its_interval() -> None:
     assert np.mean(by_estimate) >= 0.15
     assert rates["small"] == 1.0
     assert rates["none"] == 1.0
-
-
-def test_nothing_else_tells_that_a_factor_is_negligible() -> None:
-    assert negligible(screened(1)["S1", "none"]) == (None,)
-    found, _ = analysed("fast", 1025, 1, ("S1", "ST"))
-    assert negligible(found["ST", "inert"]) == (None,), "FAST has no interval"
