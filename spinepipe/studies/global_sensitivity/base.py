@@ -18,10 +18,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, SpineModel
-from spinepipe.schema import Table
 from spinepipe.statics.batched import Cases, Spines, solve_many
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.loaded import loaded
+from spinepipe.studies.global_sensitivity.largest_moment import largest_moment
 from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, asked_tests, start_of
@@ -62,18 +61,14 @@ def run(root: str, study: str, specimen: str, base_stiffness: str, base_motion: 
     if settings.is_fitted:
         stiffness[:] = [row["stiffness"] for row in rows]
     model = start_of(cohort, specimen, stiffness, damping, tests, all_steps=False).model
-    moved = list(_beside_measured(cohort, model, tests))
+    motion = list(_beside_measured(cohort, model, tests))
     made_by = provenance("base", settings, cohort, [specimen])
     for table, found, path in (
         (BASE_STIFFNESS, rows, base_stiffness),
-        (BASE_MOTION, moved, base_motion),
+        (BASE_MOTION, motion, base_motion),
     ):
-        write(_table(table, found), path, made_by)
-
-
-def _table(table: Table, rows: Rows) -> Any:
-    """The specimen is in the name of the folder."""
-    return from_rows(table.without("specimen"), rows)
+        # the specimen is in the name of the folder
+        write(from_rows(table.without("specimen"), found), path, made_by)
 
 
 def _stiffness_row(coordinate: str, start: float) -> dict[str, Any]:
@@ -114,14 +109,14 @@ def _fitted(settings: GlobalSensitivity, cohort: Cohort, start: DescribedSpecime
     while found is not None and found.status.usable and found.at_bound.any() and free:
         at = [name for name, side in zip(free, found.at_bound, strict=True) if side]
         free, bounded = [name for name in free if name not in at], bounded + at
-        found, why = _fit(settings, cohort, start, free) if free else (None, _ALL_AT_BOUNDS)
+        if free:
+            found, why = _fit(settings, cohort, start, free)
+        else:
+            found, why = None, "every stiffness ran to a bound"
     return [
         _fitted_row(settings, name, value, found, why, free, bounded)
         for name, value in zip(COORDINATES, settings.start_stiffness.in_order(), strict=True)
     ]
-
-
-_ALL_AT_BOUNDS = "every stiffness ran to a bound"
 
 
 def _fit(
@@ -161,15 +156,11 @@ def _fitted_row(
         return {**row, "source": "no_fit"}
     assert found is not None
     at = list(free).index(name)
-    return {**row, "source": "fitted", **_region(found, at)}
-
-
-def _region(found: Fit, at: int) -> dict[str, Any]:
-    """Value of one unknown and how far the data let it go."""
     value = float(found.values[at])
     reach = found.reach(at, value)
     assert reach is not None  # of every fit that has a stiffness
-    return {"stiffness": value, **asdict(reach), "identifiable": found.identifiable(at)}
+    fitted = {"stiffness": value, **asdict(reach), "identifiable": found.identifiable(at)}
+    return {**row, "source": "fitted", **fitted}
 
 
 def _beside_measured(
@@ -193,7 +184,7 @@ def _rows_of_test(
     solved = solve_many(Spines.of(model, 1), Cases.of(test.case, 1))
     predicted = from_si(subtract_baseline(solved.q[0], test.from_first))[-1]
     last = len(test.case.steps) - 1
-    driven = loaded(cohort, test.case.test, model.specimen)
+    driven = largest_moment(cohort, test.case.test, model.specimen)
     for column, coordinate in enumerate(COORDINATES):
         common = {
             "test": test.case.test,

@@ -11,7 +11,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.global_sensitivity.drawn import drawn_values
+from spinepipe.studies.global_sensitivity.sampling import factor_values
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, start_of
 from spinepipe.studies.global_sensitivity.tables import EVERY
@@ -64,7 +64,7 @@ def batch_of(
     """
     size = study.batch_size(len(study.chosen_specimens(cohort)))
     first = number * size
-    values = drawn_values(design, study, slice(first, first + size))
+    values = factor_values(design, study, slice(first, first + size))
     fitted = tuple(stamp(path) for path in base)
     start = start_of_specimen(root, study.study, specimen, all_steps, cohort.digest, fitted)
     return Batch(first, len(values), start, vary(start, study.changes, values))

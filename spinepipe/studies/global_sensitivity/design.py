@@ -6,8 +6,8 @@ import pyarrow as pa
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.sensitivity.global_indices.spread import values_of
-from spinepipe.studies.global_sensitivity.drawn import design_of
-from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
+from spinepipe.studies.global_sensitivity.sampling import design_of, spreads_of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import DESIGN
 from spinepipe.tables import to_arrow, write
 

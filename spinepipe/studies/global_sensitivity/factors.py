@@ -1,13 +1,49 @@
 """Factors of a global sensitivity study: what is uncertain, where, and how far it is spread."""
 
+from dataclasses import dataclass
+from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
-from spinepipe.studies.global_sensitivity.change import FactorChange, Of
 from spinepipe.studies.parts import FORM, Coordinate, EachOnce
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, ROTATIONS, TRANSLATIONS
+
+
+class Of(StrEnum):
+    """What can be changed; offsets are in m and rad, everything else is multiplied."""
+
+    STIFFNESS = "stiffness"
+    LANDMARK = "landmark"
+    JOINT_CENTRE = "joint_centre"
+    JOINT_AXES = "joint_axes"
+    LOAD_POINT = "load_point"
+    LOAD_DIRECTION = "load_direction"
+    LOAD_SIZE = "load_size"
+    MASS = "mass"
+    CENTRE_OF_MASS = "centre_of_mass"
+    DAMPING = "damping"
+    NOTHING = "nothing"
+
+
+@dataclass(frozen=True)
+class FactorChange:
+    """One factor, its value left open.
+
+    Attributes
+    ----------
+    at : names of joints or vertebrae; empty: of all.
+    axis : place of the axis: of ground (x, y, z), of a joint frame, or of a coordinate among the
+        six; 0 where there is none.
+    landmark : name of the landmark that is moved.
+    """
+
+    of: Of
+    at: tuple[str, ...] = ()
+    axis: int = 0
+    landmark: str = ""
+
 
 _FORMS = "{low, high}, or {sd} with or without mean, low and high"
 
@@ -26,15 +62,11 @@ class _Spread(BaseModel):
     def _one_form(self) -> Self:
         if self.sd is None and (self.mean is not None or None in (self.low, self.high)):
             raise ValueError(f"one of two forms: {_FORMS}")
-        inside = [end for end in (self.low, self._between, self.high) if end is not None]
+        between = None if self.sd is None else self.middle
+        inside = [end for end in (self.low, between, self.high) if end is not None]
         if any(above <= below for below, above in pairwise(inside)):
             raise ValueError(f"low below {'mean, mean below ' if self.sd else ''}high")
         return self
-
-    @property
-    def _between(self) -> float | None:
-        """What must lie between the ends."""
-        return None if self.sd is None else self.middle
 
     @property
     def middle(self) -> float:

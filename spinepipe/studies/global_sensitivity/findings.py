@@ -9,6 +9,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.report.words import capital, count, fixed, listed, number
+from spinepipe.sensitivity.global_indices.design import DUMMY
 from spinepipe.sensitivity.global_indices.floor import NEGLIGIBLE
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
@@ -20,16 +21,15 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     by_joint,
     factor_name,
     leading,
-    measures_of,
-    outputs,
     pooled,
+    shown_outputs,
     unit_of,
     what,
     where,
     whole,
     with_results,
 )
-from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.soundness import doubts, grounds
 
 Record = dict[str, Any]
@@ -87,7 +87,7 @@ _EXACT = {
 def opening(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> Headline:
     """The leading factors in a sentence, how sure they are, and what casts doubt on them."""
     indices = results.table("indices")
-    found, measures = _outputs(cohort, results)
+    found, measures = shown_outputs(cohort, indices)
     words = most(found, measures, cohort.joint_names) if measures else ""
     sure = [runs(study, indices)]
     if measures:
@@ -105,7 +105,7 @@ def opening(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> 
 def findings(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> list[str]:
     """A sentence or two for each output, then interactions and outputs without an index."""
     indices = results.table("indices")
-    found, measures = _outputs(cohort, results)
+    found, measures = shown_outputs(cohort, indices)
     shown = found[:MOST_OUTPUTS] if measures else []
     told = [driver(panel, measures, cohort.joint_names) for panel in shown if measures]
     told += grounds(study, *(results.table(name) for name in RESTS_ON[:2]))
@@ -113,20 +113,9 @@ def findings(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) ->
         told.append(f"{count(len(found) - MOST_OUTPUTS, 'more output')}: see the tables.")
     told.append(pairs(indices, found))
     told += [words for status, words in without(indices) if status not in DOUBTFUL]
-    told.append(_of_the_dummy(study))
+    nothing = "There is no dummy factor (dummy: false), so nothing tells an index from noise."
+    told.append(_EXACT.get(study.design.method, "") if study.dummy else nothing)
     return [sentence for sentence in told if sentence]
-
-
-def _outputs(cohort: Cohort, results: ResultTables) -> tuple[Sequence[Panel], Measures | None]:
-    indices = results.table("indices")
-    measures = measures_of(indices) if len(indices) else None
-    return (outputs(cohort, indices, measures) if measures else []), measures
-
-
-def _of_the_dummy(study: GlobalSensitivity) -> str:
-    if not study.dummy:
-        return "There is no dummy factor (dummy: false), so nothing tells an index from noise."
-    return _EXACT.get(study.design.method, "")
 
 
 def most(panels: Sequence[Panel], measures: Measures, joints: Sequence[str]) -> str:

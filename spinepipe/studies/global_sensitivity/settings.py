@@ -1,7 +1,7 @@
 """What a study of global sensitivity asks: factors, design, outputs, fits of stiffness."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -15,15 +15,9 @@ from pydantic import (
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.names import distinct
-from spinepipe.sensitivity.global_indices.spread import (
-    Distribution,
-    LogNormal,
-    LogUniform,
-    Normal,
-    Uniform,
-)
-from spinepipe.studies.global_sensitivity.change import FactorChange, Of
-from spinepipe.studies.global_sensitivity.factors import AnyFactor, AnySpread, Times
+from spinepipe.sensitivity.global_indices.design import DUMMY, Method
+from spinepipe.sensitivity.global_indices.estimates import INDICES
+from spinepipe.studies.global_sensitivity.factors import AnyFactor, FactorChange, Of
 from spinepipe.studies.parts import (
     AUTO,
     FORM,
@@ -70,22 +64,11 @@ class SampleCalibration(BaseModel):
     )
 
 
-DUMMY = "dummy"
-"""Name of the factor that changes nothing."""
-
 MOST_SINGLE_TARGETS = 2000
 """Samples x specimens up to which each sample is a target of its own."""
 
 SAMPLES_PER_TARGET = 256
 """Samples per target beyond that."""
-
-INDICES = {
-    "sobol": ("S1", "ST", "S2"),
-    "morris": ("mu", "mu_star", "sigma"),
-    "fast": ("S1", "ST"),
-    "latin_hypercube": ("S1_RBD", "PAWN", "KS_low", "KS_high", "delta"),
-}
-"""Indices of each kind of design."""
 
 SLOW = ("delta",)
 """Indices that are computed only when they are named."""
@@ -95,14 +78,9 @@ IndexName = Literal[
 ]
 
 
-def _form(given: Any) -> str:
-    """What is a word may only be `fitted`."""
-    return FITTED if isinstance(given, str) else "given"
-
-
 _BaseStiffness = Annotated[
     Annotated[PublishedStiffness, Tag("given")] | Annotated[Literal["fitted"], Tag(FITTED)],
-    Discriminator(_form),
+    Discriminator(lambda given: FITTED if isinstance(given, str) else "given"),
 ]
 
 _Coordinates = Annotated[tuple[Coordinate, ...], Field(strict=False), AfterValidator(distinct)]
@@ -277,7 +255,9 @@ class GlobalSensitivity(Study):
     @property
     def chosen_indices(self) -> tuple[str, ...]:
         """Names of the indices that are computed."""
-        return self.indices or tuple(n for n in INDICES[self.design.method] if n not in SLOW)
+        return self.indices or tuple(
+            n for n in INDICES[Method(self.design.method)] if n not in SLOW
+        )
 
     def batch_size(self, specimens: int) -> int:
         """Runs of a specimen that one job computes, in a study of so many specimens."""
@@ -292,20 +272,3 @@ class GlobalSensitivity(Study):
     def chosen_tests(self, cohort: Cohort) -> tuple[str, ...]:
         """The study's tests."""
         return self.tests or cohort.tests
-
-
-def spreads_of(study: GlobalSensitivity) -> tuple[Distribution, ...]:
-    """(D,) how each value is spread: m, rad, or a multiplier; the dummy's from 0 to 1."""
-    own = tuple(_in_si(factor.spread) for factor in study.factors)
-    return (*own, Uniform(0.0, 1.0)) if study.dummy else own
-
-
-def _in_si(spread: AnySpread) -> Distribution:
-    found = {"low": spread.low, "high": spread.high}
-    ends = {name: end / spread.per_si for name, end in found.items() if end is not None}
-    times = isinstance(spread, Times)
-    if spread.sd is None:
-        return LogUniform(**ends) if times else Uniform(**ends)
-    if times:
-        return LogNormal(spread.middle, spread.sd, **ends)
-    return Normal(spread.middle / spread.per_si, spread.sd / spread.per_si, **ends)

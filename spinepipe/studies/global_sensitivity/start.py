@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.specimen import (
@@ -17,8 +18,12 @@ from spinepipe.cohort.specimen import (
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.model import SpineModel
-from spinepipe.studies.global_sensitivity.many_frames import INFERIOR, SUPERIOR, Flags
 from spinepipe.studies.selected_tests import AskedTest, asked, first_cycles
+
+Flags = NDArray[np.bool_]
+
+SUPERIOR, INFERIOR, LEFT, RIGHT = range(len(FRAME_LANDMARKS))
+"""Places of the landmarks, in the order of `FRAME_LANDMARKS`."""
 
 
 @dataclass(frozen=True, eq=False)

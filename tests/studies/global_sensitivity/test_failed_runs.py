@@ -9,7 +9,13 @@ from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.failed import WAYS, Ends, failed_rows, of_runs, rows_of
+from spinepipe.studies.global_sensitivity.failed_runs import (
+    WAYS,
+    Ends,
+    failed_rows,
+    of_runs,
+    rows_of,
+)
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.soundness import doubts
 from spinepipe.studies.global_sensitivity.tables import FAILED_RUNS, RESPONSES

@@ -12,8 +12,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.panels import lettered, sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
 from spinepipe.report.words import AXIS, capital, case, count, plain, short, unit
-from spinepipe.studies.global_sensitivity.loaded import loaded
-from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.sensitivity.global_indices.design import DUMMY
+from spinepipe.studies.global_sensitivity.largest_moment import largest_moment
 from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
@@ -104,6 +104,12 @@ def measures_of(indices: pd.DataFrame) -> Measures | None:
     return next((known for known in _KNOWN if known.main in names), None)
 
 
+def shown_outputs(cohort: Cohort, indices: pd.DataFrame) -> tuple[list[Panel], Measures | None]:
+    """The outputs of a study, and the measures of its indices; none where no index is known."""
+    measures = measures_of(indices) if len(indices) else None
+    return (outputs(cohort, indices, measures) if measures else []), measures
+
+
 def outputs(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> list[Panel]:
     """One panel for each output and test: the coordinate that the test loads, at its peak.
 
@@ -112,7 +118,7 @@ def outputs(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> list[P
     rows = with_results(indices, measures)
     found = []
     for (output, test), part in rows.groupby(["output", "test"], sort=False):
-        known = loaded(cohort, str(test))
+        known = largest_moment(cohort, str(test))
         steps = set(part["step"])
         step = known[1] if known and known[1] in steps else max(steps)
         for name in _coordinates(part[part["step"] == step], known[0] if known else ""):
