@@ -10,7 +10,7 @@ from spinepipe.studies.read import check
 from spinepipe.studies.registry import files_of
 from spinepipe.studies.scoliosis.film_fit import FilmFit
 from spinepipe.studies.scoliosis.films import ERECT
-from spinepipe.studies.scoliosis.learn import weights
+from spinepipe.studies.scoliosis.fit_population import weights
 from spinepipe.studies.scoliosis.personal import WAYS, Personal, patient_of
 from spinepipe.studies.scoliosis.population import assumed
 from spinepipe.studies.scoliosis.settings import Scoliosis
@@ -39,7 +39,7 @@ def _everyone(study: Scoliosis, cohort: Cohort, model: str) -> None:
         else:
             fit = FilmFit(patient, sd)
             personal = fit.personal(fit.fit(assumed(len(cohort.joint_names))))
-        spine = patient.held(personal.model)
+        spine = patient.fixed_end(personal.model)
         for position, film in patient.read.films.items():
             if position != ERECT:
                 spine.at(film.top)

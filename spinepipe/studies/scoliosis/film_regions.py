@@ -15,7 +15,7 @@ from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.profile import Best, RegionEnds, profile_in_turn
 from spinepipe.effects.contract import Array
 from spinepipe.statics.prescribed import Ask, alone, answered
-from spinepipe.studies.scoliosis.film_fit import FARTHEST, TOPS, FilmFit, FittedFilms
+from spinepipe.studies.scoliosis.film_fit import FARTHEST, FilmFit, FittedFilms, prior
 from spinepipe.studies.scoliosis.population import Population
 
 SETTLED = DescentTolerances(cost=1e-3, step=1e-3, slope=1e-6, evaluations=30)
@@ -42,7 +42,7 @@ def region(
     fit.near = dict(fitted.poses)
     numbers = by_ratio(fit.segments, len(fitted.unknowns), segment)
     point = once(_of_films(fit, population, segment, numbers))
-    usual, scale = _usual(population)
+    usual, scale, _ = prior(population)
     middle = np.asarray(np.linalg.solve(numbers, usual), dtype=np.float64)
     lower, upper = middle - FARTHEST * scale, middle + FARTHEST * scale
     begin = np.clip(np.linalg.solve(numbers, fitted.unknowns), lower + 1e-9, upper - 1e-9)
@@ -74,28 +74,17 @@ def by_ratio(segments: int, unknowns: int, segment: int) -> Array:
     return made
 
 
-def _usual(population: Population) -> tuple[Array, Array]:
-    """(n,) each: middle and SD of the unknowns before any film."""
-    tops = np.zeros(TOPS)
-    return (
-        np.concatenate([population.mean, tops]),
-        np.concatenate([population.sd, tops + 1.0]),
-    )
-
-
 def _of_films(fit: FilmFit, population: Population, segment: int, numbers: Array) -> Point:
     """Errors of the films and of all but one number of the population, in their SD."""
-    middle, _ = _usual(population)
-    drawn = np.eye(len(middle))
-    drawn[: len(population.mean), : len(population.mean)] = population.root
-    drawn = np.delete(drawn, segment, axis=0)  # a ratio is drawn apart from all other numbers
+    middle, _, root = prior(population)
+    root = np.delete(root, segment, axis=0)  # a ratio is drawn apart from all other numbers
 
     def point(moved: Array) -> tuple[Array, Array] | None:
         unknowns = numbers @ moved
         found = fit.missed(unknowns)
         if found is None:
             return None
-        errors = np.append(found[0], drawn @ (unknowns - middle))
-        return errors, np.vstack([found[1], drawn]) @ numbers
+        errors = np.append(found[0], root @ (unknowns - middle))
+        return errors, np.vstack([found[1], root]) @ numbers
 
     return point

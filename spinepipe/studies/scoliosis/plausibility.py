@@ -66,7 +66,8 @@ def _fault(cohort: Cohort, rows: pd.DataFrame) -> _Fault | None:
     films = []
     for _, film in rows.groupby("position", sort=False):
         for reading in by_reading(film):
-            if sorted(reading["vertebra"]) == sorted(cohort.vertebrae) and _whole(reading):
+            whole = any(reading[list(c)].notna().all(axis=None) for c in (CENTRE, CORNERS))
+            if sorted(reading["vertebra"]) == sorted(cohort.vertebrae) and whole:
                 films.append(placed(reading, cohort.vertebrae))
     if not films:
         return None
@@ -74,10 +75,6 @@ def _fault(cohort: Cohort, rows: pd.DataFrame) -> _Fault | None:
         return _corners(rows) or _direction(films, *CORNERS[:2]) or _size(cohort, films, CORNERS)
     found = _direction(films, *CENTRE[:2]) or _size(cohort, films, CENTRE[:2])
     return found or _tilts(films)
-
-
-def _whole(rows: pd.DataFrame) -> bool:
-    return any(bool(rows[list(names)].notna().all(axis=None)) for names in (CENTRE, CORNERS))
 
 
 def _direction(films: list[Film], y: str, z: str) -> _Fault | None:

@@ -163,6 +163,7 @@ def characterise(pairs: Pairs, shape: Shape, apical_nm: float) -> Laws:
     def rmse(log_ratio: float) -> float:
         return _laws(pairs, shape, loads, float(np.exp(log_ratio)), apical_nm).rmse
 
+    # it may have several minima: a grid, then Brent's method between the best one's neighbours
     tried = np.linspace(-FARTHEST_RATIO, FARTHEST_RATIO, RATIOS_TRIED)
     best = int(np.argmin([rmse(one) for one in tried]))
     low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
@@ -175,6 +176,7 @@ def _laws(pairs: Pairs, shape: Shape, loads: Array, ratio: float, apical_nm: flo
     force = apical_nm / max(pairs.arm_right[pairs.apex], ratio * pairs.arm_left[pairs.apex])
     moments = np.stack([force * pairs.arm_right, -ratio * force * pairs.arm_left], axis=1)
     rotations = np.stack([pairs.right, pairs.left], axis=1)
+    # films that ask for nothing above nought leave no median: the limits are then about 1 N m
     asked = (moments * loads).sum(axis=1) / (loads**2).sum(axis=1)
     middle = float(np.median(asked[asked > 0.0])) if (asked > 0.0).any() else 1.0
     stretch = np.clip(asked, LEAST_SHARE * middle, MOST_SHARE * middle)

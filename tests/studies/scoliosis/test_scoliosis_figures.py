@@ -6,24 +6,22 @@ unknown noise, and marks that are not where the tables have them.
 
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from drawn import caption, drawings
 from matplotlib.figure import Figure
-from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of, write_shipped
+from scoliosis_cases import ERRORS, Size, cohort_of, shipped, study_of, tables_of
 from sweeps import sweep
 
-from spinepipe import cohort as cohorts
 from spinepipe.report.style import WIDTH_MM, style
 from spinepipe.studies.scoliosis.errors import held_out_error
 from spinepipe.studies.scoliosis.figures.errors_by_range import classified
 from spinepipe.studies.scoliosis.figures.film_overlay import chosen, places, posed
 from spinepipe.studies.scoliosis.figures.fitted_and_held_out import errors_of_patients
 from spinepipe.studies.scoliosis.figures.load_displacement import curve
-from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT
+from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.kind import KIND
 from spinepipe.studies.scoliosis.personal import patient_of, tangent
 from spinepipe.studies.scoliosis.personalise import rows_of
@@ -152,17 +150,15 @@ def test_errors_of_patients_leave_out_who_has_no_pose() -> None:
     assert float(kept["error"].iloc[0]) == pytest.approx(0.8 * 1.2)
 
 
-def test_models_stand_where_their_poses_are(tmp_path: Path) -> None:
+def test_models_stand_where_their_poses_are() -> None:
     """Places of the overlay are those of the solved pose, out of the plane and all."""
-    write_shipped(tmp_path / "ais", 1)
-    cohort = cohorts.read(tmp_path / "ais", (FILMS, PATIENTS))
-    study = study_of(Size(1))
+    cohort, study = shipped(1), study_of(Size(1))
     patient = patient_of(study, cohort, "p01")
     rows = from_rows(
         DISPLACEMENTS, rows_of(study, cohort, "p01", "tangent")["displacements"]
     ).to_pandas()
     film = patient.read.films["traction"]
-    held = patient.held(tangent(patient, study).model).at(film.top)
+    held = patient.fixed_end(tangent(patient, study).model).at(film.top)
     at = posed(film, rows[rows["position"] == "traction"])
     np.testing.assert_allclose(at, places(held.film), rtol=0, atol=1e-9)
     np.testing.assert_allclose(at[-1], places(film)[-1], rtol=0, atol=1e-9)

@@ -68,10 +68,6 @@ def test_page_of_any_films_fetches_nothing_and_has_no_view_in_space(size: str) -
     assert "nan" not in re.sub("<[^>]*>", " ", before_scripts).lower().split()
 
 
-def test_page_has_the_same_bytes_twice() -> None:
-    assert page_of(SIZES["a pose lost"]) == page("a pose lost")
-
-
 def test_the_answer_stands_before_all_else() -> None:
     text = page("a pose lost")
     order = ["Look at this first", "Verdict", 'class="headline"', "Figure 1.", "Table 1."]
