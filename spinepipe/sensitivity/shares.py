@@ -175,13 +175,20 @@ def _shares_of_table(values: Array, hypercubes: bool) -> VarianceShares:
         if hypercubes
         else of(MeanSquares(swapped.column, swapped.row, swapped.interaction), rows, columns - 1)
     )
-    low, high = share_intervals(raw, by_row, by_column)
-    # an estimate set to 0 changes the others a little
-    low, high = np.minimum(low, estimates), np.maximum(high, estimates)
-    found = [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
+    found = _with_intervals(estimates, raw, by_row, by_column)
     names = [name for name, share in zip(("row", "column"), raw[:2], strict=True) if share < 0.0]
     message = f"negative {' and '.join(names)} component set to 0" if names else ""
     return VarianceShares(rows, columns, ComputationStatus.DONE, message, *found)
+
+
+def _with_intervals(
+    estimates: Array, raw: Array, by_row: Array, by_column: Array
+) -> list[VarianceShare]:
+    """Shares with the intervals of the raw ones, which hold the estimates."""
+    low, high = share_intervals(raw, by_row, by_column)
+    # an estimate set to 0 changes the others a little
+    low, high = np.minimum(low, estimates), np.maximum(high, estimates)
+    return [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
 
 
 def mean_squares(values: Array) -> MeanSquares:
@@ -305,10 +312,8 @@ def _shares_of_grid(grid: Array) -> NestedShares:
     raw, left_out = (part / part.sum(axis=-1, keepdims=True) for part in (whole, by_specimen))
     kept = np.maximum(raw, 0.0)
     estimates = kept / kept.sum()
-    low, high = share_intervals(raw, left_out, np.stack([raw, raw]))  # treatments do not vary
-    # an estimate set to 0 changes the others a little
-    low, high = np.minimum(low, estimates), np.maximum(high, estimates)
-    found = [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
+    # treatments do not vary
+    found = _with_intervals(estimates, raw, left_out, np.stack([raw, raw]))
     message = "negative treatment component set to 0" if raw[2] < 0.0 else ""
     return NestedShares(ComputationStatus.DONE, message, *found)
 

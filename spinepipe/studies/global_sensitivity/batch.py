@@ -15,7 +15,7 @@ from spinepipe.studies.global_sensitivity.sampling import factor_values
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, start_of
 from spinepipe.studies.global_sensitivity.tables import EVERY
-from spinepipe.studies.global_sensitivity.vary import Varied, vary
+from spinepipe.studies.global_sensitivity.vary import SpineSamples, vary
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
@@ -28,7 +28,7 @@ class Batch:
     first: int
     count: int
     start: DescribedSpecimen
-    varied: Varied
+    varied: SpineSamples
 
 
 def made_of_batches(

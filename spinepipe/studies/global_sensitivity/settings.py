@@ -1,7 +1,7 @@
 """What a study of global sensitivity asks: factors, design, outputs, fits of stiffness."""
 
-from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -31,6 +31,8 @@ from spinepipe.studies.parts import (
     Weights,
 )
 from spinepipe.studies.study import Study
+
+T = TypeVar("T")
 
 FITTED = "fitted"
 """In place of a stiffness: each specimen's own."""
@@ -215,16 +217,19 @@ class GlobalSensitivity(Study):
         """What all joints have before anything is fitted."""
         return self.calibration.start if isinstance(self.stiffness, str) else self.stiffness
 
+    def _with_dummy(self, own: Iterable[T], dummy: T) -> tuple[T, ...]:
+        """(D,) of all factors, the dummy's last where there is one."""
+        return (*own, dummy) if self.dummy else tuple(own)
+
     @property
     def factor_names(self) -> tuple[str, ...]:
         """(D,) names, the dummy's last."""
-        return (*(factor.label for factor in self.factors), *((DUMMY,) if self.dummy else ()))
+        return self._with_dummy((factor.label for factor in self.factors), DUMMY)
 
     @property
     def groups(self) -> tuple[str, ...]:
         """(D,) group of each factor; one without is a group by its own name."""
-        own = tuple(factor.group or factor.label for factor in self.factors)
-        return (*own, *((DUMMY,) if self.dummy else ()))
+        return self._with_dummy((one.group or one.label for one in self.factors), DUMMY)
 
     @property
     def compared(self) -> tuple[str, ...]:
@@ -234,18 +239,17 @@ class GlobalSensitivity(Study):
     @property
     def changes(self) -> tuple[FactorChange, ...]:
         """(D,) what each factor changes."""
-        nothing = (FactorChange(Of.NOTHING),) if self.dummy else ()
-        return (*(factor.change for factor in self.factors), *nothing)
+        return self._with_dummy((one.change for one in self.factors), FactorChange(Of.NOTHING))
 
     @property
     def units(self) -> tuple[str, ...]:
         """(D,) unit of each value in files and tables: mm, deg or 1."""
-        return (*(factor.spread.unit for factor in self.factors), *(("1",) if self.dummy else ()))
+        return self._with_dummy((one.spread.unit for one in self.factors), "1")
 
     @property
     def per_si(self) -> tuple[float, ...]:
         """(D,) what one SI unit of each value is in its unit of files and tables."""
-        return (*(one.spread.per_si for one in self.factors), *((1.0,) if self.dummy else ()))
+        return self._with_dummy((one.spread.per_si for one in self.factors), 1.0)
 
     @property
     def n_runs(self) -> int:

@@ -80,7 +80,7 @@ class Frames:
 
 
 @dataclass(frozen=True, eq=False)
-class Varied:
+class SpineSamples:
     """Spines of a specimen, for those of the samples that make a spine.
 
     Attributes
@@ -97,7 +97,7 @@ class Varied:
     refused: dict[int, str]
 
 
-def vary(start: DescribedSpecimen, changes: Sequence[FactorChange], values: Array) -> Varied:
+def vary(start: DescribedSpecimen, changes: Sequence[FactorChange], values: Array) -> SpineSamples:
     """Give factors their values.
 
     Landmarks are moved first; the joint frames that they make are then moved along their own axes
@@ -140,13 +140,13 @@ def _out_of_bounds(scoped: ScopedEffect, joints: Sequence[str], values: Array) -
     return refused
 
 
-def _of_kept(spines: Spines, cases: tuple[Cases, ...], refused: dict[int, str]) -> Varied:
+def _of_kept(spines: Spines, cases: tuple[Cases, ...], refused: dict[int, str]) -> SpineSamples:
     """The spines that are spines."""
     kept = np.setdiff1d(np.arange(len(spines)), list(refused)).astype(np.int64)
     if refused:
         spines = spines.part(kept)
         cases = tuple(case.part(kept) for case in cases)
-    return Varied(spines, cases, kept, dict(sorted(refused.items())))
+    return SpineSamples(spines, cases, kept, dict(sorted(refused.items())))
 
 
 def variation(

@@ -21,8 +21,8 @@ from spinepipe.studies.scoliosis.films import (
     PATIENTS,
     RIGHT,
     Film,
-    as_read,
     by_reading,
+    film_readings,
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -81,7 +81,7 @@ def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Input
         faults = list(_film(cohort, place, film))
         yield from faults
         if not faults:
-            shapes[position] = Film(*as_read(film, cohort.vertebrae).mean(axis=0))
+            shapes[position] = Film(*film_readings(film, cohort.vertebrae).mean(axis=0))
             yield from _tilts(place, film, cohort.vertebrae, shapes[position])
     yield from _bends(file, patient, shapes)
     if ERECT in shapes:

@@ -29,8 +29,8 @@ from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.fixed_end_spine import BENDING, with_laws
 from spinepipe.studies.scoliosis.optima import FilmOptimum, Limits, best, optimum
-from spinepipe.studies.scoliosis.personal import Fitting, Patient, Personal
-from spinepipe.studies.scoliosis.population import PatientPrior, Population, assumed
+from spinepipe.studies.scoliosis.personal import Fitting, Patient, PersonalModel
+from spinepipe.studies.scoliosis.population import PatientPrior, Population, usual_population
 from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, EndRotations
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -84,7 +84,7 @@ class FilmInformation:
 
 
 @dataclass(frozen=True)
-class FittedFilms:
+class FilmFitResult:
     """The end of a fit.
 
     Attributes
@@ -184,11 +184,11 @@ class FilmFit:
         """
         self.patient, self.size, self.sd = patient, patient.size, sd
         self.segments = patient.chain.n_joints
-        model = self._model(next(self._guesses(assumed(self.segments)))[:-TOPS])
+        model = self._model(next(self._guesses(usual_population(self.segments)))[:-TOPS])
         self.spine = replace(patient.fixed_end(model), ask=ask)
         self.near: dict[str, PrescribedResult] = {}
 
-    def fit(self, population: Population, start: FittedFilms | None = None) -> FittedFilms:
+    def fit(self, population: Population, start: FilmFitResult | None = None) -> FilmFitResult:
         """The likeliest numbers, and what is known of them; from a fit near by, if there is one.
 
         Raises
@@ -228,25 +228,25 @@ class FilmFit:
 
         return found
 
-    def personal(self, fitted: FittedFilms) -> Personal:
+    def personal(self, fitted: FilmFitResult) -> PersonalModel:
         """The model of a fit."""
         found = self._personal(fitted.known, fitted.decided)
         return replace(found, fitting=Fitting(fitted.status, fitted.n_optima))
 
-    def unfitted(self, population: Population) -> Personal:
+    def unfitted(self, population: Population) -> PersonalModel:
         """The model of a patient of whom no film was fitted."""
         nothing = np.zeros((len(population.mean),) * 2)
         known = FilmInformation(nothing, nothing[0]).known(population)
         begin = self._beyond_films(known.mean, BEYOND_THE_FILM[-1])
         return self._personal(PatientPrior(begin, known.covariance), 0.0)
 
-    def _personal(self, known: PatientPrior, decided: float) -> Personal:
+    def _personal(self, known: PatientPrior, decided: float) -> PersonalModel:
         # ratios are over the geometric mean: logarithms less their mean
         s = self.segments
         centred = np.eye(s) - 1.0 / s
         ratio, spread = centred @ known.mean[:s], centred @ known.covariance[:s, :s] @ centred
         reach = float(norm.ppf(0.5 + 0.5 * LEVEL)) * np.sqrt(np.diag(spread))
-        return Personal(
+        return PersonalModel(
             self._model(known.mean),
             self.size * np.exp(known.mean[:s]),
             EndRotations(*ends_of(known.mean)),
@@ -317,10 +317,10 @@ class FilmFit:
 def fit_alike(
     fits: Sequence[FilmFit],
     population: Population,
-    before: Sequence[FittedFilms | None],
+    before: Sequence[FilmFitResult | None],
     drawn: int = DRAWN_STARTS,
     seed: int = 0,
-) -> list[FittedFilms | None]:
+) -> list[FilmFitResult | None]:
     """Fits of patients with equally many segments, all starts in lockstep; None without a pose.
 
     Parameters
@@ -355,7 +355,7 @@ def _search(
     return optimum(fit, fit.point(population), begin, near, _limits(population), SETTLED)
 
 
-def _fitted(ends: Sequence[FilmOptimum | None], population: Population) -> FittedFilms | None:
+def _fitted(ends: Sequence[FilmOptimum | None], population: Population) -> FilmFitResult | None:
     """The best end, and what the films say near it."""
     found, n_optima = best(ends, _limits(population)[2])
     if found is None:
@@ -363,7 +363,9 @@ def _fitted(ends: Sequence[FilmOptimum | None], population: Population) -> Fitte
     films = len(found.residual) - len(found.x)  # the rest is of the population
     information = _information(found.residual[:films], found.jacobian[:films], found.x)
     known = replace(information.known(population), mean=found.x[:-TOPS])
-    return FittedFilms(found.x, information, known, found.status, found.poses, found.cost, n_optima)
+    return FilmFitResult(
+        found.x, information, known, found.status, found.poses, found.cost, n_optima
+    )
 
 
 def _limits(population: Population) -> Limits:

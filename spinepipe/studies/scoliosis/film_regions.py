@@ -15,7 +15,7 @@ from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.profile import Best, RegionEnds, profile_in_turn
 from spinepipe.effects.contract import Array
 from spinepipe.statics.prescribed import Ask, alone, answered
-from spinepipe.studies.scoliosis.film_fit import FARTHEST, FilmFit, FittedFilms, prior
+from spinepipe.studies.scoliosis.film_fit import FARTHEST, FilmFit, FilmFitResult, prior
 from spinepipe.studies.scoliosis.population import Population
 
 SETTLED = DescentTolerances(cost=1e-3, step=1e-3, slope=1e-6, evaluations=30)
@@ -28,14 +28,14 @@ OPEN = RegionEnds(None, None, True, True)
 """Of a segment of which films tell nothing."""
 
 
-def regions(fit: FilmFit, population: Population, fitted: FittedFilms) -> tuple[RegionEnds, ...]:
+def regions(fit: FilmFit, population: Population, fitted: FilmFitResult) -> tuple[RegionEnds, ...]:
     """(S,) 95 % region of each segment's ratio; ends that the films leave open are none."""
     searches = [partial(region, fit, population, fitted, one) for one in range(fit.segments)]
     return tuple(in_lockstep(searches, answered))
 
 
 def region(
-    fit: FilmFit, population: Population, fitted: FittedFilms, segment: int, ask: Ask = alone
+    fit: FilmFit, population: Population, fitted: FilmFitResult, segment: int, ask: Ask = alone
 ) -> RegionEnds:
     """95 % region of one segment's ratio."""
     fit = FilmFit(fit.patient, fit.sd, ask)

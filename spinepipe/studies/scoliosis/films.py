@@ -113,7 +113,7 @@ def read_films(cohort: Cohort, patient: str) -> PatientFilms:
     rows = rows[rows["specimen"] == patient]
     every, sizes = {}, {}
     for position, film in rows.groupby("position", sort=False):
-        every[str(position)] = as_read(film, cohort.vertebrae)
+        every[str(position)] = film_readings(film, cohort.vertebrae)
         size = height(film)
         if size is not None:
             sizes[str(position)] = size
@@ -134,13 +134,13 @@ def by_reading(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
         yield one
 
 
-def as_read(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Array:
+def film_readings(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Array:
     """(K, 3, V) right, up and tilt of each reading of a film, seen from its lowest vertebra."""
-    each = (placed(one, vertebrae).seen_from_below() for one in by_reading(rows))
+    each = (film_of_rows(one, vertebrae).seen_from_below() for one in by_reading(rows))
     return np.array([[one.right, one.up, one.tilt] for one in each])
 
 
-def placed(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Film:
+def film_of_rows(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Film:
     """One reading of a film, in the film's own frame."""
     rows = rows.set_index("vertebra").loc[list(vertebrae)]
     if rows[list(CORNERS)].notna().all(axis=None):

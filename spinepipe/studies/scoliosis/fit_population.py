@@ -17,8 +17,8 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.progress import Progress
 from spinepipe.studies.scoliosis.film_fit import (
     FilmFit,
+    FilmFitResult,
     FilmInformation,
-    FittedFilms,
     fit_alike,
     weighed_with,
 )
@@ -27,9 +27,9 @@ from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import (
     Population,
     PopulationEstimate,
-    assumed,
-    learned,
     population_rows,
+    update_population,
+    usual_population,
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import POPULATION
@@ -66,8 +66,8 @@ def fit_population(
 ) -> PopulationEstimate:
     """Rounds of fits of all patients, until the population stands still."""
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
-    population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, FittedFilms]()
-    rounds = 0
+    population = usual_population(len(cohort.joint_names))
+    rounds, change, fits = 0, np.inf, dict[str, FilmFitResult]()
     for _ in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
         rounds += 1
         fits = dict(_fits(patients, sd, population, fits))
@@ -84,8 +84,8 @@ def _fits(
     patients: Mapping[str, Patient],
     sd: Array,
     population: Population,
-    before: Mapping[str, FittedFilms],
-) -> Iterator[tuple[str, FittedFilms]]:
+    before: Mapping[str, FilmFitResult],
+) -> Iterator[tuple[str, FilmFitResult]]:
     """The patients that can be fitted, from the fits before or, without these, from all starts."""
     problems = [FilmFit(patient, sd) for patient in patients.values()]
     found = fit_alike(problems, population, [before.get(name) for name in patients])
@@ -99,7 +99,7 @@ def _likeliest(population: Population, patients: list[FilmInformation]) -> Popul
     of these posteriors, until it stands still.
     """
     for _ in range(MOST_STEPS if patients else 0):
-        after = learned(population, [one.known(population) for one in patients])
+        after = update_population(population, [one.known(population) for one in patients])
         change, population = _change(population, after), after
         if change < LAST_STEP:
             break

@@ -37,8 +37,8 @@ from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
     EndRotations,
     Flags,
+    LinearShape,
     Pairs,
-    Straight,
     characterise,
     ends_of,
 )
@@ -120,7 +120,7 @@ class Fitting(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Personal:
+class PersonalModel:
     """A personalised model.
 
     Attributes
@@ -203,7 +203,7 @@ def geometric_mean(values: Array) -> float:
     return float(np.exp(np.mean(np.log(values))))
 
 
-def tangent(patient: Patient, study: Scoliosis) -> Personal:
+def tangent(patient: Patient, study: Scoliosis) -> PersonalModel:
     """The published model: tangent laws of the two bending films."""
     ends = ends_of(patient.pairs, study.enlargement)
     laws = characterise(patient.pairs, ends, study.scale.apical_moment_nm)
@@ -212,29 +212,29 @@ def tangent(patient: Patient, study: Scoliosis) -> Personal:
     values = np.column_stack([factor * laws.stretch, ends.lower, ends.upper])
     model = with_laws(patient.chain, patient.springs, values)
     free = 3 * len(at_rest) + 1
-    return Personal(model, factor * at_rest, ends, laws.constrained, free, free)
+    return PersonalModel(model, factor * at_rest, ends, laws.constrained, free, free)
 
 
-def linear_per_segment(patient: Patient, study: Scoliosis) -> Personal:
+def linear_per_segment(patient: Patient, study: Scoliosis) -> PersonalModel:
     """A spring for each segment from the same pairs."""
-    laws = characterise(patient.pairs, Straight(), study.scale.apical_moment_nm)
+    laws = characterise(patient.pairs, LinearShape(), study.scale.apical_moment_nm)
     at_rest = laws.stretch * patient.size / geometric_mean(laws.stretch)
     model = with_springs(patient.chain, _with_bending(patient, at_rest))
     free = len(at_rest) + 1
-    return Personal(model, at_rest, None, laws.constrained, free, free)
+    return PersonalModel(model, at_rest, None, laws.constrained, free, free)
 
 
-def uniform(patient: Patient, study: Scoliosis) -> Personal:
+def uniform(patient: Patient, study: Scoliosis) -> PersonalModel:
     """The same spring everywhere: nothing is taken from the films."""
     return _springs(patient, patient.springs[:, BENDING], 0)
 
 
-def _springs(patient: Patient, at_rest: Array, free: int) -> Personal:
+def _springs(patient: Patient, at_rest: Array, free: int) -> PersonalModel:
     model = with_springs(patient.chain, _with_bending(patient, at_rest))
-    return Personal(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), free, free)
+    return PersonalModel(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), free, free)
 
 
-def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
+def linear_regions(patient: Patient, study: Scoliosis) -> PersonalModel:
     """Petit's scheme: a multiplier of the springs for each curve, by the curves' Ferguson angles.
 
     With the uppermost vertebra held in place only ratios of the multipliers count.
@@ -323,7 +323,7 @@ def _with_bending(patient: Patient, at_rest: Array) -> Array:
     return springs
 
 
-WAYS: Mapping[str, Callable[[Patient, Scoliosis], Personal]] = {
+WAYS: Mapping[str, Callable[[Patient, Scoliosis], PersonalModel]] = {
     "tangent": tangent,
     "linear_regions": linear_regions,
     "linear_per_segment": linear_per_segment,

@@ -16,7 +16,7 @@ from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.film_regions import regions
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
 from spinepipe.studies.scoliosis.fixed_end_spine import SpinePose
-from spinepipe.studies.scoliosis.personal import POSED, WAYS, Patient, Personal, patient_of
+from spinepipe.studies.scoliosis.personal import POSED, WAYS, Patient, PersonalModel, patient_of
 from spinepipe.studies.scoliosis.population import population_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
@@ -112,7 +112,7 @@ def rows_of(
 
 def _personal(
     settings: Scoliosis, patient: Patient, model: str, population: pd.DataFrame | None
-) -> tuple[Personal, str]:
+) -> tuple[PersonalModel, str]:
     """The model, and what is to be said of how it was come by."""
     if population is None:
         personal = WAYS[model](patient, settings)
@@ -130,7 +130,7 @@ def _personal(
     return personal, joined(unsettled, _of_fit(personal))
 
 
-def _of_fit(personal: Personal) -> str:
+def _of_fit(personal: PersonalModel) -> str:
     """What is to be said of a fit to the films."""
     if personal.fitting is None:
         return ""
@@ -140,7 +140,7 @@ def _of_fit(personal: Personal) -> str:
     return joined(told, several)
 
 
-def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
+def _laws(patient: Patient, personal: PersonalModel) -> Iterator[Row]:
     ends, reach = personal.ends, personal.ratio_range
     for number, joint in enumerate(patient.chain.joints):
         # how far the films let the segment's ratio go, where they were asked

@@ -14,7 +14,14 @@ from spinepipe.plausibility.score import suspect, usual
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.levels import spacing_mm
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
-from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film, by_reading, corners, placed
+from spinepipe.studies.scoliosis.films import (
+    CENTRE,
+    CORNERS,
+    Film,
+    by_reading,
+    corners,
+    film_of_rows,
+)
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 WITH = 0.7
@@ -68,7 +75,7 @@ def _fault(cohort: Cohort, rows: pd.DataFrame) -> _Fault | None:
         for reading in by_reading(film):
             whole = any(reading[list(c)].notna().all(axis=None) for c in (CENTRE, CORNERS))
             if sorted(reading["vertebra"]) == sorted(cohort.vertebrae) and whole:
-                films.append(placed(reading, cohort.vertebrae))
+                films.append(film_of_rows(reading, cohort.vertebrae))
     if not films:
         return None
     if rows[list(CORNERS)].notna().all(axis=None):

@@ -90,7 +90,7 @@ class Population:
         return found
 
 
-def assumed(segments: int) -> Population:
+def usual_population(segments: int) -> Population:
     """What is taken for granted before any film."""
     mean = np.repeat([0.0, np.log(END_RAD), np.log(END_RAD)], segments)
     return Population(mean, RATIO_SPREAD, END_SPREAD)
@@ -104,7 +104,7 @@ class PatientPrior:
     covariance: Array
 
 
-def learned(before: Population, patients: Sequence[PatientPrior]) -> Population:
+def update_population(before: Population, patients: Sequence[PatientPrior]) -> Population:
     """The population that patients, known by means of the one before, make likeliest.
 
     The maximisation of expectation and maximisation: squares of means and what is unsure of them.

@@ -93,7 +93,7 @@ class EndRotations:
 
 
 @dataclass(frozen=True)
-class Straight:
+class LinearShape:
     """The shape of linear laws: as many times the rotation as its stiffness says."""
 
     def load(self, r: Array) -> Array:
@@ -105,7 +105,7 @@ class Straight:
         return load
 
 
-Shape = EndRotations | Straight
+Shape = EndRotations | LinearShape
 """How the moments of segments grow with their rotation, but for a factor of each."""
 
 

@@ -17,7 +17,7 @@ from spinepipe.studies.global_sensitivity.failed_runs import (
     rows_of,
 )
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.soundness import doubts
+from spinepipe.studies.global_sensitivity.soundness import cautions
 from spinepipe.studies.global_sensitivity.tables import FAILED_RUNS, RESPONSES
 from spinepipe.tables import from_rows, write
 
@@ -149,5 +149,5 @@ def said(table: pd.DataFrame) -> list[str]:
     factors = [{"of": "load_size", "times": {"sd": 0.1}}, {"of": "damping", "times": {"sd": 0.1}}]
     head = {"study": "probe", "kind": "global_sensitivity", "cohort": "any", "factors": factors}
     nothing = pd.DataFrame()
-    told = doubts(GlobalSensitivity.model_validate(head), nothing, nothing, table)
+    told = cautions(GlobalSensitivity.model_validate(head), nothing, nothing, table)
     return [words.replace("\u00a0", " ").replace("\u2009", "") for words in told]

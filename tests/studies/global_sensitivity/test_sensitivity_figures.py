@@ -23,11 +23,11 @@ from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.style import style
 from spinepipe.schema import Table
 from spinepipe.studies.global_sensitivity.figures.panels import (
+    choose_panels,
     leading,
     measures_of,
     outputs,
-    pooled,
-    shown,
+    pool,
 )
 from spinepipe.studies.global_sensitivity.figures.scatter import running
 from spinepipe.studies.global_sensitivity.findings import (
@@ -372,7 +372,7 @@ def test_pooled_ends_are_means_of_ends() -> None:
             "ci_high": [0.3, 0.8, 0.2],
         }
     )
-    one = pooled(rows).iloc[0]
+    one = pool(rows).iloc[0]
     found = [one[name] for name in ("estimate", "low", "high", "lowest", "highest", "places")]
     assert found == pytest.approx([0.3, 0.15, 0.55, 0.2, 0.4, 2])
 
@@ -520,8 +520,8 @@ def test_joints_with_leaders_of_their_own_are_told_apart(cohort: Cohort) -> None
         "Motion hangs most on load size or load point x, by test and joint; joint load on load "
         "size."
     )
-    assert len(shown(panels, cohort.joint_names, 12)) == 12
-    assert len(shown(panels, cohort.joint_names, 2)) == 2
+    assert len(choose_panels(panels, cohort.joint_names, 12)) == 12
+    assert len(choose_panels(panels, cohort.joint_names, 2)) == 2
 
 
 @sweep("method", LEFT_OUT)

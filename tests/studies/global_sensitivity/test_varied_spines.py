@@ -16,7 +16,7 @@ from spinepipe.frames import FRAME_LANDMARKS, joint_pose, transform_of
 from spinepipe.studies.global_sensitivity.factors import FactorChange, Of
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, asked_tests, start_of
 from spinepipe.studies.global_sensitivity.vary import (
-    Varied,
+    SpineSamples,
     many_joint_frames,
     one_joint_frame,
     vary,
@@ -43,7 +43,7 @@ def start(cohort: Cohort, all_steps: bool = False) -> DescribedSpecimen:
     return start_of(cohort, "a", STIFFNESS, DAMPING, cohort.tests, all_steps)
 
 
-def one(cohort: Cohort, *changes: tuple[FactorChange, float]) -> Varied:
+def one(cohort: Cohort, *changes: tuple[FactorChange, float]) -> SpineSamples:
     """One sample of some factors with their values."""
     whats, values = zip(*changes, strict=True)
     return vary(start(cohort, all_steps=True), whats, np.array([values]))

@@ -17,7 +17,11 @@ from scoliosis_cases import shipped, write_shipped
 from spinepipe.studies.scoliosis.accuracy import accuracy_rows
 from spinepipe.studies.scoliosis.films import CORNERS, read_films, reading_noise
 from spinepipe.studies.scoliosis.personalise import rows_of
-from spinepipe.studies.scoliosis.population import PopulationEstimate, assumed, population_rows
+from spinepipe.studies.scoliosis.population import (
+    PopulationEstimate,
+    population_rows,
+    usual_population,
+)
 from spinepipe.studies.scoliosis.settings import MODELS
 from spinepipe.studies.scoliosis.tables import (
     ACCURACY,
@@ -40,7 +44,7 @@ TABLES = (LAWS, POSITIONS, DISPLACEMENTS, CURVES)
 
 @pytest.fixture(scope="module")
 def tables() -> dict[str, pd.DataFrame]:
-    usual = PopulationEstimate(assumed(len(COHORT.joint_names)), 1, 0.0, 0, (), True)
+    usual = PopulationEstimate(usual_population(len(COHORT.joint_names)), 1, 0.0, 0, (), True)
     population = from_rows(
         POPULATION, list(population_rows(usual, COHORT.joint_names, np.array([1e-3, 1e-3, 0.01])))
     )

@@ -26,7 +26,7 @@ from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.fit_population import fit_population, weights
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.personalise import rows_of
-from spinepipe.studies.scoliosis.population import assumed, population_rows
+from spinepipe.studies.scoliosis.population import population_rows, usual_population
 from spinepipe.studies.scoliosis.tables import LAWS, POPULATION, POSITIONS
 from spinepipe.tables import from_rows
 
@@ -41,7 +41,7 @@ SHARP = weighed_with(0.0, 0.0, 0.05, 0.02)
 
 def some_unknowns(patient: Patient) -> np.ndarray:
     rng, s = np.random.default_rng(3), patient.chain.n_joints
-    numbers = assumed(s).mean.copy()
+    numbers = usual_population(s).mean.copy()
     numbers[:s] += rng.normal(0.0, 0.3, s)
     numbers[s:] += 0.3 + rng.normal(0.0, 0.1, 2 * s)
     return np.append(numbers, rng.normal(0.0, 0.5, TOPS))
@@ -90,7 +90,7 @@ def weights_of_a_usual_study() -> np.ndarray:
 def test_films_of_the_model_itself_are_reproduced(patient: Patient) -> None:
     hidden = some_unknowns(patient)[:-TOPS]
     fit = FilmFit(filmed_with(patient, hidden, SHARP), SHARP)
-    found = fit.fit(assumed(patient.chain.n_joints))
+    found = fit.fit(usual_population(patient.chain.n_joints))
     assert found.status.usable
     errors, _ = fit.missed(found.unknowns) or (None, None)
     assert errors is not None
@@ -101,14 +101,14 @@ def test_films_of_the_model_itself_are_reproduced(patient: Patient) -> None:
 
 
 def test_what_films_decide_falls_with_how_coarsely_they_are_read(patient: Patient) -> None:
-    population = assumed(patient.chain.n_joints)
+    population = usual_population(patient.chain.n_joints)
     decided = [FilmFit(patient, f * SHARP).fit(population).decided for f in (1.0, 10.0, 100.0)]
     assert 41.0 > decided[0] > decided[1] > decided[2] > 0.0
 
 
 def test_an_interval_holds_the_ratio(patient: Patient) -> None:
     fit = FilmFit(patient, weights_of_a_usual_study())
-    personal = fit.personal(fit.fit(assumed(patient.chain.n_joints)))
+    personal = fit.personal(fit.fit(usual_population(patient.chain.n_joints)))
     assert personal.ratio_range is not None
     low, high = personal.ratio_range
     assert (low < personal.ratio).all()
@@ -129,7 +129,7 @@ def test_films_close_the_ratios_that_move_them_and_leave_others_open(patient: Pa
     """Films of a known chain: regions hold its ratios. Coarsely read, nothing is told."""
     hidden = some_unknowns(patient)[:-TOPS]
     sd, s = weights_of_a_usual_study(), patient.chain.n_joints
-    population = assumed(s)
+    population = usual_population(s)
     filmed = FilmFit(filmed_with(patient, hidden, sd), sd)
     fitted = filmed.fit(population)
     true = np.exp(hidden[:s] - hidden[:s].mean())
@@ -149,7 +149,10 @@ def test_a_ratio_whose_fit_does_not_arrive_is_left_open(
 ) -> None:
     """After two evaluations nothing has settled: what lies about such a point is no region."""
     monkeypatch.setattr(film_regions, "SETTLED", replace(film_regions.SETTLED, evaluations=2))
-    fit, population = FilmFit(patient, weights_of_a_usual_study()), assumed(patient.chain.n_joints)
+    fit, population = (
+        FilmFit(patient, weights_of_a_usual_study()),
+        usual_population(patient.chain.n_joints),
+    )
     assert region(fit, population, fit.fit(population), 5) is film_regions.OPEN
 
 

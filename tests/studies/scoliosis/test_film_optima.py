@@ -25,7 +25,7 @@ from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT
 from spinepipe.studies.scoliosis.optima import FilmOptimum, best, optimum
 from spinepipe.studies.scoliosis.personal import linear_regions, patient_of, region_optimum
 from spinepipe.studies.scoliosis.personalise import UNSETTLED, rows_of
-from spinepipe.studies.scoliosis.population import Population, assumed, population_rows
+from spinepipe.studies.scoliosis.population import Population, population_rows, usual_population
 from spinepipe.studies.scoliosis.tables import LAWS, POPULATION, POSITIONS
 from spinepipe.tables import from_rows
 
@@ -70,7 +70,7 @@ def held_off_the_path(fit: FilmFit, numbers: Array) -> tuple[PrescribedResult, P
 def test_the_pose_is_the_end_of_the_way_and_not_where_one_long_step_lands(cohort: Cohort) -> None:
     """p14 with wide ends: all at once from neutral another stable pose is met, 2.5 deg off."""
     fit = fit_of(cohort, "p14")
-    numbers = list(fit._guesses(assumed(SEGMENTS)))[2][:-TOPS]
+    numbers = list(fit._guesses(usual_population(SEGMENTS)))[2][:-TOPS]
     at_once, found = held_off_the_path(fit, numbers)
     assert at_once.status is found.status is PrescribedStatus.CONVERGED
     assert np.abs(at_once.q - found.q).max() > np.deg2rad(2.0)
@@ -87,7 +87,7 @@ def test_the_pose_is_the_end_of_the_way_and_not_where_one_long_step_lands(cohort
 
 def test_a_fit_from_poses_off_the_path_ends_on_it(cohort: Cohort) -> None:
     """Trial poses begin on another path; what is told are errors of the poses from neutral."""
-    fit, population = fit_of(cohort, "p14"), assumed(SEGMENTS)
+    fit, population = fit_of(cohort, "p14"), usual_population(SEGMENTS)
     unknowns = list(fit._guesses(population))[2]
     off, _ = held_off_the_path(fit, unknowns[:-TOPS])
     usual = fit.fit(population)

@@ -19,15 +19,21 @@ from sweeps import sweep
 from spinepipe import cohort as cohorts
 from spinepipe.status import PrescribedStatus
 from spinepipe.studies.scoliosis import films as film_module
-from spinepipe.studies.scoliosis.curve_angles import SpinalCurve, curves, lumbar_apex, region
+from spinepipe.studies.scoliosis.curve_angles import (
+    SpinalCurve,
+    curves,
+    lumbar_apex,
+    main_curve,
+    region,
+)
 from spinepipe.studies.scoliosis.films import (
     CORNERS,
     FILMS,
     PATIENTS,
     Film,
     PatientFilms,
+    film_of_rows,
     height,
-    placed,
     read_films,
     reading_noise,
 )
@@ -127,6 +133,14 @@ def test_upside_down_and_mirrored_a_film_has_the_same_curves(tilts: list[float])
             assert cobb == np.ptp(within) > np.deg2rad(5.0)
 
 
+def test_the_main_curve_is_that_of_the_largest_angle() -> None:
+    film = tilted(0, 10, 20, 5, -10)
+    lower, upper = curves(film)
+    assert (main_curve(film), main_curve(tilted(0, 15, 30, 20, 5))) == (upper, lower)
+    assert (lower.side, upper.side) == (-1, 1)
+    assert np.rad2deg([lower.cobb(film), upper.cobb(film)]) == pytest.approx([20.0, 30.0])
+
+
 def test_a_spine_of_two_vertebrae_has_no_curve() -> None:
     assert curves(tilted(0, 20)) == ()
     assert lumbar_apex(tilted(0, 20), ("L5", "L4")) == 0
@@ -184,7 +198,7 @@ def test_the_centre_of_a_wedge_is_where_its_diagonals_cross() -> None:
     rows = cornered(
         lower_left=(30, 0), lower_right=(-30, 0), upper_left=(10, 20), upper_right=(-10, 20)
     )
-    found = placed(rows, ("L4",))
+    found = film_of_rows(rows, ("L4",))
     np.testing.assert_allclose([found.right[0], found.up[0]], [0.0, 0.015], atol=1e-15)
     assert found.tilt[0] == 0.0
     assert height(rows) == pytest.approx(0.020)
@@ -195,7 +209,7 @@ def test_a_vertebra_leans_with_the_line_through_its_endplates() -> None:
     rows = cornered(
         lower_left=(30, 0), lower_right=(-10, 0), upper_left=(15, 20), upper_right=(-25, 20)
     )
-    found = placed(rows, ("L4",))
+    found = film_of_rows(rows, ("L4",))
     assert np.tan(found.tilt[0]) == pytest.approx(0.75)
     assert found.right[0] == pytest.approx(-0.0025)
     assert height(rows) == pytest.approx(0.025)
@@ -204,7 +218,7 @@ def test_a_vertebra_leans_with_the_line_through_its_endplates() -> None:
 def test_one_corner_short_the_centre_is_taken() -> None:
     rows = cornered(lower_left=(30, 0), lower_right=(-30, 0), upper_left=(10, 20))
     rows = rows.assign(y_mm=-3.0, z_mm=7.0, orientation_deg=-8.0)
-    found = placed(rows, ("L4",))
+    found = film_of_rows(rows, ("L4",))
     np.testing.assert_allclose(found.rows[:, 0], [0.003, 0.007, np.deg2rad(8.0)])
     assert height(rows) is None
 

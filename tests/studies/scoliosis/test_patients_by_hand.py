@@ -23,7 +23,7 @@ from spinepipe.studies.scoliosis.fixed_end_spine import BENDING, geometry, with_
 from spinepipe.studies.scoliosis.personal import (
     Fitting,
     Patient,
-    Personal,
+    PersonalModel,
     arms,
     geometric_mean,
     size_of,
@@ -31,8 +31,8 @@ from spinepipe.studies.scoliosis.personal import (
 from spinepipe.studies.scoliosis.settings import SagittalProfile, Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
     EndRotations,
+    LinearShape,
     Pairs,
-    Straight,
     characterise,
     ends_of,
 )
@@ -98,7 +98,7 @@ def test_stiffness_of_even_pairs_is_that_of_the_apical_moment() -> None:
     """10 N m at the second segment: 15, 10 and 5 N m; linear laws moment over rotation. Tangents
     have their ends at 1.2 times; at 1 / 1.2 of an end e the load is tan(75 deg) A, the slope at
     rest A pi / (2 e)."""
-    linear = characterise(PAIRS, Straight(), 10.0)
+    linear = characterise(PAIRS, LinearShape(), 10.0)
     np.testing.assert_allclose(linear.stretch, [15, 10, 5] / PAIRS.right, rtol=1e-6)
     assert linear.ratio == pytest.approx(1.0, rel=1e-6)
     assert (linear.force_right_n, linear.force_left_n) == pytest.approx((50.0, 50.0), rel=1e-6)
@@ -115,7 +115,7 @@ def test_stiffness_of_even_pairs_is_that_of_the_apical_moment() -> None:
 
 def test_errors_of_laws_are_summed_over_segments_as_roots_of_two_films() -> None:
     """Eq 5: 3 and 4 are a root mean square of 3.54, 0 and 2 one of 1.41."""
-    linear = characterise(PAIRS, Straight(), 10.0)
+    linear = characterise(PAIRS, LinearShape(), 10.0)
     made = type(linear)(
         **{**vars(linear), "errors": np.array([[3.0, -4.0], [0.0, 2.0], [0.0, 0.0]])}
     )
@@ -152,7 +152,7 @@ def test_stiffness_stays_between_a_twentieth_and_twenty_times_the_median(
     springs = np.array([100.0, 100.0, 100.0 * times, 100.0, 100.0])
     arm = np.full(5, 0.2)
     right = 10.0 / springs
-    found = characterise(Pairs(right, -right, arm, arm, 0), Straight(), 10.0)
+    found = characterise(Pairs(right, -right, arm, arm, 0), LinearShape(), 10.0)
     np.testing.assert_allclose(found.stretch, [100.0, 100.0, 100.0 * held, 100.0, 100.0], rtol=1e-6)
     assert found.constrained.tolist() == [False, False, held != times, False, False]
 
@@ -161,7 +161,7 @@ def test_stiffness_stays_between_a_twentieth_and_twenty_times_the_median(
 def test_forces_differ_by_thirty_times_at_most(ratio: float, found: float) -> None:
     arm, stiffness = np.array([0.3, 0.2, 0.1]), np.array([90.0, 60.0, 75.0])
     pairs = Pairs(10.0 * arm / stiffness, -ratio * 10.0 * arm / stiffness, arm, arm, 1)
-    laws = characterise(pairs, Straight(), 63.0)
+    laws = characterise(pairs, LinearShape(), 63.0)
     assert laws.ratio == pytest.approx(found, rel=1e-4)
     larger = max(laws.force_right_n, laws.force_left_n) * 0.2
     assert larger == pytest.approx(63.0)
@@ -198,10 +198,10 @@ class Fit:
     def fit(self, population: Any) -> Any:
         return SimpleNamespace(arrived=self.arrived)
 
-    def personal(self, fitted: Any) -> Personal:
+    def personal(self, fitted: Any) -> PersonalModel:
         nothing: Any = None
         ended = Fitting(Status.CONVERGED if self.arrived else Status.NOT_CONVERGED, 1)
-        made = Personal(nothing, np.ones(2), None, np.zeros(2, dtype=bool), 0, 0.0)
+        made = PersonalModel(nothing, np.ones(2), None, np.zeros(2, dtype=bool), 0, 0.0)
         return replace(made, fitting=ended)
 
 
@@ -226,9 +226,9 @@ TABLE: Any = pd.DataFrame({"status": ["converged"]})
 """A population's table, of which nobody here looks at more."""
 
 
-def person(by_films: tuple[RegionEnds, ...] | None, **more: Any) -> Personal:
+def person(by_films: tuple[RegionEnds, ...] | None, **more: Any) -> PersonalModel:
     nothing: Any = None
-    return Personal(
+    return PersonalModel(
         nothing,
         np.array([50.0, 200.0]),
         more.get("ends"),

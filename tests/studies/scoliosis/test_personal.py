@@ -21,7 +21,7 @@ from spinepipe.studies.scoliosis.personal import (
     patient_of,
     tangent,
 )
-from spinepipe.studies.scoliosis.population import assumed
+from spinepipe.studies.scoliosis.population import usual_population
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import Pairs
 
@@ -113,7 +113,7 @@ def test_models_say_how_much_they_take_from_the_films(patient: Patient) -> None:
 
 def test_a_mirrored_patient_has_the_mirrored_fit(patient: Patient) -> None:
     """The fit to films: ratios alike, ends exchanged, as many optima."""
-    population = assumed(patient.chain.n_joints)
+    population = usual_population(patient.chain.n_joints)
     one, other = (FilmFit(p, np.array([1e-3, 1e-3, 0.01])) for p in (patient, turned_over(patient)))
     fits = one.fit(population), other.fit(population)
     assert fits[0].n_optima == fits[1].n_optima

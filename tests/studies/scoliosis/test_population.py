@@ -17,8 +17,8 @@ from spinepipe.studies.scoliosis import fit_population as learning
 from spinepipe.studies.scoliosis.film_fit import (
     TOPS,
     FilmFit,
+    FilmFitResult,
     FilmInformation,
-    FittedFilms,
     _information,
     ends_of,
     laws_of,
@@ -31,10 +31,10 @@ from spinepipe.studies.scoliosis.population import (
     PatientPrior,
     Population,
     PopulationEstimate,
-    assumed,
-    learned,
     population_of,
     population_rows,
+    update_population,
+    usual_population,
 )
 from spinepipe.studies.scoliosis.tables import POPULATION
 from spinepipe.tables import from_rows
@@ -45,7 +45,7 @@ SILENT = Progress(lambda line: None)
 def test_what_is_assumed_of_segments_before_any_film() -> None:
     """Half of the ratios between 0.76 and 1.3; ends about 9 deg, half of them within 0.79 to 1.27,
     which of one patient have 0.15 in common: logarithms with SDs of 0.40, and 0.35 and 0.15."""
-    usual = assumed(3)
+    usual = usual_population(3)
     assert usual.segments == 3
     np.testing.assert_allclose(np.exp(usual.mean[:3]), 1.0)
     np.testing.assert_allclose(np.rad2deg(np.exp(usual.mean[3:])), 9.0)
@@ -58,17 +58,17 @@ def test_what_is_assumed_of_segments_before_any_film() -> None:
 
 def test_assumptions_count_as_thirty_segments() -> None:
     """One patient of four segments who is just as the mean has it, known exactly."""
-    usual = assumed(4)
-    found = learned(usual, [PatientPrior(usual.mean, np.zeros((12, 12)))])
+    usual = usual_population(4)
+    found = update_population(usual, [PatientPrior(usual.mean, np.zeros((12, 12)))])
     assert found.ratio_sd == pytest.approx(0.40 * np.sqrt(30.0 / (30.0 + 4.0)))
     assert found.end_sd == pytest.approx(0.35 * np.sqrt(30.0 / (30.0 + 2.0 * 4.0 - 1.0)))
 
 
 def test_levels_and_the_common_end_are_drawn_to_what_is_assumed() -> None:
     """SDs of levels of 0.30 and 0.15 and of the common end of 0.25, as for one patient."""
-    usual = Population(assumed(2).mean, 0.3, 0.15)
+    usual = Population(usual_population(2).mean, 0.3, 0.15)
     mean = usual.mean + np.array([0.2, -0.2, *(0.5, 0.1, 0.1, 0.1)])
-    found = learned(usual, [PatientPrior(mean, np.zeros((6, 6)))]).mean - usual.mean
+    found = update_population(usual, [PatientPrior(mean, np.zeros((6, 6)))]).mean - usual.mean
     np.testing.assert_allclose(found[:2], [0.1, -0.1])  # 0.3^2 / (0.3^2 + 0.3^2)
     common = 0.2 * 0.25**2 / (0.25**2 + 0.15**2 + 0.15**2 / 4.0)
     np.testing.assert_allclose(found[2:], common + np.array([0.15, -0.05, -0.05, -0.05]))
@@ -103,11 +103,11 @@ def test_rounds_end_when_the_population_stands_still_or_after_twenty(
 def test_steps_on_parabolas_end_when_nothing_moves_or_after_five_hundred(
     by: float, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(learning, "learned", moved(by))
+    monkeypatch.setattr(learning, "update_population", moved(by))
     patient: Any = SimpleNamespace(known=lambda population: None)
-    found = learning._likeliest(assumed(2), [patient])
-    np.testing.assert_allclose(found.mean - assumed(2).mean, steps * by, rtol=1e-9)
-    usual = assumed(2)
+    found = learning._likeliest(usual_population(2), [patient])
+    np.testing.assert_allclose(found.mean - usual_population(2).mean, steps * by, rtol=1e-9)
+    usual = usual_population(2)
     assert learning._likeliest(usual, []) is usual
 
 
@@ -123,7 +123,7 @@ def test_the_largest_change_counts_up_or_down() -> None:
 
 def test_a_table_tells_means_with_the_interval_of_patients() -> None:
     """Of a normal logarithm: exp(mean -+ 1.96 SD); ends in degrees."""
-    usual = assumed(2)
+    usual = usual_population(2)
     rows = list(
         population_rows(
             PopulationEstimate(usual, 4, np.inf, 3, (), True), ("a", "b"), np.full(3, 0.002)
@@ -170,14 +170,14 @@ def test_what_films_say_of_numbers_is_told_whatever_the_top_was() -> None:
 
 def test_a_patient_of_a_population_is_between_the_films_and_the_population() -> None:
     """As precise as both together; and by how many numbers the films decided."""
-    population = assumed(1)
+    population = usual_population(1)
     told = FilmInformation(
         3.0 * population.precision, 3.0 * population.precision @ (population.mean + 1.0)
     )
     known = told.known(population)
     np.testing.assert_allclose(known.mean, population.mean + 0.75)
     np.testing.assert_allclose(known.covariance, np.linalg.inv(population.precision) / 4.0)
-    fitted = FittedFilms(np.zeros(9), told, known, Status.CONVERGED, {}, 0.0, 1)
+    fitted = FilmFitResult(np.zeros(9), told, known, Status.CONVERGED, {}, 0.0, 1)
     assert fitted.decided == pytest.approx(3.0 * 0.75)
 
 
@@ -220,7 +220,7 @@ def test_an_unfitted_patient_has_the_population_s_intervals() -> None:
     """Ratios are told about their mean: of two segments each with an SD of 0.4 / sqrt(2)."""
     fit = of_films([6.0, 6.0], [-6.0, -6.0])
     fit.size, fit._model = 80.0, lambda numbers: "model"
-    found = fit.unfitted(assumed(2))
+    found = fit.unfitted(usual_population(2))
     reach = np.exp(1.959964 * 0.4 / np.sqrt(2.0))
     np.testing.assert_allclose(found.ratio_range, [[1.0 / reach] * 2, [reach] * 2], rtol=1e-6)
     np.testing.assert_allclose(found.at_rest, [80.0, 80.0])
@@ -232,7 +232,7 @@ def test_an_unfitted_patient_has_the_population_s_intervals() -> None:
 def test_a_profiled_ratio_is_drawn_to_nothing_and_all_else_to_the_population() -> None:
     """The sum of squares beside the films is minus twice the logarithm of a normal density of the
     other numbers, but for what does not change."""
-    population = assumed(2)
+    population = usual_population(2)
     mean, sd, _ = prior(population)
     np.testing.assert_allclose(mean, [*population.mean, *np.zeros(TOPS)])
     np.testing.assert_allclose(sd, [*population.sd, *np.ones(TOPS)])
@@ -287,9 +287,9 @@ def test_patients_who_are_known_exactly_give_their_population_back() -> None:
     drawn = rng.multivariate_normal(truth.mean, covariance(truth), count)
     drawn[:, :SEGMENTS] -= drawn[:, :SEGMENTS].mean(axis=1, keepdims=True)
     nothing = np.zeros((3 * SEGMENTS,) * 2)
-    found = assumed(SEGMENTS)
+    found = usual_population(SEGMENTS)
     for _ in range(20):
-        found = learned(found, [PatientPrior(one, nothing) for one in drawn])
+        found = update_population(found, [PatientPrior(one, nothing) for one in drawn])
     # 2,000 patients: means to 0.3 / sqrt(2000), five times that; spreads to a few percent
     np.testing.assert_allclose(found.mean, truth.mean, atol=0.035)
     # ratios are told about their mean, which takes one of their freedoms
@@ -311,8 +311,8 @@ def test_a_population_comes_back_from_its_table() -> None:
 
 
 def test_patients_of_whom_nothing_is_known_change_no_spread() -> None:
-    before = assumed(SEGMENTS)
+    before = usual_population(SEGMENTS)
     unknown = PatientPrior(before.mean, np.linalg.inv(before.precision))
-    after = learned(before, [unknown] * 50)
+    after = update_population(before, [unknown] * 50)
     np.testing.assert_allclose(after.mean, before.mean, atol=1e-12)
     np.testing.assert_allclose([after.ratio_sd, after.end_sd], [0.40, 0.35], rtol=1e-9)

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from drawn import caption, drawings
 from matplotlib.figure import Figure
-from scoliosis_cases import ERRORS, Size, cohort_of, shipped, study_of, tables_of
+from scoliosis_cases import Size, cohort_of, shipped, study_of, tables_of
 from sweeps import sweep
 
 from spinepipe.report.style import WIDTH_MM, style
@@ -37,17 +37,6 @@ SIZES = {
     ),
 }
 """Each figure is drawn once of each, and looked at by all tests."""
-
-FURTHER = {
-    "three patients": Size(),
-    "one patient": Size(1),
-    "nothing held out": Size(positions=(RIGHT, LEFT)),
-    "one held-out film": Size(positions=(RIGHT, LEFT, "neutral")),
-    "one linear model": Size(errors={"uniform": 0.3}),
-    "exact": Size(errors=dict.fromkeys(ERRORS, 0.0)),
-    "reading unknown": Size(noise_deg=None),
-    "nobody has all poses": Size(lost=3),
-}
 
 
 @cache
@@ -82,13 +71,6 @@ def test_every_figure_has_a_caption_and_tables_that_the_kind_makes() -> None:
 @sweep("size", SIZES)
 def test_no_words_leave_the_page_or_stand_on_each_other(name: str, size: str) -> None:
     fits_the_page(drawn(name, size))
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("name", DRAW)
-@sweep("size", FURTHER.values())
-def test_no_words_leave_the_page_of_other_sizes(name: str, size: Size) -> None:
-    fits_the_page(draw(name, size))
 
 
 def fits_the_page(figure: Figure) -> None:

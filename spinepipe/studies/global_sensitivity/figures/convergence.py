@@ -17,12 +17,12 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     OUTPUT,
     Measures,
     Panel,
+    choose_panels,
     factor_name,
     leading,
     no_index,
-    pooled,
+    pool,
     sections_of,
-    shown,
     shown_outputs,
     title,
     unit_of,
@@ -58,7 +58,7 @@ def convergence_figure(
     grown = grown[grown["index"] == measures.main]
     if grown["runs"].nunique() < 2:
         return saying("No convergence can be shown: this design has no smaller part of its own.")
-    kept = shown(found, cohort.joint_names, MOST_PANELS)
+    kept = choose_panels(found, cohort.joint_names, MOST_PANELS)
     panels, figure = sections_of(kept, dict.fromkeys(OUTPUT, _PANEL_MM), _KEY_MM)
     for index, (axis, panel) in enumerate(zip(panels, kept, strict=True)):
         factors = leading([panel], measures)
@@ -73,7 +73,7 @@ def convergence_figure(
 
 
 def _draw(axis: Axes, panel: Panel, styles: Styles, measures: Measures) -> None:
-    rows = pooled(panel.rows, ["factor", "runs"]).sort_values("runs", kind="stable")
+    rows = pool(panel.rows, ["factor", "runs"]).sort_values("runs", kind="stable")
     for name, style in styles.items():
         one = rows[rows["factor"] == name]
         axis.fill_between(

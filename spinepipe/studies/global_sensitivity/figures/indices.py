@@ -22,18 +22,18 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     Measures,
     Panel,
     above_floor,
+    choose_panels,
     factor_name,
     floor_seen,
+    footnote,
     leading,
     no_index,
     not_negligible,
-    pooled,
+    pool,
     screened,
     sections_of,
-    shown,
     shown_outputs,
     title,
-    told,
     unit_of,
 )
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
@@ -62,7 +62,7 @@ def _seen(found: Sequence[Panel], measures: Measures) -> set[str]:
     names: set[str] = set()
     for panel in found:
         main = panel.rows[panel.rows["index"] == measures.main]
-        means = pooled(main, ["factor"]).set_index("factor")["estimate"]
+        means = pool(main, ["factor"]).set_index("factor")["estimate"]
         large = set(means.index[means >= SMALL * means.max()])
         floor = main["noise_floor"].notna().any()
         names |= large & above_floor(main) if floor else large
@@ -102,7 +102,7 @@ def indices_figure(
     # as many panels as a page holds, if every line of them is as high as the mean
     line = _LEAST_ROW_MM * sum(rows.values()) / len(rows) + _AROUND_MM
     most = MOST_ACROSS * max(len(rows), int((TALLEST_MM - _KEY_MM) // line))
-    kept = shown(found, cohort.joint_names, most)
+    kept = choose_panels(found, cohort.joint_names, most)
     lines = {name: -(-len(part) // MOST_ACROSS) for name, part in _by_output(kept).items()}
     room = TALLEST_MM - _KEY_MM - _AROUND_MM * sum(lines.values())
     row = min(_ROW_MM, room / sum(n * rows[name] for name, n in lines.items()))
@@ -122,7 +122,7 @@ def indices_figure(
     missing = next(iter(others.values()), "")
     if len(set(others.values())) > 1:
         missing = "; ".join(f"{OUTPUT[name]}: {words}" for name, words in others.items())
-    explain_marks(figure, handles, told(kept, found, missing), len(handles))
+    explain_marks(figure, handles, footnote(kept, found, missing), len(handles))
     return figure
 
 
@@ -152,7 +152,7 @@ def _bars(
     axis: Axes, rows: pd.DataFrame, order: Sequence[str], at: float, height: float, color: str
 ) -> None:
     """One index: bars, lines for their intervals, dots for single joints where several are one."""
-    one = pooled(rows).set_index("factor").reindex(list(order)).dropna(subset="estimate")
+    one = pool(rows).set_index("factor").reindex(list(order)).dropna(subset="estimate")
     y = np.array([len(order) - 1 - order.index(name) for name in one.index], dtype=float) + at
     axis.barh(y, one["estimate"], height=height, color=color, lw=0, zorder=3)
     for at_y, low, high in zip(y, one["low"], one["high"], strict=True):

@@ -148,7 +148,7 @@ def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
     return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
 
 
-def shown(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
+def choose_panels(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
     """At most so many panels; of a single specimen a joint each, where there is room."""
     apart = [one for panel in found for one in by_joint(panel, joints)]
     several = any(panel.rows["specimen"].nunique() > 1 for panel in found)
@@ -176,7 +176,7 @@ def by_joint(panel: Panel, joints: Sequence[str]) -> list[Panel]:
     ] or [panel]
 
 
-def pooled(rows: pd.DataFrame, by: Sequence[str] = ("index", "factor")) -> pd.DataFrame:
+def pool(rows: pd.DataFrame, by: Sequence[str] = ("index", "factor")) -> pd.DataFrame:
     """Mean estimate and mean ends over joints and specimens, in the order of the rows.
 
     The mean of the ends is no narrower than the interval of the mean: SDs add up at most.
@@ -228,7 +228,7 @@ def leading(found: Sequence[Panel], measures: Measures) -> list[str]:
     """
     every = []
     for panel in found:
-        rows = pooled(panel.rows[panel.rows["index"] == measures.main])
+        rows = pool(panel.rows[panel.rows["index"] == measures.main])
         largest = rows["estimate"].abs().max() if measures.in_units and len(rows) else 1.0
         every.append(rows.set_index("factor")["estimate"] / (largest or 1.0))
     mean = pd.concat(every).groupby(level=0, sort=False).mean()
@@ -297,7 +297,7 @@ def no_index(rows: pd.DataFrame) -> Figure:
     return saying(f"No index can be shown: {reason}.")
 
 
-def told(kept: Sequence[Panel], found: Sequence[Panel], not_drawn: str) -> str:
+def footnote(kept: Sequence[Panel], found: Sequence[Panel], not_drawn: str) -> str:
     """Below the panels: runs, what is together, the dummy, and what is only in the table."""
     rows = pd.concat([panel.rows for panel in kept])
     parts = [_runs(rows), _together(kept), _dummy(rows), _more(kept, found), not_drawn]
