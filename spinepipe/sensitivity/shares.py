@@ -31,6 +31,7 @@ def share_intervals(whole: Array, by_row: Array, by_column: Array) -> tuple[Arra
     inside = ((everything > 0.0) & (everything < 1.0)).all(axis=0)
     half = _half_width(by_row, by_column)
     low, high = whole - half, whole + half
+    # where all shares lie inside 0 to 1 the interval is symmetric on the logit scale instead
     if inside.any():
         scaled = [logit(shares[..., inside]) for shares in (whole, by_row, by_column)]
         half = _half_width(*scaled[1:])
@@ -43,11 +44,13 @@ def _half_width(*left_out: Array) -> Array:
 
     Without any variance the width is 0, whatever the freedom.
     """
+    # jackknife: (n - 1) / n times the sum of squares about the mean of the n estimates
     counts = np.array([[len(some)] for some in left_out])
     spreads = np.array([some.var(axis=0, ddof=1) for some in left_out])
     variances = (counts - 1) ** 2 / counts * spreads
     total = variances.sum(axis=0)
     uncertainty = np.sum(variances**2 / (counts - 1), axis=0)
+    # Welch-Satterthwaite: freedom of a sum of variances of n - 1 degrees each
     freedom = np.divide(total**2, uncertainty, out=np.ones_like(total), where=uncertainty > 0.0)
     half: Array = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * np.sqrt(total)
     return half
@@ -227,6 +230,7 @@ def _leaving_out_rows(values: Array) -> MeanSquares:
 
 def _raw_shares(squares: MeanSquares, rows: int, columns: int) -> Array:
     """(..., 5) row, column, interaction, totals; beyond 0 to 1 where chance has it."""
+    # expected mean squares of the random model: E[row] = interaction + columns x variance of rows
     row = (squares.row - squares.interaction) / columns
     column = (squares.column - squares.interaction) / rows
     return _of_parts(row, column, squares.interaction)
@@ -323,6 +327,7 @@ def components(grid: Array) -> Array:
     specimens = grid.shape[0]
     by_specimen, by_treatment = grid.mean(axis=(1, 2)), grid.mean(axis=(0, 1))
     by_draw, by_both = grid.mean(axis=2), grid.mean(axis=1)
+    # cell means of specimen and treatment, rid of both main effects
     both_rest = by_both - by_specimen[:, None] - by_treatment + grid.mean()
     both = np.sum(both_rest**2, axis=0).mean() / (specimens - 1)
     left = grid - by_draw[:, :, None] - by_both[:, None, :] + by_specimen[:, None, None]

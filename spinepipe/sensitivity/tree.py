@@ -145,6 +145,7 @@ def _chosen(
     # as in rpart: each subtree is tried at the geometric mean of the ends of its range
     inner = np.append(np.sqrt(ends[:-1] * ends[1:]), BEYOND_ROOT)
     error, standard_error = _cross_validated(growth, splitter, x, y, inner, units)
+    # 1-SE rule: the smallest tree whose error is within one standard error of the least
     best = int(np.argmin(error))
     index = int(np.flatnonzero(error <= error[best] + standard_error[best])[-1])
     model = clone(growth).set_params(ccp_alpha=float(inner[index])).fit(x, y)
@@ -181,6 +182,7 @@ def _cross_validated(
         leaves, ends = model.apply(x[left_out]), _weakest_links(model.tree_)
         for number, complexity in enumerate(complexities):
             predicted[number, left_out] = _cut_back(model.tree_, ends, complexity)[leaves]
+    # the standard error is that of sums over groups, whose rows are not independent
     squared = (y - predicted) ** 2
     _, unit = np.unique(units, return_inverse=True)
     sums = np.array([np.bincount(unit, row) for row in squared])

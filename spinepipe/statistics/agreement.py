@@ -92,6 +92,7 @@ def bland_altman(measured: ArrayLike, predicted: ArrayLike) -> Agreement:
         )
     bias, sd = float(difference.mean()), float(difference.std(ddof=1))
     mean = sd * stats.t.ppf(TAILS, n - 1) / np.sqrt(n)
+    # quantiles of (limit - mean) sqrt(n) / SD: noncentral t about 1.96 sqrt(n), of n - 1 freedom
     limit = sd * stats.nct.ppf(TAILS, n - 1, LIMIT_SDS * np.sqrt(n)) / np.sqrt(n)
     return Agreement(
         *(n, proportional, ComputationStatus.DONE, *sds),

@@ -47,6 +47,7 @@ def chi_squared_normality(values: ArrayLike) -> StatisticalTest:
         return refused
     edges = np.linspace(x.min(), x.max(), BINS + 1)
     observed = np.histogram(x, edges)[0].astype(np.float64)
+    # the outermost bins are open: all of the normal is expected somewhere
     inner = stats.norm.cdf(edges[1:-1], x.mean(), x.std(ddof=1))
     expected = len(x) * np.diff(np.concatenate(([0.0], inner, [1.0])))
     observed, expected = _pooled(observed, expected)

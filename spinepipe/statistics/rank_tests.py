@@ -124,6 +124,7 @@ def _dealt_p(groups: Sequence[Array]) -> float:
     ranks = stats.rankdata(np.concatenate(groups))
     sizes = tuple(len(group) for group in groups)
     if factorial(len(ranks)) // prod(map(factorial, sizes)) <= MOST_ARRANGEMENTS:
+        # H grows with the sum of squared rank sums over sizes, the rest is the same in all dealings
         dealings = _dealings(sizes)  # the first is as the groups are
         found = _between(*np.split(ranks[dealings], np.cumsum(sizes)[:-1], axis=1), axis=1)
         return float(np.mean(found >= found[0] * (1.0 - ROUNDING)))

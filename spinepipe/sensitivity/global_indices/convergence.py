@@ -50,6 +50,7 @@ def convergence(
     values = np.asarray(outputs, dtype=np.float64)
     good = np.ones(design.n, dtype=bool) if ok is None else np.asarray(ok, dtype=bool)
     if design.method is Method.LATIN_HYPERCUBE:
+        # the first points of a hypercube are none: a random order makes nested subsets
         order = np.random.default_rng([settings.seed, design.n]).permutation(design.n)
         design = replace(design, unit=design.unit[order])
         values, good, whole = values[order], good[order], ()

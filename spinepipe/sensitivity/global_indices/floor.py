@@ -192,6 +192,7 @@ def _of_morris(
     name: str, design: Design, outputs: Array, open_to: Array, rng: np.random.Generator
 ) -> Array:
     """(R, K) of effects that are what the solver leaves open over the step of a level."""
+    # a step of Morris goes over half of the levels
     step = design.levels / (2.0 * (design.levels - 1.0))
     shape = (REPLICATES, len(outputs) // design.block, outputs.shape[1])
     effects = rng.uniform(-open_to, open_to, size=shape) / step
@@ -223,6 +224,7 @@ def _given_data(name: str, outputs: Array, settings: Settings, rng: np.random.Ge
 
 def _on_curve(name: str, curve: Array, harmonics: int) -> Array:
     """(R, K) S1 or ST at frequencies of the dummy's curve (N, K) at which nothing is moved."""
+    # frequencies of FAST at which the dummy's curve has nothing but the solver's noise
     own = (len(curve) - 1) // (2 * harmonics)
     lowest = int(np.ceil(LOWEST_FREQUENCY * own))
     drawn = [

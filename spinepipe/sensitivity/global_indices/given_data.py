@@ -52,6 +52,7 @@ class WeightedSample:
         ----------
         part : (N,) bool.
         """
+        # distributions of part and whole differ most at, or just before, a value of the part
         members = np.flatnonzero(part[self.order])
         values = self._values[members]
         sums = _sums(self._weights[:, members])

@@ -199,6 +199,7 @@ def indices(
     status, why = _for_all(design, left, settings)
     varies = np.zeros(values.shape[1], dtype=bool)
     if left.rows.any() and status is IndexStatus.DONE:
+        # constant is what varies by less than rounding, or than its resolution
         size = ROUNDING * np.abs(values[left.rows]).max(axis=0)
         varies = np.ptp(values[left.rows], axis=0) > np.maximum(size, resolution)
     found = _found(design, values[:, varies], left, settings) if varies.any() else NOTHING

@@ -135,6 +135,7 @@ def _of_effects(effects: Array, resamples: Sequence[Counts], confidence: float) 
 
 def _indices(weights: Array, effects: Array) -> Array:
     """(R, 3 G) mu, mu_star, sigma of each factor, for weights (R, r) that sum to 1."""
+    # weighted moments about the mean of all, for all resamples in one product
     r, centre = len(effects), effects.mean(axis=0)
     off = effects - centre  # sums of squares of small numbers
     mean, size = weights @ off, weights @ np.abs(effects)

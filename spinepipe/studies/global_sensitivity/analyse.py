@@ -65,13 +65,12 @@ class OutputGroup:
     Attributes
     ----------
     where : (K,) what each is. values : (n, K) in units of the tables, 0 where a run failed.
-    ok : (n,) which runs succeeded. resolution : below which an output counts as constant.
+    ok : (n,) which runs succeeded.
     """
 
     where: tuple[Where, ...]
     values: Array
     ok: NDArray[np.bool_]
-    resolution: float
 
 
 def run(
@@ -117,9 +116,9 @@ def _analysed(
         most_failed=settings.most_failed,
         wanted=settings.chosen_indices,
     )
-    found = indices(design, one.values, one.ok, asked, one.resolution)
-    floors = noise_floor(design, one.values, found, one.ok, asked, one.resolution)
-    stages = convergence(design, one.values, one.ok, asked, 8, one.resolution, found)
+    found = indices(design, one.values, one.ok, asked, SETTLED)
+    floors = noise_floor(design, one.values, found, one.ok, asked, SETTLED)
+    stages = convergence(design, one.values, one.ok, asked, 8, SETTLED, found)
     count, where = len(one.where), dict(zip(WHERE, zip(*one.where, strict=True), strict=True))
     good = one.values[one.ok] if one.ok.any() else np.full((1, count), np.nan)
     common = where | {"mean": good.mean(axis=0), "sd": good.std(axis=0)}
@@ -177,6 +176,7 @@ def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterato
     columns = [column for kind in kinds.values() for column in kind.values()]
     rows = read_blocks(blocks, ["sample", "test", "step", "joint", "status", *columns])
     head = rows.filter(pc.equal(rows["sample"], rows["sample"][0])).to_pylist()
+    # all samples have the rows of the first one, in the same order
     per_sample = len(head)
     good = np.array(pc.equal(rows["status"], Status.CONVERGED.value)).reshape(-1, per_sample)
     numbers = {
@@ -192,7 +192,7 @@ def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterato
         )
         values = [numbers[column][:, at] for kind in kinds.values() for column in kind.values()]
         ok: NDArray[np.bool_] = np.all(good[:, at], axis=1, keepdims=False)
-        yield OutputGroup(where, np.where(ok[:, None], np.hstack(values), 0.0), ok, SETTLED)
+        yield OutputGroup(where, np.where(ok[:, None], np.hstack(values), 0.0), ok)
 
 
 def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[OutputGroup]:
@@ -205,4 +205,4 @@ def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Itera
     ok = np.asarray(pc.is_in(rows["status"], value_set=pa.array(["converged"])))
     values = np.column_stack([np.nan_to_num(rows[names[name]].to_numpy()) for name in free])
     where = tuple(("stiffness", EVERY, 0, EVERY, name) for name in free)
-    yield OutputGroup(where, np.where(ok[:, None], values, 0.0), ok, SETTLED)
+    yield OutputGroup(where, np.where(ok[:, None], values, 0.0), ok)

@@ -106,6 +106,7 @@ def _fitted(settings: GlobalSensitivity, cohort: Cohort, start: DescribedSpecime
     free: list[str] = list(settings.calibration.free)
     bounded: list[str] = []
     found, why = _fit(settings, cohort, start, free)
+    # each round frees fewer coordinates, so it ends
     while found is not None and found.status.usable and found.at_bound.any() and free:
         at = [name for name, side in zip(free, found.at_bound, strict=True) if side]
         free, bounded = [name for name in free if name not in at], bounded + at
@@ -199,6 +200,7 @@ def _rows_of_test(
         read = np.isfinite(theirs)
         if read.any():
             mean = float(ours[read].mean()), float(theirs[read].mean())
+            # readings of joints err independently of each other
             spread = float(noise[column]) / np.sqrt(read.sum())
             yield {**common, "joint": EVERY, **compared(*mean, spread)}
         for joint, own, their in zip(model.joints, ours, theirs, strict=True):

@@ -122,9 +122,11 @@ def _thirds(design: Design, column: int, failed: NDArray[np.bool_]) -> dict[str,
     row: dict[str, Any] = {f"{name}_third": n for name, n in zip(THIRDS, counts, strict=True)}
     if not failed.any():
         return {**row, "p": None, "mostly": "nowhere"}
+    # of each block with a failure the first failed run is an independent draw of its third
     blocks = failed.reshape(-1, design.block)
     spoiled = np.flatnonzero(blocks.any(axis=1))
     drawn = third[spoiled * design.block + blocks[spoiled].argmax(axis=1)]
+    # Bonferroni: both ends of every factor are looked at
     looked_at = len(ENDS) * len(design.factors)
     chances = {}
     for place, name in enumerate(THIRDS):

@@ -115,6 +115,8 @@ def given_joints(cohort: Cohort, specimen: str) -> Flags:
 
 def moved_by(known: Flags, given: Flags, vertebra: int, landmark: int) -> list[int]:
     """Joints whose frame a landmark has a part in."""
+    # a frame is the mean of those of vertebrae that have all landmarks, at the middle of the two
+    # facing endplates: other landmarks of a vertebra that lacks one have no part in it
     whole = [bool(row.all()) for row in known]
     facing = {vertebra: SUPERIOR, vertebra - 1: INFERIOR}  # of the joint above, and of that below
     return [

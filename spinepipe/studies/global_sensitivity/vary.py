@@ -218,6 +218,7 @@ def _from_landmarks(
 ) -> dict[int, str]:
     """Replace frames of joints one of whose vertebrae has a moved landmark."""
     refused: dict[int, str] = {}
+    # frames of joints that no landmark moves stay the cohort's own, to the last bit
     moved = np.any(offsets, axis=(0, 2, 3))
     points = start.points + offsets
     for joint, name in enumerate(start.model.joints):
@@ -242,6 +243,7 @@ def _moved(by: Array, rotations: Array, origins: Array) -> None:
     for joint in np.flatnonzero(by.any(axis=(0, 2))):
         own = rotations[:, joint]
         origins[:, joint] += (own @ by[:, joint, :3, None])[..., 0]
+        # Euler angles in the sequence Z, X', Y'', as `frames.transform_of` has them
         rotations[:, joint] = own @ Rotation.from_euler("ZXY", by[:, joint, 3:]).as_matrix()
 
 
@@ -249,6 +251,7 @@ def varied_cases(case: LoadCase, change: Variation) -> Cases:
     """One test of M spines: force and moment of each load are turned together and scaled."""
     same = Cases.of(case, len(change.load_sizes))
     turn = Rotation.from_rotvec(change.load_turns).as_matrix()
+    # force and moment of a load turn and grow together, about its own point
     by = change.load_sizes[:, None, None] * turn
     points = same.points.copy()
     for row, step in enumerate(case.steps):  # where a step has fewer loads, the rest is nobody's
@@ -298,6 +301,7 @@ def many_joint_frames(lower: Array, upper: Array, in_lower: Flags, in_upper: Fla
 
 def _vertebra_rotations(points: Array) -> tuple[Array, Flags]:
     """(M, 3, 3) ISB axes of a vertebra and (M,) whether there are any, from (M, 4, 3) landmarks."""
+    # ISB axes: z along the pedicle bases to the right, x in front, across both lines
     z, wide = _directions(points[:, LEFT], points[:, RIGHT])
     y0, high = _directions(points[:, INFERIOR], points[:, SUPERIOR])
     normal = np.cross(y0, z)

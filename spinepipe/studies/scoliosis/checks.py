@@ -160,6 +160,8 @@ def _tilts(
         remedy = "radians? multiply by 57.3"
         yield place.problem(None, "orientation_deg", found, "degrees", remedy)
         return
+    # a vertebra stands across the line of centres: tilts read off the other way or of another
+    # vertebra do not follow it
     off = np.abs(film.tilt - line)
     worst = int(np.argmax(off))
     if off[worst] > np.deg2rad(FARTHEST_APART_DEG):

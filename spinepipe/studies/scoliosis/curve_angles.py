@@ -77,6 +77,7 @@ def curves(erect: Film) -> tuple[SpinalCurve, ...]:
     before, found = 0, []
     points = np.stack([erect.right, erect.up], axis=1)
     for turn, upper in pairwise(_turning_points(erect.tilt)):
+        # equally tilted vertebrae: the lowest one begins the curve, the uppermost one ends it
         lower = before + int(np.argmax(erect.tilt[before:] == erect.tilt[turn]))
         before = turn
         if upper - lower < 2:

@@ -274,12 +274,15 @@ class FilmFit:
             if posed.result.status is not PrescribedStatus.CONVERGED:
                 return None
             self.near[position] = posed.result
+            # implicit function theorem: how equilibrium moves the pose when an unknown changes what
+            # the joints hold, or where the top is
             held_by = np.zeros((len(posed.result.q), len(unknowns)))
             held_by[:, :-TOPS] = self._held_by(posed.result.q, laws, laws_by)
             top_by = np.zeros((3, len(unknowns)))
             at = len(numbers) + 3 * film_number
             top_by[:, at : at + 3] = np.diag(self.sd)
             change = posed.answers_to(held_by, top_by)
+            # the lowest vertebra is fixed and the uppermost held: what lies between is compared
             off = (posed.film.rows - film.rows)[:, 1:-1] / self.sd[:, None]
             by = posed.film_by[:, :-1] @ change / self.sd[:, None, None]
             errors.append(off.ravel())
@@ -310,6 +313,7 @@ class FilmFit:
         pairs, s = self.patient.pairs, self.segments
         least = -np.minimum(pairs.right, pairs.left)
         most = np.maximum(pairs.right, pairs.left)
+        # an end must lie beyond what a segment has turned on either film, in the sense of that end
         reached = beyond * np.maximum(np.concatenate([least, most]), SMALLEST_END)
         return np.concatenate([numbers[:s], np.maximum(numbers[s:], np.log(reached))])
 

@@ -53,9 +53,11 @@ def region(
     found = point(ended.x)
     if found is None or not ended.arrived:
         return OPEN
+    # only the ratio is profiled; it is the one unknown that no prior holds
     bent = np.arange(len(begin)) == segment
     best = Best(ended.x, *found, lower, upper, scale, bent, ENOUGH)
     seen = profile_in_turn(best, point, [segment])
+    # a lower cost beside the fit: this was no optimum, and its region would be none
     if seen.lower_cost:
         return OPEN
     below, above = bool(seen.open_below[segment]), bool(seen.open_above[segment])

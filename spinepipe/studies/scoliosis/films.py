@@ -157,6 +157,7 @@ def _of_corners(rows: pd.DataFrame) -> Film:
     # start + share across = other + s back, by Cramer's rule
     share = _cross(other - start, back) / _cross(across, back)
     centre = start + share[:, None] * across
+    # twice the line from the centre of the lower endplate to that of the upper one
     axis = (corner["upper_left"] + corner["upper_right"]) - (
         corner["lower_left"] + corner["lower_right"]
     )

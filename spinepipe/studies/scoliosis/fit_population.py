@@ -70,6 +70,7 @@ def fit_population(
     rounds, change, fits = 0, np.inf, dict[str, FilmFitResult]()
     for _ in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
         rounds += 1
+        # fits of all under the population, then the population that their parabolas make likeliest
         fits = dict(_fits(patients, sd, population, fits))
         before = population
         population = _likeliest(before, [one.information for one in fits.values()])

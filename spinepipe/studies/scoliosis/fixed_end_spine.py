@@ -81,6 +81,7 @@ def with_springs(model: SpineModel, springs: Array) -> SpineModel:
 def with_laws(model: SpineModel, springs: Array, laws: Array) -> SpineModel:
     """The chain on bounded tangents (S, 3) in lateral bending and springs in the rest."""
     others = springs.copy()
+    # the tangent bends in place of the spring; a bushing may not have nothing at all
     others[:, BENDING] = LEAST_NM_PER_RAD
     tangent = ScopedEffect(create("bounded_tangent", {}), _all(model), laws)
     return replace(model, effects=(*with_springs(model, others).effects, tangent))
@@ -162,6 +163,7 @@ class FixedEndSpine:
         )
         if level:
             grips = (*grips, Tilt(top, ANTERIOR, ANTERIOR, UP))
+        # translations are locked, rotations free
         free = np.tile([False] * 3 + [True] * 3, model.n_joints)
         return cls(HeldChain(model, grips, free), erect)
 

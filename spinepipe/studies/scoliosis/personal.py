@@ -208,6 +208,7 @@ def tangent(patient: Patient, study: Scoliosis) -> PersonalModel:
     ends = ends_of(patient.pairs, study.enlargement)
     laws = characterise(patient.pairs, ends, study.scale.apical_moment_nm)
     at_rest = ends.at_rest(laws.stretch)
+    # all models have one size: films decide ratios, the scale comes from outside
     factor = patient.size / geometric_mean(at_rest)
     values = np.column_stack([factor * laws.stretch, ends.lower, ends.upper])
     model = with_laws(patient.chain, patient.springs, values)
@@ -278,6 +279,7 @@ class RegionFit:
     def __init__(self, patient: Patient, regions: Regions) -> None:
         self.patient, self.start = patient, patient.springs[:, BENDING]
         self.regions = regions
+        # columns sum to nought, so that the geometric mean stays; the last multiplier follows
         own = np.eye(int(regions.max()) + 1)[regions]
         self.by_logs = (own - own.mean(axis=0))[:, :-1]  # (S, k - 1) of the segments' logarithms
         self.spine = patient.fixed_end(with_springs(patient.chain, patient.springs))
@@ -300,6 +302,7 @@ class RegionFit:
                 return None
             self.near[position] = posed.result
             q = posed.result.q.reshape(-1, 6)
+            # a spring k exp(b x) holds k exp(b x) q: its change with x is b times that
             held_by = np.zeros((*q.shape, len(logs)))
             held_by[:, BENDING] = (springs * q[:, BENDING])[:, None] * self.by_logs
             change = posed.answers_to(held_by.reshape(q.size, -1))

@@ -124,6 +124,7 @@ def _tilts(films: list[Film]) -> _Fault | None:
         return None
     if np.ptp(tilt) == 0.0:
         return _Fault("tilts_alike", CENTRE[2])
+    # cosine between tilts and line over all films, and how large the one is beside the other
     alike = float(tilt @ line) / float(np.linalg.norm(tilt) * np.linalg.norm(line))
     share = float(np.linalg.norm(tilt) / np.linalg.norm(line))
     if alike < -WITH:

@@ -145,6 +145,7 @@ def _end_sd(after: Population, means: Array, patients: Sequence[PatientPrior]) -
     s, total = after.segments, 0.0
     for mean, one in zip(means, patients, strict=True):
         away = (mean - after.mean)[s:]
+        # expected squares of the deviations, less those of their mean, which all ends share
         moment = np.outer(away, away) + one.covariance[s:, s:]
         total += float(np.trace(moment) - moment.sum() / (2 * s))
     return _spread(total, len(patients) * (2 * s - 1), END_SPREAD)

@@ -39,6 +39,7 @@ def variant_rows(settings: Scoliosis, cohort: Cohort, specimen: str) -> Iterator
     patient = patient_of(settings, cohort, specimen)
     studied = tangent(patient, settings).model
     spine = patient.fixed_end(studied)
+    # what the study has is what every variant is told against
     usual = {name: spine.at(film.top) for name, film in _others(patient)}
     for percent in settings.variants.enlargement_percent:
         known: Row = {"specimen": specimen, "varied": "enlargement", "value": percent}

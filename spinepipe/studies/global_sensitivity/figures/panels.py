@@ -229,6 +229,7 @@ def leading(found: Sequence[Panel], measures: Measures) -> list[str]:
     every = []
     for panel in found:
         rows = pool(panel.rows[panel.rows["index"] == measures.main])
+        # effects in mm and N m cannot be averaged: as shares of the panel's largest they can
         largest = rows["estimate"].abs().max() if measures.in_units and len(rows) else 1.0
         every.append(rows.set_index("factor")["estimate"] / (largest or 1.0))
     mean = pd.concat(every).groupby(level=0, sort=False).mean()

@@ -127,6 +127,7 @@ def running(x: Array, y: Array, few: int = 12) -> tuple[Array, Array]:
     if len(levels) <= few:
         groups = [x == level for level in levels]
     else:
+        # a hundred different values a part, from four parts to twenty
         parts = min(20, max(4, len(levels) // 100))
         part = np.searchsorted(np.quantile(levels, np.arange(1, parts) / parts), x)
         groups = [part == number for number in range(parts)]
@@ -209,6 +210,7 @@ def _cloud(axis: Axes, x: Array, y: Array, unit: str, lost: Array) -> None:
     ----------
     lost : values of the factor at runs that failed and have no output: crosses at the bottom.
     """
+    # the same dots each time a figure is drawn
     kept = np.random.default_rng(0).permutation(len(x))[:MOST_DOTS]
     axis.plot(
         x[kept], y[kept], "o", color=GREY, ms=1.6, mew=0.0, alpha=0.45, zorder=2, rasterized=True
