@@ -10,9 +10,9 @@ from spinepipe.studies.read import check
 from spinepipe.studies.registry import files_of
 from spinepipe.studies.scoliosis.film_fit import FilmFit
 from spinepipe.studies.scoliosis.films import ERECT
-from spinepipe.studies.scoliosis.learn import weights
-from spinepipe.studies.scoliosis.personal import WAYS, Personal, patient_of
-from spinepipe.studies.scoliosis.population import assumed
+from spinepipe.studies.scoliosis.fit_population import weights
+from spinepipe.studies.scoliosis.personal import WAYS, PersonalModel, patient_of
+from spinepipe.studies.scoliosis.population import usual_population
 from spinepipe.studies.scoliosis.settings import Scoliosis
 
 STUDY = "ais18_scoliosis"
@@ -33,13 +33,13 @@ def _everyone(study: Scoliosis, cohort: Cohort, model: str) -> None:
     sd = weights(study, cohort)
     for name in cohort.specimen_names:
         patient = patient_of(study, cohort, name)
-        personal: Personal
+        personal: PersonalModel
         if model in WAYS:
             personal = WAYS[model](patient, study)
         else:
             fit = FilmFit(patient, sd)
-            personal = fit.personal(fit.fit(assumed(len(cohort.joint_names))))
-        spine = patient.held(personal.model)
+            personal = fit.personal(fit.fit(usual_population(len(cohort.joint_names))))
+        spine = patient.fixed_end(personal.model)
         for position, film in patient.read.films.items():
             if position != ERECT:
                 spine.at(film.top)

@@ -13,8 +13,8 @@ from spinepipe.marks import read_mark
 from spinepipe.sensitivity.global_indices.spread import values_of
 from spinepipe.statics.batched import solve_many
 from spinepipe.studies.global_sensitivity.batch import start_of_specimen
-from spinepipe.studies.global_sensitivity.drawn import design_of
-from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
+from spinepipe.studies.global_sensitivity.sampling import design_of, spreads_of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.vary import vary
 from spinepipe.studies.read import check
 

@@ -13,8 +13,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.global_sensitivity.analyse import analysed, outputs_of
 from spinepipe.studies.global_sensitivity.base import base, stiffness_of
 from spinepipe.studies.global_sensitivity.batch import Batch
-from spinepipe.studies.global_sensitivity.drawn import design_of, drawn_in_units
 from spinepipe.studies.global_sensitivity.respond import responses
+from spinepipe.studies.global_sensitivity.sampling import design_of, drawn_in_units
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import start_of
 from spinepipe.studies.global_sensitivity.tables import INDICES, RESPONSES

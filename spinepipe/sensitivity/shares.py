@@ -31,6 +31,7 @@ def share_intervals(whole: Array, by_row: Array, by_column: Array) -> tuple[Arra
     inside = ((everything > 0.0) & (everything < 1.0)).all(axis=0)
     half = _half_width(by_row, by_column)
     low, high = whole - half, whole + half
+    # where all shares lie inside 0 to 1 the interval is symmetric on the logit scale instead
     if inside.any():
         scaled = [logit(shares[..., inside]) for shares in (whole, by_row, by_column)]
         half = _half_width(*scaled[1:])
@@ -43,11 +44,13 @@ def _half_width(*left_out: Array) -> Array:
 
     Without any variance the width is 0, whatever the freedom.
     """
+    # jackknife: (n - 1) / n times the sum of squares about the mean of the n estimates
     counts = np.array([[len(some)] for some in left_out])
     spreads = np.array([some.var(axis=0, ddof=1) for some in left_out])
     variances = (counts - 1) ** 2 / counts * spreads
     total = variances.sum(axis=0)
     uncertainty = np.sum(variances**2 / (counts - 1), axis=0)
+    # Welch-Satterthwaite: freedom of a sum of variances of n - 1 degrees each
     freedom = np.divide(total**2, uncertainty, out=np.ones_like(total), where=uncertainty > 0.0)
     half: Array = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * np.sqrt(total)
     return half
@@ -164,7 +167,10 @@ def _shares_of_table(values: Array, hypercubes: bool) -> VarianceShares:
     values = (values - values.mean()) / np.abs(values - values.mean()).max()
     of = _shares_of_hypercubes if hypercubes else _raw_shares
     raw = of(mean_squares(values), rows, columns)
-    estimates = _estimates(raw)
+    # negative components are set to 0; rounding may leave a sum above 1
+    parts = np.maximum(raw[:3], 0.0)
+    row, column, rest = parts / parts.sum()
+    estimates = np.minimum([row, column, rest, row + rest, column + rest], 1.0)
     by_row = of(_leaving_out_rows(values), rows - 1, columns)
     swapped = _leaving_out_rows(values.T)
     by_column = (
@@ -172,11 +178,20 @@ def _shares_of_table(values: Array, hypercubes: bool) -> VarianceShares:
         if hypercubes
         else of(MeanSquares(swapped.column, swapped.row, swapped.interaction), rows, columns - 1)
     )
+    found = _with_intervals(estimates, raw, by_row, by_column)
+    names = [name for name, share in zip(("row", "column"), raw[:2], strict=True) if share < 0.0]
+    message = f"negative {' and '.join(names)} component set to 0" if names else ""
+    return VarianceShares(rows, columns, ComputationStatus.DONE, message, *found)
+
+
+def _with_intervals(
+    estimates: Array, raw: Array, by_row: Array, by_column: Array
+) -> list[VarianceShare]:
+    """Shares with the intervals of the raw ones, which hold the estimates."""
     low, high = share_intervals(raw, by_row, by_column)
     # an estimate set to 0 changes the others a little
     low, high = np.minimum(low, estimates), np.maximum(high, estimates)
-    found = [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
-    return VarianceShares(rows, columns, ComputationStatus.DONE, _message(raw), *found)
+    return [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
 
 
 def mean_squares(values: Array) -> MeanSquares:
@@ -195,6 +210,8 @@ def _leaving_out_rows(values: Array) -> MeanSquares:
     """Mean squares (P,) of the P grids that lack one row each."""
     rows, columns = values.shape
     left = rows - 1
+    # without row p: means of columns (P, S) and of all (P,), then sums of squares as differences of
+    # sums over the whole grid, so that no grid is copied
     by_row = values.mean(axis=1)
     by_column = (values.sum(axis=0) - values) / left
     mean = by_column.mean(axis=1)
@@ -213,6 +230,7 @@ def _leaving_out_rows(values: Array) -> MeanSquares:
 
 def _raw_shares(squares: MeanSquares, rows: int, columns: int) -> Array:
     """(..., 5) row, column, interaction, totals; beyond 0 to 1 where chance has it."""
+    # expected mean squares of the random model: E[row] = interaction + columns x variance of rows
     row = (squares.row - squares.interaction) / columns
     column = (squares.column - squares.interaction) / rows
     return _of_parts(row, column, squares.interaction)
@@ -232,18 +250,6 @@ def _of_parts(row: Array, column: Array, rest: Array) -> Array:
     parts = np.stack([row, column, rest, row + rest, column + rest], axis=-1)
     shares: Array = parts / (row + column + rest)[..., None]
     return shares
-
-
-def _estimates(raw: Array) -> Array:
-    """(5,) shares with negative components set to 0."""
-    parts = np.maximum(raw[:3], 0.0)
-    row, column, rest = parts / parts.sum()
-    return np.minimum([row, column, rest, row + rest, column + rest], 1.0)  # rounding
-
-
-def _message(raw: Array) -> str:
-    names = [name for name, share in zip(("row", "column"), raw[:2], strict=True) if share < 0.0]
-    return f"negative {' and '.join(names)} component set to 0" if names else ""
 
 
 @dataclass(frozen=True)
@@ -310,10 +316,8 @@ def _shares_of_grid(grid: Array) -> NestedShares:
     raw, left_out = (part / part.sum(axis=-1, keepdims=True) for part in (whole, by_specimen))
     kept = np.maximum(raw, 0.0)
     estimates = kept / kept.sum()
-    low, high = share_intervals(raw, left_out, np.stack([raw, raw]))  # treatments do not vary
-    # an estimate set to 0 changes the others a little
-    low, high = np.minimum(low, estimates), np.maximum(high, estimates)
-    found = [VarianceShare(*map(float, share)) for share in zip(estimates, low, high, strict=True)]
+    # treatments do not vary
+    found = _with_intervals(estimates, raw, left_out, np.stack([raw, raw]))
     message = "negative treatment component set to 0" if raw[2] < 0.0 else ""
     return NestedShares(ComputationStatus.DONE, message, *found)
 
@@ -323,6 +327,7 @@ def components(grid: Array) -> Array:
     specimens = grid.shape[0]
     by_specimen, by_treatment = grid.mean(axis=(1, 2)), grid.mean(axis=(0, 1))
     by_draw, by_both = grid.mean(axis=2), grid.mean(axis=1)
+    # cell means of specimen and treatment, rid of both main effects
     both_rest = by_both - by_specimen[:, None] - by_treatment + grid.mean()
     both = np.sum(both_rest**2, axis=0).mean() / (specimens - 1)
     left = grid - by_draw[:, :, None] - by_both[:, None, :] + by_specimen[:, None, None]

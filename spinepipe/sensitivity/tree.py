@@ -145,9 +145,10 @@ def _chosen(
     # as in rpart: each subtree is tried at the geometric mean of the ends of its range
     inner = np.append(np.sqrt(ends[:-1] * ends[1:]), BEYOND_ROOT)
     error, standard_error = _cross_validated(growth, splitter, x, y, inner, units)
+    # 1-SE rule: the smallest tree whose error is within one standard error of the least
     best = int(np.argmin(error))
     index = int(np.flatnonzero(error <= error[best] + standard_error[best])[-1])
-    model = _pruned(growth, inner[index]).fit(x, y)
+    model = clone(growth).set_params(ccp_alpha=float(inner[index])).fit(x, y)
     message = "no split is worth its leaf" if model.get_n_leaves() == 1 else ""
     return Tree(
         names,
@@ -160,11 +161,6 @@ def _chosen(
         ComputationStatus.DONE,
         message,
     )
-
-
-def _pruned(growth: DecisionTreeRegressor, complexity: float) -> DecisionTreeRegressor:
-    """The same growth, cut back at a complexity."""
-    return clone(growth).set_params(ccp_alpha=float(complexity))
 
 
 def _cross_validated(
@@ -186,6 +182,7 @@ def _cross_validated(
         leaves, ends = model.apply(x[left_out]), _weakest_links(model.tree_)
         for number, complexity in enumerate(complexities):
             predicted[number, left_out] = _cut_back(model.tree_, ends, complexity)[leaves]
+    # the standard error is that of sums over groups, whose rows are not independent
     squared = (y - predicted) ** 2
     _, unit = np.unique(units, return_inverse=True)
     sums = np.array([np.bincount(unit, row) for row in squared])
@@ -205,6 +202,7 @@ def _weakest_links(tree: Any) -> Array:
     ends = np.where(left < 0, -np.inf, np.inf)
     reached = 0.0
     while ends[0] > reached:
+        # error and leaves of each node's branch from below, then which nodes are still reached
         branch, leaves, there = error.copy(), np.ones(len(error)), np.zeros(len(error), dtype=bool)
         for node in range(len(error) - 1, -1, -1):
             if ends[node] > reached:
@@ -214,6 +212,7 @@ def _weakest_links(tree: Any) -> Array:
         for node in range(len(error)):
             if there[node] and ends[node] > reached:
                 there[[left[node], right[node]]] = True
+        # the weakest link saves least per leaf; its complexity is where the next subtree begins
         branches = np.flatnonzero(there & (leaves > 1.0))
         saved = (error - branch)[branches] / (leaves[branches] - 1.0)
         reached = max(reached, float(saved.min()))

@@ -8,7 +8,6 @@ from scipy import stats
 
 from spinepipe.statistics.correlation import spearman
 from spinepipe.statistics.outcome import (
-    Array,
     ComputationStatus,
     StatisticalTest,
     constant,
@@ -73,7 +72,10 @@ def bland_altman(measured: ArrayLike, predicted: ArrayLike) -> Agreement:
     first, second = finite_pairs(measured, predicted)
     proportional = spearman(0.5 * (first + second), second - first)
     difference, n = second - first, len(first)
-    sds = _sds(first, second)
+    sds: tuple[bool, float | None, float | None] = (False, None, None)
+    if n >= 2:
+        one, other = float(first.std(ddof=1)), float(second.std(ddof=1))
+        sds = max(one, other) <= COMPARABLE * min(one, other), one, other
     if n < FEWEST:
         message = f"{n} pairs; at least {FEWEST} are needed"
         return Agreement(n, proportional, ComputationStatus.TOO_FEW, *sds, message=message)
@@ -88,23 +90,9 @@ def bland_altman(measured: ArrayLike, predicted: ArrayLike) -> Agreement:
             lower_limit=same,
             upper_limit=same,
         )
-    return _agreement(difference, proportional, sds)
-
-
-def _sds(first: Array, second: Array) -> tuple[bool, float | None, float | None]:
-    """Whether the spreads of two values (n,) are comparable, then these."""
-    if len(first) < 2:
-        return False, None, None
-    one, other = float(first.std(ddof=1)), float(second.std(ddof=1))
-    return max(one, other) <= COMPARABLE * min(one, other), one, other
-
-
-def _agreement(
-    difference: Array, proportional: StatisticalTest, sds: tuple[bool, float | None, float | None]
-) -> Agreement:
-    """Bias, limits and their intervals from differences (n,) that are not all the same."""
-    n, bias, sd = len(difference), float(difference.mean()), float(difference.std(ddof=1))
+    bias, sd = float(difference.mean()), float(difference.std(ddof=1))
     mean = sd * stats.t.ppf(TAILS, n - 1) / np.sqrt(n)
+    # quantiles of (limit - mean) sqrt(n) / SD: noncentral t about 1.96 sqrt(n), of n - 1 freedom
     limit = sd * stats.nct.ppf(TAILS, n - 1, LIMIT_SDS * np.sqrt(n)) / np.sqrt(n)
     return Agreement(
         *(n, proportional, ComputationStatus.DONE, *sds),

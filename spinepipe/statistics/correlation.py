@@ -26,7 +26,7 @@ LARGEST = 10
 """Up to so many pairs; R counts up to 9 and takes an Edgeworth series above."""
 
 
-def exact_p(first: Array, second: Array) -> float:
+def spearman_p(first: Array, second: Array) -> float:
     """Two-sided p of Spearman's rho of pairs of ranks (n,): share of orderings as far to one side.
 
     The doubled smaller tail, as R's ``cor.test`` has it. With ties the mid-ranks are dealt out.
@@ -43,6 +43,8 @@ def _distances(first: tuple[int, ...], second: tuple[int, ...]) -> Array:
 
     Counted over the sets of ranks given out so far: the k-th pair takes any rank still free.
     """
+    # Dynamic programming over subsets: the set of ranks taken is a number, one bit a rank, and its
+    # counts are ways by the sum so far. 2^n sets in place of n! orderings.
     length = 1 + sum((one - other) ** 2 for one, other in zip(first, second[::-1], strict=True))
     counts = {0: np.eye(1, length, dtype=np.int64)[0]}
     for own in first:
@@ -79,7 +81,7 @@ def spearman(x: ArrayLike, y: ArrayLike) -> StatisticalTest:
     rho = float(found.statistic)
     if n > LARGEST:
         return SPEARMAN.done(rho, found.pvalue, n, rho, ties)
-    p = exact_p(stats.rankdata(first), stats.rankdata(second))
+    p = spearman_p(stats.rankdata(first), stats.rankdata(second))
     return SPEARMAN.done(rho, p, n, rho, f"exact p; {ties}" if ties else "exact p")
 
 

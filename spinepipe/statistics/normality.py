@@ -4,7 +4,6 @@ Of the first there are two tests of the paper, and the right one; the second is 
 squares F test.
 """
 
-from collections.abc import Callable
 from math import isfinite
 
 import numpy as np
@@ -43,7 +42,22 @@ def chi_squared_normality(values: ArrayLike) -> StatisticalTest:
     open to infinity, pooled from the tails inwards until at least 5 are expected in each tail bin;
     degrees of freedom = bins - 1 - 2.
     """
-    return _tested(CHI_SQUARED, finite(values), _chi_squared)
+    x = finite(values)
+    if refused := _refused(CHI_SQUARED, x):
+        return refused
+    edges = np.linspace(x.min(), x.max(), BINS + 1)
+    observed = np.histogram(x, edges)[0].astype(np.float64)
+    # the outermost bins are open: all of the normal is expected somewhere
+    inner = stats.norm.cdf(edges[1:-1], x.mean(), x.std(ddof=1))
+    expected = len(x) * np.diff(np.concatenate(([0.0], inner, [1.0])))
+    observed, expected = _pooled(observed, expected)
+    bins = len(expected)
+    if bins - 1 - ESTIMATED < 1:
+        message = f"{bins} bins left after pooling, which leaves no degree of freedom: "
+        message += "use Kolmogorov-Smirnov, as the paper did"
+        return CHI_SQUARED.without(ComputationStatus.TOO_FEW, len(x), message)
+    found = stats.chisquare(observed, expected, ddof=ESTIMATED)
+    return CHI_SQUARED.done(found.statistic, found.pvalue, len(x), stats.skew(x), f"{bins} bins")
 
 
 def kolmogorov_smirnov_normality(values: ArrayLike) -> StatisticalTest:
@@ -51,18 +65,30 @@ def kolmogorov_smirnov_normality(values: ArrayLike) -> StatisticalTest:
 
     Its p is too large, as mean and SD come from the same values; see `lilliefors_normality`.
     """
-    return _tested(KOLMOGOROV_SMIRNOV, finite(values), _kolmogorov_smirnov)
+    x = finite(values)
+    if refused := _refused(KOLMOGOROV_SMIRNOV, x):
+        return refused
+    found = stats.kstest(stats.zscore(x, ddof=1), "norm")
+    message = "p is too large: mean and SD come from the same values (see Lilliefors)"
+    return KOLMOGOROV_SMIRNOV.done(found.statistic, found.pvalue, len(x), stats.skew(x), message)
 
 
 def lilliefors_normality(values: ArrayLike) -> StatisticalTest:
     """Kolmogorov-Smirnov test whose p allows for estimated mean and SD (Lilliefors 1967)."""
-    return _tested(LILLIEFORS, finite(values), _lilliefors)
+    x = finite(values)
+    if refused := _refused(LILLIEFORS, x):
+        return refused
+    # Loaded here: it takes 0.6 s, and most who load this file test no normality.
+    from statsmodels.stats.diagnostic import lilliefors
+
+    statistic, p = lilliefors(x, dist="norm", pvalmethod="table")
+    low, high = LILLIEFORS_RANGE
+    message = f"p at most {low}" if p <= low else f"p at least {high}" if p >= high else ""
+    return LILLIEFORS.done(statistic, p, len(x), stats.skew(x), message)
 
 
-def _tested(
-    test: Test, values: Array, compute: Callable[[Array], StatisticalTest]
-) -> StatisticalTest:
-    """The outcome of a test of normality, unless there is nothing to test."""
+def _refused(test: Test, values: Array) -> StatisticalTest | None:
+    """The outcome of values that cannot be tested, or None."""
     n = len(values)
     if n < FEWEST:
         return test.without(
@@ -70,27 +96,7 @@ def _tested(
         )
     if constant(values):
         return test.without(ComputationStatus.CONSTANT, n, "all values are the same")
-    return compute(values)
-
-
-def _chi_squared(values: Array) -> StatisticalTest:
-    n = len(values)
-    edges = np.linspace(values.min(), values.max(), BINS + 1)
-    observed = np.histogram(values, edges)[0].astype(np.float64)
-    inner = stats.norm.cdf(edges[1:-1], values.mean(), values.std(ddof=1))
-    expected = n * np.diff(np.concatenate(([0.0], inner, [1.0])))
-    observed, expected = _pooled(observed, expected)
-    if len(expected) - 1 - ESTIMATED < 1:
-        return CHI_SQUARED.without(
-            ComputationStatus.TOO_FEW,
-            n,
-            f"{len(expected)} bins left after pooling, which leaves no degree of freedom: "
-            "use Kolmogorov-Smirnov, as the paper did",
-        )
-    found = stats.chisquare(observed, expected, ddof=ESTIMATED)
-    return CHI_SQUARED.done(
-        found.statistic, found.pvalue, n, stats.skew(values), f"{len(expected)} bins"
-    )
+    return None
 
 
 def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
@@ -104,27 +110,6 @@ def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
         starts = np.delete(np.arange(len(expected)), first + 1)
         observed, expected = np.add.reduceat(observed, starts), np.add.reduceat(expected, starts)
     return observed, expected
-
-
-def _kolmogorov_smirnov(values: Array) -> StatisticalTest:
-    found = stats.kstest(stats.zscore(values, ddof=1), "norm")
-    return KOLMOGOROV_SMIRNOV.done(
-        found.statistic,
-        found.pvalue,
-        len(values),
-        stats.skew(values),
-        "p is too large: mean and SD come from the same values (see Lilliefors)",
-    )
-
-
-def _lilliefors(values: Array) -> StatisticalTest:
-    # Loaded here: it takes 0.6 s, and most who load this file test no normality.
-    from statsmodels.stats.diagnostic import lilliefors
-
-    statistic, p = lilliefors(values, dist="norm", pvalmethod="table")
-    low, high = LILLIEFORS_RANGE
-    message = f"p at most {low}" if p <= low else f"p at least {high}" if p >= high else ""
-    return LILLIEFORS.done(statistic, p, len(values), stats.skew(values), message)
 
 
 ROUNDING = 1e-9
@@ -156,7 +141,13 @@ def f_test_nested(
     ValueError
         If the larger model has not fewer degrees of freedom, or a sum is negative or not finite.
     """
-    _check(rss_small, df_small, rss_large, df_large)
+    if df_small <= df_large:
+        raise ValueError(
+            f"the larger model has the fewer degrees of freedom, found {df_small} and {df_large}"
+        )
+    for rss in (rss_small, rss_large):
+        if not (isfinite(rss) and rss >= 0.0):
+            raise ValueError(f"a sum of squares is finite and not negative, found {rss}")
     if df_large < 1:
         message = f"{df_large} degrees of freedom left by the larger model; at least 1 is needed"
         return NESTED.without(ComputationStatus.TOO_FEW, max(df_large, 0), message)
@@ -170,14 +161,3 @@ def f_test_nested(
         message += f"; the larger model fits worse ({rss_large:.6g} against {rss_small:.6g})"
     effect = gained / rss_small if rss_small > 0.0 else 0.0
     return NESTED.done(f, stats.f.sf(f, extra, df_large), df_large, effect, message)
-
-
-def _check(rss_small: float, df_small: int, rss_large: float, df_large: int) -> None:
-    """Raise ValueError for what can be no two nested fits."""
-    if df_small <= df_large:
-        raise ValueError(
-            f"the larger model has the fewer degrees of freedom, found {df_small} and {df_large}"
-        )
-    for rss in (rss_small, rss_large):
-        if not (isfinite(rss) and rss >= 0.0):
-            raise ValueError(f"a sum of squares is finite and not negative, found {rss}")

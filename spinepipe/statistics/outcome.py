@@ -152,6 +152,7 @@ def _holm(p: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Written out because statsmodels collects garbage at each call, 0.1 s in a long-lived process.
     """
+    # step-down: the smallest p is tested n times, the next n - 1 times
     order = np.argsort(p, kind="stable")
     steps = np.maximum.accumulate(np.arange(len(p), 0, -1) * p[order])
     result = np.empty_like(steps)

@@ -124,6 +124,7 @@ def _dealt_p(groups: Sequence[Array]) -> float:
     ranks = stats.rankdata(np.concatenate(groups))
     sizes = tuple(len(group) for group in groups)
     if factorial(len(ranks)) // prod(map(factorial, sizes)) <= MOST_ARRANGEMENTS:
+        # H grows with the sum of squared rank sums over sizes, the rest is the same in all dealings
         dealings = _dealings(sizes)  # the first is as the groups are
         found = _between(*np.split(ranks[dealings], np.cumsum(sizes)[:-1], axis=1), axis=1)
         return float(np.mean(found >= found[0] * (1.0 - ROUNDING)))
@@ -242,12 +243,15 @@ def _tail_of_blocks(blocks: tuple[tuple[int, ...], ...]) -> Array | None:
     treatments, base = len(blocks[0]), sum(blocks[0]) * len(blocks) + 1
     if treatments > MOST_TREATMENTS or base ** (treatments - 1) > np.iinfo(np.int64).max:
         return None
-    digits = base ** np.arange(treatments - 1)  # the last sum follows from the others
+    # A state is the sorted sums of ranks, and its key these as digits of one number; the last sum
+    # follows from the others.
+    digits = base ** np.arange(treatments - 1)
     counted, sums, chance = 0, np.array(blocks[:1], dtype=np.int32), np.ones(1)
     for block in blocks[1:-1]:
         counted += len(sums) * _orders(block)
         if counted > MOST_SUMS:
             return None
+        # every state meets every order of the block's ranks; equal states are added up
         ways = np.array(list(set(permutations(block))), dtype=np.int32)
         every = np.sort((sums[:, None] + ways).reshape(-1, treatments), axis=1)
         keys, at = np.unique(every[:, :-1] @ digits, return_inverse=True)
@@ -257,6 +261,7 @@ def _tail_of_blocks(blocks: tuple[tuple[int, ...], ...]) -> Array | None:
         sums, chance = every[one], shares.astype(np.float64)
     if len(sums) * _orders(blocks[-1]) > 2 * MOST_SUMS:
         return None
+    # of the last block only the squares are asked: |s + w|^2 = |s|^2 + 2 s w + |w|^2
     ways = np.array(list(set(permutations(blocks[-1]))))
     sums = sums.astype(np.int64)
     squares = np.sum(sums**2, axis=1)[:, None] + 2 * sums @ ways.T + sum(np.square(blocks[-1]))
@@ -274,21 +279,18 @@ LARGEST = 50
 """Up to so many differences."""
 
 
-def exact_p(v: float, ranks: Array) -> float:
+def signed_rank_p(v: float, ranks: Array) -> float:
     """Two-sided p of a rank sum v: the doubled smaller tail over all signs of the ranks (n,)."""
-    share, place = _distribution(ranks), round(2.0 * v)
-    return float(min(1.0, 2.0 * min(share[: place + 1].sum(), share[place:].sum())))
-
-
-def _distribution(ranks: Array) -> Array:
-    """Probability that twice the rank sum is 0, 1, ...; mid-ranks are halves, doubled whole."""
+    # probability that twice the rank sum is 0, 1, ...: mid-ranks are halves, doubled whole; each
+    # rank is in the sum or not, with equal chance
     doubled = np.rint(2.0 * ranks).astype(int)
     share = np.eye(1, doubled.sum() + 1)[0]
     for rank in doubled:
         moved = np.zeros_like(share)
         moved[rank:] = share[:-rank]  # nothing is lost off the end: no sum is above the total
         share = 0.5 * (share + moved)
-    return share
+    place = round(2.0 * v)
+    return float(min(1.0, 2.0 * min(share[: place + 1].sum(), share[place:].sum())))
 
 
 FEWEST = 4
@@ -322,26 +324,23 @@ def wilcoxon_signed_rank(x: ArrayLike, y: ArrayLike) -> StatisticalTest:
         return SIGNED_RANK.without(ComputationStatus.TOO_FEW, n, message)
     ranks = stats.rankdata(np.abs(differences))
     v, total = float(ranks[differences > 0.0].sum()), left * (left + 1) / 2
-    message = _message(differences, n - left)
-    return SIGNED_RANK.done(
-        v, _p_of_pairs(differences, ranks, v), n, 2.0 * v / total - 1.0, message
+    # above the largest count scipy's normal approximation, corrected for ties and continuity
+    p = (
+        signed_rank_p(v, ranks)
+        if left <= LARGEST
+        else stats.wilcoxon(differences, correction=True).pvalue
     )
+    return SIGNED_RANK.done(v, p, n, 2.0 * v / total - 1.0, _message(differences, n - left))
 
 
 def _differences(x: Array, y: Array) -> Array:
     """x - y where they differ, in steps of what rounding can tell apart."""
+    # steps of `SAME` times the largest value: what is closer than rounding is tied
     largest = max(np.abs(x).max(initial=0.0), np.abs(y).max(initial=0.0))
     if largest == 0.0:
         return np.empty(0)
     steps: Array = np.round((x / largest - y / largest) / SAME)
     return steps[steps != 0.0]
-
-
-def _p_of_pairs(differences: Array, ranks: Array, v: float) -> float:
-    """Two-sided p."""
-    if len(ranks) <= LARGEST:
-        return exact_p(v, ranks)
-    return float(stats.wilcoxon(differences, correction=True).pvalue)
 
 
 def _message(differences: Array, equal: int) -> str:

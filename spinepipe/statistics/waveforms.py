@@ -63,6 +63,7 @@ def multiple_correlation(curves: Array) -> MultipleCorrelation:
     whole = np.sum((y - y.mean()) ** 2) / (n * points - 1)
     if whole <= np.finfo(float).eps * np.mean(y**2):
         return MultipleCorrelation(None, Likeness.UNDEFINED, "nothing varies", n, points)
+    # variance of the curves about their mean curve, over that about their mean value
     apart = np.sum((y - y.mean(axis=0)) ** 2) / (points * (n - 1))
     square = float(1.0 - apart / whole)
     if square < 0.0:

@@ -1,6 +1,5 @@
 """A project with a cohort of one stiff joint without weight under a small force."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -75,9 +74,7 @@ def table(project: Project, study: str, name: str) -> pd.DataFrame:
     return pd.read_parquet(project.path(f"results/{study}/{name}.parquet"))
 
 
-def tables_of(
-    root: Path, study: str, solve: Callable[..., None] = respond.run
-) -> dict[str, pd.DataFrame]:
+def tables_of(root: Path, study: str) -> dict[str, pd.DataFrame]:
     """Tables of specimen a, its jobs run one after the other in this process."""
     told = Expected(str(root), *check(root, study))
     files = told.files
@@ -95,7 +92,7 @@ def tables_of(
     base.run(str(root), study, "a", **of_base)
     start = [path(name) for name in files.base_of("a")]
     blocks: dict[str, Any] = {"responses": [], "calibrated": []}
-    for table, job in (("responses", solve), ("calibrated", calibrate.run)):
+    for table, job in (("responses", respond.run), ("calibrated", calibrate.run)):
         if table not in files.tables:
             continue
         for specimen, block in files.blocks(table):

@@ -14,7 +14,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.schema import Table
 from spinepipe.studies.scoliosis.accuracy import accuracy_rows
-from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT, read_films
+from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT, Film, read_films
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import (
     ACCURACY,
@@ -25,6 +25,8 @@ from spinepipe.studies.scoliosis.tables import (
     VARIATION,
 )
 from spinepipe.tables import from_rows
+
+STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
 
 FREE = dict(zip(MODELS, (43, 43, 2, 15, 0), strict=True))
 FITTED = ("tangent_fitted", "linear_regions")
@@ -78,10 +80,21 @@ def write_shipped(folder: Path, count: int, name: str = "ais18_phantom") -> None
 
 
 @cache
-def _read(patients: int) -> Cohort:
+def shipped(patients: int, name: str = "ais18_phantom") -> Cohort:
+    """The first patients of a cohort that comes along."""
     with TemporaryDirectory() as folder:
-        write_shipped(Path(folder) / "ais", patients)
+        write_shipped(Path(folder) / "ais", patients, name)
         return cohorts.read(Path(folder) / "ais", (FILMS, PATIENTS))
+
+
+def mirrored(film: Film) -> Film:
+    """Left and right exchanged."""
+    return Film(-film.right, film.up, -film.tilt)
+
+
+def scaled(film: Film, factor: float) -> Film:
+    """The same film, so many times as large."""
+    return Film(factor * film.right, factor * film.up, film.tilt)
 
 
 def study_of(size: Size) -> Scoliosis:
@@ -92,7 +105,7 @@ def study_of(size: Size) -> Scoliosis:
 
 def cohort_of(size: Size) -> Cohort:
     """Its patients, filmed erect and in the positions."""
-    whole = _read(size.patients)
+    whole = shipped(size.patients)
     films = whole.further["films"]
     kept = films[films["position"].isin(["erect", *size.positions])]
     parts = {name: getattr(whole, name) for name in whole.__dataclass_fields__}

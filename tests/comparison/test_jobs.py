@@ -11,9 +11,9 @@ from papers.engine import claims_of, judge, rows_of
 from papers.run import StudyRun
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.studies.scoliosis.against_jalalian_2017 import facts
-from spinepipe.studies.scoliosis.jalalian_2017 import reproduces as has_the_patients
 from spinepipe.studies.scoliosis.kind import KIND, ScoliosisFiles
 from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import JALALIAN_2017_COHORTS
 from spinepipe.studies.tracking.against_wang_2021 import asked_of as asked_of_tracking
 from spinepipe.studies.tracking.settings import JointLimits, Tracking
 from spinepipe.studies.trunk_loads.against_ghezelbash_2016 import asked_of as asked_of_trunk
@@ -48,9 +48,9 @@ def test_a_job_writes_the_table_with_its_origin(
 
 def test_the_table_is_made_where_the_cohort_stands_for_that_of_the_paper() -> None:
     settings, cohort = study_of_kind(Scoliosis, str(ROOT), "ais18_scoliosis")
-    assert has_the_patients(cohort.name)
+    assert cohort.name in JALALIAN_2017_COHORTS
     made = ScoliosisFiles.of(settings, cohort).tables
-    rebuilt = has_the_patients("t12s1_phantom")
+    rebuilt = "t12s1_phantom" in JALALIAN_2017_COHORTS
     other = ScoliosisFiles(settings, cohort.specimen_names, rebuilt=rebuilt).tables
     assert set(made) - set(other) == {"against_jalalian_2017"}
     assert {"by_range", "statistics"} <= set(other) <= {one.name for one in KIND.tables}

@@ -23,7 +23,7 @@ from spinepipe.sensitivity.global_indices.floor import (
     negligible,
     noise_floor,
 )
-from spinepipe.sensitivity.global_indices.indices import indices, kept, names_of
+from spinepipe.sensitivity.global_indices.indices import complete_blocks, indices, names_of
 from spinepipe.sensitivity.global_indices.structured import elementary_effects, fast_indices
 
 QUICK = Settings(bootstraps=5, delta_bootstraps=4)
@@ -158,7 +158,7 @@ def test_as_many_may_be_lost_as_is_said() -> None:
     design = draw("morris", ALONE, 8, 20027)
     ok = np.ones(design.n, dtype=bool)
     ok[[0, -1]] = False
-    assert kept(design, ok).lost == 0.25
+    assert complete_blocks(design, ok).lost == 0.25
     for most, status in ((0.25, IndexStatus.DONE), (0.24, IndexStatus.TOO_MANY_FAILED)):
         found = indices(design, design.unit[:, :1], ok, replace(QUICK, most_failed=most))
         assert {index.status for index in found} == {(status,)}

@@ -117,6 +117,7 @@ def test_what_cannot_be_drawn_is_said(
 
 
 def test_all_problems_are_told_at_once() -> None:
+    assert design_problems("sobol", (), (), 8) == ["a design needs at least one factor"]
     found = design_problems("morris", ("a", "a"), (None, None), 10, levels=3)
     assert len(found) == 2
     with pytest.raises(ValueError, match="same name: dummy"):
@@ -156,17 +157,6 @@ def test_more_harmonics_need_more_samples(harmonics: int, least: int) -> None:
         found = design_problems("fast", FACTORS, (None,) * 4, samples, harmonics=harmonics)
         assert len(found) == wrong
     assert len(design_problems("fast", FACTORS, (None,) * 4, 1000, harmonics=0)) == 1
-
-
-def test_harmonics_and_levels_that_nobody_names_are_four() -> None:
-    lowest = draw("fast", ("a", "b"), 65, 3)
-    np.testing.assert_array_equal(lowest.unit, draw("fast", ("a", "b"), 65, 3, harmonics=4).unit)
-    assert lowest.harmonics == 4
-    assert len(np.unique(draw("morris", ("a", "b"), 20, 3).unit.round(9))) == 4
-
-
-def test_a_design_without_factors_is_none() -> None:
-    assert design_problems("sobol", (), (), 8) == ["a design needs at least one factor"]
 
 
 def test_a_part_is_the_first_blocks() -> None:

@@ -1,6 +1,7 @@
-"""Indices of a global analysis: equal to SALib's and scipy's, failures, constants, the dummy.
+"""Indices of a global analysis: equal to SALib's and scipy's, failures, constants, growing designs.
 
-Catches an index that differs from SALib's, and failed runs that count.
+Catches an index that differs from SALib's, failed runs that count, and an end of a growing design
+that comes too soon.
 """
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.integrate import dblquad
 from scipy.stats import ks_2samp, norm
 from sweeps import sweep
 
+from spinepipe.sensitivity.global_indices.convergence import convergence
 from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.sensitivity.global_indices.estimates import IndexStatus, SensitivityIndex, Settings
 from spinepipe.sensitivity.global_indices.indices import indices
@@ -278,3 +280,55 @@ def test_outputs_that_do_not_fit_are_refused() -> None:
         indices(design, outputs)
     with pytest.raises(ValueError, match="no index S3"):
         Settings(wanted=("S3",))
+
+
+def test_sobol_settles_on_powers_of_two_of_the_base_sample() -> None:
+    function = FUNCTIONS["ishigami"]
+    design = draw("sobol", function.factors, 1024, 5)
+    outputs = function.values(design.unit)[:, None]
+    settings = Settings(bootstraps=50)
+    stages = convergence(design, outputs, settings=settings, sizes=5)
+    assert [stage.samples for stage in stages] == [64, 128, 256, 512, 1024]
+    assert [stage.runs for stage in stages] == [8 * stage.samples for stage in stages]
+    assert {index.other for stage in stages for index in stage.indices} == {""}
+    whole = {(i.index, i.factor): i for i in indices(design, outputs, settings=settings)}
+    widths = []
+    for index in stages[-1].indices:
+        assert index.estimate[0] == pytest.approx(whole[index.index, index.factor].estimate[0])
+    for stage in stages:
+        widths.append(np.mean([(index.high - index.low)[0] for index in stage.indices]))
+    assert widths[-1] < 0.4 * widths[0]  # 1 / sqrt(16) if samples were drawn one by one
+
+
+def test_parts_of_a_latin_hypercube_are_random_and_repeat() -> None:
+    function = FUNCTIONS["ishigami"]
+    design = draw("latin_hypercube", function.factors, 400, 5)
+    order = np.argsort(design.unit[:, 0])  # a first part in this order would see low x1 alone
+    design = type(design)(**{**vars(design), "unit": design.unit[order]})
+    outputs = function.values(design.unit)[:, None]
+    settings = Settings(bootstraps=20, wanted=("S1_RBD",))
+    first, again = (convergence(design, outputs, settings=settings) for _ in range(2))
+    assert [stage.samples for stage in first] == [50, 100, 200, 400]
+    assert [index.estimate.tolist() for stage in first for index in stage.indices] == [
+        index.estimate.tolist() for stage in again for index in stage.indices
+    ]
+    half = first[2].indices[0].estimate[0]
+    assert half == pytest.approx(function.truth["S1", "x1", ""], abs=0.15)
+
+
+def test_failures_count_in_the_part_they_are_in() -> None:
+    function = FUNCTIONS["ishigami"]
+    design = draw("morris", function.factors, 32, 5)
+    outputs, ok = function.values(design.unit)[:, None], np.ones(design.n, dtype=bool)
+    outputs[-1], ok[-1] = np.nan, False
+    stages = convergence(design, outputs, ok, Settings(bootstraps=20), sizes=9)
+    assert [stage.samples for stage in stages] == [4, 8, 16, 32]
+    assert [stage.indices[0].failed for stage in stages] == [0, 0, 0, 1]
+    assert stages[-1].indices[0].runs == design.n - design.block
+
+
+def test_fast_has_one_stage() -> None:
+    function = FUNCTIONS["ishigami"]
+    design = draw("fast", function.factors, 513, 5)
+    stages = convergence(design, function.values(design.unit)[:, None])
+    assert [(stage.samples, stage.runs) for stage in stages] == [(513, 3 * 513)]

@@ -71,11 +71,6 @@ def test_shares_and_intervals_by_the_long_way() -> None:
     assert (found.status, found.message) == (ComputationStatus.DONE, "")
 
 
-def test_the_truth_is_found_in_a_large_grid() -> None:
-    grid = normal_grid(np.random.default_rng(2), (300, 40, 300), (4.0, 2.0, 3.0, 0.5, 0.5))
-    np.testing.assert_allclose(components(grid), [4.0, 2.0, 3.0, 1.0], rtol=0.25)
-
-
 def hypercube_grid(rng, shape: tuple[int, int, int], treatments: np.ndarray) -> np.ndarray:
     """Values (S, P, K) of specimens, of 12 factors of a draw, and of a 13th that hangs on the
     treatment; variances 1, 0.5, that of the treatments, and 0.3."""
@@ -143,24 +138,6 @@ def test_shares_do_not_hang_on_unit_or_origin() -> None:
             [a.estimate, a.low, a.high], [b.estimate, b.low, b.high], rtol=1e-6
         )
         assert a.low <= a.estimate <= a.high
-
-
-@pytest.mark.full
-def test_intervals_cover_the_shares_under_the_same_treatments() -> None:
-    """Treatments are fixed; specimens and draws are new in every grid. Binomial limits of 95 %."""
-    rng = np.random.default_rng(4)
-    treatments = np.array([-1.2, 0.1, 1.0])
-    truth = np.array([1.0, 0.5, treatments.var(), 0.3])
-    truth /= truth.sum()
-    covered = np.zeros(4)
-    n = 200
-    for _ in range(n):
-        grid = hypercube_grid(rng, (40, 12, 3), treatments)
-        found = nested_shares(grid)
-        ends = np.array([[getattr(found, part).low, getattr(found, part).high] for part in PARTS])
-        covered += (ends[:, 0] <= truth) & (truth <= ends[:, 1])
-    assert (covered / n > 0.90).all()
-    assert (covered / n < 0.995).all()
 
 
 def test_what_has_no_shares_says_why() -> None:

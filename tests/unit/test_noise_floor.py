@@ -1,8 +1,5 @@
 """What indices say of a factor without effect, and which factors may be called negligible.
 
-Beside the dummy each design has another factor without effect, ``inert``, of which the floor knows
-nothing: its indices must lie in the floor about as often as the interval says.
-
 Catches a factor called negligible, or important, by noise alone.
 """
 
@@ -10,16 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from known_indices import FUNCTIONS, linear_gaussian
+from known_indices import FUNCTIONS
 
-from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import DUMMY, draw
 from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
 from spinepipe.sensitivity.global_indices.floor import (
     REPLICATES,
     Floor,
     above_floor,
-    negligible,
     noise_floor,
 )
 from spinepipe.sensitivity.global_indices.indices import indices
@@ -46,36 +41,16 @@ def analysed(
 
 
 CASES = [
-    ("latin_hypercube", 200, ("PAWN", "S1_RBD", "KS_high"), 10),
-    ("fast", 1025, ("S1", "ST"), 30),
-    ("sobol", 64, ("S1", "ST"), 40),
-    ("morris", 20, ("mu", "mu_star", "sigma"), 40),
+    ("latin_hypercube", 200, ("PAWN", "S1_RBD", "KS_high")),
+    ("fast", 1025, ("S1", "ST")),
+    ("sobol", 64, ("S1", "ST")),
+    ("morris", 20, ("mu", "mu_star", "sigma")),
 ]
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(("method", "samples", "wanted", "seeds"), CASES)
-def test_a_factor_without_effect_lies_in_the_floor(
-    method: str, samples: int, wanted: tuple[str, ...], seeds: int
-) -> None:
-    """97.5 % are below its upper end; 5 SDs of a binomial are allowed for so few seeds."""
-    scatter = RESOLUTION if method in ("sobol", "morris") else 0.0
-    below, above = [], []
-    for seed in range(seeds):
-        found, floors = analysed(method, samples, seed, wanted, scatter)
-        for name in wanted:
-            size = found[name, "inert"].estimate
-            size = np.ma.abs(size) if name == "mu" else size
-            below.append(bool(size[0] <= floors[name].high[0]))
-            above += above_floor(found[name, "inert"], floors)
-    slack = 5.0 * np.sqrt(0.025 * 0.975 / (len(below) / len(wanted)))
-    assert np.mean(below) >= 0.975 - slack
-    assert np.mean(above) <= 0.025
-
-
-@pytest.mark.parametrize(("method", "samples", "wanted", "seeds"), CASES)
+@pytest.mark.parametrize(("method", "samples", "wanted"), CASES)
 def test_a_floor_is_an_interval_above_nothing_and_below_what_matters(
-    method: str, samples: int, wanted: tuple[str, ...], seeds: int
+    method: str, samples: int, wanted: tuple[str, ...]
 ) -> None:
     found, floors = analysed(method, samples, 3, wanted, 1e-6)
     for name in wanted:
@@ -138,41 +113,3 @@ def test_outputs_without_an_index_have_no_floor_and_failed_runs_no_part_in_it() 
     floor = noise_floor(design, outputs, found, ok, settings)["PAWN"]
     assert floor.high.tolist()[1] is None
     assert 0.0 < floor.low.tolist()[0] < floor.high.tolist()[0] < 1.0
-
-
-SHARES = {"large": 0.9, "border": 0.0105, "small": 0.002, "none": 0.0}
-"""Total indices of a sum of independent normals; the rest is of ``other``."""
-
-
-def screened(seed: int, samples: int = 32) -> Names:
-    shares = [*SHARES.values(), 1.0 - sum(SHARES.values())]
-    function = linear_gaussian(tuple(np.sqrt(shares)))
-    design = draw("sobol", (*SHARES, "other"), samples, seed, second_order=False)
-    outputs: Array = function.values(design.unit)[:, None]
-    return {
-        (i.index, i.factor): i
-        for i in indices(design, outputs, settings=Settings(bootstraps=200, seed=seed))
-    }
-
-
-def test_a_factor_is_negligible_only_by_the_end_of_its_interval() -> None:
-    """A factor just above 1 % is almost never called so; by its estimate alone it often is."""
-    called: dict[str, list[bool | None]] = {name: [] for name in SHARES}
-    by_estimate = []
-    for seed in range(40):
-        found = screened(seed)
-        for name in SHARES:
-            called[name] += negligible(found["ST", name])
-        by_estimate.append(float(found["ST", "border"].estimate[0]) < 0.01)
-    rates = {name: float(np.mean(np.array(told, float))) for name, told in called.items()}
-    assert rates["large"] == 0.0
-    assert rates["border"] <= 0.05
-    assert np.mean(by_estimate) >= 0.15
-    assert rates["small"] == 1.0
-    assert rates["none"] == 1.0
-
-
-def test_nothing_else_tells_that_a_factor_is_negligible() -> None:
-    assert negligible(screened(1)["S1", "none"]) == (None,)
-    found, _ = analysed("fast", 1025, 1, ("S1", "ST"))
-    assert negligible(found["ST", "inert"]) == (None,), "FAST has no interval"

@@ -5,6 +5,7 @@ Catches a tree that is not rpart's, and poses learnt by heart that are praised.
 
 import numpy as np
 import pytest
+from sklearn.base import clone
 from sklearn.model_selection import GroupKFold
 from sweeps import sweep
 
@@ -13,7 +14,6 @@ from spinepipe.sensitivity.tree import (
     _cross_validated,
     _cut_back,
     _growth,
-    _pruned,
     _weakest_links,
     regression_tree,
 )
@@ -255,5 +255,5 @@ def test_a_tree_that_is_cut_back_is_the_one_that_scikit_learn_prunes() -> None:
     path = whole.cost_complexity_pruning_path(x, y).ccp_alphas
     assert len(path) > 10
     for complexity in (0.0, *(0.5 * (path[:-1] + path[1:])), BEYOND_ROOT):
-        pruned = _pruned(growth, complexity).fit(x, y).predict(x)
+        pruned = clone(growth).set_params(ccp_alpha=complexity).fit(x, y).predict(x)
         np.testing.assert_array_equal(_cut_back(whole.tree_, ends, complexity)[leaves], pruned)

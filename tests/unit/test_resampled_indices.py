@@ -75,25 +75,11 @@ def test_under_a_mask_there_is_nothing() -> None:
     assert found.data.tolist() == [1.0, 0.0, 3.0]
 
 
-@sweep("change", [{"bootstraps": 1}, {"delta_bootstraps": 1}])
-def test_one_resample_is_no_interval(change: dict[str, int]) -> None:
-    with pytest.raises(ValueError, match="at least 2 bootstraps"):
+@sweep("change", [{"bootstraps": 1}, {"delta_bootstraps": 1}, {"confidence": 0}, {"confidence": 1}])
+def test_one_resample_is_no_interval_and_nothing_is_sure(change: dict[str, int]) -> None:
+    with pytest.raises(ValueError, match="at least 2 bootstraps and a confidence between"):
         Settings(**change)
-    assert Settings(**{name: count + 1 for name, count in change.items()})
-
-
-@sweep("confidence", [0.0, 1.0])
-def test_nothing_is_sure_or_unsure_altogether(confidence: float) -> None:
-    with pytest.raises(ValueError, match="a confidence between"):
-        Settings(confidence=confidence)
-
-
-def test_what_is_asked_where_nothing_is_said() -> None:
-    """As docs/studies/global_sensitivity.md has it; delta's resamples are fewer for their time."""
-    asked = Settings()
-    assert (asked.bootstraps, asked.delta_bootstraps, asked.seed) == (1000, 50, 0)
-    assert (asked.confidence, asked.most_failed) == (0.95, 0.2)
-    assert (asked.tail, asked.slices) == (0.25, 10)
+    assert Settings(bootstraps=2, delta_bootstraps=2, confidence=1e-9)
 
 
 def test_distance_from_the_rest_is_scipys_of_repeated_rows() -> None:
@@ -123,7 +109,9 @@ def test_pawn_of_weights_is_that_of_repeated_rows_in_the_same_slices() -> None:
 
 def test_resamples_all_in_or_out_of_a_part_are_no_distance_away() -> None:
     values, part = np.array([3.0, 1.0, 2.0, 4.0]), np.array([True, True, False, False])
-    ordered = given_data.Ordered(values, np.array([[1, 1, 0, 0], [0, 0, 1, 1], [1, 1, 1, 1.0]]))
+    ordered = given_data.WeightedSample(
+        values, np.array([[1, 1, 0, 0], [0, 0, 1, 1], [1, 1, 1, 1.0]])
+    )
     np.testing.assert_allclose(ordered.share(part), [1.0, 0.0, 0.5])
     # of all four: after 1 half of the part and a quarter of all
     np.testing.assert_allclose(ordered.distance(part), [0.0, 0.0, 0.25])

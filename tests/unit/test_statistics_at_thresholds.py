@@ -1,11 +1,12 @@
-"""Tests of values exactly where they change their way: counts, sizes, rounding, signs.
+"""Statistics where they change their way, and of few numbers: counts, rounding, signs, small cases.
 
-Catches a test that takes the wrong way exactly at its threshold.
+Catches a test that takes the wrong way exactly at its threshold, and means, bins and likeness that
+are off with few numbers.
 """
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy import stats
 from sweeps import sweep
 
 from spinepipe.statistics import (
@@ -19,6 +20,7 @@ from spinepipe.statistics import (
     spearman,
     wilcoxon_signed_rank,
 )
+from spinepipe.statistics.normality import _pooled
 from spinepipe.statistics.waveforms import Likeness, multiple_correlation
 
 
@@ -42,19 +44,6 @@ def test_the_least_variation_is_the_rounding_of_the_values_squares() -> None:
     for d, varies in ((3.0e-8, True), (2.0e-8, False)):
         found = multiple_correlation(-np.array([[1.0, 1.0 + d]] * 2))
         assert (found.status is Likeness.DONE) is varies
-
-
-def test_two_curves_of_two_points_are_enough() -> None:
-    """0 1 and 0 3: apart 2 in 2, whole 6 in 3: 1 - 1 / 2."""
-    found = multiple_correlation(np.array([[0.0, 1.0], [0.0, 3.0]]))
-    assert found.value == pytest.approx(np.sqrt(0.5))
-
-
-def test_curves_that_differ_more_than_they_vary_have_no_coefficient() -> None:
-    """0 1, 1 0 and 1 1: 4/3 in 4 about their means, 4/3 in 5 in all."""
-    below = multiple_correlation(np.array([[0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]))
-    assert (below.status, below.value) == (Likeness.UNDEFINED, None)
-    assert below.message.endswith("the square is -0.25")
 
 
 def test_rank_correlation_is_exact_up_to_ten_pairs() -> None:
@@ -148,7 +137,7 @@ def test_a_model_that_fits_worse_by_rounding_is_not_said_to() -> None:
 def test_what_is_as_normal_as_can_be_is_at_the_other_end_of_the_table() -> None:
     """Quantiles of a normal themselves, and four values, with which the table begins."""
 
-    found = lilliefors_normality(norm.ppf((np.arange(40) + 0.5) / 40))
+    found = lilliefors_normality(stats.norm.ppf((np.arange(40) + 0.5) / 40))
     assert found.message == "p at least 0.99"
     assert found.p == pytest.approx(0.99)
     assert lilliefors_normality([1.0, 2.0, 4.0, 9.0]).status is ComputationStatus.DONE
@@ -156,8 +145,79 @@ def test_what_is_as_normal_as_can_be_is_at_the_other_end_of_the_table() -> None:
     assert between.message == ""
 
 
-def test_a_mean_of_two_has_an_interval() -> None:
-    """12.706 is the 97.5 % point of t with one degree of freedom."""
-    found = mean_of(np.array([1.0, 3.0]))
-    assert found.interval == pytest.approx((2.0 - 12.706, 2.0 + 12.706), abs=1e-3)
-    assert found.p == pytest.approx(1.0 - 2.0 * np.arctan(2.0) / np.pi)
+def test_a_mean_of_three_has_the_interval_of_student() -> None:
+    """4.303 is the 97.5 % point of t with two degrees of freedom, in any table."""
+    found = mean_of(np.array([1.0, 2.0, 6.0]))
+    half = 4.303 * np.sqrt(7.0 / 3.0)  # variance 7
+    assert (found.n, found.value) == (3, 3.0)
+    assert found.interval == pytest.approx((3.0 - half, 3.0 + half), abs=2e-3)
+    # with two degrees of freedom p = 1 - t / sqrt(2 + t^2)
+    t = 3.0 / np.sqrt(7.0 / 3.0)
+    assert found.p == pytest.approx(1.0 - t / np.sqrt(2.0 + t**2))
+
+
+@sweep("values", [[], [2.0], [2.0, 2.0], [2.0, 2.0 + 1e-9], [0.0, 0.0]])
+def test_what_does_not_vary_has_no_interval(values: list[float]) -> None:
+    found = mean_of(np.array(values))
+    assert (found.n, found.interval, found.p) == (len(values), None, None)
+    assert found.value == (pytest.approx(values[0]) if values else None)
+
+
+@sweep("unit", [1e-6, 1.0, 1e6])
+def test_a_small_scatter_is_one_whatever_the_unit(unit: float) -> None:
+    found = mean_of(unit * np.array([-2.0, -2.0 - 1e-8]))
+    assert found.interval is not None
+    low, high = found.interval
+    assert low < found.value < high < 0.0  # type: ignore[operator]
+
+
+@sweep("unit", [1e-9, 1.0, 1e9])
+def test_curves_are_as_alike_in_any_unit(unit: float) -> None:
+    """Of 0 1 2 and 0 1 4: apart 2 in 3, whole 34/3 in 5; 1 - (2/3) / (34/15) = 12/17."""
+    found = multiple_correlation(unit * np.array([[0.0, 1.0, 2.0], [0.0, 1.0, 4.0]]))
+    assert (found.status, found.curves, found.points) == (Likeness.DONE, 2, 3)
+    assert found.value == pytest.approx(np.sqrt(12.0 / 17.0))
+
+
+def test_opposite_curves_have_no_coefficient_and_one_curve_too_few() -> None:
+    """Apart by 1 in two points of one further curve, whole 1 in 3: 1 - (4/2) / (4/3) = -1/2."""
+    opposite = multiple_correlation(np.array([[-1.0, 1.0], [1.0, -1.0]]))
+    assert (opposite.status, opposite.value) == (Likeness.UNDEFINED, None)
+    assert opposite.message.endswith("-0.5")
+    for shape in ((1, 5), (5, 1)):
+        few = multiple_correlation(np.ones(shape))
+        assert (few.status, few.curves, few.points) == (Likeness.TOO_FEW, *shape)
+    assert multiple_correlation(np.array([[0.0, 1.0]] * 2)).value == 1.0
+
+
+@sweep(
+    "expected, pooled",
+    [
+        ([6.0, 7.0, 8.0, 4.0, 6.0], [6.0, 7.0, 8.0, 10.0]),  # beside the upper tail
+        ([6.0, 4.0, 8.0, 7.0, 9.0], [10.0, 8.0, 7.0, 9.0]),  # beside the lower one
+        ([6.0, 7.0, 1.0, 8.0, 6.0], [6.0, 7.0, 1.0, 8.0, 6.0]),  # inner bins are left alone
+        ([5.0, 5.0, 5.0], [5.0, 5.0, 5.0]),  # five are enough
+        ([4.0, 5.0, 5.0], [9.0, 5.0]),
+        ([1.0, 1.0, 1.0], [1.0, 2.0]),  # two stay, the upper tail is emptied first
+    ],
+)
+def test_bins_are_pooled_from_the_emptier_tail(expected: list[float], pooled: list[float]) -> None:
+    observed, left = _pooled(np.array(expected) + 1.0, np.array(expected))
+    assert left.tolist() == pooled
+    assert observed.sum() == sum(expected) + len(expected)
+    assert len(observed) == len(left)
+
+
+def test_limits_of_agreement_are_as_sure_as_draws_of_normal_differences_say() -> None:
+    """Of four differences: (bias + 1.96 SD of the truth) in SDs seen, drawn 400,000 times."""
+    found = bland_altman([0.0, 0.0, 0.0, 0.0], [1.0, 2.0, 4.0, 9.0])
+    rng = np.random.default_rng(20004)
+    mean, sd = rng.normal(size=400_000) / 2.0, np.sqrt(rng.chisquare(3, 400_000) / 3.0)
+    low, high = np.quantile((1.96 - mean) / sd, [0.025, 0.975])
+    assert found.sd == pytest.approx(np.std([1.0, 2.0, 4.0, 9.0], ddof=1))
+    assert found.upper_limit_low == pytest.approx(found.bias + low * found.sd, rel=0.02)
+    assert found.upper_limit_high == pytest.approx(found.bias + high * found.sd, rel=0.02)
+    assert found.lower_limit_low == pytest.approx(found.bias - high * found.sd, rel=0.02)
+    assert found.lower_limit_high == pytest.approx(found.bias - low * found.sd, rel=0.02)
+    half = stats.t.isf(0.025, 3) * found.sd / 2.0
+    assert (found.bias_low, found.bias_high) == pytest.approx((4.0 - half, 4.0 + half))

@@ -14,7 +14,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress
 from spinepipe.studies.scoliosis.film_fit import FilmFit
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
-from spinepipe.studies.scoliosis.learn import learn, weights
+from spinepipe.studies.scoliosis.fit_population import fit_population, weights
 from spinepipe.studies.scoliosis.personal import geometric_mean, patient_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from tests.generators import ais_films
@@ -58,7 +58,7 @@ def _rows(cohort: Cohort, truth: dict[str, dict[str, list[list[float]]]]) -> Ite
         {"study": "ratios", "kind": "scoliosis", "cohort": cohort.name, **stated}
     )
     sd = weights(study, cohort)
-    learned = learn(study, cohort, sd, Progress(lambda line: print(line, flush=True)))
+    learned = fit_population(study, cohort, sd, Progress(lambda line: print(line, flush=True)))
     for name in cohort.specimen_names:
         fit = FilmFit(patient_of(study, cohort, name), sd)
         found = fit.personal(fit.fit(learned.population))

@@ -10,7 +10,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress
 from spinepipe.studies.read import check
 from spinepipe.studies.scoliosis.film_fit import FilmFit, fit_alike
-from spinepipe.studies.scoliosis.learn import learn, weights
+from spinepipe.studies.scoliosis.fit_population import fit_population, weights
 from spinepipe.studies.scoliosis.personal import Patient, patient_of, region_optimum
 from spinepipe.studies.scoliosis.population import Population
 from spinepipe.studies.scoliosis.settings import Scoliosis
@@ -35,7 +35,9 @@ def table() -> pd.DataFrame:
     study, cohort = check(ROOT, STUDY)
     assert isinstance(study, Scoliosis)
     sd = weights(study, cohort)
-    everyone = learn(study, cohort, sd, Progress(lambda line: print(line, flush=True))).population
+    everyone = fit_population(
+        study, cohort, sd, Progress(lambda line: print(line, flush=True))
+    ).population
     patients = [patient_of(study, cohort, name) for name in cohort.specimen_names]
     return pd.DataFrame([*_tangents(patients, sd, everyone), *_regions(patients)])
 

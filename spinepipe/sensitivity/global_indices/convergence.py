@@ -50,22 +50,18 @@ def convergence(
     values = np.asarray(outputs, dtype=np.float64)
     good = np.ones(design.n, dtype=bool) if ok is None else np.asarray(ok, dtype=bool)
     if design.method is Method.LATIN_HYPERCUBE:
+        # the first points of a hypercube are none: a random order makes nested subsets
         order = np.random.default_rng([settings.seed, design.n]).permutation(design.n)
         design = replace(design, unit=design.unit[order])
         values, good, whole = values[order], good[order], ()
+    # halves of halves of the samples, smallest first
+    halves = {design.samples >> step for step in range(sizes)}
+    least = FEWEST.get(design.method, design.samples)  # a FAST curve has no parts
+    grown = sorted(n for n in halves if n == design.samples or n >= least)
     stages, known = [], tuple(one for one in whole if one.index in asked and not one.other)
-    for samples in _sizes(design, sizes):
+    for samples in grown:
         part = design.first(samples)
         found = known if samples == design.samples else ()
         found = found or indices(part, values[: part.n], good[: part.n], settings, resolution)
         stages.append(DesignStage(samples, part.n, found))
     return tuple(stages)
-
-
-def _sizes(design: Design, sizes: int) -> list[int]:
-    """Halves of halves of the samples, smallest first."""
-    if design.method is Method.FAST:
-        return [design.samples]
-    halves = {design.samples >> step for step in range(sizes)}
-    least = FEWEST[design.method]
-    return sorted(size for size in halves if size >= least or size == design.samples)

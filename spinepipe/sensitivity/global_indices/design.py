@@ -93,15 +93,6 @@ def design_problems(
     harmonics: int = 4,
 ) -> list[str]:
     """All that stands against a design, in plain words; empty where it can be drawn."""
-    found = _names(factors, groups)
-    if len(groups) == len(factors) and any(group is not None for group in groups):
-        found += _groups(Method(method))
-    if Method(method) is Method.FAST:
-        return found + _fast_samples(len(factors), samples, harmonics)
-    return found + _samples(Method(method), samples, levels)
-
-
-def _names(factors: Sequence[str], groups: Sequence[str | None]) -> list[str]:
     found = [] if factors else ["a design needs at least one factor"]
     if len(set(factors)) != len(factors):
         twice = sorted({name for name in factors if list(factors).count(name) > 1})
@@ -110,37 +101,32 @@ def _names(factors: Sequence[str], groups: Sequence[str | None]) -> list[str]:
         found.append(f"{len(factors)} factors but {len(groups)} groups (None for a factor alone)")
     alone = {name for name, group in zip(factors, groups, strict=False) if group is None}
     found += [f"group {name!r} is also a factor" for name in sorted(alone & set(groups) - {None})]
+    # Methods that look at one factor at a time have nothing to say of a group: SALib's Latin
+    # hypercube gives all factors of a group the same share (rank correlation 1), so that opposite
+    # effects cancel; its FAST knows no groups.
+    own = Method(method)
+    grouped = len(groups) == len(factors) and any(group is not None for group in groups)
+    if grouped and own not in (Method.SOBOL, Method.MORRIS):
+        found.append(
+            f"{own.value} has no indices of groups: leave groups out, or use sobol or morris"
+        )
+    if own is Method.FAST:
+        # with fewer samples SALib lets two other factors share a frequency: they then move as one
+        least = 4 * harmonics**2 * max(1, len(factors) - 1) + 1
+        if harmonics < 1 or samples < least:
+            found.append(
+                f"fast with {harmonics} harmonics and {len(factors)} factors needs at least "
+                f"{least} samples per curve, for each factor its own frequency, found {samples}"
+            )
+    elif own is Method.SOBOL and (samples < 2 or samples & (samples - 1)):
+        found.append(
+            f"sobol needs a power of two as samples (balance of the sequence), found {samples}"
+        )
+    elif own is Method.MORRIS and (levels < 2 or levels % 2):
+        found.append(f"morris needs an even number of levels, found {levels}")
+    elif samples < 2:
+        found.append(f"at least 2 samples are needed, found {samples}")
     return found
-
-
-def _groups(method: Method) -> list[str]:
-    """Methods that look at one factor at a time have nothing to say of a group.
-
-    SALib's Latin hypercube gives all factors of a group the same share (rank correlation 1), so
-    that opposite effects cancel; its FAST knows no groups.
-    """
-    if method in (Method.SOBOL, Method.MORRIS):
-        return []
-    return [f"{method.value} has no indices of groups: leave groups out, or use sobol or morris"]
-
-
-def _samples(method: Method, samples: int, levels: int) -> list[str]:
-    if method is Method.SOBOL and (samples < 2 or samples & (samples - 1)):
-        return [f"sobol needs a power of two as samples (balance of the sequence), found {samples}"]
-    if method is Method.MORRIS and (levels < 2 or levels % 2):
-        return [f"morris needs an even number of levels, found {levels}"]
-    return [] if samples >= 2 else [f"at least 2 samples are needed, found {samples}"]
-
-
-def _fast_samples(factors: int, samples: int, harmonics: int) -> list[str]:
-    """With fewer samples SALib lets two other factors share a frequency; they then move as one."""
-    least = 4 * harmonics**2 * max(1, factors - 1) + 1
-    if harmonics >= 1 and samples >= least:
-        return []
-    return [
-        f"fast with {harmonics} harmonics and {factors} factors needs at least {least} samples per "
-        f"curve, for each factor its own frequency, found {samples}"
-    ]
 
 
 def draw(
@@ -188,11 +174,11 @@ def draw(
         levels,
         harmonics,
     )
-    return Design(**{**vars(bare), "unit": _points(bare)})
+    return replace(bare, unit=_points(bare))
 
 
-def salib_problem(design: Design) -> dict[str, Any]:
-    """SALib's description of the unit cube; a new one for each call, for SALib writes into it."""
+def _points(design: Design) -> Array:
+    """(n, D) points; all of SALib's samplers that are used."""
     problem: dict[str, Any] = {
         "num_vars": len(design.factors),
         "names": list(design.factors),
@@ -200,12 +186,7 @@ def salib_problem(design: Design) -> dict[str, Any]:
     }
     if design.groups != design.factors:
         problem["groups"] = list(design.groups)
-    return problem
-
-
-def _points(design: Design) -> Array:
-    """(n, D) points; all of SALib's samplers that are used."""
-    problem, samples, seed = salib_problem(design), design.samples, design.seed
+    samples, seed = design.samples, design.seed
     if design.method is Method.SOBOL:
         order = design.second_order
         return sobol.sample(problem, samples, calc_second_order=order, seed=seed)

@@ -37,7 +37,7 @@ from spinepipe.sensitivity.global_indices.given_data import (
     regional,
     tail_of,
 )
-from spinepipe.sensitivity.global_indices.indices import ROUNDING, kept, without_lost
+from spinepipe.sensitivity.global_indices.indices import ROUNDING, complete_blocks, without_lost
 
 REPLICATES = 100
 """Factors without effect."""
@@ -93,7 +93,9 @@ def noise_floor(
         return {}
     of_dummy = {i.index: i for i in found if DUMMY in (i.factor, i.other)}
     values: Array = np.asarray(outputs, dtype=np.float64)
-    left = kept(design, np.ones(design.n, dtype=bool) if ok is None else np.asarray(ok, dtype=bool))
+    left = complete_blocks(
+        design, np.ones(design.n, dtype=bool) if ok is None else np.asarray(ok, dtype=bool)
+    )
     floors = {}
     for name in names:
         if name == "S2":
@@ -174,6 +176,7 @@ def _of_sobol(
     name: str, design: Design, outputs: Array, open_to: Array, rng: np.random.Generator
 ) -> Array:
     """(R, K) S1 or ST as `sobol_indices` has it, of runs that repeat A but for (K,) ``open_to``."""
+    # a run in which the dummy alone is exchanged repeats A: it is off by no more than the solver is
     blocks = outputs.reshape(-1, design.block, outputs.shape[1])
     a, b = blocks[:, 0], blocks[:, -1]
     variance = np.concatenate([a, b]).var(axis=0)
@@ -189,6 +192,7 @@ def _of_morris(
     name: str, design: Design, outputs: Array, open_to: Array, rng: np.random.Generator
 ) -> Array:
     """(R, K) of effects that are what the solver leaves open over the step of a level."""
+    # a step of Morris goes over half of the levels
     step = design.levels / (2.0 * (design.levels - 1.0))
     shape = (REPLICATES, len(outputs) // design.block, outputs.shape[1])
     effects = rng.uniform(-open_to, open_to, size=shape) / step
@@ -200,6 +204,7 @@ def _of_morris(
 def _given_data(name: str, outputs: Array, settings: Settings, rng: np.random.Generator) -> Array:
     """(R, K) of columns of a Latin hypercube, drawn anew."""
     n, count = len(outputs), SLOW_REPLICATES if name == "delta" else REPLICATES
+    # columns of a Latin hypercube: a permutation of the cells, a uniform draw inside each
     cells = rng.permuted(np.tile(np.arange(n), (count, 1)), axis=1).T
     unit = (cells + rng.random(cells.shape)) / n
     once = np.ones((1, n))
@@ -219,6 +224,7 @@ def _given_data(name: str, outputs: Array, settings: Settings, rng: np.random.Ge
 
 def _on_curve(name: str, curve: Array, harmonics: int) -> Array:
     """(R, K) S1 or ST at frequencies of the dummy's curve (N, K) at which nothing is moved."""
+    # frequencies of FAST at which the dummy's curve has nothing but the solver's noise
     own = (len(curve) - 1) // (2 * harmonics)
     lowest = int(np.ceil(LOWEST_FREQUENCY * own))
     drawn = [

@@ -31,7 +31,7 @@ from spinepipe.sensitivity.global_indices.estimates import (
 )
 
 
-class Ordered:
+class WeightedSample:
     """Values with the weights of resamples, sorted once and then compared with parts.
 
     Parameters
@@ -52,6 +52,7 @@ class Ordered:
         ----------
         part : (N,) bool.
         """
+        # distributions of part and whole differ most at, or just before, a value of the part
         members = np.flatnonzero(part[self.order])
         values = self._values[members]
         sums = _sums(self._weights[:, members])
@@ -103,12 +104,20 @@ def given_data_indices(design: Design, outputs: Array, settings: Settings) -> In
 
 def _one(index: str, unit: Array, outputs: Array, settings: Settings) -> Array:
     """(3, D, K) estimates and ends of one index."""
-    find = {"delta": _delta, "S1_RBD": _first_order, "PAWN": _pawn}.get(index)
-    if find is None:
+    if index == "delta":
+        drawings = resample_weights(len(outputs), settings.delta_bootstraps, settings.seed)
+        weights = np.concatenate(list(drawings))
+        found = [delta_indices(unit, output, weights) for output in outputs.T]
+        estimate, drawn = (np.stack(each, axis=-1) for each in zip(*found, strict=True))
+    elif index == "S1_RBD":
+        estimates = partial(rbd_fast_resampled, unit, outputs)
+        estimate, drawn = rbd_fast_s1(unit, outputs), _resampled(estimates, len(unit), settings)[1]
+    elif index == "PAWN":
+        estimates = partial(_pawn, unit, outputs, settings.slices)
+        estimate, drawn = _resampled(estimates, len(unit), settings)
+    else:
         region = tail_of(outputs, settings.tail, highest=index == "KS_high")
         estimate, drawn = _resampled(partial(regional, unit, region), len(unit), settings)
-    else:
-        estimate, drawn = find(unit, outputs, settings)
     ends = normal_interval(estimate, drawn, settings.confidence, LOWEST.get(index, 0.0))
     return np.concatenate([estimate[None], ends])
 
@@ -122,29 +131,9 @@ def _resampled(
     return estimates(np.ones((1, n)))[0], drawn
 
 
-def _pawn(unit: Array, outputs: Array, settings: Settings) -> tuple[Array, Array]:
-    """(D, K) and (R, D, K)."""
-
-    def estimates(weights: Array) -> Array:
-        every = [pawn(unit, output, weights, settings.slices) for output in outputs.T]
-        return np.stack(every, axis=-1)
-
-    return _resampled(estimates, len(unit), settings)
-
-
-def _first_order(unit: Array, outputs: Array, settings: Settings) -> tuple[Array, Array]:
-    """(D, K) and (R, D, K)."""
-    drawn = _resampled(partial(rbd_fast_resampled, unit, outputs), len(unit), settings)[1]
-    return rbd_fast_s1(unit, outputs), drawn
-
-
-def _delta(unit: Array, outputs: Array, settings: Settings) -> tuple[Array, Array]:
-    """(D, K) and (R, D, K)."""
-    drawn = resample_weights(len(outputs), settings.delta_bootstraps, settings.seed)
-    weights = np.concatenate(list(drawn))
-    every = [delta_indices(unit, output, weights) for output in outputs.T]
-    estimates, resampled = zip(*every, strict=True)
-    return np.stack(estimates, axis=-1), np.stack(resampled, axis=-1)
+def _pawn(unit: Array, outputs: Array, slices: int, weights: Array) -> Array:
+    """(R, D, K) of `pawn`."""
+    return np.stack([pawn(unit, output, weights, slices) for output in outputs.T], axis=-1)
 
 
 def rbd_fast_s1(unit: Array, outputs: Array) -> Array:
@@ -170,6 +159,7 @@ def rbd_fast_resampled(unit: Array, outputs: Array, weights: Array) -> Array:
     found = np.empty((len(weights), unit.shape[1], outputs.shape[1]))
     for column, values in enumerate(unit.T):
         rows = _sorted_rows(values, weights)
+        # along these rows the factor goes up and down once, as on a curve of FAST of frequency 1
         for k in range(outputs.shape[1]):
             raw = _share_of_harmonics(outputs[rows, k])
             found[:, column, k] = rbd_fast.unskew_S1(raw, HARMONICS, len(outputs))
@@ -206,18 +196,14 @@ def pawn(unit: Array, output: Array, weights: Array, slices: int) -> Array:
     Pianosi & Wagener 2018, doi:10.1016/j.envsoft.2018.07.019, slices as in SALib. It is never 0:
     a factor that does nothing has the distance of a small sample (compare with a dummy).
     """
-    outputs = Ordered(output, weights)
+    outputs = WeightedSample(output, weights)
     found = np.empty((len(weights), unit.shape[1]))
     for column, values in enumerate(unit.T):
-        parts = _slices(values, slices)
+        # slices are closed below and open above; the largest value is in none
+        edges = np.quantile(values, np.linspace(0.0, 1.0, slices + 1))
+        parts = [(values >= low) & (values < high) for low, high in pairwise(edges)]
         found[:, column] = np.median([outputs.distance(part) for part in parts], axis=0)
     return found
-
-
-def _slices(values: Array, slices: int) -> list[NDArray[np.bool_]]:
-    """(N,) bool of each slice, closed below and open above; the largest value is in none."""
-    edges = np.quantile(values, np.linspace(0.0, 1.0, slices + 1))
-    return [(values >= low) & (values < high) for low, high in pairwise(edges)]
 
 
 def delta_indices(unit: Array, output: Array, weights: Array) -> tuple[Array, Array]:
@@ -235,10 +221,11 @@ def delta_indices(unit: Array, output: Array, weights: Array) -> tuple[Array, Ar
     """
     n = len(output)
     resamples = np.array([np.repeat(np.arange(n), row.astype(int)) for row in weights])
-    mixed = np.random.default_rng(n).permuted(resamples, axis=1)  # equal values: ranks by chance
+    # delta is of ranks: repeated rows of a resample are equal, and come in an order of chance
+    mixed = np.random.default_rng(n).permuted(resamples, axis=1)
     rows = [np.arange(n), *mixed]
     found = np.array([[_delta_of(output[at], values[at]) for values in unit.T] for at in rows])
-    reduced = 2.0 * found[0] - found[1:]
+    reduced = 2.0 * found[0] - found[1:]  # bootstrap correction of the bias
     return reduced.mean(axis=0), reduced
 
 
@@ -247,16 +234,13 @@ def _delta_of(output: Array, factor: Array) -> float:
     if np.ptp(output) == 0.0:
         return 0.0
     grid = np.linspace(output.min(), output.max(), 100)
-    edges = np.linspace(0, len(output), _classes(len(output)) + 1)
+    # number of classes of a factor's values, as in SALib's `analyze`
+    power = 2.0 / (7.0 + np.tanh((1500.0 - len(output)) / 500.0))
+    classes = min(int(np.ceil(len(output) ** power)), 48)
+    edges = np.linspace(0, len(output), classes + 1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of classes whose outputs are all the same
         return float(delta.calc_delta(output, grid, factor, edges))
-
-
-def _classes(n: int) -> int:
-    """Number of classes of a factor's values, as in SALib's `analyze`."""
-    power = 2.0 / (7.0 + np.tanh((1500.0 - n) / 500.0))
-    return min(int(np.ceil(n**power)), 48)
 
 
 def tail_of(outputs: Array, share: float, highest: bool) -> NDArray[np.bool_]:
@@ -278,13 +262,13 @@ def regional(unit: Array, region: NDArray[np.bool_], weights: Array) -> Array:
     """
     found = np.empty((len(weights), unit.shape[1], region.shape[1]))
     for column, values in enumerate(unit.T):
-        factor = Ordered(values, weights)
+        factor = WeightedSample(values, weights)
         for k in range(region.shape[1]):
             found[:, column, k] = _from_rest(factor, region[:, k])
     return found
 
 
-def _from_rest(factor: Ordered, region: NDArray[np.bool_]) -> Array:
+def _from_rest(factor: WeightedSample, region: NDArray[np.bool_]) -> Array:
     """(R,) distance between region and rest; 0 for a resample that lies all in one of them.
 
     With the region's share p in all, F_region - F_all = (1 - p) (F_region - F_rest).

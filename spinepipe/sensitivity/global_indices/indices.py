@@ -58,7 +58,7 @@ class CompleteBlocks:
         return float(1.0 - self.blocks.mean())
 
 
-def kept(design: Design, ok: NDArray[np.bool_]) -> CompleteBlocks:
+def complete_blocks(design: Design, ok: NDArray[np.bool_]) -> CompleteBlocks:
     """A failed run takes its whole block with it: a base sample of Sobol, a trajectory of Morris,
     a curve of FAST; of a Latin hypercube itself.
 
@@ -99,7 +99,7 @@ class Report:
 
     def index(self, name: Name) -> SensitivityIndex:
         """One index of all outputs."""
-        status, message = self._told(name)
+        status, message = self._statuses(name)
         at = self._at.get(name)
         known = self.varies & (at is not None)
         ends = None if self.found.ends is None or at is None else self.found.ends[:, at]
@@ -110,7 +110,8 @@ class Report:
             self._spread_out(estimate, known),
             self._spread_out(low, known),
             self._spread_out(high, known),
-            self._runs,
+            # of FAST an index rests on the one curve of its factor
+            self.design.block if self.design.method is Method.FAST else int(self.left.rows.sum()),
             self.left.failed,
             status,
             message,
@@ -120,23 +121,20 @@ class Report:
     def _at(self) -> dict[Name, int]:
         return {name: at for at, name in enumerate(self.found.names)}
 
-    @property
-    def _runs(self) -> int:
-        one_curve = self.design.method is Method.FAST
-        return self.design.block if one_curve else int(self.left.rows.sum())
-
-    def _told(self, name: Name) -> tuple[tuple[IndexStatus, ...], tuple[str, ...]]:
-        each = [self._told_of_one(name, bool(varies)) for varies in self.varies]
-        return tuple(status for status, _ in each), tuple(message for _, message in each)
-
-    def _told_of_one(self, name: Name, varies: bool) -> tuple[IndexStatus, str]:
+    def _statuses(self, name: Name) -> tuple[tuple[IndexStatus, ...], tuple[str, ...]]:
+        """Status and message of an index, for each output."""
+        each: list[tuple[IndexStatus, str]]
         if self.status is not IndexStatus.DONE:
-            return self.status, self.why
-        if not varies:
-            return IndexStatus.CONSTANT, "the output is the same in all runs"
-        if name not in self._at:
-            return IndexStatus.TOO_MANY_FAILED, f"{self.left.message}, {name[1]}'s among them"
-        return IndexStatus.DONE, "; ".join(filter(None, (self.left.message, self.found.note)))
+            each = [(self.status, self.why)] * len(self.varies)
+        else:
+            words = filter(None, (self.left.message, self.found.note))
+            known: tuple[IndexStatus, str] = IndexStatus.DONE, "; ".join(words)
+            if name not in self._at:
+                lost = f"{self.left.message}, {name[1]}'s among them"
+                known = IndexStatus.TOO_MANY_FAILED, lost
+            constant = IndexStatus.CONSTANT, "the output is the same in all runs"
+            each = [known if varies else constant for varies in self.varies]
+        return tuple(status for status, _ in each), tuple(message for _, message in each)
 
     def _spread_out(self, part: Array | None, known: NDArray[np.bool_]) -> Masked:
         """(K,) of numbers for the outputs that vary, or of nothing."""
@@ -154,15 +152,12 @@ def names_of(design: Design) -> list[Name]:
         if index == "S2":
             pairs = combinations(design.inputs, 2) if design.second_order else ()
             found += [(index, first, second) for first, second in pairs]
-        else:
-            found += [(index, name, "") for name in design.inputs if _has(design, index, name)]
+            continue
+        # of Morris, groups of several have no sign, so no mean and SD of signed effects
+        signed = design.method is Method.MORRIS and index != "mu_star"
+        named = (name for name in design.inputs if not signed or design.groups.count(name) == 1)
+        found += [(index, name, "") for name in named]
     return found
-
-
-def _has(design: Design, index: str, name: str) -> bool:
-    """Of Morris, groups of several have no sign, so no mean and SD of signed effects."""
-    signed = design.method is Method.MORRIS and index != "mu_star"
-    return not (signed and design.groups.count(name) > 1)
 
 
 FEWEST = {Method.SOBOL: 8, Method.LATIN_HYPERCUBE: 50, Method.MORRIS: 4}
@@ -200,9 +195,13 @@ def indices(
     """
     settings = settings or Settings()
     values, good = _checked(design, outputs, ok)
-    left = kept(design, good)
+    left = complete_blocks(design, good)
     status, why = _for_all(design, left, settings)
-    varies = _varies(values[left.rows], resolution) & (status is IndexStatus.DONE)
+    varies = np.zeros(values.shape[1], dtype=bool)
+    if left.rows.any() and status is IndexStatus.DONE:
+        # constant is what varies by less than rounding, or than its resolution
+        size = ROUNDING * np.abs(values[left.rows]).max(axis=0)
+        varies = np.ptp(values[left.rows], axis=0) > np.maximum(size, resolution)
     found = _found(design, values[:, varies], left, settings) if varies.any() else NOTHING
     report = Report(design, left, found, varies, status, why)
     return tuple(report.index(name) for name in names_of(design) if settings.asks(name[0]))
@@ -235,14 +234,6 @@ def _for_all(design: Design, left: CompleteBlocks, settings: Settings) -> tuple[
         what = f"{whole} {BLOCKS[design.method]}; at least {FEWEST[design.method]} are needed"
         return IndexStatus.TOO_FEW, what
     return IndexStatus.DONE, ""
-
-
-def _varies(values: Array, resolution: ArrayLike) -> NDArray[np.bool_]:
-    """(K,) whether an output varies by more than rounding and its resolution."""
-    if not len(values):
-        return np.zeros(values.shape[1], dtype=bool)
-    size = ROUNDING * np.abs(values).max(axis=0)
-    return np.ptp(values, axis=0) > np.maximum(size, resolution)
 
 
 def _found(

@@ -126,15 +126,12 @@ def values_of(design: Design, spreads: Sequence[Distribution]) -> Array:
     ValueError
         Unless there is one spread for each factor.
     """
-    columns = zip(design.unit.T, spreads, strict=True)
-    return np.column_stack([s.values(_shares(design, u, s)) for u, s in columns])
-
-
-def _shares(design: Design, unit: Array, spread: Distribution) -> Array:
-    if design.method is not Method.MORRIS or spread.bounded:
-        return unit
     low, high = MORRIS_ENDS
-    return low + (high - low) * unit
+    columns = []
+    for unit, spread in zip(design.unit.T, spreads, strict=True):
+        inner = design.method is Method.MORRIS and not spread.bounded
+        columns.append(spread.values(low + (high - low) * unit if inner else unit))
+    return np.column_stack(columns)
 
 
 def _inside(shares: Array) -> Array:

@@ -99,6 +99,7 @@ def elementary_effects(design: Design, outputs: Array) -> Array:
     found = np.empty((len(steps), len(inputs), outputs.shape[1]))
     for g, name in enumerate(inputs):
         columns = [at for at, group in enumerate(design.groups) if group == name]
+        # each trajectory moves a group in one of its steps only
         moved = steps[:, :, columns[0]]
         when = np.abs(moved).argmax(axis=1)[:, None]
         effect = np.take_along_axis(changes, when[:, :, None], axis=1)[:, 0]
@@ -134,6 +135,7 @@ def _of_effects(effects: Array, resamples: Sequence[Counts], confidence: float) 
 
 def _indices(weights: Array, effects: Array) -> Array:
     """(R, 3 G) mu, mu_star, sigma of each factor, for weights (R, r) that sum to 1."""
+    # weighted moments about the mean of all, for all resamples in one product
     r, centre = len(effects), effects.mean(axis=0)
     off = effects - centre  # sums of squares of small numbers
     mean, size = weights @ off, weights @ np.abs(effects)
@@ -156,7 +158,8 @@ def sobol_indices(design: Design, outputs: Array, settings: Settings) -> IndexEs
     (tests/validation/results/index_coverage.md).
     """
     inputs = design.inputs
-    pairs = _pairs(len(inputs) if design.second_order and settings.asks("S2") else 0)
+    paired = len(inputs) if design.second_order and settings.asks("S2") else 0
+    pairs = np.array(list(combinations(range(paired), 2)), dtype=int).reshape(-1, 2)
     blocks = outputs.reshape(-1, design.block, outputs.shape[1])
     drawn = _resamples(len(blocks), settings)
     found = [
@@ -167,11 +170,6 @@ def sobol_indices(design: Design, outputs: Array, settings: Settings) -> IndexEs
     names = [(index, name, "") for index in ("S1", "ST") for name in inputs]
     names += [("S2", inputs[j], inputs[k]) for j, k in pairs]
     return IndexEstimates(tuple(names), estimate, np.stack([low, high]))
-
-
-def _pairs(inputs: int) -> Array:
-    """(P, 2) positions of the inputs of each pair."""
-    return np.array(list(combinations(range(inputs), 2)), dtype=int).reshape(-1, 2)
 
 
 def _of_blocks(
@@ -191,14 +189,16 @@ def _columns(blocks: Array, inputs: int, pairs: Array) -> Array:
     ab = blocks[:, 1 : 1 + inputs]
     ba = blocks[:, 1 + inputs : -1]  # empty without second order, and so are then the pairs
     crossed = ba[:, pairs[:, 0]] * ab[:, pairs[:, 1]] - a * b
+    # numerators of S1 (Saltelli 2010), ST (Jansen) and of closed S2 (Saltelli 2002)
     return np.hstack([b * (ab - a), 0.5 * (a - ab) ** 2, crossed, a + b, a**2 + b**2])
 
 
 def _from_means(means: Array, inputs: int, pairs: Array) -> Array:
     """(R, C) indices from means (R, C + 2); 0 where A and B do not vary, as in SALib."""
     variance = means[:, -1:] / 2.0 - (means[:, -2:-1] / 2.0) ** 2
-    varies = variance > np.finfo(float).eps
+    varies = variance > np.finfo(float).eps  # outputs are scaled to an SD of 1
     found = np.zeros_like(means[:, :-2])
     np.divide(means[:, :-2], variance, out=found, where=varies)
+    # a pair's closed index holds both first orders
     found[:, 2 * inputs :] -= found[:, pairs[:, 0]] + found[:, pairs[:, 1]]
     return found

@@ -24,8 +24,8 @@ from spinepipe.sensitivity.global_indices.floor import (
 )
 from spinepipe.sensitivity.global_indices.indices import indices
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.drawn import design_of, drawn_values
-from spinepipe.studies.global_sensitivity.failed import failed_rows
+from spinepipe.studies.global_sensitivity.failed_runs import failed_rows, read_blocks
+from spinepipe.studies.global_sensitivity.sampling import design_of, factor_values
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import (
     CALIBRATED,
@@ -35,7 +35,7 @@ from spinepipe.studies.global_sensitivity.tables import (
     INDICES,
     RESPONSES,
 )
-from spinepipe.tables import from_rows, read, to_arrow, write
+from spinepipe.tables import from_rows, to_arrow, write
 
 Where = tuple[str, str, int, str, str]
 """Output, test, step, joint, coordinate."""
@@ -47,17 +47,15 @@ SETTLED = 1e-6
 
 WHERE = ("output", "test", "step", "joint", "coordinate")
 
-_MOTION = {
-    c.name.removeprefix("predicted_").rsplit("_", 1)[0]: c.name
-    for c in RESPONSES.columns
-    if c.name.startswith("predicted_")
-}
-
-_LOAD = {
-    c.name.removeprefix("load_").rsplit("_", 1)[0]: c.name
-    for c in RESPONSES.columns
-    if c.name.startswith("load_")
-}
+_MOTION, _LOAD = (
+    {
+        column.name.removeprefix(kind).rsplit("_", 1)[0]: column.name
+        for column in RESPONSES.columns
+        if column.name.startswith(kind)
+    }
+    for kind in ("predicted_", "load_")
+)
+"""Column of each coordinate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +65,12 @@ class OutputGroup:
     Attributes
     ----------
     where : (K,) what each is. values : (n, K) in units of the tables, 0 where a run failed.
-    ok : (n,) which runs succeeded. resolution : below which an output counts as constant.
+    ok : (n,) which runs succeeded.
     """
 
     where: tuple[Where, ...]
     values: Array
     ok: NDArray[np.bool_]
-    resolution: float
 
 
 def run(
@@ -99,7 +96,7 @@ def run(
     rows = analysed(settings, drawn, outputs)
     for table, path in zip(rows, (indices, convergence), strict=True):
         write(table, path, made_by)
-    values = drawn_values(design, settings, slice(None)) * np.array(settings.per_si)
+    values = factor_values(design, settings, slice(None)) * np.array(settings.per_si)
     failed = list(failed_rows(drawn, values, settings.units, responses, calibrated))
     write(from_rows(FAILED_RUNS.without("specimen"), failed), failed_runs, made_by)
 
@@ -131,9 +128,9 @@ def _analysed(
         most_failed=settings.most_failed,
         wanted=settings.chosen_indices,
     )
-    found = indices(design, one.values, one.ok, asked, one.resolution)
-    floors = noise_floor(design, one.values, found, one.ok, asked, one.resolution)
-    stages = convergence(design, one.values, one.ok, asked, 8, one.resolution, found)
+    found = indices(design, one.values, one.ok, asked, SETTLED)
+    floors = noise_floor(design, one.values, found, one.ok, asked, SETTLED)
+    stages = convergence(design, one.values, one.ok, asked, 8, SETTLED, found)
     count, where = len(one.where), dict(zip(WHERE, zip(*one.where, strict=True), strict=True))
     good = one.values[one.ok] if one.ok.any() else np.full((1, count), np.nan)
     common = where | {"mean": good.mean(axis=0), "sd": good.std(axis=0)}
@@ -186,7 +183,7 @@ def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterato
         columns = [_MOTION[name] for name in study.outputs.motion]
         columns += [_LOAD[name] for name in study.outputs.joint_load]
         asked = ["sample", "test", "step", "joint", "status", *columns]
-        yield from outputs_of(_rows(blocks, asked), study)
+        yield from outputs_of(read_blocks(blocks, asked), study)
 
 
 def outputs_of(rows: pa.Table, study: GlobalSensitivity) -> Iterator[OutputGroup]:
@@ -197,6 +194,7 @@ def outputs_of(rows: pa.Table, study: GlobalSensitivity) -> Iterator[OutputGroup
     }
     columns = [column for kind in kinds.values() for column in kind.values()]
     head = rows.filter(pc.equal(rows["sample"], rows["sample"][0])).to_pylist()
+    # all samples have the rows of the first one, in the same order
     per_sample = len(head)
     good = np.array(pc.equal(rows["status"], Status.CONVERGED.value)).reshape(-1, per_sample)
     numbers = {
@@ -212,7 +210,7 @@ def outputs_of(rows: pa.Table, study: GlobalSensitivity) -> Iterator[OutputGroup
         )
         values = [numbers[column][:, at] for kind in kinds.values() for column in kind.values()]
         ok: NDArray[np.bool_] = np.all(good[:, at], axis=1, keepdims=False)
-        yield OutputGroup(where, np.where(ok[:, None], np.hstack(values), 0.0), ok, SETTLED)
+        yield OutputGroup(where, np.where(ok[:, None], np.hstack(values), 0.0), ok)
 
 
 def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[OutputGroup]:
@@ -221,13 +219,8 @@ def calibrated_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Itera
         return
     free = study.calibration.free
     names = {c.name.rsplit("_n", 1)[0]: c.name for c in CALIBRATED.columns if "_per_" in c.name}
-    rows = _rows(blocks, ["status", *(names[name] for name in free)])
+    rows = read_blocks(blocks, ["status", *(names[name] for name in free)])
     ok = np.asarray(pc.is_in(rows["status"], value_set=pa.array(["converged"])))
     values = np.column_stack([np.nan_to_num(rows[names[name]].to_numpy()) for name in free])
     where = tuple(("stiffness", EVERY, 0, EVERY, name) for name in free)
-    yield OutputGroup(where, np.where(ok[:, None], values, 0.0), ok, SETTLED)
-
-
-def _rows(blocks: Sequence[str], columns: list[str]) -> pa.Table:
-    """Rows of all blocks; they come in the order of the samples."""
-    return pa.concat_tables([read(path, columns) for path in blocks])
+    yield OutputGroup(where, np.where(ok[:, None], values, 0.0), ok)

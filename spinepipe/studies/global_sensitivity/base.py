@@ -18,10 +18,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, SpineModel
-from spinepipe.schema import Table
 from spinepipe.statics.batched import Cases, Spines, solve_many
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.loaded import loaded
+from spinepipe.studies.global_sensitivity.largest_moment import largest_moment
 from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, asked_tests, start_of
@@ -59,7 +58,8 @@ def run(root: str, study: str, specimen: str, base_stiffness: str, base_motion: 
         (BASE_STIFFNESS, rows, base_stiffness),
         (BASE_MOTION, moved, base_motion),
     ):
-        write(_table(table, found), path, made_by)
+        # the specimen is in the name of the folder
+        write(from_rows(table.without("specimen"), found), path, made_by)
 
 
 def base(settings: GlobalSensitivity, cohort: Cohort, specimen: str) -> tuple[Rows, Rows]:
@@ -79,11 +79,6 @@ def base(settings: GlobalSensitivity, cohort: Cohort, specimen: str) -> tuple[Ro
 def stiffness_of(rows: Rows) -> Array:
     """(6,) N/m and N m/rad of all joints, from rows of ``base_stiffness``."""
     return np.array([row["stiffness"] for row in rows if row["joint"] == EVERY])
-
-
-def _table(table: Table, rows: Rows) -> Any:
-    """The specimen is in the name of the folder."""
-    return from_rows(table.without("specimen"), rows)
 
 
 def _stiffness_row(coordinate: str, start: float) -> dict[str, Any]:
@@ -121,17 +116,18 @@ def _fitted(settings: GlobalSensitivity, cohort: Cohort, start: DescribedSpecime
     free: list[str] = list(settings.calibration.free)
     bounded: list[str] = []
     found, why = _fit(settings, cohort, start, free)
+    # each round frees fewer coordinates, so it ends
     while found is not None and found.status.usable and found.at_bound.any() and free:
         at = [name for name, side in zip(free, found.at_bound, strict=True) if side]
         free, bounded = [name for name in free if name not in at], bounded + at
-        found, why = _fit(settings, cohort, start, free) if free else (None, _ALL_AT_BOUNDS)
+        if free:
+            found, why = _fit(settings, cohort, start, free)
+        else:
+            found, why = None, "every stiffness ran to a bound"
     return [
         _fitted_row(settings, name, value, found, why, free, bounded)
         for name, value in zip(COORDINATES, settings.start_stiffness.in_order(), strict=True)
     ]
-
-
-_ALL_AT_BOUNDS = "every stiffness ran to a bound"
 
 
 def _fit(
@@ -171,15 +167,11 @@ def _fitted_row(
         return {**row, "source": "no_fit"}
     assert found is not None
     at = list(free).index(name)
-    return {**row, "source": "fitted", **_region(found, at)}
-
-
-def _region(found: Fit, at: int) -> dict[str, Any]:
-    """Value of one unknown and how far the data let it go."""
     value = float(found.values[at])
     reach = found.reach(at, value)
     assert reach is not None  # of every fit that has a stiffness
-    return {"stiffness": value, **asdict(reach), "identifiable": found.identifiable(at)}
+    fitted = {"stiffness": value, **asdict(reach), "identifiable": found.identifiable(at)}
+    return {**row, "source": "fitted", **fitted}
 
 
 def _beside_measured(
@@ -203,7 +195,7 @@ def _rows_of_test(
     solved = solve_many(Spines.of(model, 1), Cases.of(test.case, 1))
     predicted = from_si(subtract_baseline(solved.q[0], test.from_first))[-1]
     last = len(test.case.steps) - 1
-    driven = loaded(cohort, test.case.test, model.specimen)
+    driven = largest_moment(cohort, test.case.test, model.specimen)
     for column, coordinate in enumerate(COORDINATES):
         common = {
             "test": test.case.test,
@@ -218,6 +210,7 @@ def _rows_of_test(
         read = np.isfinite(theirs)
         if read.any():
             mean = float(ours[read].mean()), float(theirs[read].mean())
+            # readings of joints err independently of each other
             spread = float(noise[column]) / np.sqrt(read.sum())
             yield {**common, "joint": EVERY, **compared(*mean, spread)}
         for joint, own, their in zip(model.joints, ours, theirs, strict=True):

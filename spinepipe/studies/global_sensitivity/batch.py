@@ -11,11 +11,11 @@ from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.global_sensitivity.drawn import drawn_values
+from spinepipe.studies.global_sensitivity.sampling import factor_values
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, start_of
 from spinepipe.studies.global_sensitivity.tables import EVERY
-from spinepipe.studies.global_sensitivity.vary import Varied, vary
+from spinepipe.studies.global_sensitivity.vary import SpineSamples, vary
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
@@ -28,7 +28,7 @@ class Batch:
     first: int
     count: int
     start: DescribedSpecimen
-    varied: Varied
+    varied: SpineSamples
 
 
 def made_of_batches(
@@ -64,7 +64,7 @@ def batch_of(
     """
     size = study.batch_size(len(study.chosen_specimens(cohort)))
     first = number * size
-    values = drawn_values(design, study, slice(first, first + size))
+    values = factor_values(design, study, slice(first, first + size))
     fitted = tuple(stamp(path) for path in base)
     start = start_of_specimen(root, study.study, specimen, all_steps, cohort.digest, fitted)
     return Batch(first, len(values), start, vary(start, study.changes, values))

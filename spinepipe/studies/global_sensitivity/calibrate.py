@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.calibrate import fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.inputs import study_of_kind
@@ -57,28 +57,19 @@ def _fitted(
     place: int,
     sample: int,
 ) -> dict[str, Any]:
+    options = settings.calibration
     try:
-        problem = _problem(settings, cohort, batch, place)
+        # the sample's spine and loads, and the readings in the frames that it has
+        model = batch.varied.spines.model(place)
+        cases = [varied.case(place) for varied in batch.varied.cases]
+        problem = problem_of(options, cohort, batch.start, model, cases, options.free)
         seed = specimen_seed(settings.seed, f"{specimen}/{sample}")
-        found = fit(problem, STARTS, seed, settings.calibration.identifiable_below)
+        found = fit(problem, STARTS, seed, options.identifiable_below)
     except RefusedModel as error:
         return _refused(sample, str(error))
-    return _row(sample, problem, found)
-
-
-def _problem(settings: GlobalSensitivity, cohort: Cohort, batch: Batch, place: int) -> Problem:
-    """The sample's spine and loads, and the readings in the frames that it has."""
-    model = batch.varied.spines.model(place)
-    cases = [varied.case(place) for varied in batch.varied.cases]
-    options = settings.calibration
-    return problem_of(options, cohort, batch.start, model, cases, options.free)
-
-
-def _row(sample: int, problem: Problem, found: Fit) -> dict[str, Any]:
-    solved = found.status.usable
     values = with_parameters(problem.model, problem.free, found.x).effects[0].values[0]
     row: dict[str, Any] = {
-        name: float(value) if solved else None
+        name: float(value) if found.status.usable else None
         for name, value in zip(STIFFNESS_COLUMNS, values, strict=True)
     }
     return {**row, "sample": sample, "status": found.status.value, "message": found.message}

@@ -8,8 +8,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.problems import InputProblem, did_you_mean, one_of
-from spinepipe.studies.global_sensitivity.change import FactorChange, Of
-from spinepipe.studies.global_sensitivity.settings import DUMMY, INDICES, GlobalSensitivity
+from spinepipe.sensitivity.global_indices.design import DUMMY, Method
+from spinepipe.sensitivity.global_indices.estimates import INDICES
+from spinepipe.studies.global_sensitivity.factors import FactorChange, Of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import frame_landmarks, given_joints, moved_by
 from spinepipe.studies.parts import AUTO
 from spinepipe.studies.places import (
@@ -88,7 +90,7 @@ def _samples(document: YamlDocument, study: GlobalSensitivity) -> Iterator[Input
 
 def _indices(document: YamlDocument, study: GlobalSensitivity) -> Iterator[InputProblem]:
     """Each method has indices of its own."""
-    there = INDICES[study.design.method]
+    there = INDICES[Method(study.design.method)]
     for number, index in enumerate(study.indices or ()):
         if index not in there:
             place = at(document, f"indices.{number}")
@@ -165,16 +167,14 @@ def _motion(
             missing = _without_motion(study, cohort)
             if missing:
                 remedy = f"{otherwise}, or choose other specimens and tests"
-                allowed = f"{word} with {_WITH_MOTION}"
+                whose = "every chosen specimen in one chosen test at least"
+                allowed = f"{word} with measured motion of {whose}"
                 yield InputProblem(*at(document, key), f"{word}, and {missing}", allowed, remedy)
     if study.is_fitted and study.level_stiffness:
         found = "levels of their own with stiffness: fitted, which all joints of a specimen share"
         yield InputProblem(*at(document, "level_stiffness"), found, "none of them", "delete it")
     if study.is_fitted or study.outputs.stiffness:
         yield from _weights(document, study, cohort)
-
-
-_WITH_MOTION = "measured motion of every chosen specimen in one chosen test at least"
 
 
 def _without_motion(study: GlobalSensitivity, cohort: Cohort) -> str:
@@ -310,25 +310,16 @@ def check_landmark(
         place = at(document, f"{key}.vertebra")
         yield InputProblem(*place, f"unknown vertebra '{vertebra}'", one_of(known), remedy)
     if change.landmark not in FRAME_LANDMARKS:
-        yield _no_frame_landmark(document, key, change, cohort)
+        # a landmark that makes no frame may be moved as far as one likes
+        there = change.landmark in set(cohort.landmarks["landmark"])
+        why = "in no joint frame: it would do nothing" if there else "unknown"
+        remedy = did_you_mean(
+            change.landmark, FRAME_LANDMARKS, "correct its name, or delete the factor"
+        )
+        found = f"landmark '{change.landmark}', {why}"
+        yield InputProblem(*at(document, f"{key}.landmark"), found, one_of(FRAME_LANDMARKS), remedy)
     elif vertebra in cohort.vertebrae:
         yield from _of_specimens(document, key, change, cohort, specimens)
-
-
-def _no_frame_landmark(
-    document: YamlDocument, key: str, change: FactorChange, cohort: Cohort
-) -> InputProblem:
-    """A landmark that makes no frame may be moved as far as one likes."""
-    assert cohort.landmarks is not None
-    there = change.landmark in set(cohort.landmarks["landmark"])
-    why = "in no joint frame: it would do nothing" if there else "unknown"
-    remedy = did_you_mean(
-        change.landmark, FRAME_LANDMARKS, "correct its name, or delete the factor"
-    )
-    place = at(document, f"{key}.landmark")
-    return InputProblem(
-        *place, f"landmark '{change.landmark}', {why}", one_of(FRAME_LANDMARKS), remedy
-    )
 
 
 def _of_specimens(

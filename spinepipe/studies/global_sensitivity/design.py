@@ -5,7 +5,7 @@ import pyarrow as pa
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.global_sensitivity.drawn import drawn_in_units
+from spinepipe.studies.global_sensitivity.sampling import drawn_in_units
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import DESIGN
 from spinepipe.tables import to_arrow, write

@@ -1,13 +1,50 @@
 """Factors of a global sensitivity study: what is uncertain, where, and how far it is spread."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
-from spinepipe.studies.global_sensitivity.change import FactorChange, Of
 from spinepipe.studies.parts import FORM, Coordinate, EachOnce
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, ROTATIONS, TRANSLATIONS
+
+
+class Of(StrEnum):
+    """What can be changed; offsets are in m and rad, everything else is multiplied."""
+
+    STIFFNESS = "stiffness"
+    LANDMARK = "landmark"
+    JOINT_CENTRE = "joint_centre"
+    JOINT_AXES = "joint_axes"
+    LOAD_POINT = "load_point"
+    LOAD_DIRECTION = "load_direction"
+    LOAD_SIZE = "load_size"
+    MASS = "mass"
+    CENTRE_OF_MASS = "centre_of_mass"
+    DAMPING = "damping"
+    NOTHING = "nothing"
+
+
+@dataclass(frozen=True)
+class FactorChange:
+    """One factor, its value left open.
+
+    Attributes
+    ----------
+    at : names of joints or vertebrae; empty: of all.
+    axis : place of the axis: of ground (x, y, z), of a joint frame, or of a coordinate among the
+        six; 0 where there is none.
+    landmark : name of the landmark that is moved.
+    """
+
+    of: Of
+    at: tuple[str, ...] = ()
+    axis: int = 0
+    landmark: str = ""
+
 
 _FORMS = "{low, high}, or {sd} with or without mean, low and high"
 
@@ -16,6 +53,11 @@ class _Spread(BaseModel):
     """Ends of a uniform spread, or the SD of a normal one, which ends may cut off."""
 
     model_config = FORM
+
+    per_si: ClassVar[float]
+    unit: ClassVar[str]
+    unchanged: ClassVar[float]
+    """What changes nothing: 0 of offsets, 1 of multipliers."""
 
     low: float | None
     high: float | None
@@ -26,39 +68,24 @@ class _Spread(BaseModel):
     def _one_form(self) -> Self:
         if self.sd is None and (self.mean is not None or None in (self.low, self.high)):
             raise ValueError(f"one of two forms: {_FORMS}")
-        inside = [end for end in (self.low, self._between, self.high) if end is not None]
+        between = None if self.sd is None else self.middle
+        inside = [end for end in (self.low, between, self.high) if end is not None]
         if any(above <= below for below, above in pairwise(inside)):
             raise ValueError(f"low below {'mean, mean below ' if self.sd else ''}high")
         return self
 
     @property
-    def _between(self) -> float | None:
-        """What must lie between the ends."""
-        return None if self.sd is None else self.middle
-
-    @property
     def middle(self) -> float:
         """Mean of a normal spread, median of a log-normal one."""
-        raise NotImplementedError
+        return self.unchanged if self.mean is None else self.mean
 
 
-class _Offset(_Spread):
-    """An offset: uniform or normal."""
-
-    per_si: ClassVar[float]
-    unit: ClassVar[str]
-
-    @property
-    def middle(self) -> float:
-        """Mean of a normal offset."""
-        return 0.0 if self.mean is None else self.mean
-
-
-class Millimetres(_Offset):
+class Millimetres(_Spread):
     """An offset along an axis: uniform from low to high, or normal."""
 
     per_si: ClassVar[float] = MM_PER_M
     unit: ClassVar[str] = "mm"
+    unchanged: ClassVar[float] = 0.0
 
     low: float | None = Field(default=None, ge=-200, le=200, description="lowest offset, mm")
     high: float | None = Field(default=None, ge=-200, le=200, description="highest offset, mm")
@@ -73,11 +100,12 @@ class Millimetres(_Offset):
     )
 
 
-class Degrees(_Offset):
+class Degrees(_Spread):
     """A turn about an axis: uniform from low to high, or normal."""
 
     per_si: ClassVar[float] = DEG_PER_RAD
     unit: ClassVar[str] = "deg"
+    unchanged: ClassVar[float] = 0.0
 
     low: float | None = Field(default=None, ge=-90, le=90, description="lowest angle, deg")
     high: float | None = Field(default=None, ge=-90, le=90, description="highest angle, deg")
@@ -97,6 +125,7 @@ class Times(_Spread):
 
     per_si: ClassVar[float] = 1.0
     unit: ClassVar[str] = "1"
+    unchanged: ClassVar[float] = 1.0
 
     low: float | None = Field(default=None, ge=1e-4, le=1e4, description="lowest multiplier")
     high: float | None = Field(default=None, ge=1e-4, le=1e4, description="highest multiplier")
@@ -114,11 +143,6 @@ class Times(_Spread):
         "cut it off); null: log-uniform",
     )
 
-    @property
-    def middle(self) -> float:
-        """Geometric mean, which is the median."""
-        return 1.0 if self.mean is None else self.mean
-
 
 AnySpread = Times | Millimetres | Degrees
 """How a factor can be spread."""
@@ -127,10 +151,16 @@ AnySpread = Times | Millimetres | Degrees
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_]+$")]
 
 
+GROUND_AXES = ("x", "y", "z")
+
+
 class Factor(BaseModel):
     """One uncertain input."""
 
     model_config = FORM
+    changes: ClassVar[Of]
+    axes: ClassVar[Sequence[str]] = ()
+    """Of those that have an axis, the names of all of these, in their order."""
 
     name: Label | None = Field(
         default=None, description="name in the tables; null: made of what the factor is"
@@ -148,8 +178,10 @@ class Factor(BaseModel):
 
     @property
     def change(self) -> FactorChange:
-        """What it changes."""
-        raise NotImplementedError
+        """What it changes: these joints or bodies alike, all where none is named."""
+        at = getattr(self, "joints", None) or getattr(self, "vertebrae", None) or ()
+        axis = self.axes.index(str(self.axis)) if hasattr(self, "axis") else 0
+        return FactorChange(self.changes, at, axis)
 
     @property
     def spread(self) -> AnySpread:
@@ -165,8 +197,6 @@ class Factor(BaseModel):
         """Words of the name that follow the places."""
         return (str(self.axis),) if hasattr(self, "axis") else ()
 
-
-GROUND_AXES = ("x", "y", "z")
 
 _Places = EachOnce[Annotated[str, StringConstraints(min_length=1)]]
 _GroundAxis = Literal["x", "y", "z"]
@@ -222,20 +252,19 @@ class LandmarkFactor(Factor):
 class JointCentreFactor(Factor):
     """The origin of joint frames, along one of their own axes."""
 
+    changes: ClassVar[Of] = Of.JOINT_CENTRE
+    axes: ClassVar[Sequence[str]] = TRANSLATIONS
     of: Literal["joint_centre"] = Field(description="what is uncertain")
     joints: _Places | None = _JOINTS
     axis: Literal["anterior", "superior", "right"] = Field(description="axis of the joint frame")
     offset_mm: Millimetres = _OFFSET_MM
 
-    @property
-    def change(self) -> FactorChange:
-        """The origins of these joints alike."""
-        return FactorChange(Of.JOINT_CENTRE, self.joints or (), TRANSLATIONS.index(self.axis))
-
 
 class JointAxesFactor(Factor):
     """The orientation of joint frames, about one of their own axes."""
 
+    changes: ClassVar[Of] = Of.JOINT_AXES
+    axes: ClassVar[Sequence[str]] = ROTATIONS
     of: Literal["joint_axes"] = Field(description="what is uncertain")
     joints: _Places | None = _JOINTS
     axis: Literal["extension", "right_bending", "left_rotation"] = Field(
@@ -244,28 +273,22 @@ class JointAxesFactor(Factor):
     )
     offset_deg: Degrees = _OFFSET_DEG
 
-    @property
-    def change(self) -> FactorChange:
-        """The frames of these joints alike."""
-        return FactorChange(Of.JOINT_AXES, self.joints or (), ROTATIONS.index(self.axis))
-
 
 class LoadPointFactor(Factor):
     """Where all loads of the chosen tests act, along one axis of ground."""
 
+    changes: ClassVar[Of] = Of.LOAD_POINT
+    axes: ClassVar[Sequence[str]] = GROUND_AXES
     of: Literal["load_point"] = Field(description="what is uncertain")
     axis: _GroundAxis = Field(description="axis of ground: x anterior, y superior, z right")
     offset_mm: Millimetres = _OFFSET_MM
-
-    @property
-    def change(self) -> FactorChange:
-        """All load points alike."""
-        return FactorChange(Of.LOAD_POINT, axis=GROUND_AXES.index(self.axis))
 
 
 class LoadDirectionFactor(Factor):
     """The direction of all loads of the chosen tests, force and moment together."""
 
+    changes: ClassVar[Of] = Of.LOAD_DIRECTION
+    axes: ClassVar[Sequence[str]] = GROUND_AXES
     of: Literal["load_direction"] = Field(description="what is uncertain")
     axis: _GroundAxis = Field(
         description="axis of ground about which loads are turned at their own points; angles "
@@ -273,42 +296,31 @@ class LoadDirectionFactor(Factor):
     )
     offset_deg: Degrees = _OFFSET_DEG
 
-    @property
-    def change(self) -> FactorChange:
-        """All loads alike."""
-        return FactorChange(Of.LOAD_DIRECTION, axis=GROUND_AXES.index(self.axis))
-
 
 class LoadSizeFactor(Factor):
     """The size of all loads of the chosen tests, force and moment together; weight is no load."""
 
+    changes: ClassVar[Of] = Of.LOAD_SIZE
     of: Literal["load_size"] = Field(description="what is uncertain")
     times: Times = _TIMES
-
-    @property
-    def change(self) -> FactorChange:
-        """All loads alike."""
-        return FactorChange(Of.LOAD_SIZE)
 
 
 class MassFactor(Factor):
     """Mass and inertia of vertebrae."""
 
+    changes: ClassVar[Of] = Of.MASS
     of: Literal["mass"] = Field(description="what is uncertain")
     vertebrae: _Places | None = Field(
         default=None, description="vertebrae, together; null: all that move"
     )
     times: Times = _TIMES
 
-    @property
-    def change(self) -> FactorChange:
-        """Mass and inertia of these bodies alike."""
-        return FactorChange(Of.MASS, self.vertebrae or ())
-
 
 class CentreOfMassFactor(Factor):
     """The centre of mass of vertebrae, along one axis of ground; loads keep their points."""
 
+    changes: ClassVar[Of] = Of.CENTRE_OF_MASS
+    axes: ClassVar[Sequence[str]] = GROUND_AXES
     of: Literal["centre_of_mass"] = Field(description="what is uncertain")
     vertebrae: _Places | None = Field(
         default=None, description="vertebrae, together; null: all that move"
@@ -316,22 +328,13 @@ class CentreOfMassFactor(Factor):
     axis: _GroundAxis = Field(description="axis of ground: x anterior, y superior, z right")
     offset_mm: Millimetres = _OFFSET_MM
 
-    @property
-    def change(self) -> FactorChange:
-        """The centres of these bodies alike."""
-        return FactorChange(Of.CENTRE_OF_MASS, self.vertebrae or (), GROUND_AXES.index(self.axis))
-
 
 class DampingFactor(Factor):
     """The damping of all joints; of equilibria it decides at most which are stable."""
 
+    changes: ClassVar[Of] = Of.DAMPING
     of: Literal["damping"] = Field(description="what is uncertain")
     times: Times = _TIMES
-
-    @property
-    def change(self) -> FactorChange:
-        """All damping alike."""
-        return FactorChange(Of.DAMPING)
 
 
 AnyFactor = Annotated[

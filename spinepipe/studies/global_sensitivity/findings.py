@@ -9,6 +9,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.report.words import capital, count, fixed, listed, number
+from spinepipe.sensitivity.global_indices.design import DUMMY
 from spinepipe.sensitivity.global_indices.floor import NEGLIGIBLE
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
@@ -20,17 +21,16 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     by_joint,
     factor_name,
     leading,
-    measures_of,
-    outputs,
-    pooled,
+    pool,
+    shown_outputs,
     unit_of,
     what,
     where,
     whole,
     with_results,
 )
-from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
-from spinepipe.studies.global_sensitivity.soundness import doubts, grounds
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.soundness import cautions, starting_spine
 
 Record = dict[str, Any]
 
@@ -87,7 +87,7 @@ _EXACT = {
 def opening(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> Headline:
     """The leading factors in a sentence, how sure they are, and what casts doubt on them."""
     indices = results.table("indices")
-    found, measures = _outputs(cohort, results)
+    found, measures = shown_outputs(cohort, indices)
     words = most(found, measures, cohort.joint_names) if measures else ""
     sure = [runs(study, indices)]
     if measures:
@@ -96,7 +96,7 @@ def opening(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> 
         if indices["ci_low"].notna().any():
             sure.append(f"In brackets: {100.0 * study.confidence:g} % confidence intervals.")
     warned = [words for status, words in without(indices) if status in DOUBTFUL]
-    warned += doubts(study, *(results.table(name) for name in RESTS_ON))
+    warned += cautions(study, *(results.table(name) for name in RESTS_ON))
     return Headline(
         words or "No output has an index.", " ".join(part for part in sure if part), tuple(warned)
     )
@@ -105,28 +105,17 @@ def opening(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> 
 def findings(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> list[str]:
     """A sentence or two for each output, then interactions and outputs without an index."""
     indices = results.table("indices")
-    found, measures = _outputs(cohort, results)
+    found, measures = shown_outputs(cohort, indices)
     shown = found[:MOST_OUTPUTS] if measures else []
     told = [driver(panel, measures, cohort.joint_names) for panel in shown if measures]
-    told += grounds(study, *(results.table(name) for name in RESTS_ON[:2]))
+    told += starting_spine(study, *(results.table(name) for name in RESTS_ON[:2]))
     if len(found) > MOST_OUTPUTS:
         told.append(f"{count(len(found) - MOST_OUTPUTS, 'more output')}: see the tables.")
     told.append(pairs(indices, found))
     told += [words for status, words in without(indices) if status not in DOUBTFUL]
-    told.append(_of_the_dummy(study))
+    nothing = "There is no dummy factor (dummy: false), so nothing tells an index from noise."
+    told.append(_EXACT.get(study.design.method, "") if study.dummy else nothing)
     return [sentence for sentence in told if sentence]
-
-
-def _outputs(cohort: Cohort, results: ResultTables) -> tuple[Sequence[Panel], Measures | None]:
-    indices = results.table("indices")
-    measures = measures_of(indices) if len(indices) else None
-    return (outputs(cohort, indices, measures) if measures else []), measures
-
-
-def _of_the_dummy(study: GlobalSensitivity) -> str:
-    if not study.dummy:
-        return "There is no dummy factor (dummy: false), so nothing tells an index from noise."
-    return _EXACT.get(study.design.method, "")
 
 
 def most(panels: Sequence[Panel], measures: Measures, joints: Sequence[str]) -> str:
@@ -164,7 +153,7 @@ def _main(panel: Panel, measures: Measures) -> pd.DataFrame:
 
 def _ordered(panel: Panel, measures: Measures) -> list[Record]:
     """Factors but for the dummy, the largest index first."""
-    rows = pooled(_main(panel, measures), ["factor"])
+    rows = pool(_main(panel, measures), ["factor"])
     ordered = rows[rows["factor"] != DUMMY].sort_values("estimate", ascending=False, kind="stable")
     return [{str(name): cell for name, cell in row.items()} for row in ordered.to_dict("records")]
 
@@ -216,7 +205,7 @@ def _alone(panel: Panel, measures: Measures) -> str:
     first = panel.rows[panel.rows["index"] == "S1"]
     if not measures.of_variance or first.empty:
         return ""
-    share = float(pooled(first, ["factor"])["estimate"].sum())
+    share = float(pool(first, ["factor"])["estimate"].sum())
     if share >= HARDLY:
         return "There is hardly any interaction."
     return f"Alone, the factors make up {value(share, panel, measures)}; the rest is interaction."
@@ -342,7 +331,7 @@ def _change(main: pd.DataFrame, factors: Sequence[str], measures: Measures) -> f
     """Largest change of the leading factors; of indices in units relative to the largest."""
     rows = main[main["factor"].isin(list(factors[:_LEADING]))]
     early, late = (
-        pooled(rows[rows["runs"] == runs], ["factor"]).set_index("factor")["estimate"]
+        pool(rows[rows["runs"] == runs], ["factor"]).set_index("factor")["estimate"]
         for runs in sorted(rows["runs"].unique())[-2:]
     )
     scale = float(late.abs().max()) if measures.in_units else 1.0

@@ -93,7 +93,8 @@ class SensitivityFiles(StudyFiles):
         if table in _BY_SPECIMEN:
             return [f"{self.folder}/{_FOLDER[table]}/specimen={specimen}/{table}.parquet"]
         numbers = files_of_block(block, len(self.specimens), self.n_batches)
-        return [self._batch_file(table, specimen, number) for number in numbers]
+        folder = f"{self.folder}/jobs/{table}/specimen={specimen}"
+        return [f"{folder}/batch={number:05d}.parquet" for number in numbers]
 
     def blocks_of(self, table: str, specimen: str) -> list[str]:
         """The blocks of a table that hold a specimen; none where there is no such table."""
@@ -108,9 +109,6 @@ class SensitivityFiles(StudyFiles):
     def n_batches(self) -> int:
         """Number of batches of a specimen."""
         return -(-self.study.n_runs // self.study.batch_size(len(self.specimens)))
-
-    def _batch_file(self, table: str, specimen: str, number: int) -> str:
-        return f"{self.folder}/jobs/{table}/specimen={specimen}/batch={number:05d}.parquet"
 
 
 def _of_batch(expected: Any, place: Mapping[str, str]) -> list[str]:

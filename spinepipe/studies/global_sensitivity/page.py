@@ -9,6 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, ResultTables, Sortable, page_tables, sortable
 from spinepipe.report.words import fixed, number
 from spinepipe.schema import Column
+from spinepipe.sensitivity.global_indices.design import DUMMY
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
     NAME,
@@ -19,7 +20,7 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     outputs,
 )
 from spinepipe.studies.global_sensitivity.findings import RESTS_ON, findings, opening
-from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import (
     BASE_MOTION,
     BASE_STIFFNESS,

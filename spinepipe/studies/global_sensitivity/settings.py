@@ -1,7 +1,7 @@
 """What a study of global sensitivity asks: factors, design, outputs, fits of stiffness."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -15,15 +15,9 @@ from pydantic import (
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.names import distinct
-from spinepipe.sensitivity.global_indices.spread import (
-    Distribution,
-    LogNormal,
-    LogUniform,
-    Normal,
-    Uniform,
-)
-from spinepipe.studies.global_sensitivity.change import FactorChange, Of
-from spinepipe.studies.global_sensitivity.factors import AnyFactor, AnySpread, Times
+from spinepipe.sensitivity.global_indices.design import DUMMY, Method
+from spinepipe.sensitivity.global_indices.estimates import INDICES
+from spinepipe.studies.global_sensitivity.factors import AnyFactor, FactorChange, Of
 from spinepipe.studies.parts import (
     AUTO,
     FORM,
@@ -37,6 +31,8 @@ from spinepipe.studies.parts import (
     Weights,
 )
 from spinepipe.studies.study import Study
+
+T = TypeVar("T")
 
 FITTED = "fitted"
 """In place of a stiffness: each specimen's own."""
@@ -70,22 +66,11 @@ class SampleCalibration(BaseModel):
     )
 
 
-DUMMY = "dummy"
-"""Name of the factor that changes nothing."""
-
 MOST_SINGLE_TARGETS = 2000
 """Samples x specimens up to which each sample is a target of its own."""
 
 SAMPLES_PER_TARGET = 256
 """Samples per target beyond that."""
-
-INDICES = {
-    "sobol": ("S1", "ST", "S2"),
-    "morris": ("mu", "mu_star", "sigma"),
-    "fast": ("S1", "ST"),
-    "latin_hypercube": ("S1_RBD", "PAWN", "KS_low", "KS_high", "delta"),
-}
-"""Indices of each kind of design."""
 
 SLOW = ("delta",)
 """Indices that are computed only when they are named."""
@@ -95,14 +80,9 @@ IndexName = Literal[
 ]
 
 
-def _form(given: Any) -> str:
-    """What is a word may only be `fitted`."""
-    return FITTED if isinstance(given, str) else "given"
-
-
 _BaseStiffness = Annotated[
     Annotated[PublishedStiffness, Tag("given")] | Annotated[Literal["fitted"], Tag(FITTED)],
-    Discriminator(_form),
+    Discriminator(lambda given: FITTED if isinstance(given, str) else "given"),
 ]
 
 _Coordinates = Annotated[tuple[Coordinate, ...], Field(strict=False), AfterValidator(distinct)]
@@ -237,16 +217,19 @@ class GlobalSensitivity(Study):
         """What all joints have before anything is fitted."""
         return self.calibration.start if isinstance(self.stiffness, str) else self.stiffness
 
+    def _with_dummy(self, own: Iterable[T], dummy: T) -> tuple[T, ...]:
+        """(D,) of all factors, the dummy's last where there is one."""
+        return (*own, dummy) if self.dummy else tuple(own)
+
     @property
     def factor_names(self) -> tuple[str, ...]:
         """(D,) names, the dummy's last."""
-        return (*(factor.label for factor in self.factors), *((DUMMY,) if self.dummy else ()))
+        return self._with_dummy((factor.label for factor in self.factors), DUMMY)
 
     @property
     def groups(self) -> tuple[str, ...]:
         """(D,) group of each factor; one without is a group by its own name."""
-        own = tuple(factor.group or factor.label for factor in self.factors)
-        return (*own, *((DUMMY,) if self.dummy else ()))
+        return self._with_dummy((one.group or one.label for one in self.factors), DUMMY)
 
     @property
     def compared(self) -> tuple[str, ...]:
@@ -256,18 +239,17 @@ class GlobalSensitivity(Study):
     @property
     def changes(self) -> tuple[FactorChange, ...]:
         """(D,) what each factor changes."""
-        nothing = (FactorChange(Of.NOTHING),) if self.dummy else ()
-        return (*(factor.change for factor in self.factors), *nothing)
+        return self._with_dummy((one.change for one in self.factors), FactorChange(Of.NOTHING))
 
     @property
     def units(self) -> tuple[str, ...]:
         """(D,) unit of each value in files and tables: mm, deg or 1."""
-        return (*(factor.spread.unit for factor in self.factors), *(("1",) if self.dummy else ()))
+        return self._with_dummy((one.spread.unit for one in self.factors), "1")
 
     @property
     def per_si(self) -> tuple[float, ...]:
         """(D,) what one SI unit of each value is in its unit of files and tables."""
-        return (*(one.spread.per_si for one in self.factors), *((1.0,) if self.dummy else ()))
+        return self._with_dummy((one.spread.per_si for one in self.factors), 1.0)
 
     @property
     def n_runs(self) -> int:
@@ -277,7 +259,9 @@ class GlobalSensitivity(Study):
     @property
     def chosen_indices(self) -> tuple[str, ...]:
         """Names of the indices that are computed."""
-        return self.indices or tuple(n for n in INDICES[self.design.method] if n not in SLOW)
+        return self.indices or tuple(
+            n for n in INDICES[Method(self.design.method)] if n not in SLOW
+        )
 
     def batch_size(self, specimens: int) -> int:
         """Runs of a specimen that one job computes, in a study of so many specimens."""
@@ -292,20 +276,3 @@ class GlobalSensitivity(Study):
     def chosen_tests(self, cohort: Cohort) -> tuple[str, ...]:
         """The study's tests."""
         return self.tests or cohort.tests
-
-
-def spreads_of(study: GlobalSensitivity) -> tuple[Distribution, ...]:
-    """(D,) how each value is spread: m, rad, or a multiplier; the dummy's from 0 to 1."""
-    own = tuple(_in_si(factor.spread) for factor in study.factors)
-    return (*own, Uniform(0.0, 1.0)) if study.dummy else own
-
-
-def _in_si(spread: AnySpread) -> Distribution:
-    found = {"low": spread.low, "high": spread.high}
-    ends = {name: end / spread.per_si for name, end in found.items() if end is not None}
-    times = isinstance(spread, Times)
-    if spread.sd is None:
-        return LogUniform(**ends) if times else Uniform(**ends)
-    if times:
-        return LogNormal(spread.middle, spread.sd, **ends)
-    return Normal(spread.middle / spread.per_si, spread.sd / spread.per_si, **ends)

@@ -12,8 +12,6 @@ from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import asked_tests
 from spinepipe.studies.places import at
 
-__all__ = ["Size", "available_memory", "check_size_of_design", "free_disk", "size_of_design"]
-
 RESULTS = "results"
 MEMINFO = Path("/proc/meminfo")
 
@@ -42,7 +40,7 @@ AT_LEAST_IN_MEMORY = 900_000_000
 
 
 @dataclass(frozen=True)
-class Size:
+class DesignSize:
     """Counts of a study, and what they take.
 
     Attributes
@@ -76,7 +74,7 @@ class Size:
         return AT_LEAST_IN_MEMORY + max(steps)
 
 
-def size_of_design(study: GlobalSensitivity, cohort: Cohort) -> Size:
+def size_of_design(study: GlobalSensitivity, cohort: Cohort) -> DesignSize:
     """Counts of a study that fits its cohort."""
     specimens, joints = study.chosen_specimens(cohort), len(cohort.joint_names)
     tests, all_steps = study.chosen_tests(cohort), study.steps == "all"
@@ -88,7 +86,7 @@ def size_of_design(study: GlobalSensitivity, cohort: Cohort) -> Size:
     batches = -(-study.n_runs // study.batch_size(len(specimens)))
     fitted = len(study.calibration.free) if stiffness else 0
     coordinates = len(study.outputs.motion) + len(study.outputs.joint_load)
-    return Size(
+    return DesignSize(
         runs=study.n_runs,
         outputs=max(steps) * joints * coordinates + fitted,
         design_rows=study.n_runs * len(study.factor_names),
@@ -113,7 +111,7 @@ def check_size_of_design(
 
 
 def _short(
-    document: YamlDocument, size: Size, what: str, needed: int, there: int | None
+    document: YamlDocument, size: DesignSize, what: str, needed: int, there: int | None
 ) -> Iterator[InputProblem]:
     if there is None or needed <= there:
         return

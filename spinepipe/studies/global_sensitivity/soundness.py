@@ -34,7 +34,7 @@ REACH = 2.0
 _THIRD = {"lowest_third": ("low_third", "lowest"), "highest_third": ("high_third", "highest")}
 
 
-def doubts(
+def cautions(
     study: GlobalSensitivity, stiffness: pd.DataFrame, motion: pd.DataFrame, failed: pd.DataFrame
 ) -> Iterator[str]:
     """What may make the indices those of another spine, or of a part of the inputs only."""
@@ -44,7 +44,7 @@ def doubts(
     yield from _failed(failed)
 
 
-def grounds(
+def starting_spine(
     study: GlobalSensitivity, stiffness: pd.DataFrame, motion: pd.DataFrame
 ) -> Iterator[str]:
     """From which stiffness the factors start, and how that spine moves."""

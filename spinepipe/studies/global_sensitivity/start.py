@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.specimen import (
@@ -17,8 +18,12 @@ from spinepipe.cohort.specimen import (
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.model import SpineModel
-from spinepipe.studies.global_sensitivity.many_frames import INFERIOR, SUPERIOR, Flags
 from spinepipe.studies.selected_tests import AskedTest, asked, first_cycles
+
+Flags = NDArray[np.bool_]
+
+SUPERIOR, INFERIOR, LEFT, RIGHT = range(len(FRAME_LANDMARKS))
+"""Places of the landmarks, in the order of `FRAME_LANDMARKS`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +115,8 @@ def given_joints(cohort: Cohort, specimen: str) -> Flags:
 
 def moved_by(known: Flags, given: Flags, vertebra: int, landmark: int) -> list[int]:
     """Joints whose frame a landmark has a part in."""
+    # a frame is the mean of those of vertebrae that have all landmarks, at the middle of the two
+    # facing endplates: other landmarks of a vertebra that lacks one have no part in it
     whole = [bool(row.all()) for row in known]
     facing = {vertebra: SUPERIOR, vertebra - 1: INFERIOR}  # of the joint above, and of that below
     return [

@@ -3,7 +3,7 @@
 What the factors add up to becomes joint frames, models and loads.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +11,18 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from spinepipe.effects.contract import Array
-from spinepipe.frames import FRAME_LANDMARKS
+from spinepipe.frames import FRAME_LANDMARKS, SMALLEST_LENGTH_M, SMALLEST_SINE, Pose, joint_pose
 from spinepipe.model import LoadCase, ScopedEffect
 from spinepipe.statics.batched.spines import Cases, Spines
-from spinepipe.studies.global_sensitivity.change import FactorChange, Of
-from spinepipe.studies.global_sensitivity.many_frames import many_joint_frames, why_none
-from spinepipe.studies.global_sensitivity.start import DescribedSpecimen
+from spinepipe.studies.global_sensitivity.factors import FactorChange, Of
+from spinepipe.studies.global_sensitivity.start import (
+    INFERIOR,
+    LEFT,
+    RIGHT,
+    SUPERIOR,
+    DescribedSpecimen,
+    Flags,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +80,7 @@ class Frames:
 
 
 @dataclass(frozen=True, eq=False)
-class Varied:
+class SpineSamples:
     """Spines of a specimen, for those of the samples that make a spine.
 
     Attributes
@@ -91,7 +97,7 @@ class Varied:
     refused: dict[int, str]
 
 
-def vary(start: DescribedSpecimen, changes: Sequence[FactorChange], values: Array) -> Varied:
+def vary(start: DescribedSpecimen, changes: Sequence[FactorChange], values: Array) -> SpineSamples:
     """Give factors their values.
 
     Landmarks are moved first; the joint frames that they make are then moved along their own axes
@@ -134,13 +140,13 @@ def _out_of_bounds(scoped: ScopedEffect, joints: Sequence[str], values: Array) -
     return refused
 
 
-def _of_kept(spines: Spines, cases: tuple[Cases, ...], refused: dict[int, str]) -> Varied:
+def _of_kept(spines: Spines, cases: tuple[Cases, ...], refused: dict[int, str]) -> SpineSamples:
     """The spines that are spines."""
     kept = np.setdiff1d(np.arange(len(spines)), list(refused)).astype(np.int64)
     if refused:
         spines = spines.part(kept)
         cases = tuple(case.part(kept) for case in cases)
-    return Varied(spines, cases, kept, dict(sorted(refused.items())))
+    return SpineSamples(spines, cases, kept, dict(sorted(refused.items())))
 
 
 def variation(
@@ -154,81 +160,47 @@ def variation(
     joints, vertebrae : of the spine, caudal to cranial.
     """
     total = Variation.none(len(values), len(joints))
-    places = _Places(tuple(joints), tuple(vertebrae))
     for change, column in zip(changes, values.T, strict=True):
-        if change.of is not Of.NOTHING:
-            _APPLY[change.of](total, change, places, column)
+        _apply(total, change, column, joints, vertebrae)
     return total
 
 
-@dataclass(frozen=True)
-class _Places:
-    joints: tuple[str, ...]
-    vertebrae: tuple[str, ...]
+def _apply(
+    total: Variation,
+    change: FactorChange,
+    column: Array,
+    joints: Sequence[str],
+    vertebrae: Sequence[str],
+) -> None:
+    """Change a variation by one change with its values (M,), of all places where it names none."""
 
-    def of_joints(self, change: FactorChange) -> list[int]:
-        return [self.joints.index(name) for name in change.at or self.joints]
+    def places(names: Sequence[str]) -> list[int]:
+        return [names.index(name) for name in change.at or names]
 
-    def of_bodies(self, change: FactorChange) -> list[int]:
-        """Places among the moving vertebrae."""
-        moving = self.vertebrae[1:]
-        return [moving.index(name) for name in change.at or moving]
-
-
-def _stiffness(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.stiffness[:, places.of_joints(change), change.axis] *= column[:, None]
-
-
-def _landmark(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    point = FRAME_LANDMARKS.index(change.landmark)
-    for vertebra in change.at:
-        total.landmarks[:, places.vertebrae.index(vertebra), point, change.axis] += column
-
-
-def _joint_centre(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.frames[:, places.of_joints(change), change.axis] += column[:, None]
-
-
-def _joint_axes(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.frames[:, places.of_joints(change), 3 + change.axis] += column[:, None]
-
-
-def _load_point(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.load_points[:, change.axis] += column
-
-
-def _load_direction(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.load_turns[:, change.axis] += column
-
-
-def _load_size(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.load_sizes[:] *= column
-
-
-def _mass(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.masses[:, places.of_bodies(change)] *= column[:, None]
-
-
-def _centre_of_mass(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.coms[:, places.of_bodies(change), change.axis] += column[:, None]
-
-
-def _damping(total: Variation, change: FactorChange, places: _Places, column: Array) -> None:
-    total.damping[:] *= column
-
-
-_APPLY: dict[Of, Callable[[Variation, FactorChange, _Places, Array], None]] = {
-    Of.STIFFNESS: _stiffness,
-    Of.LANDMARK: _landmark,
-    Of.JOINT_CENTRE: _joint_centre,
-    Of.JOINT_AXES: _joint_axes,
-    Of.LOAD_POINT: _load_point,
-    Of.LOAD_DIRECTION: _load_direction,
-    Of.LOAD_SIZE: _load_size,
-    Of.MASS: _mass,
-    Of.CENTRE_OF_MASS: _centre_of_mass,
-    Of.DAMPING: _damping,
-}
+    axis, each = change.axis, column[:, None]
+    match change.of:
+        case Of.STIFFNESS:
+            total.stiffness[:, places(joints), axis] *= each
+        case Of.LANDMARK:
+            point = FRAME_LANDMARKS.index(change.landmark)
+            for vertebra in change.at:
+                total.landmarks[:, vertebrae.index(vertebra), point, axis] += column
+        case Of.JOINT_CENTRE:
+            total.frames[:, places(joints), axis] += each
+        case Of.JOINT_AXES:
+            total.frames[:, places(joints), 3 + axis] += each
+        case Of.LOAD_POINT:
+            total.load_points[:, axis] += column
+        case Of.LOAD_DIRECTION:
+            total.load_turns[:, axis] += column
+        case Of.LOAD_SIZE:
+            total.load_sizes[:] *= column
+        case Of.MASS:
+            total.masses[:, places(vertebrae[1:])] *= each
+        case Of.CENTRE_OF_MASS:
+            total.coms[:, places(vertebrae[1:]), axis] += each
+        case Of.DAMPING:
+            total.damping[:] *= column
 
 
 def varied_frames(start: DescribedSpecimen, change: Variation) -> Frames:
@@ -246,6 +218,7 @@ def _from_landmarks(
 ) -> dict[int, str]:
     """Replace frames of joints one of whose vertebrae has a moved landmark."""
     refused: dict[int, str] = {}
+    # frames of joints that no landmark moves stay the cohort's own, to the last bit
     moved = np.any(offsets, axis=(0, 2, 3))
     points = start.points + offsets
     for joint, name in enumerate(start.model.joints):
@@ -256,7 +229,11 @@ def _from_landmarks(
         made = many_joint_frames(*of, *known)
         rotations[:, joint], origins[:, joint] = made.rotations, made.origins
         for sample in np.flatnonzero(~made.defined).tolist():
-            reason = why_none(of[0][sample], of[1][sample], *known)
+            reason = "the landmarks are at the edge of defining no frame"
+            try:
+                one_joint_frame(of[0][sample], of[1][sample], *known)
+            except ValueError as error:
+                reason = str(error)
             refused.setdefault(sample, f"joint {name}: {reason}")
     return refused
 
@@ -266,6 +243,7 @@ def _moved(by: Array, rotations: Array, origins: Array) -> None:
     for joint in np.flatnonzero(by.any(axis=(0, 2))):
         own = rotations[:, joint]
         origins[:, joint] += (own @ by[:, joint, :3, None])[..., 0]
+        # Euler angles in the sequence Z, X', Y'', as `frames.transform_of` has them
         rotations[:, joint] = own @ Rotation.from_euler("ZXY", by[:, joint, 3:]).as_matrix()
 
 
@@ -273,6 +251,7 @@ def varied_cases(case: LoadCase, change: Variation) -> Cases:
     """One test of M spines: force and moment of each load are turned together and scaled."""
     same = Cases.of(case, len(change.load_sizes))
     turn = Rotation.from_rotvec(change.load_turns).as_matrix()
+    # force and moment of a load turn and grow together, about its own point
     by = change.load_sizes[:, None, None] * turn
     points = same.points.copy()
     for row, step in enumerate(case.steps):  # where a step has fewer loads, the rest is nobody's
@@ -284,3 +263,67 @@ def _turned(by: Array, vectors: Array) -> Array:
     """(M, T, W, 3) vectors turned by (M, 3, 3)."""
     turned: Array = (by[:, None, None] @ vectors[..., None])[..., 0]
     return turned
+
+
+@dataclass(frozen=True, eq=False)
+class ManyFrames:
+    """One joint's frame of M landmark sets.
+
+    Attributes
+    ----------
+    rotations : (M, 3, 3); the identity where there is no frame.
+    origins : (M, 3) m, ground.
+    defined : (M,) whether the landmarks define a frame.
+    """
+
+    rotations: Array
+    origins: Array
+    defined: Flags
+
+
+def many_joint_frames(lower: Array, upper: Array, in_lower: Flags, in_upper: Flags) -> ManyFrames:
+    """Frames of a joint from landmarks (M, 4, 3) m of its two vertebrae, see `joint_pose`.
+
+    Parameters
+    ----------
+    in_lower, in_upper : (4,) which landmarks a vertebra has; those of the facing endplates are
+        there, and one of the two vertebrae has all. What it has not may hold any number.
+    """
+    # axes of each vertebra that has all landmarks; the joint's are their mean on the rotation group
+    sides = [points for points, there in ((lower, in_lower), (upper, in_upper)) if there.all()]
+    rotations, defined = zip(*(_vertebra_rotations(points) for points in sides), strict=True)
+    whole: Flags = np.logical_and.reduce(defined)
+    stacked = np.stack(rotations, axis=1)
+    stacked[~whole] = np.eye(3)
+    mean = Rotation.from_matrix(stacked).mean(axis=1).as_matrix()
+    return ManyFrames(mean, (upper[:, INFERIOR] + lower[:, SUPERIOR]) / 2.0, whole)
+
+
+def _vertebra_rotations(points: Array) -> tuple[Array, Flags]:
+    """(M, 3, 3) ISB axes of a vertebra and (M,) whether there are any, from (M, 4, 3) landmarks."""
+    # ISB axes: z along the pedicle bases to the right, x in front, across both lines
+    z, wide = _directions(points[:, LEFT], points[:, RIGHT])
+    y0, high = _directions(points[:, INFERIOR], points[:, SUPERIOR])
+    normal = np.cross(y0, z)
+    sine = np.linalg.norm(normal, axis=1)
+    defined = wide & high & (sine >= SMALLEST_SINE)
+    x = normal / np.where(defined, sine, 1.0)[:, None]
+    return np.stack([x, np.cross(z, x), z], axis=2), defined
+
+
+def _directions(start: Array, end: Array) -> tuple[Array, Flags]:
+    """(M, 3) unit vectors, and (M,) whether the points are far enough apart to have one."""
+    line = end - start
+    length = np.linalg.norm(line, axis=1)
+    apart = length >= SMALLEST_LENGTH_M
+    return line / np.where(apart, length, 1.0)[:, None], apart
+
+
+def one_joint_frame(lower: Array, upper: Array, in_lower: Flags, in_upper: Flags) -> Pose:
+    """The frame of one landmark set (4, 3) of each vertebra, by `joint_pose` itself."""
+    sides = ((lower, in_lower), (upper, in_upper))
+    named = (
+        {name: p for name, p, there in zip(FRAME_LANDMARKS, points, given, strict=True) if there}
+        for points, given in sides
+    )
+    return joint_pose(*named)

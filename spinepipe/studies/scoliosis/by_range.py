@@ -5,7 +5,7 @@ that turns with the bend lies at 1 / 1.2 of its end, so that fitted films fill o
 these. A held-out film may have a segment beyond its end, where the published law has no load.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
@@ -14,7 +14,7 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.scoliosis.errors import REFERENCE, of_group, of_rotations
+from spinepipe.studies.scoliosis.errors import of_group, of_rotations, with_reduction
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import BEYOND, BY_RANGE, EVERY, GROUPS, RANGES
 from spinepipe.tables import from_rows, read_frames, write
@@ -48,8 +48,12 @@ def by_range_rows(displacements: pd.DataFrame) -> Iterator[dict[str, Any]]:
             if name != EVERY:
                 chosen = chosen[chosen["range"] == name]
             place = {"films": group, "opposite": opposite, "range": name}
-            rows = [place | _of_model(chosen, model) for model in models]
-            yield from _with_reduction(rows)
+            rows = []
+            for model in models:
+                of_model = chosen.loc[chosen["model"] == model, "square"]
+                rmse = float(np.sqrt(of_model.mean())) if len(of_model) else None
+                rows.append(place | {"model": model, "n": len(of_model), "rmse_deg": rmse})
+            yield from with_reduction(rows, "rmse_deg")
 
 
 def classes(share: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> list[str]:
@@ -59,17 +63,3 @@ def classes(share: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> list[str]:
     last = max(high for _, high in RANGES.values())
     within = np.searchsorted(lows, share, side="right") - 1
     return [CLASSES[one] for one in np.where(share > last, len(RANGES), within)]
-
-
-def _of_model(chosen: pd.DataFrame, model: str) -> dict[str, Any]:
-    squares = chosen.loc[chosen["model"] == model, "square"]
-    rmse = float(np.sqrt(squares.mean())) if len(squares) else None
-    return {"model": model, "n": len(squares), "rmse_deg": rmse}
-
-
-def _with_reduction(rows: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    other = next((row["rmse_deg"] for row in rows if row["model"] == REFERENCE), None)
-    for row in rows:
-        known = other and row["rmse_deg"] is not None
-        reduction = 100.0 * (1.0 - row["rmse_deg"] / other) if known else None
-        yield row | {"reduction_percent": reduction}

@@ -8,7 +8,6 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.yaml_text import YamlDocument
-from spinepipe.effects.contract import Array
 from spinepipe.problems import InputProblem
 from spinepipe.studies.places import at
 from spinepipe.studies.scoliosis.curve_angles import curves, main_curve
@@ -22,8 +21,8 @@ from spinepipe.studies.scoliosis.films import (
     PATIENTS,
     RIGHT,
     Film,
-    as_read,
     by_reading,
+    film_readings,
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -82,7 +81,7 @@ def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[Input
         faults = list(_film(cohort, place, film))
         yield from faults
         if not faults:
-            shapes[position] = Film(*as_read(film, cohort.vertebrae).mean(axis=0))
+            shapes[position] = Film(*film_readings(film, cohort.vertebrae).mean(axis=0))
             yield from _tilts(place, film, cohort.vertebrae, shapes[position])
     yield from _bends(file, patient, shapes)
     if ERECT in shapes:
@@ -108,8 +107,8 @@ def _cobb(cohort: Cohort, patient: str, erect: Film) -> Iterator[InputProblem]:
 def _film(cohort: Cohort, place: _FilmPlace, rows: pd.DataFrame) -> Iterator[InputProblem]:
     """Each reading of a film: every vertebra once, all of its numbers, the lowest at nought."""
     for reading in by_reading(rows):
-        told = reading[["observer", "repeat"]].iloc[0].dropna()
-        who = ", ".join(f"{name} {value}" for name, value in told.items())
+        known = reading[["observer", "repeat"]].iloc[0].dropna()
+        who = ", ".join(f"{name} {value}" for name, value in known.items())
         by = f" ({who})" if who else ""
         line = int(reading.index[0])
         there = list(reading["vertebra"])
@@ -150,7 +149,10 @@ def _tilts(
     place: _FilmPlace, rows: pd.DataFrame, vertebrae: tuple[str, ...], film: Film
 ) -> Iterator[InputProblem]:
     """Does what is said of tilt go with the line of the centres?"""
-    line = _line_of_centres(film)
+    # (V,) rad, of the line from the neighbour below to the neighbour above
+    below = np.maximum(np.arange(len(film.up)) - 1, 0)
+    above = np.minimum(np.arange(len(film.up)) + 1, len(film.up) - 1)
+    line = np.arctan2(film.right[above] - film.right[below], film.up[above] - film.up[below])
     given = float(np.abs(film.tilt).max())
     if np.abs(line).max() > np.deg2rad(5.0) and given < RADIANS * np.abs(line).max():
         found = f"no vertebra tilted by more than {DEG_PER_RAD * given:.2g}, while the line of "
@@ -158,6 +160,8 @@ def _tilts(
         remedy = "radians? multiply by 57.3"
         yield place.problem(None, "orientation_deg", found, "degrees", remedy)
         return
+    # a vertebra stands across the line of centres: tilts read off the other way or of another
+    # vertebra do not follow it
     off = np.abs(film.tilt - line)
     worst = int(np.argmax(off))
     if off[worst] > np.deg2rad(FARTHEST_APART_DEG):
@@ -168,24 +172,15 @@ def _tilts(
         yield place.problem(row, "orientation_deg", f"{found} of centres", allowed, remedy)
 
 
-def _line_of_centres(film: Film) -> Array:
-    """(V,) rad, tilt of the line from the neighbour below to the neighbour above."""
-    right, up = film.right, film.up
-    below = np.maximum(np.arange(len(up)) - 1, 0)
-    above = np.minimum(np.arange(len(up)) + 1, len(up) - 1)
-    found: Array = np.arctan2(right[above] - right[below], up[above] - up[below])
-    return found
-
-
 def _bends(file: str, patient: str, films: dict[str, Film]) -> Iterator[InputProblem]:
     """Do the films show what their positions say?"""
     if ERECT not in films:
         return
     erect = films[ERECT]
-    yield from _same(file, patient, films)
+    yield from _duplicates(file, patient, films)
     leans = {}
     for position, side in ((RIGHT, 1.0), (LEFT, -1.0)):
-        if position in films and not _alike(films[position], erect):
+        if position in films and not _is_same(films[position], erect):
             leans[position] = side * float(films[position].tilt[-1] - erect.tilt[-1])
     wrong = [name for name, lean in leans.items() if lean < -np.deg2rad(LEAST_BEND_DEG)]
     if len(wrong) == 2:
@@ -211,16 +206,16 @@ def _bends(file: str, patient: str, films: dict[str, Film]) -> Iterator[InputPro
         yield place.problem(None, "z_mm", found, "traction lengthens a spine", remedy)
 
 
-def _same(file: str, patient: str, films: dict[str, Film]) -> Iterator[InputProblem]:
+def _duplicates(file: str, patient: str, films: dict[str, Film]) -> Iterator[InputProblem]:
     names = [name for name in (*NEEDED, *HELD_OUT) if name in films]
     for number, one in enumerate(names):
         for other in names[number + 1 :]:
-            if _alike(films[one], films[other]):
+            if _is_same(films[one], films[other]):
                 place, found = _FilmPlace(file, patient, other), f"the same as film {one}"
                 remedy = "replace the one that was entered twice"
                 yield place.problem(None, "position", found, "a film of its own", remedy)
 
 
-def _alike(one: Film, other: Film) -> bool:
+def _is_same(one: Film, other: Film) -> bool:
     apart = np.hypot(one.right - other.right, one.up - other.up)
     return bool(MM_PER_M * apart.max() < SAME_MM)

@@ -18,7 +18,6 @@ LEAST_CURVE = float(np.deg2rad(5.0)) + 1e-9
 """Changes of tilt up to 5 deg are waves of the line, no curves; rounding makes no curve of one that
 is read as 5 deg."""
 
-
 LOWEST_PROXIMAL, THORACOLUMBAR = 5, "T12"
 
 
@@ -76,13 +75,19 @@ def curves(erect: Film) -> tuple[SpinalCurve, ...]:
     Where several are equally tilted between two curves, each curve has the outermost of them.
     """
     before, found = 0, []
+    points = np.stack([erect.right, erect.up], axis=1)
     for turn, upper in pairwise(_turning_points(erect.tilt)):
+        # equally tilted vertebrae: the lowest one begins the curve, the uppermost one ends it
         lower = before + int(np.argmax(erect.tilt[before:] == erect.tilt[turn]))
         before = turn
         if upper - lower < 2:
             continue
         side = 1 if erect.tilt[lower] > erect.tilt[upper] else -1
-        found.append(SpinalCurve(lower, upper, _apex(erect, lower, upper), side))
+        # the apex is the vertebra between them that is farthest from the line through them
+        line = points[upper] - points[lower]
+        off = points[lower + 1 : upper] - points[lower]
+        away = np.abs(line[0] * off[:, 1] - line[1] * off[:, 0])
+        found.append(SpinalCurve(lower, upper, lower + 1 + int(np.argmax(away)), side))
     return tuple(found)
 
 
@@ -95,12 +100,13 @@ def lumbar_apex(erect: Film, vertebrae: tuple[str, ...]) -> int:
     """Apex of the lowest curve whose apex is lumbar or at T12 or T11; else of the lowest curve."""
     every = curves(erect)
     names = (vertebrae[one.apex] for one in every)
-    low = [one for one, name in zip(every, names, strict=True) if name[0] == "L" or name in _LAST]
-    chosen = low or list(every[:1])
+    lowest = [
+        one
+        for one, name in zip(every, names, strict=True)
+        if name[0] == "L" or name in ("T12", "T11")
+    ]
+    chosen = lowest or list(every[:1])
     return chosen[0].apex if chosen else len(vertebrae) // 3
-
-
-_LAST = ("T12", "T11")
 
 
 def _turning_points(tilt: Array) -> list[int]:
@@ -108,6 +114,7 @@ def _turning_points(tilt: Array) -> list[int]:
 
     Of equally tilted ones the uppermost. Without a curve: the lowest and the uppermost vertebra.
     """
+    # an extreme is a turning point once the tilt has come back from it by more than a wave
     risen, fallen = tilt - np.minimum.accumulate(tilt), np.maximum.accumulate(tilt) - tilt
     gone = np.flatnonzero(np.maximum(risen, fallen) > LEAST_CURVE)
     if not len(gone):
@@ -123,12 +130,3 @@ def _turning_points(tilt: Array) -> list[int]:
             points.append(extreme)
             way, extreme = -way, at
     return [*points, extreme]
-
-
-def _apex(erect: Film, lower: int, upper: int) -> int:
-    """The vertebra between two others that is farthest from the line through these."""
-    points = np.stack([erect.right, erect.up], axis=1)
-    line = points[upper] - points[lower]
-    off = points[lower + 1 : upper] - points[lower]
-    away = np.abs(line[0] * off[:, 1] - line[1] * off[:, 0])
-    return lower + 1 + int(np.argmax(away))

@@ -1,9 +1,12 @@
 """Errors of models against films, by patient and model: what comparisons of models begin with."""
 
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+
+from spinepipe.studies.scoliosis.tables import GROUPS, MEASURES
 
 REFERENCE = "linear_regions"
 """The model that Jalalian 2017 compares with."""
@@ -31,6 +34,19 @@ def squares(
     return rows[["specimen", "model"]].assign(square=error.astype(float) ** 2)
 
 
+def errors_by_measure(
+    positions: pd.DataFrame,
+    displacements: pd.DataFrame,
+    curves: pd.DataFrame,
+    measures: Iterable[str] = MEASURES,
+) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """Group of films, measure and its `squares`, for every group and measure."""
+    for group in GROUPS:
+        chosen = [of_group(one, group) for one in (positions, displacements, curves)]
+        for measure in measures:
+            yield group, measure, squares(measure, *chosen)
+
+
 def of_rotations(displacements: pd.DataFrame) -> "pd.Series[Any]":
     """Simulated less measured rotation, deg; NaN where there is no pose."""
     error: pd.Series[Any] = displacements["simulated_deg"] - displacements["measured_deg"]
@@ -55,6 +71,20 @@ def by_patient(errors: pd.DataFrame) -> pd.DataFrame:
     means = mean_squares(errors).set_index(["specimen", "model"])["square"]
     found: pd.DataFrame = np.sqrt(means).unstack("model")
     return found.reindex(index=errors["specimen"].unique(), columns=errors["model"].unique())
+
+
+def with_reduction(rows: Sequence[dict[str, Any]], error: str) -> Iterator[dict[str, Any]]:
+    """Rows, one per model, with the percentage by which an error is less than the reference's."""
+    other = next((row[error] for row in rows if row["model"] == REFERENCE), None)
+    for row in rows:
+        known = other and row[error] is not None
+        yield row | {"reduction_percent": 100.0 * (1.0 - row[error] / other) if known else None}
+
+
+def reading_floor(accuracy: pd.DataFrame, measure: str) -> float:
+    """Error in a measure that reading films alone makes; NaN where nobody knows."""
+    known = accuracy.loc[accuracy["measure"] == measure, "reading_noise"].dropna()
+    return float(known.iloc[0]) if len(known) else np.nan
 
 
 def held_out_error(positions: pd.DataFrame) -> pd.Series:

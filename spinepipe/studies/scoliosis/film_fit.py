@@ -29,8 +29,8 @@ from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.fixed_end_spine import BENDING, with_laws
 from spinepipe.studies.scoliosis.optima import FilmOptimum, Limits, best, optimum
-from spinepipe.studies.scoliosis.personal import Fitting, Patient, Personal
-from spinepipe.studies.scoliosis.population import PatientPrior, Population, assumed
+from spinepipe.studies.scoliosis.personal import Fitting, Patient, PersonalModel
+from spinepipe.studies.scoliosis.population import PatientPrior, Population, usual_population
 from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, EndRotations
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -84,7 +84,7 @@ class FilmInformation:
 
 
 @dataclass(frozen=True)
-class FittedFilms:
+class FilmFitResult:
     """The end of a fit.
 
     Attributes
@@ -99,7 +99,7 @@ class FittedFilms:
     """
 
     unknowns: Array
-    told: FilmInformation
+    information: FilmInformation
     known: PatientPrior
     status: Status
     poses: Mapping[str, PrescribedResult]
@@ -107,18 +107,17 @@ class FittedFilms:
     n_optima: int
 
     @property
-    def arrived(self) -> bool:
-        """Whether the fit settled."""
-        return self.status.usable
-
-    @property
     def decided(self) -> float:
         """Sum over numbers of the films' share of what is known of them."""
-        return float(np.trace(self.known.covariance @ self.told.matrix))
+        return float(np.trace(self.known.covariance @ self.information.matrix))
 
 
-def _told(errors: Array, slopes: Array, at: Array) -> FilmInformation:
-    """What errors and their slopes at a point say of the numbers, wherever the top was."""
+def _information(errors: Array, slopes: Array, at: Array) -> FilmInformation:
+    """What errors and their slopes at a point say of the numbers, wherever the top was.
+
+    Gauss-Newton's normal equations; the top's six unknowns, each with a prior of SD 1, are
+    eliminated by their Schur complement.
+    """
     matrix = slopes.T @ slopes + np.diag(np.arange(len(at)) >= len(at) - TOPS)
     vector = matrix @ at - slopes.T @ errors
     vector[-TOPS:] -= at[-TOPS:]
@@ -138,6 +137,7 @@ def ends_of(numbers: Array) -> tuple[Array, Array]:
 def laws_of(numbers: Array, size: float) -> Array:
     """(S, 3) stretch (N m) and ends (rad) of the tangents whose mean at rest is a size, N m/rad."""
     lower, upper = ends_of(numbers)
+    # moment A (tan(B r + C) - tan C), whose slope at rest is A B (1 + tan(C)^2)
     b, c = argument(lower, upper)
     at_rest = size * np.exp(numbers.reshape(3, -1)[0])
     return np.column_stack([at_rest / (b * (1.0 + np.tan(c) ** 2)), lower, upper])
@@ -150,11 +150,25 @@ def by_numbers(numbers: Array, size: float) -> Array:
     found = np.zeros((len(lower), 3, 3))
     found[:, 0, 0] = stretch
     for column, sign, end in ((1, 1.0, lower), (2, -1.0, upper)):
+        # B = pi / (upper - lower), C = -B (lower + upper) / 2; unknowns are logarithms of the ends
         b_by_end = sign * b**2 / np.pi
         c_by_end = -0.5 * (b_by_end * (lower + upper) + b)
         found[:, 0, column] = -stretch * (b_by_end / b + 2.0 * np.tan(c) * c_by_end) * end
         found[:, column, column] = end
     return found
+
+
+def prior(population: Population) -> tuple[Array, Array, Array]:
+    """What is known of the n = 3 S + 6 unknowns of a fit before any film.
+
+    Returns
+    -------
+    (n,) means and (n,) SDs, and (n, n) that makes of unknowns less their means errors of SD 1.
+    """
+    root = np.eye(len(population.mean) + TOPS)
+    root[:-TOPS, :-TOPS] = population.root
+    means = np.append(population.mean, np.zeros(TOPS))
+    return means, np.append(population.sd, np.ones(TOPS)), root
 
 
 class FilmFit:
@@ -170,11 +184,11 @@ class FilmFit:
         """
         self.patient, self.size, self.sd = patient, patient.size, sd
         self.segments = patient.chain.n_joints
-        model = self._model(next(self._guesses(assumed(self.segments)))[:-TOPS])
-        self.spine = replace(patient.held(model), ask=ask)
+        model = self._model(next(self._guesses(usual_population(self.segments)))[:-TOPS])
+        self.spine = replace(patient.fixed_end(model), ask=ask)
         self.near: dict[str, PrescribedResult] = {}
 
-    def fit(self, population: Population, start: FittedFilms | None = None) -> FittedFilms:
+    def fit(self, population: Population, start: FilmFitResult | None = None) -> FilmFitResult:
         """The likeliest numbers, and what is known of them; from a fit near by, if there is one.
 
         Raises
@@ -191,6 +205,7 @@ class FilmFit:
     ) -> list[list[Array]]:
         """Where fits begin: each a list of unknowns, of which the first that has poses is taken."""
         s = self.segments
+        # ends exchanged: the second third of the numbers, lower ends, with the last one
         draws = qmc.LatinHypercube(3 * s, rng=np.random.default_rng(seed)).random(drawn)
         exchanged = np.concatenate([draws[:, :s], draws[:, 2 * s :], draws[:, s : 2 * s]], axis=1)
         numbers = population.mean + population.sd * norm.ppf(np.vstack([draws, exchanged]))
@@ -202,37 +217,36 @@ class FilmFit:
 
     def point(self, population: Population) -> Point:
         """Errors of the films, and of the numbers in the population, in their SDs."""
-        middle = np.append(population.mean, np.zeros(TOPS))
-        drawn = np.eye(len(middle))
-        drawn[: len(population.mean), : len(population.mean)] = population.root
+        middle, _, root = prior(population)
 
         def found(unknowns: Array) -> tuple[Array, Array] | None:
             films = self.missed(unknowns)
             if films is None:
                 return None
-            away = drawn @ (unknowns - middle)
-            return np.append(films[0], away), np.vstack([films[1], drawn])
+            away = root @ (unknowns - middle)
+            return np.append(films[0], away), np.vstack([films[1], root])
 
         return found
 
-    def personal(self, fitted: FittedFilms) -> Personal:
+    def personal(self, fitted: FilmFitResult) -> PersonalModel:
         """The model of a fit."""
         found = self._personal(fitted.known, fitted.decided)
         return replace(found, fitting=Fitting(fitted.status, fitted.n_optima))
 
-    def unfitted(self, population: Population) -> Personal:
+    def unfitted(self, population: Population) -> PersonalModel:
         """The model of a patient of whom no film was fitted."""
         nothing = np.zeros((len(population.mean),) * 2)
         known = FilmInformation(nothing, nothing[0]).known(population)
         begin = self._beyond_films(known.mean, BEYOND_THE_FILM[-1])
         return self._personal(PatientPrior(begin, known.covariance), 0.0)
 
-    def _personal(self, known: PatientPrior, decided: float) -> Personal:
+    def _personal(self, known: PatientPrior, decided: float) -> PersonalModel:
+        # ratios are over the geometric mean: logarithms less their mean
         s = self.segments
         centred = np.eye(s) - 1.0 / s
         ratio, spread = centred @ known.mean[:s], centred @ known.covariance[:s, :s] @ centred
         reach = float(norm.ppf(0.5 + 0.5 * LEVEL)) * np.sqrt(np.diag(spread))
-        return Personal(
+        return PersonalModel(
             self._model(known.mean),
             self.size * np.exp(known.mean[:s]),
             EndRotations(*ends_of(known.mean)),
@@ -257,15 +271,18 @@ class FilmFit:
             film = self.patient.read.films[position]
             top = film.top + self.sd * tops[film_number]
             posed = spine.at(top, self.near.get(position))
-            if posed.held.status is not PrescribedStatus.CONVERGED:
+            if posed.result.status is not PrescribedStatus.CONVERGED:
                 return None
-            self.near[position] = posed.held
-            held_by = np.zeros((len(posed.held.q), len(unknowns)))
-            held_by[:, :-TOPS] = self._held_by(posed.held.q, laws, laws_by)
+            self.near[position] = posed.result
+            # implicit function theorem: how equilibrium moves the pose when an unknown changes what
+            # the joints hold, or where the top is
+            held_by = np.zeros((len(posed.result.q), len(unknowns)))
+            held_by[:, :-TOPS] = self._held_by(posed.result.q, laws, laws_by)
             top_by = np.zeros((3, len(unknowns)))
             at = len(numbers) + 3 * film_number
             top_by[:, at : at + 3] = np.diag(self.sd)
             change = posed.answers_to(held_by, top_by)
+            # the lowest vertebra is fixed and the uppermost held: what lies between is compared
             off = (posed.film.rows - film.rows)[:, 1:-1] / self.sd[:, None]
             by = posed.film_by[:, :-1] @ change / self.sd[:, None, None]
             errors.append(off.ravel())
@@ -296,6 +313,7 @@ class FilmFit:
         pairs, s = self.patient.pairs, self.segments
         least = -np.minimum(pairs.right, pairs.left)
         most = np.maximum(pairs.right, pairs.left)
+        # an end must lie beyond what a segment has turned on either film, in the sense of that end
         reached = beyond * np.maximum(np.concatenate([least, most]), SMALLEST_END)
         return np.concatenate([numbers[:s], np.maximum(numbers[s:], np.log(reached))])
 
@@ -303,10 +321,10 @@ class FilmFit:
 def fit_alike(
     fits: Sequence[FilmFit],
     population: Population,
-    before: Sequence[FittedFilms | None],
+    before: Sequence[FilmFitResult | None],
     drawn: int = DRAWN_STARTS,
     seed: int = 0,
-) -> list[FittedFilms | None]:
+) -> list[FilmFitResult | None]:
     """Fits of patients with equally many segments, all starts in lockstep; None without a pose.
 
     Parameters
@@ -341,21 +359,22 @@ def _search(
     return optimum(fit, fit.point(population), begin, near, _limits(population), SETTLED)
 
 
-def _fitted(ends: Sequence[FilmOptimum | None], population: Population) -> FittedFilms | None:
+def _fitted(ends: Sequence[FilmOptimum | None], population: Population) -> FilmFitResult | None:
     """The best end, and what the films say near it."""
     found, n_optima = best(ends, _limits(population)[2])
     if found is None:
         return None
     films = len(found.residual) - len(found.x)  # the rest is of the population
-    told = _told(found.residual[:films], found.jacobian[:films], found.x)
-    known = replace(told.known(population), mean=found.x[:-TOPS])
-    return FittedFilms(found.x, told, known, found.status, found.poses, found.cost, n_optima)
+    information = _information(found.residual[:films], found.jacobian[:films], found.x)
+    known = replace(information.known(population), mean=found.x[:-TOPS])
+    return FilmFitResult(
+        found.x, information, known, found.status, found.poses, found.cost, n_optima
+    )
 
 
 def _limits(population: Population) -> Limits:
     """(3 S + 6,) each: least and largest unknowns, and their SD in the population."""
-    middle = np.append(population.mean, np.zeros(TOPS))
-    scale = np.append(population.sd, np.ones(TOPS))
+    middle, scale, _ = prior(population)
     return middle - FARTHEST * scale, middle + FARTHEST * scale, scale
 
 

@@ -15,7 +15,7 @@ from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.profile import Best, RegionEnds, profile_in_turn
 from spinepipe.effects.contract import Array
 from spinepipe.statics.prescribed import Ask, alone, answered
-from spinepipe.studies.scoliosis.film_fit import FARTHEST, TOPS, FilmFit, FittedFilms
+from spinepipe.studies.scoliosis.film_fit import FARTHEST, FilmFit, FilmFitResult, prior
 from spinepipe.studies.scoliosis.population import Population
 
 SETTLED = DescentTolerances(cost=1e-3, step=1e-3, slope=1e-6, evaluations=30)
@@ -28,21 +28,21 @@ OPEN = RegionEnds(None, None, True, True)
 """Of a segment of which films tell nothing."""
 
 
-def regions(fit: FilmFit, population: Population, fitted: FittedFilms) -> tuple[RegionEnds, ...]:
+def regions(fit: FilmFit, population: Population, fitted: FilmFitResult) -> tuple[RegionEnds, ...]:
     """(S,) 95 % region of each segment's ratio; ends that the films leave open are none."""
     searches = [partial(region, fit, population, fitted, one) for one in range(fit.segments)]
     return tuple(in_lockstep(searches, answered))
 
 
 def region(
-    fit: FilmFit, population: Population, fitted: FittedFilms, segment: int, ask: Ask = alone
+    fit: FilmFit, population: Population, fitted: FilmFitResult, segment: int, ask: Ask = alone
 ) -> RegionEnds:
     """95 % region of one segment's ratio."""
     fit = FilmFit(fit.patient, fit.sd, ask)
     fit.near = dict(fitted.poses)
     numbers = by_ratio(fit.segments, len(fitted.unknowns), segment)
     point = once(_of_films(fit, population, segment, numbers))
-    usual, scale = _usual(population)
+    usual, scale, _ = prior(population)
     middle = np.asarray(np.linalg.solve(numbers, usual), dtype=np.float64)
     lower, upper = middle - FARTHEST * scale, middle + FARTHEST * scale
     begin = np.clip(np.linalg.solve(numbers, fitted.unknowns), lower + 1e-9, upper - 1e-9)
@@ -53,9 +53,11 @@ def region(
     found = point(ended.x)
     if found is None or not ended.arrived:
         return OPEN
+    # only the ratio is profiled; it is the one unknown that no prior holds
     bent = np.arange(len(begin)) == segment
     best = Best(ended.x, *found, lower, upper, scale, bent, ENOUGH)
     seen = profile_in_turn(best, point, [segment])
+    # a lower cost beside the fit: this was no optimum, and its region would be none
     if seen.lower_cost:
         return OPEN
     below, above = bool(seen.open_below[segment]), bool(seen.open_above[segment])
@@ -74,28 +76,17 @@ def by_ratio(segments: int, unknowns: int, segment: int) -> Array:
     return made
 
 
-def _usual(population: Population) -> tuple[Array, Array]:
-    """(n,) each: middle and SD of the unknowns before any film."""
-    tops = np.zeros(TOPS)
-    return (
-        np.concatenate([population.mean, tops]),
-        np.concatenate([population.sd, tops + 1.0]),
-    )
-
-
 def _of_films(fit: FilmFit, population: Population, segment: int, numbers: Array) -> Point:
     """Errors of the films and of all but one number of the population, in their SD."""
-    middle, _ = _usual(population)
-    drawn = np.eye(len(middle))
-    drawn[: len(population.mean), : len(population.mean)] = population.root
-    drawn = np.delete(drawn, segment, axis=0)  # a ratio is drawn apart from all other numbers
+    middle, _, root = prior(population)
+    root = np.delete(root, segment, axis=0)  # a ratio is drawn apart from all other numbers
 
     def point(moved: Array) -> tuple[Array, Array] | None:
         unknowns = numbers @ moved
         found = fit.missed(unknowns)
         if found is None:
             return None
-        errors = np.append(found[0], drawn @ (unknowns - middle))
-        return errors, np.vstack([found[1], drawn]) @ numbers
+        errors = np.append(found[0], root @ (unknowns - middle))
+        return errors, np.vstack([found[1], root]) @ numbers
 
     return point

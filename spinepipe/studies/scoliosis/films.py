@@ -5,7 +5,7 @@ to the right negative. Here: to the right, up, tilt to the right; m and rad. Eac
 its own lowest vertebra, which then lies at nought and stands upright.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +17,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.memoize import kept_with_cohort
 from spinepipe.documents.form import read_forms
 from spinepipe.effects.contract import Array
+from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 ERECT, RIGHT, LEFT = "erect", "right_bending", "left_bending"
@@ -30,7 +31,6 @@ CORNERS = tuple(
     for side in ("left", "right")
     for axis in "yz"
 )
-
 
 FILMS, PATIENTS = read_forms(Path(__file__).with_name("forms.yaml")).values()
 
@@ -76,22 +76,14 @@ class Film:
         right, up = self.right - self.right[0], self.up - self.up[0]
         return Film(cos * right - sin * up, sin * right + cos * up, self.tilt - self.tilt[0])
 
-    def scaled(self, factor: float) -> "Film":
-        """The same film, so many times as large."""
-        return Film(factor * self.right, factor * self.up, self.tilt)
-
-    def mirrored(self) -> "Film":
-        """Left and right exchanged."""
-        return Film(-self.right, self.up, -self.tilt)
-
 
 @dataclass(frozen=True)
-class Read:
+class PatientFilms:
     """What was read of one patient.
 
     Attributes
     ----------
-    films : by position. sizes : by position, mean height of the vertebrae, m; none without corners.
+    films : by position, the mean of all readings.
     scales : by position, the factor that makes the film as large as the erect one.
     sd : (3,) m, m and rad, SD of one reading: of right and up as seen from the lowest vertebra, of
         a vertebra's own tilt; NaN where none tells.
@@ -99,7 +91,6 @@ class Read:
     """
 
     films: Mapping[str, Film]
-    sizes: Mapping[str, float]
     scales: Mapping[str, float]
     sd: Array
     readings: Mapping[str, int]
@@ -116,21 +107,25 @@ class Read:
 
 
 @kept_with_cohort
-def read_films(cohort: Cohort, patient: str) -> Read:
+def read_films(cohort: Cohort, patient: str) -> PatientFilms:
     """The films of a patient; `checks` has seen to it that they are whole."""
     rows = cohort.further["films"]
     rows = rows[rows["specimen"] == patient]
     every, sizes = {}, {}
     for position, film in rows.groupby("position", sort=False):
-        every[str(position)] = as_read(film, cohort.vertebrae)
+        every[str(position)] = film_readings(film, cohort.vertebrae)
         size = height(film)
         if size is not None:
             sizes[str(position)] = size
-    scales = _scales(every, sizes)
+    # corners tell how large a film is: all become as large as the erect one
+    known = ERECT in sizes
+    scales = {
+        name: sizes[ERECT] / sizes[name] if known and name in sizes else 1.0 for name in every
+    }
     every = {name: each * np.array([[scales[name]] * 2 + [1.0]]).T for name, each in every.items()}
     films = {name: Film(*each.mean(axis=0)) for name, each in every.items()}
     readings = {name: len(each) for name, each in every.items()}
-    return Read(films, sizes, scales, _sd(list(every.values())), readings)
+    return PatientFilms(films, scales, _sd(list(every.values())), readings)
 
 
 def by_reading(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
@@ -139,13 +134,13 @@ def by_reading(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
         yield one
 
 
-def as_read(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Array:
+def film_readings(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Array:
     """(K, 3, V) right, up and tilt of each reading of a film, seen from its lowest vertebra."""
-    each = (placed(one, vertebrae).seen_from_below() for one in by_reading(rows))
+    each = (film_of_rows(one, vertebrae).seen_from_below() for one in by_reading(rows))
     return np.array([[one.right, one.up, one.tilt] for one in each])
 
 
-def placed(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Film:
+def film_of_rows(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Film:
     """One reading of a film, in the film's own frame."""
     rows = rows.set_index("vertebra").loc[list(vertebrae)]
     if rows[list(CORNERS)].notna().all(axis=None):
@@ -159,8 +154,10 @@ def _of_corners(rows: pd.DataFrame) -> Film:
     corner = corners(rows)
     start, across = corner["upper_left"], corner["lower_right"] - corner["upper_left"]
     other, back = corner["upper_right"], corner["lower_left"] - corner["upper_right"]
+    # start + share across = other + s back, by Cramer's rule
     share = _cross(other - start, back) / _cross(across, back)
     centre = start + share[:, None] * across
+    # twice the line from the centre of the lower endplate to that of the upper one
     axis = (corner["upper_left"] + corner["upper_right"]) - (
         corner["lower_left"] + corner["lower_right"]
     )
@@ -193,13 +190,6 @@ def height(rows: pd.DataFrame) -> float | None:
     return float(np.hypot(*axis.T).mean()) / MM_PER_M
 
 
-def _scales(positions: Iterable[str], sizes: Mapping[str, float]) -> dict[str, float]:
-    known = ERECT in sizes
-    return {
-        name: sizes[ERECT] / sizes[name] if known and name in sizes else 1.0 for name in positions
-    }
-
-
 def _sd(films: Sequence[Array]) -> Array:
     """(3,) SD of one reading, pooled over the films (K, 3, V) that were read more than once."""
     repeated = [each for each in films if len(each) > 1]
@@ -214,3 +204,20 @@ def _sd(films: Sequence[Array]) -> Array:
         squares += (off**2).sum(axis=(0, 2)) / (each.shape[2] - 1)
     found: Array = np.sqrt(squares / sum(len(each) - 1 for each in repeated))
     return found
+
+
+def reading_noise(settings: Scoliosis, cohort: Cohort) -> Array:
+    """(2,) SD of what is taken for a place seen from the lowest vertebra (mm, each way) and for a
+    vertebra's own tilt (deg); NaN where nothing tells.
+
+    Repeated readings tell; where there are none, the study may state it. A mean of readings has
+    less than one: by the mean over all films of one over their readings.
+    """
+    patients = [read_films(cohort, name) for name in cohort.specimen_names]
+    known = [one.sd for one in patients if np.isfinite(one.sd).all()]
+    if known:
+        share = np.mean([1.0 / count for one in patients for count in one.readings.values()])
+        right, up, tilt = np.sqrt(share * np.mean(np.square(known), axis=0))
+        return np.array([MM_PER_M * np.sqrt(0.5 * (right**2 + up**2)), DEG_PER_RAD * tilt])
+    stated = (settings.place_sd_mm, settings.tilt_sd_deg)
+    return np.array([np.nan if one is None else one for one in stated])

@@ -1,6 +1,6 @@
 """Key findings of a study of scoliotic spines as sentences, what casts doubt on others first."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import pandas as pd
@@ -16,20 +16,22 @@ from spinepipe.studies.scoliosis.words import IN_WORDS, OF_FILMS, TOLD, in_order
 _MOST_PLACES = 6
 _SCALED = 1e-9
 
-Finding = Callable[[Scoliosis, ResultTables], Iterator[str]]
+Finding = Callable[[Scoliosis, ResultTables, pd.DataFrame], Iterator[str]]
+"""Sentences of a study and its results, first of all of the rows of one table."""
 
 
 def findings(study: Scoliosis, results: ResultTables) -> list[str]:
     """The sentences, without those that the study has no table for."""
-    told = [sentence for make in MAKERS for sentence in make(study, results)]
-    return [sentence.replace(" %", "\u00a0%") for sentence in told]
+    found = []
+    for make, table in FINDINGS.items():
+        rows = results.table(table)
+        if not rows.empty:
+            found += [sentence.replace(" %", "\u00a0%") for sentence in make(study, results, rows)]
+    return found
 
 
-def ended(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def ended(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Poses that are not as they should be, by how their solve ended."""
-    rows = results.table("positions")
-    if rows.empty:
-        return
     others = rows[rows["status"] != PrescribedStatus.CONVERGED.value]
     if others.empty:
         yield f"All {count(len(rows), 'pose')} converged."
@@ -54,16 +56,16 @@ def _some(places: list[str]) -> str:
     return "; ".join(places[:_MOST_PLACES]) + (f"; and {more} more" if more > 0 else "")
 
 
-def errors(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def errors(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Models in the order of their errors of rotations; by the other measures the first one."""
-    accuracy, statistics = results.table("accuracy"), results.table("statistics")
+    statistics = results.table("statistics")
     for films in reversed(GROUPS):
-        standing = ModelRanking.of(accuracy, films, DECIDING)
+        standing = ModelRanking.of(rows, films, DECIDING)
         if standing.models:
             told = _order(standing, statistics, films, DECIDING)
             yield f"{OF_FILMS[films]}, {MEASURES[DECIDING][1]}, least error first: {told}."
         others = {
-            measure: ModelRanking.of(accuracy, films, measure)
+            measure: ModelRanking.of(rows, films, measure)
             for measure in MEASURES
             if measure != DECIDING
         }
@@ -95,11 +97,11 @@ def _first(standing: ModelRanking, statistics: pd.DataFrame, films: str, measure
     return f"{IN_WORDS[best]} ({standing.sized(best)}{alike})"
 
 
-def both_ways(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def both_ways(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """The published tangent beside the linear regions that its paper compares it with."""
     told = []
     for films in GROUPS:
-        standing = ModelRanking.of(results.table("accuracy"), films, "rotation")
+        standing = ModelRanking.of(rows, films, "rotation")
         if {"tangent", "linear_regions"} <= set(standing.models):
             share = 100.0 * standing.less("tangent", "linear_regions")
             more = f"{number(abs(share), 2)} % {'less' if share > 0.0 else 'more'}"
@@ -111,11 +113,8 @@ def both_ways(study: Scoliosis, results: ResultTables) -> Iterator[str]:
         )
 
 
-def opposite(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def opposite(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Segments that the films turn the wrong way."""
-    rows = results.table("laws")
-    if rows.empty:
-        return
     segments = rows.drop_duplicates(["specimen", "joint"])
     wrong = segments[segments["opposite"]]
     if wrong.empty:
@@ -137,11 +136,8 @@ def _joints(rows: pd.DataFrame) -> str:
     return _some(words)
 
 
-def constrained(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def constrained(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Stiffness that the films asked to be less than is allowed."""
-    rows = results.table("laws")
-    if rows.empty:
-        return
     parts = [(name, rows[rows["model"] == name]) for name in in_order(rows["model"])]
     held = [(name, part, part[part["constrained"]]) for name, part in parts]
     told = [
@@ -158,11 +154,8 @@ def constrained(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     )
 
 
-def optima(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def optima(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Fits that depend on where they start, or did not settle."""
-    rows = results.table("laws")
-    if rows.empty:
-        return
     fits = rows.dropna(subset=["fit_status"]).drop_duplicates(["specimen", "model"])
     lost = fits[fits["fit_status"] == Status.NOT_CONVERGED.value]
     several = fits[fits["n_optima"] > 1]
@@ -177,11 +170,8 @@ def optima(study: Scoliosis, results: ResultTables) -> Iterator[str]:
             yield f"{len(some)} of {count(len(fits), 'fit')} to films {told}: {_some(places)}."
 
 
-def ratios(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def ratios(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """What films do not tell, where it comes from, and how much hangs on it."""
-    rows = results.table("positions")
-    if rows.empty:
-        return
     moment, mean = study.scale.apical_moment_nm, study.scale.mean_stiffness_nm_per_rad
     sources = {
         "apical_moment": f"the apical moment of {number(moment)} N m that the study states",
@@ -192,7 +182,10 @@ def ratios(study: Scoliosis, results: ResultTables) -> Iterator[str]:
         "Films tell ratios of stiffness between segments only; the size of all of them comes from "
         f"{listed(named)}."
     )
-    scale = _varied(results, "scale").dropna(subset=["moved_deg"])
+    varied = results.table("variation")
+    if varied.empty:
+        return
+    scale = varied[varied["varied"] == "scale"].dropna(subset=["moved_deg"])
     if len(scale):
         low, high = scale["value"].min(), scale["value"].max()
         yield (
@@ -201,10 +194,9 @@ def ratios(study: Scoliosis, results: ResultTables) -> Iterator[str]:
         )
 
 
-def by_films(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def by_films(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Whose stiffness a fitted one is: the patient's, or that of all."""
-    rows = results.table("laws")
-    asked = rows[rows["identifiable"].notna()] if len(rows) else rows
+    asked = rows[rows["identifiable"].notna()]
     if asked.empty:
         return
     known = asked["identifiable"].astype(bool)
@@ -222,12 +214,12 @@ def by_films(study: Scoliosis, results: ResultTables) -> Iterator[str]:
         yield f"At {listed(few)} films tell both ends in fewer than half of the patients."
 
 
-def enlargement(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def enlargement(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Which enlargement of the published ends has the least error."""
-    rows = _varied(results, "enlargement").dropna(subset=["rotation_rmse_deg"])
+    tried = rows[rows["varied"] == "enlargement"].dropna(subset=["rotation_rmse_deg"])
     told = []
     for films in GROUPS:
-        own = rows[rows["films"] == films]
+        own = tried[tried["films"] == films]
         if len(own):
             best = own.sort_values("rotation_rmse_deg", kind="stable").iloc[0]
             error = number(float(best["rotation_rmse_deg"]))
@@ -240,17 +232,8 @@ def enlargement(study: Scoliosis, results: ResultTables) -> Iterator[str]:
         )
 
 
-def _varied(results: ResultTables, what: str) -> pd.DataFrame:
-    rows = results.table("variation")
-    columns = ["films", "value", "moved_deg", "rotation_rmse_deg"]
-    return pd.DataFrame(columns=columns) if rows.empty else rows[rows["varied"] == what]
-
-
-def parameters(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def parameters(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """How many numbers each model takes from a patient's films."""
-    rows = results.table("positions")
-    if rows.empty:
-        return
     told = []
     for name in in_order(rows["model"]):
         own = rows[rows["model"] == name]
@@ -266,11 +249,8 @@ def parameters(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     )
 
 
-def beyond(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def beyond(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Held-out rotations that the published law has no load for."""
-    rows = results.table("displacements")
-    if rows.empty:
-        return
     own = rows[~rows["fitted"].astype(bool)].drop_duplicates(["specimen", "position", "joint"])
     over = own[own["share_of_range"] > 1.0]
     if len(own):
@@ -281,11 +261,8 @@ def beyond(study: Scoliosis, results: ResultTables) -> Iterator[str]:
         )
 
 
-def sizes(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def sizes(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """Whether films were brought to one size."""
-    rows = results.table("positions")
-    if rows.empty:
-        return
     films = rows.drop_duplicates(["specimen", "position"])
     scaled = films[(films["film_scale"] - 1.0).abs() > _SCALED]
     chord = films["chord_ratio"]
@@ -303,14 +280,26 @@ def sizes(study: Scoliosis, results: ResultTables) -> Iterator[str]:
     )
 
 
-def beside_the_paper(study: Scoliosis, results: ResultTables) -> Iterator[str]:
+def beside_the_paper(study: Scoliosis, results: ResultTables, rows: pd.DataFrame) -> Iterator[str]:
     """How published quantities were judged."""
-    told = judged(results.table("against_jalalian_2017"))
+    told = judged(rows)
     if told:
         yield capital(told)
 
 
-MAKERS: tuple[Finding, ...] = (
-    *(ended, errors, both_ways, opposite, constrained, optima, ratios),
-    *(by_films, enlargement, parameters, beyond, sizes, beside_the_paper),
-)
+FINDINGS: Mapping[Finding, str] = {
+    ended: "positions",
+    errors: "accuracy",
+    both_ways: "accuracy",
+    opposite: "laws",
+    constrained: "laws",
+    optima: "laws",
+    ratios: "positions",
+    by_films: "laws",
+    enlargement: "variation",
+    parameters: "positions",
+    beyond: "displacements",
+    sizes: "positions",
+    beside_the_paper: "against_jalalian_2017",
+}
+"""In the order of the page, with the table that each is about."""

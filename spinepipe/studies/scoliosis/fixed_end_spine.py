@@ -81,6 +81,7 @@ def with_springs(model: SpineModel, springs: Array) -> SpineModel:
 def with_laws(model: SpineModel, springs: Array, laws: Array) -> SpineModel:
     """The chain on bounded tangents (S, 3) in lateral bending and springs in the rest."""
     others = springs.copy()
+    # the tangent bends in place of the spring; a bushing may not have nothing at all
     others[:, BENDING] = LEAST_NM_PER_RAD
     tangent = ScopedEffect(create("bounded_tangent", {}), _all(model), laws)
     return replace(model, effects=(*with_springs(model, others).effects, tangent))
@@ -91,7 +92,7 @@ def _all(model: SpineModel) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class Posed:
+class SpinePose:
     """A position as a model has it.
 
     Attributes
@@ -101,7 +102,7 @@ class Posed:
     axes : (n, 6) twist of each coordinate: angular, and linear at the origin of ground.
     """
 
-    held: PrescribedResult
+    result: PrescribedResult
     film: Film
     r: Array
     points: Array
@@ -111,6 +112,8 @@ class Posed:
     @property
     def film_by(self) -> Array:
         """(3, S, n) change of right, up and tilt of all vertebrae but the lowest with q (n,)."""
+        # a unit twist (w, v) moves a point p by v + w x p, and turns a line u by w x u; the tilt is
+        # the angle of u in the coronal plane. A joint carries the vertebrae above it alone.
         around, along = self.axes[:, :3].T, self.axes[:, 3:].T
         x, y, z = self.points.T[..., None]
         right = along[2] + around[0] * y - around[1] * x
@@ -128,15 +131,15 @@ class Posed:
         held_by : (n, m) changes of what the joints hold. top_by : (3, m) m, m and rad, of where
             the uppermost vertebra is held.
         """
-        assert self.held.answers is not None  # a pose that was found has them
+        assert self.result.answers is not None  # a pose that was found has them
         if top_by is None:
-            return self.held.answers.to(held_by)[0]
-        level = np.zeros((len(self.held.pushes) - len(top_by), top_by.shape[1]))
-        return self.held.answers.to(held_by, np.vstack([top_by, level]))[0]
+            return self.result.answers.to(held_by)[0]
+        level = np.zeros((len(self.result.pushes) - len(top_by), top_by.shape[1]))
+        return self.result.answers.to(held_by, np.vstack([top_by, level]))[0]
 
 
 @dataclass(frozen=True, eq=False)
-class HeldSpine:
+class FixedEndSpine:
     """A model whose uppermost vertebra is put where a film has it.
 
     Attributes
@@ -149,7 +152,7 @@ class HeldSpine:
     ask: Ask = alone
 
     @classmethod
-    def of(cls, model: SpineModel, erect: Film, level: bool) -> "HeldSpine":
+    def of(cls, model: SpineModel, erect: Film, level: bool) -> "FixedEndSpine":
         """The spine of a model; `level` tells whether its top may not tip to the front."""
         top = model.n_joints - 1
         point, line = np.array([0.0, erect.up[-1], erect.right[-1]]), _lines(erect.tilt[-1])
@@ -160,28 +163,31 @@ class HeldSpine:
         )
         if level:
             grips = (*grips, Tilt(top, ANTERIOR, ANTERIOR, UP))
+        # translations are locked, rotations free
         free = np.tile([False] * 3 + [True] * 3, model.n_joints)
         return cls(HeldChain(model, grips, free), erect)
 
-    def with_values(self, *values: Array) -> "HeldSpine":
+    def with_values(self, *values: Array) -> "FixedEndSpine":
         """The same spine with other values of its laws."""
         return replace(self, chain=self.chain.with_values(values))
 
-    def with_model(self, model: SpineModel) -> "HeldSpine":
+    def with_model(self, model: SpineModel) -> "FixedEndSpine":
         """The same spine on other stiffness."""
         return self.with_values(*(scoped.values for scoped in model.effects))
 
-    def at(self, top: Array, start: PrescribedResult | None = None) -> Posed:
+    def at(self, top: Array, start: PrescribedResult | None = None) -> SpinePose:
         """The pose with the uppermost vertebra at a place (right, up; m) and tilt (rad)."""
         wanted = np.concatenate([top, np.zeros(len(self.chain.prescriptions) - len(top))])
-        held = hold_at(self.chain, wanted, start, self.ask)
-        erect, (axes, turned, shifted) = self.erect, self.chain.motion(held.q)
+        result = hold_at(self.chain, wanted, start, self.ask)
+        erect, (axes, turned, shifted) = self.erect, self.chain.motion(result.q)
         centres = np.column_stack([np.zeros(len(turned)), erect.up[1:], erect.right[1:]])
         points = (turned @ centres[..., None])[..., 0] + shifted
         lines = (turned @ _lines(erect.tilt[1:])[..., None])[..., 0]
         above = (points[:, 2], points[:, 1], np.arctan2(lines[:, 2], lines[:, 1]))
         film = Film(*(np.append(a[0], b) for a, b in zip(erect.rows, above, strict=True)))
-        return Posed(held, film, film.turned - erect.turned, points, lines, axes.reshape(-1, 6))
+        return SpinePose(
+            result, film, film.turned - erect.turned, points, lines, axes.reshape(-1, 6)
+        )
 
 
 def _lines(tilts: Array | float) -> Array:

@@ -158,17 +158,15 @@ def _sure(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:
             "test of it."
         )
     which = ("the next", *(TOLD[name] for name in list(ps)[1:]))
-    told = [f"from {name} it is {_verdict(p)}" for name, p in zip(which, ps.values(), strict=True)]
+    told = []
+    for name, p in zip(which, ps.values(), strict=True):
+        found = "significant" if p is not None and p < SIGNIFICANT else "not significant"
+        verdict = "not tested" if p is None else f"{found} (p {number(p, 2)})"
+        told.append(f"from {name} it is {verdict}")
     return (
         f"The difference over {patients}, by paired Wilcoxon tests corrected by Holm's method: "
         f"{', '.join(told)}."
     )
-
-
-def _verdict(p: float | None) -> str:
-    if p is None:
-        return "not tested"
-    return f"{'significant' if p < SIGNIFICANT else 'not significant'} (p {number(p, 2)})"
 
 
 def above_noise(standing: ModelRanking) -> str:

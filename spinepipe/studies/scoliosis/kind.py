@@ -10,8 +10,8 @@ from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.scoliosis.checks import check_scoliosis
 from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
-from spinepipe.studies.scoliosis.jalalian_2017 import reproduces
 from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.tables import JALALIAN_2017_COHORTS
 from spinepipe.studies.study_files import Figure, StudyFiles
 
 OF_JOBS = ("laws", "positions", "displacements", "curves")
@@ -91,7 +91,7 @@ class ScoliosisFiles(StudyFiles):
     @classmethod
     def of(cls, study: Scoliosis, cohort: Cohort) -> "ScoliosisFiles":
         """The files of a study of a cohort."""
-        rebuilt = reproduces(cohort.name) and beside()
+        rebuilt = cohort.name in JALALIAN_2017_COHORTS and beside()
         return cls(study, cohort.specimen_names, rebuilt)
 
     @property
@@ -147,7 +147,7 @@ KIND = Kind(
     tables=all_declared(__file__),
     jobs=(
         Job("personalise", many=True, ignores=ignoring("models"), also=_population),
-        Job("population", "learn", makes=("population",), ignores=ignoring("models")),
+        Job("population", "fit_population", makes=("population",), ignores=ignoring("models")),
         Job("variants", ignores=ignoring("models")),
         *_ANALYSES,
     ),

@@ -86,10 +86,12 @@ def optimum(
         holder.near = {}
         return point(x)
 
+    # trials from poses near by
     holder.near = dict(near)
     ended = _ended(once(point), begin, limits, settled)
     if ended is None:
         return None
+    # the same poses from neutral; where they are others, a fit with such poses alone
     trials = holder.near
     found = from_neutral(ended.x)
     led = found is not None and all(
@@ -100,6 +102,7 @@ def optimum(
         found = None if ended is None else from_neutral(ended.x)
     if ended is None or found is None:
         return None
+    # how it ended: the slope of the sum of squares, in scales, along what no bound holds
     low, high, scale = limits
     at_bound = (ended.x - low < AT_BOUND * scale) | (high - ended.x < AT_BOUND * scale)
     slope = 2.0 * np.abs(found[0] @ found[1] * scale)[~at_bound].max(initial=0.0)

@@ -12,7 +12,6 @@ from spinepipe.report.page.document import (
 from spinepipe.studies.scoliosis.films import HELD_OUT
 from spinepipe.studies.scoliosis.findings import findings
 from spinepipe.studies.scoliosis.headline import headline
-from spinepipe.studies.scoliosis.jalalian_2017 import reproduces
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import (
     ACCURACY,
@@ -20,6 +19,7 @@ from spinepipe.studies.scoliosis.tables import (
     BY_RANGE,
     CURVES,
     DISPLACEMENTS,
+    JALALIAN_2017_COHORTS,
     LAWS,
     POPULATION,
     POSITIONS,
@@ -60,7 +60,7 @@ def document(study: Scoliosis, cohort: Cohort, results: ResultTables) -> Documen
         metadata=results.metadata,
         left_out=(
             *left_out(study, cohort),
-            *papers.left_out("Jalalian et al. 2017", reproduces(cohort.name)),
+            *papers.left_out("Jalalian et al. 2017", cohort.name in JALALIAN_2017_COHORTS),
         ),
         headline=Headline(_joined(found.words), _joined(found.how_sure), found.warnings),
     )

@@ -23,10 +23,11 @@ from spinepipe.model import SpineModel
 from spinepipe.statics.prescribed import PrescribedResult
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.curve_angles import SpinalCurve, curves, lumbar_apex
-from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, Film, Read, read_films
+from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, Film, PatientFilms, read_films
 from spinepipe.studies.scoliosis.fixed_end_spine import (
     BENDING,
-    HeldSpine,
+    FixedEndSpine,
+    SpinePose,
     geometry,
     with_laws,
     with_springs,
@@ -36,11 +37,12 @@ from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
     EndRotations,
     Flags,
+    LinearShape,
     Pairs,
-    Straight,
     characterise,
     ends_of,
 )
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 FARTHEST_MULTIPLIER = np.log(10.0)
 """Petit 2004 reports multipliers of regions up to 10."""
@@ -50,6 +52,11 @@ START_SHARES = (-0.5, 0.5)
 
 SETTLED = DescentTolerances(cost=1e-6, step=1e-4, slope=1e-10, evaluations=50)
 """Multipliers to a ten-thousandth."""
+
+POSED = (PrescribedStatus.CONVERGED, PrescribedStatus.UNREACHABLE)
+"""How a solve may end whose pose is held against the film."""
+
+ERRORS = ("rotation_rmse_deg", "place_rmse_mm", "tilt_rmse_deg")
 
 Regions = NDArray[np.int64]
 
@@ -69,7 +76,7 @@ class Patient:
     """
 
     name: str
-    read: Read
+    read: PatientFilms
     chain: SpineModel
     size: float
     springs: Array
@@ -81,9 +88,23 @@ class Patient:
         """The film that all others are held against."""
         return self.read.films[ERECT]
 
-    def held(self, model: SpineModel) -> HeldSpine:
+    def fixed_end(self, model: SpineModel) -> FixedEndSpine:
         """A model of the patient, to be held where films have its top."""
-        return HeldSpine.of(model, self.erect, self.level)
+        return FixedEndSpine.of(model, self.erect, self.level)
+
+    def errors(self, position: str, posed: SpinePose) -> dict[str, float | None]:
+        """Root mean square errors of a pose, all segments and vertebrae; None without a pose."""
+        if posed.result.status not in POSED:
+            return dict.fromkeys(ERRORS)
+        film = self.read.films[position]
+        away = np.hypot(posed.film.right - film.right, posed.film.up - film.up)[1:]
+        errors = (
+            DEG_PER_RAD * (posed.r - self.read.turned(position)),
+            MM_PER_M * away,
+            DEG_PER_RAD * (posed.film.tilt - film.tilt)[1:],
+        )
+        sizes = (float(np.sqrt(np.mean(one**2))) for one in errors)
+        return dict(zip(ERRORS, sizes, strict=True))
 
     @cached_property
     def curves(self) -> tuple[SpinalCurve, ...]:
@@ -99,7 +120,7 @@ class Fitting(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Personal:
+class PersonalModel:
     """A personalised model.
 
     Attributes
@@ -144,16 +165,13 @@ def patient_of(study: Scoliosis, cohort: Cohort, name: str) -> Patient:
         )
         for position in (RIGHT, LEFT)
     )
-    pairs = Pairs(read.turned(RIGHT), read.turned(LEFT), right, left, _apex(erect, cohort))
+    # the segment below the apical vertebra of the thoracolumbar or lumbar curve
+    apex = max(lumbar_apex(erect, cohort.vertebrae) - 1, 0)
+    pairs = Pairs(read.turned(RIGHT), read.turned(LEFT), right, left, apex)
     size = size_of(pairs, study)
     stated = np.array(study.stiffness.in_order(), dtype=float)
     springs = np.tile(stated * size / stated[BENDING], (chain.n_joints, 1))
     return Patient(name, read, chain, size, springs, pairs, not study.top_may_tip)
-
-
-def _apex(erect: Film, cohort: Cohort) -> int:
-    """The segment below the apical vertebra of the thoracolumbar or lumbar curve."""
-    return max(lumbar_apex(erect, cohort.vertebrae) - 1, 0)
 
 
 def arms(share: float, film: Film, across_chord: bool) -> Array:
@@ -185,38 +203,39 @@ def geometric_mean(values: Array) -> float:
     return float(np.exp(np.mean(np.log(values))))
 
 
-def tangent(patient: Patient, study: Scoliosis) -> Personal:
+def tangent(patient: Patient, study: Scoliosis) -> PersonalModel:
     """The published model: tangent laws of the two bending films."""
     ends = ends_of(patient.pairs, study.enlargement)
     laws = characterise(patient.pairs, ends, study.scale.apical_moment_nm)
     at_rest = ends.at_rest(laws.stretch)
+    # all models have one size: films decide ratios, the scale comes from outside
     factor = patient.size / geometric_mean(at_rest)
     values = np.column_stack([factor * laws.stretch, ends.lower, ends.upper])
     model = with_laws(patient.chain, patient.springs, values)
     free = 3 * len(at_rest) + 1
-    return Personal(model, factor * at_rest, ends, laws.constrained, free, free)
+    return PersonalModel(model, factor * at_rest, ends, laws.constrained, free, free)
 
 
-def linear_per_segment(patient: Patient, study: Scoliosis) -> Personal:
+def linear_per_segment(patient: Patient, study: Scoliosis) -> PersonalModel:
     """A spring for each segment from the same pairs."""
-    laws = characterise(patient.pairs, Straight(), study.scale.apical_moment_nm)
+    laws = characterise(patient.pairs, LinearShape(), study.scale.apical_moment_nm)
     at_rest = laws.stretch * patient.size / geometric_mean(laws.stretch)
     model = with_springs(patient.chain, _with_bending(patient, at_rest))
     free = len(at_rest) + 1
-    return Personal(model, at_rest, None, laws.constrained, free, free)
+    return PersonalModel(model, at_rest, None, laws.constrained, free, free)
 
 
-def uniform(patient: Patient, study: Scoliosis) -> Personal:
+def uniform(patient: Patient, study: Scoliosis) -> PersonalModel:
     """The same spring everywhere: nothing is taken from the films."""
     return _springs(patient, patient.springs[:, BENDING], 0)
 
 
-def _springs(patient: Patient, at_rest: Array, free: int) -> Personal:
+def _springs(patient: Patient, at_rest: Array, free: int) -> PersonalModel:
     model = with_springs(patient.chain, _with_bending(patient, at_rest))
-    return Personal(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), free, free)
+    return PersonalModel(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), free, free)
 
 
-def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
+def linear_regions(patient: Patient, study: Scoliosis) -> PersonalModel:
     """Petit's scheme: a multiplier of the springs for each curve, by the curves' Ferguson angles.
 
     With the uppermost vertebra held in place only ratios of the multipliers count.
@@ -229,7 +248,8 @@ def linear_regions(patient: Patient, study: Scoliosis) -> Personal:
             return personal
         # no start has poses with the uppermost vertebra where the films have it
         return replace(personal, fitting=Fitting(Status.NOT_CONVERGED, n_optima))
-    held = np.append(found.at_bound, found.at_bound.any())  # multipliers are over the last region's
+    # multipliers are over the last region's, which is held where any other is
+    held = np.append(found.at_bound, found.at_bound.any())
     personal = _springs(patient, fit.stiffness(found.x), free)
     fitting = Fitting(found.status, n_optima)
     return replace(personal, constrained=held[fit.regions], fitting=fitting)
@@ -259,9 +279,10 @@ class RegionFit:
     def __init__(self, patient: Patient, regions: Regions) -> None:
         self.patient, self.start = patient, patient.springs[:, BENDING]
         self.regions = regions
+        # columns sum to nought, so that the geometric mean stays; the last multiplier follows
         own = np.eye(int(regions.max()) + 1)[regions]
         self.by_logs = (own - own.mean(axis=0))[:, :-1]  # (S, k - 1) of the segments' logarithms
-        self.spine = patient.held(with_springs(patient.chain, patient.springs))
+        self.spine = patient.fixed_end(with_springs(patient.chain, patient.springs))
         self.near: dict[str, PrescribedResult] = {}
 
     def stiffness(self, logs: Array) -> Array:
@@ -277,10 +298,11 @@ class RegionFit:
         for position in (RIGHT, LEFT):
             film = patient.read.films[position]
             posed = spine.at(film.top, self.near.get(position))
-            if posed.held.status is not PrescribedStatus.CONVERGED:
+            if posed.result.status is not PrescribedStatus.CONVERGED:
                 return None
-            self.near[position] = posed.held
-            q = posed.held.q.reshape(-1, 6)
+            self.near[position] = posed.result
+            q = posed.result.q.reshape(-1, 6)
+            # a spring k exp(b x) holds k exp(b x) q: its change with x is b times that
             held_by = np.zeros((*q.shape, len(logs)))
             held_by[:, BENDING] = (springs * q[:, BENDING])[:, None] * self.by_logs
             change = posed.answers_to(held_by.reshape(q.size, -1))
@@ -304,7 +326,7 @@ def _with_bending(patient: Patient, at_rest: Array) -> Array:
     return springs
 
 
-WAYS: Mapping[str, Callable[[Patient, Scoliosis], Personal]] = {
+WAYS: Mapping[str, Callable[[Patient, Scoliosis], PersonalModel]] = {
     "tangent": tangent,
     "linear_regions": linear_regions,
     "linear_per_segment": linear_per_segment,

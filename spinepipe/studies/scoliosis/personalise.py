@@ -15,10 +15,9 @@ from spinepipe.studies.scoliosis.curve_angles import region
 from spinepipe.studies.scoliosis.film_fit import FilmFit, NoFit
 from spinepipe.studies.scoliosis.film_regions import regions
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
-from spinepipe.studies.scoliosis.fixed_end_spine import Posed
-from spinepipe.studies.scoliosis.personal import WAYS, Patient, Personal, patient_of
-from spinepipe.studies.scoliosis.population_table import population_of
-from spinepipe.studies.scoliosis.residuals import POSED, miss_of
+from spinepipe.studies.scoliosis.fixed_end_spine import SpinePose
+from spinepipe.studies.scoliosis.personal import POSED, WAYS, Patient, PersonalModel, patient_of
+from spinepipe.studies.scoliosis.population import population_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
 from spinepipe.studies.scoliosis.tangent_laws import ends_of
@@ -73,7 +72,7 @@ def rows_of(
     """Rows of each table, by its name."""
     patient = patient_of(settings, cohort, specimen)
     personal, message = _personal(settings, patient, model, population)
-    spine = patient.held(personal.model)
+    spine = patient.fixed_end(personal.model)
     known: Row = {"specimen": specimen, "model": model}
     taken: Row = {
         "free_parameters": personal.free,
@@ -95,13 +94,13 @@ def rows_of(
             continue
         posed = spine.at(patient.read.films[position].top)
         where = known | {"position": position, "fitted": position in (RIGHT, LEFT)}
-        ended: Row = {"status": posed.held.status.value}
+        ended: Row = {"status": posed.result.status.value}
         found[POSITIONS.name].append(
             where
             | _position(patient, position, posed)
             | taken
             | ended
-            | {"message": joined(message, posed.held.message)}
+            | {"message": joined(message, posed.result.message)}
         )
         for table, rows in (
             (DISPLACEMENTS, _displacements(settings, patient, position, posed)),
@@ -113,7 +112,7 @@ def rows_of(
 
 def _personal(
     settings: Scoliosis, patient: Patient, model: str, population: pd.DataFrame | None
-) -> tuple[Personal, str]:
+) -> tuple[PersonalModel, str]:
     """The model, and what is to be said of how it was come by."""
     if population is None:
         personal = WAYS[model](patient, settings)
@@ -126,13 +125,12 @@ def _personal(
         return fit.unfitted(everyone), f"not fitted: {why}; stiffness is that of the population"
     personal = fit.personal(fitted)
     unsettled = UNSETTLED if (population["status"] == Status.NOT_CONVERGED.value).any() else ""
-    told = joined(unsettled, _of_fit(personal))
-    if not settings.film_regions:
-        return personal, told
-    return replace(personal, by_films=regions(fit, everyone, fitted)), told
+    if settings.film_regions:
+        personal = replace(personal, by_films=regions(fit, everyone, fitted))
+    return personal, joined(unsettled, _of_fit(personal))
 
 
-def _of_fit(personal: Personal) -> str:
+def _of_fit(personal: PersonalModel) -> str:
     """What is to be said of a fit to the films."""
     if personal.fitting is None:
         return ""
@@ -142,16 +140,23 @@ def _of_fit(personal: Personal) -> str:
     return joined(told, several)
 
 
-def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
+def _laws(patient: Patient, personal: PersonalModel) -> Iterator[Row]:
     ends, reach = personal.ends, personal.ratio_range
     for number, joint in enumerate(patient.chain.joints):
+        # how far the films let the segment's ratio go, where they were asked
+        by_films: Row = dict.fromkeys((*REGION, "identifiable"))
+        if personal.by_films is not None:
+            region_ends = personal.by_films[number]
+            open_ends = region_ends.open_below, region_ends.open_above
+            cells = (region_ends.low, region_ends.high, *open_ends)
+            by_films = dict(zip(REGION, cells, strict=True)) | {"identifiable": not any(open_ends)}
         yield {
             "joint": joint,
             "at_rest_nm_per_rad": float(personal.at_rest[number]),
             "ratio": float(personal.ratio[number]),
             "ratio_low": None if reach is None else float(reach[0, number]),
             "ratio_high": None if reach is None else float(reach[1, number]),
-            **_by_films(personal, number),
+            **by_films,
             "lower_end_deg": None if ends is None else DEG_PER_RAD * float(ends.lower[number]),
             "upper_end_deg": None if ends is None else DEG_PER_RAD * float(ends.upper[number]),
             "opposite": bool(patient.pairs.opposite[number]),
@@ -159,36 +164,26 @@ def _laws(patient: Patient, personal: Personal) -> Iterator[Row]:
         }
 
 
-def _by_films(personal: Personal, number: int) -> Row:
-    """How far the films let a segment's ratio go."""
-    if personal.by_films is None:
-        return dict.fromkeys((*REGION, "identifiable"))
-    reach = personal.by_films[number]
-    cells = (reach.low, reach.high, reach.open_below, reach.open_above)
-    known = not (reach.open_below or reach.open_above)
-    return dict(zip(REGION, cells, strict=True)) | {"identifiable": known}
-
-
-def _position(patient: Patient, position: str, posed: Posed) -> Row:
-    missed = posed.held.missed
-    there = posed.held.status in POSED
-    pushes = dict(zip(PUSHES, posed.held.pushes.tolist(), strict=False)) if there else {}
+def _position(patient: Patient, position: str, posed: SpinePose) -> Row:
+    missed = posed.result.missed
+    there = posed.result.status in POSED
+    pushes = dict(zip(PUSHES, posed.result.pushes.tolist(), strict=False)) if there else {}
     return {
         "missed_mm": MM_PER_M * float(np.hypot(*missed[:2])),
         "missed_deg": DEG_PER_RAD * abs(float(missed[2])),
         "chord_ratio": patient.read.chord(position),
         "film_scale": patient.read.scales[position],
-        **miss_of(patient, position, posed),
+        **patient.errors(position, posed),
         **{name: pushes.get(name) for name in PUSHES},
     }
 
 
 def _displacements(
-    settings: Scoliosis, patient: Patient, position: str, posed: Posed
+    settings: Scoliosis, patient: Patient, position: str, posed: SpinePose
 ) -> Iterator[Row]:
     ends, film = ends_of(patient.pairs, settings.enlargement), patient.read.films[position]
     off = MM_PER_M * np.stack([posed.film.right - film.right, posed.film.up - film.up], axis=1)[1:]
-    measured, there = patient.read.turned(position), posed.held.status in POSED
+    measured, there = patient.read.turned(position), posed.result.status in POSED
     sides = np.where(measured > 0.0, ends.upper, -ends.lower)
     for number, joint in enumerate(patient.chain.joints):
         yield {
@@ -202,8 +197,8 @@ def _displacements(
         }
 
 
-def _curves(cohort: Cohort, patient: Patient, position: str, posed: Posed) -> Iterator[Row]:
-    film, there = patient.read.films[position], posed.held.status in POSED
+def _curves(cohort: Cohort, patient: Patient, position: str, posed: SpinePose) -> Iterator[Row]:
+    film, there = patient.read.films[position], posed.result.status in POSED
     for number, curve in enumerate(patient.curves):
         simulated = {
             "cobb_simulated_deg": DEG_PER_RAD * curve.cobb(posed.film) if there else None,

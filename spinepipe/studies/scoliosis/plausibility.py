@@ -14,7 +14,14 @@ from spinepipe.plausibility.score import suspect, usual
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.levels import spacing_mm
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
-from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film, by_reading, corners, placed
+from spinepipe.studies.scoliosis.films import (
+    CENTRE,
+    CORNERS,
+    Film,
+    by_reading,
+    corners,
+    film_of_rows,
+)
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 WITH = 0.7
@@ -66,18 +73,15 @@ def _fault(cohort: Cohort, rows: pd.DataFrame) -> _Fault | None:
     films = []
     for _, film in rows.groupby("position", sort=False):
         for reading in by_reading(film):
-            if sorted(reading["vertebra"]) == sorted(cohort.vertebrae) and _whole(reading):
-                films.append(placed(reading, cohort.vertebrae))
+            whole = any(reading[list(c)].notna().all(axis=None) for c in (CENTRE, CORNERS))
+            if sorted(reading["vertebra"]) == sorted(cohort.vertebrae) and whole:
+                films.append(film_of_rows(reading, cohort.vertebrae))
     if not films:
         return None
     if rows[list(CORNERS)].notna().all(axis=None):
         return _corners(rows) or _direction(films, *CORNERS[:2]) or _size(cohort, films, CORNERS)
     found = _direction(films, *CENTRE[:2]) or _size(cohort, films, CENTRE[:2])
     return found or _tilts(films)
-
-
-def _whole(rows: pd.DataFrame) -> bool:
-    return any(bool(rows[list(names)].notna().all(axis=None)) for names in (CENTRE, CORNERS))
 
 
 def _direction(films: list[Film], y: str, z: str) -> _Fault | None:
@@ -120,6 +124,7 @@ def _tilts(films: list[Film]) -> _Fault | None:
         return None
     if np.ptp(tilt) == 0.0:
         return _Fault("tilts_alike", CENTRE[2])
+    # cosine between tilts and line over all films, and how large the one is beside the other
     alike = float(tilt @ line) / float(np.linalg.norm(tilt) * np.linalg.norm(line))
     share = float(np.linalg.norm(tilt) / np.linalg.norm(line))
     if alike < -WITH:

@@ -10,12 +10,17 @@ Where patients are few or films are read coarsely, the assumptions below decide,
 count as so many observations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from scipy.stats import norm
 
 from spinepipe.effects.contract import Array
+from spinepipe.status import Status, joined
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 PER_SEGMENT = ("ratio", "lower_end", "upper_end")
 """The numbers of a segment; those of a patient are in this order, (3 S,)."""
@@ -67,6 +72,7 @@ class Population:
         s = self.segments
         found = np.zeros((3 * s, 3 * s))
         found[:s, :s] = np.eye(s) / self.ratio_sd**2
+        # Sherman-Morrison: the ends have covariance sd^2 I plus one shared variance everywhere
         shared = PATIENT_SPREAD**2 / (self.end_sd**2 + 2 * s * PATIENT_SPREAD**2)
         found[s:, s:] = (np.eye(2 * s) - shared) / self.end_sd**2
         return found
@@ -77,13 +83,14 @@ class Population:
         s = self.segments
         found = np.zeros((3 * s, 3 * s))
         found[:s, :s] = np.eye(s) / self.ratio_sd
+        # eigenvectors of the ends' covariance: their mean, and all that is across it
         whole = np.hypot(self.end_sd, np.sqrt(2 * s) * PATIENT_SPREAD)
         alike = np.full((2 * s, 2 * s), 1.0 / (2 * s))
         found[s:, s:] = (np.eye(2 * s) - alike) / self.end_sd + alike / whole
         return found
 
 
-def assumed(segments: int) -> Population:
+def usual_population(segments: int) -> Population:
     """What is taken for granted before any film."""
     mean = np.repeat([0.0, np.log(END_RAD), np.log(END_RAD)], segments)
     return Population(mean, RATIO_SPREAD, END_SPREAD)
@@ -97,8 +104,11 @@ class PatientPrior:
     covariance: Array
 
 
-def learned(before: Population, patients: Sequence[PatientPrior]) -> Population:
-    """The population that patients, known by means of the one before, make likeliest."""
+def update_population(before: Population, patients: Sequence[PatientPrior]) -> Population:
+    """The population that patients, known by means of the one before, make likeliest.
+
+    The maximisation of expectation and maximisation: squares of means and what is unsure of them.
+    """
     means = np.array([one.mean for one in patients])
     means[:, : before.segments] -= means[:, : before.segments].mean(axis=1, keepdims=True)
     after = replace(before, mean=_level_means(before, means))
@@ -112,6 +122,7 @@ def learned(before: Population, patients: Sequence[PatientPrior]) -> Population:
 def _level_means(before: Population, means: Array) -> Array:
     """(3 S,): levels are drawn towards their common mean, the ends' one towards the usual end."""
     count, s = means.shape[0], before.segments
+    # shrinkage of normal means: prior variance over prior variance and that of the mean of patients
     kept = LEVEL_RATIO_SPREAD**2 / (LEVEL_RATIO_SPREAD**2 + before.ratio_sd**2 / count)
     ratios = kept * means[:, :s].mean(axis=0)
     ends = means[:, s:].mean(axis=0)
@@ -134,6 +145,7 @@ def _end_sd(after: Population, means: Array, patients: Sequence[PatientPrior]) -
     s, total = after.segments, 0.0
     for mean, one in zip(means, patients, strict=True):
         away = (mean - after.mean)[s:]
+        # expected squares of the deviations, less those of their mean, which all ends share
         moment = np.outer(away, away) + one.covariance[s:, s:]
         total += float(np.trace(moment) - moment.sum() / (2 * s))
     return _spread(total, len(patients) * (2 * s - 1), END_SPREAD)
@@ -141,3 +153,68 @@ def _end_sd(after: Population, means: Array, patients: Sequence[PatientPrior]) -
 
 def _spread(squares: float, count: int, usual: float) -> float:
     return float(np.sqrt((squares + ASSUMED_COUNT * usual**2) / (count + ASSUMED_COUNT)))
+
+
+@dataclass(frozen=True)
+class PopulationEstimate:
+    """A population, and how it was come by.
+
+    Attributes
+    ----------
+    change : of the last round. unfitted : patients without a fit, which have no part in it.
+    settled : whether that is little enough.
+    """
+
+    population: Population
+    rounds: int
+    change: float
+    patients: int
+    unfitted: tuple[str, ...]
+    settled: bool
+
+
+def population_rows(
+    found: PopulationEstimate, joints: Sequence[str], sd: Array
+) -> Iterator[dict[str, Any]]:
+    """A row for each quantity and joint."""
+    population = found.population
+    means = population.mean.reshape(len(PER_SEGMENT), -1)
+    spreads = population.sd.reshape(len(PER_SEGMENT), -1)
+    reach_95 = float(norm.ppf(0.975))
+    own = (population.ratio_sd, population.end_sd, population.end_sd)
+    without = f"without {', '.join(found.unfitted)}: no fit" if found.unfitted else ""
+    moving = f"after {found.rounds} rounds a logarithm still changed by {found.change:.2g}"
+    if found.settled or not found.patients:
+        moving = ""
+    for quantity, mean, spread, sd_log in zip(PER_SEGMENT, means, spreads, own, strict=True):
+        unit = DEG_PER_RAD if quantity != "ratio" else 1.0
+        for joint, middle, reach in zip(joints, mean, reach_95 * spread, strict=True):
+            yield {
+                "quantity": quantity,
+                "joint": joint,
+                "unit": "deg" if quantity != "ratio" else "",
+                "mean": unit * float(np.exp(middle)),
+                "low": unit * float(np.exp(middle - reach)),
+                "high": unit * float(np.exp(middle + reach)),
+                "sd_log": sd_log,
+                "n_patients": found.patients,
+                "rounds": found.rounds,
+                "last_change": found.change if np.isfinite(found.change) else None,
+                "place_sd_mm": MM_PER_M * float(sd[0]),
+                "tilt_sd_deg": DEG_PER_RAD * float(sd[2]),
+                "message": joined(without, moving),
+                "status": (Status.CONVERGED if found.settled else Status.NOT_CONVERGED).value,
+            }
+
+
+def population_of(rows: pd.DataFrame) -> tuple[Population, Array]:
+    """The population of a table's rows, and (3,) m, m and rad: SD that films were weighed with."""
+    parts, spreads = [], []
+    for quantity in PER_SEGMENT:
+        chosen = rows[rows["quantity"] == quantity]
+        unit = 1.0 if quantity == "ratio" else DEG_PER_RAD
+        parts.append(np.log(chosen["mean"].to_numpy(float) / unit))
+        spreads.append(float(chosen["sd_log"].iloc[0]))
+    place = float(rows["place_sd_mm"].iloc[0]) / MM_PER_M
+    sd = np.array([place, place, float(rows["tilt_sd_deg"].iloc[0]) / DEG_PER_RAD])
+    return Population(np.concatenate(parts), spreads[0], spreads[1]), sd

@@ -16,9 +16,9 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
 from spinepipe.statistics import StatisticalTest, wilcoxon_signed_rank
 from spinepipe.status import joined
-from spinepipe.studies.scoliosis.errors import by_patient, of_group, squares
+from spinepipe.studies.scoliosis.errors import by_patient, errors_by_measure
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables import GROUPS, MEASURES, STATISTICS
+from spinepipe.studies.scoliosis.tables import MEASURES, STATISTICS
 from spinepipe.tables import from_rows, read_frames, write
 
 
@@ -39,13 +39,11 @@ def all_tests(
     The response is the one model, the factor the other; an effect below zero says that the one has
     the smaller errors.
     """
-    for group in GROUPS:
-        chosen = [of_group(one, group) for one in (positions, displacements, curves)]
-        for measure, (unit, _) in MEASURES.items():
-            values = by_patient(squares(measure, *chosen))
-            for one, other in combinations(values.columns, 2):
-                outcome = compared(values[one], values[other], unit)
-                yield Tested(f"{group}/{measure}", "*", str(one), str(other), group, outcome)
+    for group, measure, errors in errors_by_measure(positions, displacements, curves):
+        values = by_patient(errors)
+        for one, other in combinations(values.columns, 2):
+            outcome = compared(values[one], values[other], MEASURES[measure][0])
+            yield Tested(f"{group}/{measure}", "*", str(one), str(other), group, outcome)
 
 
 def compared(one: "pd.Series[Any]", other: "pd.Series[Any]", unit: str) -> StatisticalTest:

@@ -14,6 +14,10 @@ VARIANTS = declared(__file__, "variants")
 VARIATION = declared(__file__, "variation")
 AGAINST_JALALIAN_2017 = declared(__file__, "against_jalalian_2017")
 
+JALALIAN_2017_COHORTS = ("ais18_phantom", "ais18_phantom_sd07", "ais18_phantom_sd19")
+"""Made-up spines with the sex, age, Lenke class and Cobb angle of Table 1 of Jalalian et al. 2017
+(doi 10.1007/s11517-016-1576-8): only results of these are set beside its numbers."""
+
 GROUPS = ACCURACY.column("films").allowed
 
 MEASURES = {

@@ -93,7 +93,7 @@ class EndRotations:
 
 
 @dataclass(frozen=True)
-class Straight:
+class LinearShape:
     """The shape of linear laws: as many times the rotation as its stiffness says."""
 
     def load(self, r: Array) -> Array:
@@ -105,7 +105,7 @@ class Straight:
         return load
 
 
-Shape = EndRotations | Straight
+Shape = EndRotations | LinearShape
 """How the moments of segments grow with their rotation, but for a factor of each."""
 
 
@@ -129,7 +129,7 @@ class Laws:
 
     Attributes
     ----------
-    shape : of the laws. ratio : force of the left bend over that of the right one.
+    ratio : force of the left bend over that of the right one.
     stretch : (S,) A, N m (of linear laws the stiffness, N m/rad), for forces of which the larger
         has an apical moment as asked.
     constrained : (S,) whether A would have been less or more than it may be.
@@ -137,7 +137,6 @@ class Laws:
     force_right_n, force_left_n : size of the two forces.
     """
 
-    shape: Shape
     ratio: float
     stretch: Array
     constrained: Flags
@@ -163,6 +162,7 @@ def characterise(pairs: Pairs, shape: Shape, apical_nm: float) -> Laws:
     def rmse(log_ratio: float) -> float:
         return _laws(pairs, shape, loads, float(np.exp(log_ratio)), apical_nm).rmse
 
+    # it may have several minima: a grid, then Brent's method between the best one's neighbours
     tried = np.linspace(-FARTHEST_RATIO, FARTHEST_RATIO, RATIOS_TRIED)
     best = int(np.argmin([rmse(one) for one in tried]))
     low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
@@ -173,10 +173,12 @@ def characterise(pairs: Pairs, shape: Shape, apical_nm: float) -> Laws:
 def _laws(pairs: Pairs, shape: Shape, loads: Array, ratio: float, apical_nm: float) -> Laws:
     """The laws with forces of one ratio, regression of their loads (S, 2) through nought (Eq 4)."""
     force = apical_nm / max(pairs.arm_right[pairs.apex], ratio * pairs.arm_left[pairs.apex])
+    # two forces of opposite sense about each segment; regression through nought gives A (Eq 4)
     moments = np.stack([force * pairs.arm_right, -ratio * force * pairs.arm_left], axis=1)
     rotations = np.stack([pairs.right, pairs.left], axis=1)
+    # films that ask for nothing above nought leave no median: the limits are then about 1 N m
     asked = (moments * loads).sum(axis=1) / (loads**2).sum(axis=1)
     middle = float(np.median(asked[asked > 0.0])) if (asked > 0.0).any() else 1.0
     stretch = np.clip(asked, LEAST_SHARE * middle, MOST_SHARE * middle)
     reached = np.stack([shape.rotation(one / stretch) for one in moments.T], axis=1)
-    return Laws(shape, ratio, stretch, asked != stretch, reached - rotations, force, ratio * force)
+    return Laws(ratio, stretch, asked != stretch, reached - rotations, force, ratio * force)

@@ -11,14 +11,11 @@ from typing import Any
 import numpy as np
 
 from spinepipe.cohort import Cohort
-from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.model import SpineModel
 from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
-from spinepipe.studies.scoliosis.fixed_end_spine import HeldSpine, Posed, with_laws
-from spinepipe.studies.scoliosis.personal import Patient, patient_of, tangent
-from spinepipe.studies.scoliosis.residuals import POSED, miss_of
+from spinepipe.studies.scoliosis.fixed_end_spine import FixedEndSpine, SpinePose, with_laws
+from spinepipe.studies.scoliosis.personal import POSED, Patient, patient_of, tangent
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import SINGULAR, VARIANTS
 from spinepipe.studies.scoliosis.tangent_laws import characterise, ends_of
@@ -41,60 +38,49 @@ def variant_rows(settings: Scoliosis, cohort: Cohort, specimen: str) -> Iterator
     """A row for each choice, value and position."""
     patient = patient_of(settings, cohort, specimen)
     studied = tangent(patient, settings).model
-    spine = patient.held(studied)
+    spine = patient.fixed_end(studied)
+    # what the study has is what every variant is told against
     usual = {name: spine.at(film.top) for name, film in _others(patient)}
     for percent in settings.variants.enlargement_percent:
         known: Row = {"specimen": specimen, "varied": "enlargement", "value": percent}
         if percent == 0.0:
-            yield from (known | _singular(name) for name, _ in _others(patient))
+            nothing = ("law_rmse_deg", "rotation_rmse_deg", "place_rmse_mm", "moved_deg")
+            for name, _ in _others(patient):
+                place = {"position": name, "fitted": name in (RIGHT, LEFT)}
+                ended = {"status": SINGULAR, "message": ON_THE_ENDS}
+                yield {**known, **place, **dict.fromkeys(nothing), **ended}
             continue
         other = settings.model_copy(update={"enlargement": 1.0 + percent / 100.0})
-        known["law_rmse_deg"] = _law_rmse(patient, other)
+        # of the laws' rotations under the two forces, all segments and both films
+        ends = ends_of(patient.pairs, other.enlargement)
+        errors = characterise(patient.pairs, ends, other.scale.apical_moment_nm).errors
+        known["law_rmse_deg"] = DEG_PER_RAD * float(np.sqrt(np.mean(errors**2)))
         model = tangent(patient, other).model
-        yield from (known | row for row in _held(patient, spine.with_model(model), usual))
+        yield from (known | row for row in _poses(patient, spine.with_model(model), usual))
     for factor in settings.variants.scale:
         known = {"specimen": specimen, "varied": "scale", "value": factor, "law_rmse_deg": None}
-        stiffer = spine.with_model(_times(patient, studied, factor))
-        yield from (known | row for row in _held(patient, stiffer, usual))
+        stretched = studied.effects[1].values * np.array([factor, 1.0, 1.0])
+        stiffer = spine.with_model(with_laws(patient.chain, patient.springs, stretched))
+        yield from (known | row for row in _poses(patient, stiffer, usual))
 
 
 def _others(patient: Patient) -> Iterator[tuple[str, Any]]:
     return ((name, film) for name, film in patient.read.films.items() if name != ERECT)
 
 
-def _singular(position: str) -> Row:
-    nothing = ("law_rmse_deg", "rotation_rmse_deg", "place_rmse_mm", "moved_deg")
-    where = {"position": position, "fitted": position in (RIGHT, LEFT)}
-    return {**where, **dict.fromkeys(nothing), "status": SINGULAR, "message": ON_THE_ENDS}
-
-
-def _law_rmse(patient: Patient, settings: Scoliosis) -> float:
-    """Of the laws' rotations under the two forces, all segments and both films, deg."""
-    ends = ends_of(patient.pairs, settings.enlargement)
-    moment = settings.scale.apical_moment_nm
-    errors = characterise(patient.pairs, ends, moment).errors
-    return DEG_PER_RAD * float(np.sqrt(np.mean(errors**2)))
-
-
-def _times(patient: Patient, model: SpineModel, factor: float) -> SpineModel:
-    """The model with all its laws so many times as stiff."""
-    stretched: Array = model.effects[1].values * np.array([factor, 1.0, 1.0])
-    return with_laws(patient.chain, patient.springs, stretched)
-
-
-def _held(patient: Patient, spine: HeldSpine, usual: dict[str, Posed]) -> Iterator[Row]:
+def _poses(patient: Patient, spine: FixedEndSpine, usual: dict[str, SpinePose]) -> Iterator[Row]:
     """A row for each film."""
     for position, film in _others(patient):
         posed = spine.at(film.top)
-        there = posed.held.status in POSED and usual[position].held.status in POSED
+        there = posed.result.status in POSED and usual[position].result.status in POSED
         moved = np.abs(posed.r - usual[position].r).max()
-        miss = miss_of(patient, position, posed)
+        errors = patient.errors(position, posed)
         yield {
             "position": position,
             "fitted": position in (RIGHT, LEFT),
-            "rotation_rmse_deg": miss["rotation_rmse_deg"],
-            "place_rmse_mm": miss["place_rmse_mm"],
+            "rotation_rmse_deg": errors["rotation_rmse_deg"],
+            "place_rmse_mm": errors["place_rmse_mm"],
             "moved_deg": DEG_PER_RAD * float(moved) if there else None,
-            "status": posed.held.status.value,
-            "message": posed.held.message,
+            "status": posed.result.status.value,
+            "message": posed.result.message,
         }

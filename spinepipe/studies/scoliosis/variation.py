@@ -25,25 +25,22 @@ def variation_rows(variants: pd.DataFrame) -> Iterator[dict[str, Any]]:
     for (varied, value), rows in variants.groupby(["varied", "value"], sort=False):
         for group in GROUPS:
             chosen = rows[rows["fitted"] == (group == "fitted")]
-            if len(chosen):
-                known = {"varied": varied, "value": value, "films": group}
-                yield known | _over_patients(chosen)
-
-
-def _over_patients(rows: pd.DataFrame) -> dict[str, Any]:
-    """Over those that have a pose on every film; films have equally many segments."""
-    missing = rows.loc[rows["rotation_rmse_deg"].isna(), "specimen"]
-    kept = rows[~rows["specimen"].isin(missing)]
-    if kept.empty:
-        nothing = ("rotation_rmse_deg", "place_rmse_mm", "moved_deg")
-        return {"n_patients": 0, **dict.fromkeys(nothing)}
-    moved = kept["moved_deg"].astype(float)
-    return {
-        "n_patients": int(kept["specimen"].nunique()),
-        **{name: _root_mean_square(kept[name]) for name in ("rotation_rmse_deg", "place_rmse_mm")},
-        "moved_deg": float(moved.max()) if moved.notna().any() else None,
-    }
-
-
-def _root_mean_square(values: "pd.Series[float]") -> float:
-    return float(np.sqrt(np.mean(values.to_numpy(float) ** 2)))
+            if chosen.empty:
+                continue
+            # patients with a pose on every film; films have equally many segments
+            lost = chosen.loc[chosen["rotation_rmse_deg"].isna(), "specimen"]
+            posed = chosen[~chosen["specimen"].isin(lost)]
+            moved = posed["moved_deg"].astype(float)
+            yield {
+                "varied": varied,
+                "value": value,
+                "films": group,
+                "n_patients": int(posed["specimen"].nunique()),
+                **{
+                    name: float(np.sqrt(np.mean(posed[name].to_numpy(float) ** 2)))
+                    if len(posed)
+                    else None
+                    for name in ("rotation_rmse_deg", "place_rmse_mm")
+                },
+                "moved_deg": float(moved.max()) if moved.notna().any() else None,
+            }

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 
-from spinepipe.studies.scoliosis.films import ERECT, HELD_OUT, LEFT, RIGHT
 from spinepipe.studies.scoliosis.settings import MODELS
 
 IN_WORDS = {
@@ -25,17 +24,8 @@ TOLD = {
 
 OF_FILMS = {"fitted": "Fitted films", "held_out": "Held-out films"}
 
-_SHOWN_FIRST = (RIGHT, LEFT, *HELD_OUT)
-
 
 def in_order(models: Iterable[str]) -> list[str]:
     """Models in the order of the settings."""
     there = set(models)
     return [name for name in MODELS if name in there]
-
-
-def positions_in_order(positions: Iterable[str]) -> list[str]:
-    """The usual films first, any further ones after them; the erect one is what all begin at."""
-    there = list(dict.fromkeys(positions))
-    known = [name for name in _SHOWN_FIRST if name in there]
-    return known + [name for name in there if name not in (*known, ERECT)]

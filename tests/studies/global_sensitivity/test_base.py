@@ -18,7 +18,7 @@ from spinepipe.studies.global_sensitivity import base, design, respond
 from spinepipe.studies.global_sensitivity.base import compared
 from spinepipe.studies.global_sensitivity.batch import base_stiffness
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.soundness import doubts, grounds
+from spinepipe.studies.global_sensitivity.soundness import cautions, starting_spine
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
 
@@ -62,14 +62,16 @@ class Based:
         return dict(rows.set_index("coordinate").loc[coordinate])
 
     @property
-    def doubts(self) -> list[str]:
+    def cautions(self) -> list[str]:
         """As they are told."""
-        return list(doubts(self.study, self.stiffness, self.motion, NOTHING))
+        return list(cautions(self.study, self.stiffness, self.motion, NOTHING))
 
     @property
-    def grounds(self) -> str:
+    def start(self) -> str:
         """The same, in one."""
-        return " ".join(grounds(self.study, self.stiffness, self.motion)).replace("\u00a0", " ")
+        return " ".join(starting_spine(self.study, self.stiffness, self.motion)).replace(
+            "\u00a0", " "
+        )
 
 
 def chains(root: Path, noise_deg: float = 0.0, **settings: Any) -> Based:
@@ -102,11 +104,11 @@ def test_the_ratio_is_that_of_the_stiffnesses(tmp_path: Path) -> None:
     assert np.isnan(idle["ratio"])
     assert idle["verdict"] == "near", "nothing moves, and nothing was measured to move"
     assert set(found.stiffness["source"]) == {"given"}
-    (doubt,) = found.doubts
+    (doubt,) = found.cautions
     assert "in 1 of 2 tests: a, flexion: 0.25 of the measured extension" in doubt
     assert "stiffness: fitted takes each specimen's own" in doubt
-    assert "no measured motion decided" in found.grounds
-    assert "moves like the specimens in 1 of 2 tests" in found.grounds
+    assert "no measured motion decided" in found.start
+    assert "moves like the specimens in 1 of 2 tests" in found.start
 
 
 def test_a_fitted_base_is_the_specimen_s_own(tmp_path: Path) -> None:
@@ -120,9 +122,9 @@ def test_a_fitted_base_is_the_specimen_s_own(tmp_path: Path) -> None:
     assert found.of("anterior")["source"] == "not_free"
     assert found.of("anterior")["stiffness"] == found.of("anterior")["start"] == 149000.0
     assert found.mean("flexion", "extension")["ratio"] == pytest.approx(1.0, abs=0.05)
-    assert found.doubts == []
-    assert "fitted to the measured motion of a: " in found.grounds
-    assert "extension 49.9 N m/rad (95 % region 49.6 to 50.1)" in found.grounds
+    assert found.cautions == []
+    assert "fitted to the measured motion of a: " in found.start
+    assert "extension 49.9 N m/rad (95 % region 49.6 to 50.1)" in found.start
 
 
 def test_what_the_data_do_not_hold_is_said(tmp_path: Path) -> None:
@@ -134,7 +136,7 @@ def test_what_the_data_do_not_hold_is_said(tmp_path: Path) -> None:
     assert row["open_below"]
     assert row["open_above"]
     assert not row["identifiable"]
-    assert "anterior 149 000 N/m, which the data do not hold (any value)" in found.grounds.replace(
+    assert "anterior 149 000 N/m, which the data do not hold (any value)" in found.start.replace(
         "\u2009", " "
     )
 
@@ -147,8 +149,8 @@ def test_what_runs_to_a_bound_goes_back_and_the_others_are_fitted_without_it(
     row = found.of("extension")
     assert (row["source"], row["stiffness"]) == ("at_bound", 10.0)
     assert found.of("left_rotation")["stiffness"] == pytest.approx(200.0, rel=0.05)
-    assert "ran to a bound for a: factors start from calibration.start there, 10.0" in found.grounds
-    (doubt,) = found.doubts
+    assert "ran to a bound for a: factors start from calibration.start there, 10.0" in found.start
+    (doubt,) = found.cautions
     assert "a, flexion: 4.98 of the measured extension" in doubt
     assert "see base_motion" in doubt
 
@@ -165,7 +167,7 @@ def test_a_fit_that_fails_is_a_row_and_a_doubt(tmp_path: Path) -> None:
     assert row["stiffness"] == row["start"] == 51.0
     assert row["message"]
     assert found.mean("flexion", "extension")["verdict"] == "no_equilibrium"
-    words = " ".join(found.doubts)
+    words = " ".join(found.cautions)
     assert "stiffness of a could not be fitted (no stable equilibrium" in words
     assert "The base itself has no equilibrium: a flexion." in words
 
@@ -272,7 +274,7 @@ def test_the_default_stiffness_is_far_from_l1l4_and_the_fitted_one_near(tmp_path
     by_hand = by_least_energy(published)[:2].mean() / -1.6
     assert ratio == pytest.approx(by_hand, rel=0.03)
     assert ratio < 0.25
-    assert any("does not move like the specimens" in words for words in old.doubts)
+    assert any("does not move like the specimens" in words for words in old.cautions)
 
     shipped = yaml.safe_load((ROOT / "config/studies/l1l4_factors.yaml").read_text())
     assert shipped["stiffness"] == "fitted"
@@ -281,13 +283,13 @@ def test_the_default_stiffness_is_far_from_l1l4_and_the_fitted_one_near(tmp_path
     by_hand = by_least_energy([new.of(name)["stiffness"] for name in COORDINATES])[:2].mean() / -1.6
     assert new.mean("flexion", "extension")["ratio"] == pytest.approx(by_hand, rel=0.03)
     assert new.mean("flexion", "extension")["verdict"] == "near"
-    assert new.doubts == [], "nor do the shipped spreads reach beyond what the data allow"
+    assert new.cautions == [], "nor do the shipped spreads reach beyond what the data allow"
     assert new.of("anterior")["open_above"]
-    assert "anterior 17 400 N/m, which the data do not hold" in new.grounds.replace("\u2009", " ")
+    assert "anterior 17 400 N/m, which the data do not hold" in new.start.replace("\u2009", " ")
 
 
 def test_a_spread_beyond_what_the_data_allow_is_told(tmp_path: Path) -> None:
     wide = {**FACTORS[0], "coordinate": "extension", "times": {"low": 0.5, "high": 1.00001}}
     found = chains(tmp_path, 0.02, stiffness="fitted", factors=[wide, FACTORS[1]])
-    (doubt,) = found.doubts
+    (doubt,) = found.cautions
     assert "spread of stiffness extension (0.500 to 1.00 times) reaches below what" in doubt

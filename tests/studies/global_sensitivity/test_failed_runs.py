@@ -9,9 +9,15 @@ from sweeps import sweep
 
 from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.status import Status
-from spinepipe.studies.global_sensitivity.failed import WAYS, Ends, failed_rows, of_runs, rows_of
+from spinepipe.studies.global_sensitivity.failed_runs import (
+    WAYS,
+    Ends,
+    failed_rows,
+    of_runs,
+    rows_of,
+)
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.soundness import doubts
+from spinepipe.studies.global_sensitivity.soundness import cautions
 from spinepipe.studies.global_sensitivity.tables import FAILED_RUNS, RESPONSES
 from spinepipe.tables import from_rows, write
 
@@ -143,5 +149,5 @@ def said(table: pd.DataFrame) -> list[str]:
     factors = [{"of": "load_size", "times": {"sd": 0.1}}, {"of": "damping", "times": {"sd": 0.1}}]
     head = {"study": "probe", "kind": "global_sensitivity", "cohort": "any", "factors": factors}
     nothing = pd.DataFrame()
-    told = doubts(GlobalSensitivity.model_validate(head), nothing, nothing, table)
+    told = cautions(GlobalSensitivity.model_validate(head), nothing, nothing, table)
     return [words.replace("\u00a0", " ").replace("\u2009", "") for words in told]

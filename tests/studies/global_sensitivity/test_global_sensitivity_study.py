@@ -13,12 +13,11 @@ from scipy import stats
 from sweeps import sweep
 
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.sensitivity.global_indices.design import DUMMY
 from spinepipe.sensitivity.global_indices.estimates import INDICES, IndexStatus
 from spinepipe.studies import read as studies
-from spinepipe.studies.global_sensitivity import change as varied
-from spinepipe.studies.global_sensitivity import settings as study_file
-from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity, spreads_of
+from spinepipe.studies.global_sensitivity import factors as varied
+from spinepipe.studies.global_sensitivity.sampling import spreads_of
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import INDICES as INDEX_TABLE
 
 STUDY = """\
@@ -115,7 +114,6 @@ def test_the_dummy_is_last_and_can_be_left_out(tmp_path: Path) -> None:
     assert "dummy" not in study.factor_names
     for of_factors in (study.changes, study.units, study.per_si, study.groups, spreads_of(study)):
         assert len(of_factors) == len(study.factor_names) == 11
-    assert study_file.DUMMY == DUMMY
 
 
 def test_spreads_are_those_of_the_file(tmp_path: Path) -> None:
@@ -164,10 +162,6 @@ def test_delta_is_computed_only_where_it_is_named(tmp_path: Path) -> None:
     assert plain.chosen_indices == ("S1_RBD", "PAWN", "KS_low", "KS_high")
     named = sound(tmp_path / "named", short + "indices: [delta, PAWN]\n")
     assert named.chosen_indices == ("delta", "PAWN")
-
-
-def test_methods_have_the_indices_of_the_analysis() -> None:
-    assert {method.value: names for method, names in INDICES.items()} == study_file.INDICES
 
 
 @sweep(

@@ -13,21 +13,21 @@ import numpy as np
 import pandas as pd
 import pytest
 from chain_cases import JOINTS, Chains
-from drawn import caption, drawings
+from drawn import drawings
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from sweeps import sweep
 
 from spinepipe.cohort import Cohort, read
 from spinepipe.report.page.document import Picture, ResultTables
-from spinepipe.report.style import picture, style
+from spinepipe.report.style import style
 from spinepipe.schema import Table
 from spinepipe.studies.global_sensitivity.figures.panels import (
+    choose_panels,
     leading,
     measures_of,
     outputs,
-    pooled,
-    shown,
+    pool,
 )
 from spinepipe.studies.global_sensitivity.figures.scatter import running
 from spinepipe.studies.global_sensitivity.findings import (
@@ -39,7 +39,7 @@ from spinepipe.studies.global_sensitivity.findings import (
     settled,
 )
 from spinepipe.studies.global_sensitivity.kind import KIND
-from spinepipe.studies.global_sensitivity.loaded import loaded
+from spinepipe.studies.global_sensitivity.largest_moment import largest_moment
 from spinepipe.studies.global_sensitivity.page import document, shown_tables
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import CONVERGENCE, DESIGN, INDICES, RESPONSES
@@ -84,18 +84,9 @@ def truth(index: str, factor: str) -> float:
 
 
 def places(specimens: Sequence[str], kinds: Sequence[str]) -> Rows:
-    return [
-        {
-            "specimen": specimen,
-            "output": output,
-            "test": test,
-            "step": 3,
-            "joint": joint,
-            "coordinate": coordinate,
-        }
-        for specimen, output, test, joint in product(specimens, kinds, TESTS, JOINTS)
-        for coordinate in ("extension", "left_rotation")
-    ]
+    names = ("specimen", "output", "test", "joint", "coordinate")
+    each = product(specimens, kinds, TESTS, JOINTS, ("extension", "left_rotation"))
+    return [{**dict(zip(names, place, strict=True)), "step": 3} for place in each]
 
 
 def indices(
@@ -212,30 +203,18 @@ def study(method: str = "sobol", **more: Any) -> GlobalSensitivity:
     )
 
 
+def results(**tables: pd.DataFrame) -> ResultTables:
+    return ResultTables(StudyTables(tables), {}, {})
+
+
 def drawn(name: str, cohort: Cohort, **tables: pd.DataFrame) -> Figure:
     with style():
         return DRAW[name](study(), cohort, StudyTables(tables))
 
 
-def test_every_figure_becomes_a_picture(cohort: Cohort) -> None:
-    found, (responses, design) = indices(kinds=MOTION), runs(100)
-    tables = StudyTables(
-        {
-            "indices": found,
-            "convergence": convergence(found),
-            "responses": responses,
-            "design": design,
-        }
-    )
-    with style():
-        for name, draw in DRAW.items():
-            assert picture(draw(study(), cohort, tables), "svg"), name
-
-
-def top_factors(
-    cohort: Cohort, responses: pd.DataFrame, design: pd.DataFrame, found: pd.DataFrame
-) -> Figure:
-    return drawn("top_factors", cohort, responses=responses, design=design, indices=found)
+def top_factors(cohort: Cohort, *tables: pd.DataFrame) -> Figure:
+    named = zip(("responses", "design", "indices"), tables, strict=True)
+    return drawn("top_factors", cohort, **dict(named))
 
 
 def titles(figure: Figure) -> list[str]:
@@ -349,9 +328,9 @@ def test_effects_have_the_unit_of_their_output(cohort: Cohort) -> None:
 
 
 def test_each_test_is_shown_in_the_coordinate_that_it_loads(cohort: Cohort) -> None:
-    assert loaded(cohort, "flexion") == ("extension", 3)
-    assert loaded(cohort, "left_axial_rotation") == ("left_rotation", 3)
-    assert loaded(cohort, "nobody did this") is None
+    assert largest_moment(cohort, "flexion") == ("extension", 3)
+    assert largest_moment(cohort, "left_axial_rotation") == ("left_rotation", 3)
+    assert largest_moment(cohort, "nobody did this") is None
     figure = drawn("factor_indices", cohort, indices=indices())
     assert titles(figure)[0] == "Flexion, L3L4\nMotion, flexion–extension"
     assert titles(figure)[-1] == "Left axial rotation, L5S1\nMoment, axial rotation"
@@ -359,7 +338,8 @@ def test_each_test_is_shown_in_the_coordinate_that_it_loads(cohort: Cohort) -> N
 
 def test_a_force_beside_the_spine_loads_by_its_lever() -> None:
     """The published experiment has no moment, only 54 N in front of the spine."""
-    assert loaded(read(ROOT / "config" / "cohorts" / "palanca_l1l4"), "flexion") == ("extension", 1)
+    cohort = read(ROOT / "config" / "cohorts" / "palanca_l1l4")
+    assert largest_moment(cohort, "flexion") == ("extension", 1)
 
 
 def test_several_specimens_are_means_with_dots(cohort: Cohort) -> None:
@@ -392,7 +372,7 @@ def test_pooled_ends_are_means_of_ends() -> None:
             "ci_high": [0.3, 0.8, 0.2],
         }
     )
-    one = pooled(rows).iloc[0]
+    one = pool(rows).iloc[0]
     found = [one[name] for name in ("estimate", "low", "high", "lowest", "highest", "places")]
     assert found == pytest.approx([0.3, 0.15, 0.55, 0.2, 0.4, 2])
 
@@ -498,12 +478,6 @@ def test_nothing_to_show_is_said_with_its_reason(cohort: Cohort) -> None:
     assert "none has an equilibrium" in said(top_factors(cohort, gone, design, indices()))
 
 
-def test_every_figure_has_a_caption_and_a_title() -> None:
-    for figure in KIND.figures:
-        assert caption("global_sensitivity", figure.name).read_text().strip()
-        assert figure.title
-
-
 def told(cohort: Cohort, found: pd.DataFrame, place: int = 0) -> str:
     measures = measures_of(found)
     assert measures is not None
@@ -546,18 +520,18 @@ def test_joints_with_leaders_of_their_own_are_told_apart(cohort: Cohort) -> None
         "Motion hangs most on load size or load point x, by test and joint; joint load on load "
         "size."
     )
-    assert len(shown(panels, cohort.joint_names, 12)) == 12
-    assert len(shown(panels, cohort.joint_names, 2)) == 2
+    assert len(choose_panels(panels, cohort.joint_names, 12)) == 12
+    assert len(choose_panels(panels, cohort.joint_names, 2)) == 2
 
 
 @sweep("method", LEFT_OUT)
 def test_failed_runs_are_told_with_the_rule(cohort: Cohort, method: str) -> None:
-    found = ResultTables(StudyTables({"indices": indices(method, failed=3, kinds=MOTION)}), {}, {})
+    found = results(indices=indices(method, failed=3, kinds=MOTION))
     sure = opening(study(method), cohort, found).how_sure
     assert "at most 3 failed" in sure
     assert LEFT_OUT[method] in sure
     assert "3\u2009036 runs or more" in sure
-    none = ResultTables(StudyTables({"indices": indices(method, kinds=MOTION)}), {}, {})
+    none = results(indices=indices(method, kinds=MOTION))
     assert "none failed" in opening(study(method), cohort, none).how_sure
 
 
@@ -576,35 +550,24 @@ def test_outputs_without_an_index_are_told(cohort: Cohort) -> None:
     lost = (found["output"] == "joint_load") & (found["test"] == "flexion")
     found.loc[lost, ["status", "message"]] = ["too_many_failed", "far too many"]
     found.loc[lost, "estimate"] = np.nan
-    (warning,) = opening(
-        study(), cohort, ResultTables(StudyTables({"indices": found}), {}, {})
-    ).warnings
+    (warning,) = opening(study(), cohort, results(indices=found)).warnings
     assert warning.startswith("6 of 24 outputs have no index")
     assert "far too many" in warning
     constant = found.assign(status=found["status"].replace("too_many_failed", "constant"))
-    results = ResultTables(StudyTables({"indices": constant}), {}, {})
-    assert opening(study(), cohort, results).warnings == ()
-    assert any("vary with no factor" in words for words in findings(study(), cohort, results))
+    made = results(indices=constant)
+    assert opening(study(), cohort, made).warnings == ()
+    assert any("vary with no factor" in words for words in findings(study(), cohort, made))
 
 
 def test_interactions_above_their_noise_are_told(cohort: Cohort) -> None:
     found = indices()
     pair = found[found["index"] == "S1"].query("factor == 'load_size'")
-    pair = pair.assign(
-        index="S2",
-        other="mass",
-        estimate=0.2,
-        ci_low=0.15,
-        ci_high=0.25,
-        noise_floor=0.1,
-        above_floor=True,
-    )
-    both = ResultTables(StudyTables({"indices": pd.concat([found, pair])}), {}, {})
+    numbers = {"estimate": 0.2, "ci_low": 0.15, "ci_high": 0.25, "noise_floor": 0.1}
+    pair = pair.assign(index="S2", other="mass", above_floor=True, **numbers)
+    both = results(indices=pd.concat([found, pair]))
     words = " ".join(findings(study(), cohort, both))
     assert "(S2): load size with mass 0.20 [0.15 to 0.25]." in words
-    hidden = ResultTables(
-        StudyTables({"indices": pd.concat([found, pair.assign(above_floor=False)])}), {}, {}
-    )
+    hidden = results(indices=pd.concat([found, pair.assign(above_floor=False)]))
     assert "no interaction of two factors" in " ".join(findings(study(), cohort, hidden))
     names = [shown.title for shown in shown_tables(cohort, both)]
     assert names[0] == "Leading factors of every output"
@@ -615,9 +578,9 @@ def test_a_design_too_small_for_any_index_still_has_a_page(cohort: Cohort) -> No
     none = indices().assign(
         status="too_few", message="2 base samples", estimate=np.nan, ci_low=np.nan, ci_high=np.nan
     )
-    tables = StudyTables({"indices": none, "convergence": convergence(none)})
-    assert shown_tables(cohort, ResultTables(tables, {}, {})) == []
-    page = document(study(), cohort, ResultTables(tables, {}, {})).html(study(), cohort)
+    made = results(indices=none, convergence=convergence(none))
+    assert shown_tables(cohort, made) == []
+    page = document(study(), cohort, made).html(study(), cohort)
     assert "2 base samples" in page
 
 

@@ -15,7 +15,11 @@ from spinepipe.problems import InputError
 from spinepipe.studies import read as studies
 from spinepipe.studies.global_sensitivity import size_of_design
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.size_of_design import Size, available_memory, free_disk
+from spinepipe.studies.global_sensitivity.size_of_design import (
+    DesignSize,
+    available_memory,
+    free_disk,
+)
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
 from spinepipe.tables import to_arrow
 from spinepipe.tables import write as write_table
@@ -72,21 +76,6 @@ def test_runs_are_those_that_are_drawn(asked: GlobalSensitivity, runs: int) -> N
     assert asked.n_runs == runs == drawn(asked)
 
 
-def test_the_issue_s_design_has_51200_runs() -> None:
-    factors = [
-        {"of": "load_size", "times": {"sd": 0.1}, "name": f"factor{number}"} for number in range(24)
-    ]
-    found = GlobalSensitivity(
-        study="s",
-        kind="global_sensitivity",
-        cohort="c",
-        factors=factors,
-        dummy=False,
-        design={"samples": 1024},
-    )
-    assert found.n_runs == 51_200
-
-
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
     """A project with two specimens of two joints, one test of three steps, and a study."""
@@ -104,17 +93,17 @@ def test_rows_and_files_of_a_small_study(root: Path) -> None:
     of_all_steps = study("latin_hypercube", 50, steps="all", samples_per_target=20)
     found = size_of_design.size_of_design(of_all_steps, cohort)
     # 2 specimens x 50 runs x 3 steps x 2 joints; 3 batches each; 6 coordinates of 2 joints, 3 steps
-    assert found == Size(50, 36, 250, 600, 0, 6)
+    assert found == DesignSize(50, 36, 250, 600, 0, 6)
     free = ["extension", "right_bending", "left_rotation"]
     outputs = {"motion": ["right"], "stiffness": True}
     with_stiffness = study("latin_hypercube", 50, outputs=outputs, calibration={"free": free})
     found = size_of_design.size_of_design(with_stiffness, cohort)
-    assert found == Size(50, 2 * 4 + 3, 250, 200, 100, 200)
+    assert found == DesignSize(50, 2 * 4 + 3, 250, 200, 100, 200)
 
 
 def test_bytes_grow_with_rows() -> None:
-    one = Size(1000, 6, 5000, 10**6, 0, 10)
-    ten = Size(1000, 6, 5000, 10**7, 0, 10)
+    one = DesignSize(1000, 6, 5000, 10**6, 0, 10)
+    ten = DesignSize(1000, 6, 5000, 10**7, 0, 10)
     assert ten.on_disk - one.on_disk == 3 * 120 * 9 * 10**6
     assert ten.in_memory - one.in_memory == 400 * 9 * 10**6
 

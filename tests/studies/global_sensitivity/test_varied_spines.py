@@ -13,10 +13,14 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames, landmarks
 from spinepipe.frames import FRAME_LANDMARKS, joint_pose, transform_of
-from spinepipe.studies.global_sensitivity.change import FactorChange, Of
-from spinepipe.studies.global_sensitivity.many_frames import many_joint_frames, one_joint_frame
+from spinepipe.studies.global_sensitivity.factors import FactorChange, Of
 from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, asked_tests, start_of
-from spinepipe.studies.global_sensitivity.vary import Varied, vary
+from spinepipe.studies.global_sensitivity.vary import (
+    SpineSamples,
+    many_joint_frames,
+    one_joint_frame,
+    vary,
+)
 
 STIFFNESS = np.array([24600.0, 110000.0, 13500.0, 37.0, 64.0, 268.0])
 DAMPING = np.array([1000.0] * 3 + [1.4] * 3)
@@ -39,7 +43,7 @@ def start(cohort: Cohort, all_steps: bool = False) -> DescribedSpecimen:
     return start_of(cohort, "a", STIFFNESS, DAMPING, cohort.tests, all_steps)
 
 
-def one(cohort: Cohort, *changes: tuple[FactorChange, float]) -> Varied:
+def one(cohort: Cohort, *changes: tuple[FactorChange, float]) -> SpineSamples:
     """One sample of some factors with their values."""
     whats, values = zip(*changes, strict=True)
     return vary(start(cohort, all_steps=True), whats, np.array([values]))

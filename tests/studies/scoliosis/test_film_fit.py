@@ -8,10 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scoliosis_cases import write_shipped
+from scoliosis_cases import STUDY, shipped
 
-from spinepipe import cohort as cohorts
-from spinepipe.cohort import Cohort
 from spinepipe.progress import Progress
 from spinepipe.studies.scoliosis import film_regions
 from spinepipe.studies.scoliosis.film_fit import (
@@ -24,47 +22,40 @@ from spinepipe.studies.scoliosis.film_fit import (
     weighed_with,
 )
 from spinepipe.studies.scoliosis.film_regions import by_ratio, region
-from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT, Film
-from spinepipe.studies.scoliosis.learn import learn, weights
+from spinepipe.studies.scoliosis.films import LEFT, RIGHT
+from spinepipe.studies.scoliosis.fit_population import fit_population, weights
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.personalise import rows_of
-from spinepipe.studies.scoliosis.population import assumed
-from spinepipe.studies.scoliosis.population_table import population_rows
-from spinepipe.studies.scoliosis.settings import Scoliosis
+from spinepipe.studies.scoliosis.population import population_rows, usual_population
 from spinepipe.studies.scoliosis.tables import LAWS, POPULATION, POSITIONS
-from spinepipe.studies.scoliosis.tangent_laws import Pairs
 from spinepipe.tables import from_rows
 
-STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
+
+@pytest.fixture(scope="module")
+def patient() -> Patient:
+    return patient_of(STUDY, shipped(2), "p01")
+
+
 SHARP = weighed_with(0.0, 0.0, 0.05, 0.02)
-
-
-@pytest.fixture(scope="module")
-def cohort(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
-    folder = tmp_path_factory.mktemp("films") / "ais"
-    write_shipped(folder, 2)
-    return cohorts.read(folder, (FILMS, PATIENTS))
-
-
-@pytest.fixture(scope="module")
-def patient(cohort: Cohort) -> Patient:
-    return patient_of(STUDY, cohort, "p01")
 
 
 def some_unknowns(patient: Patient) -> np.ndarray:
     rng, s = np.random.default_rng(3), patient.chain.n_joints
-    numbers = assumed(s).mean.copy()
+    numbers = usual_population(s).mean.copy()
     numbers[:s] += rng.normal(0.0, 0.3, s)
     numbers[s:] += 0.3 + rng.normal(0.0, 0.1, 2 * s)
     return np.append(numbers, rng.normal(0.0, 0.5, TOPS))
 
 
-def with_films(patient: Patient, right: Film, left: Film) -> Patient:
-    """The patient with other bending films."""
-    films = {**patient.read.films, RIGHT: right, LEFT: left}
+def filmed_with(patient: Patient, numbers: np.ndarray, sd: np.ndarray) -> Patient:
+    """The patient with bending films of the model of these numbers."""
+    fit = FilmFit(patient, sd)
+    spine = fit.spine.with_model(fit._model(numbers))
+    poses = {name: spine.at(patient.read.films[name].top) for name in (RIGHT, LEFT)}
+    assert all(pose.result.status == "converged" for pose in poses.values())
+    films = {**patient.read.films, **{name: pose.film for name, pose in poses.items()}}
     read = replace(patient.read, films=films)
     pairs = replace(patient.pairs, right=read.turned(RIGHT), left=read.turned(LEFT))
-    assert isinstance(pairs, Pairs)
     return replace(patient, read=read, pairs=pairs)
 
 
@@ -97,16 +88,10 @@ def weights_of_a_usual_study() -> np.ndarray:
 
 
 def test_films_of_the_model_itself_are_reproduced(patient: Patient) -> None:
-    hidden = some_unknowns(patient)
-    hidden[-TOPS:] = 0.0
-    fit = FilmFit(patient, SHARP)
-    spine = fit.spine.with_model(fit._model(hidden[:-TOPS]))
-    poses = [spine.at(patient.read.films[position].top) for position in (RIGHT, LEFT)]
-    assert all(pose.held.status == "converged" for pose in poses)
-    filmed = with_films(patient, *(pose.film for pose in poses))
-    fit = FilmFit(filmed, SHARP)
-    found = fit.fit(assumed(patient.chain.n_joints))
-    assert found.arrived
+    hidden = some_unknowns(patient)[:-TOPS]
+    fit = FilmFit(filmed_with(patient, hidden, SHARP), SHARP)
+    found = fit.fit(usual_population(patient.chain.n_joints))
+    assert found.status.usable
     errors, _ = fit.missed(found.unknowns) or (None, None)
     assert errors is not None
     assert np.sqrt(np.mean(errors**2)) < 0.5  # of the 0.05 mm and 0.02 deg that it was held to
@@ -116,14 +101,14 @@ def test_films_of_the_model_itself_are_reproduced(patient: Patient) -> None:
 
 
 def test_what_films_decide_falls_with_how_coarsely_they_are_read(patient: Patient) -> None:
-    population = assumed(patient.chain.n_joints)
+    population = usual_population(patient.chain.n_joints)
     decided = [FilmFit(patient, f * SHARP).fit(population).decided for f in (1.0, 10.0, 100.0)]
     assert 41.0 > decided[0] > decided[1] > decided[2] > 0.0
 
 
 def test_an_interval_holds_the_ratio(patient: Patient) -> None:
     fit = FilmFit(patient, weights_of_a_usual_study())
-    personal = fit.personal(fit.fit(assumed(patient.chain.n_joints)))
+    personal = fit.personal(fit.fit(usual_population(patient.chain.n_joints)))
     assert personal.ratio_range is not None
     low, high = personal.ratio_range
     assert (low < personal.ratio).all()
@@ -142,13 +127,10 @@ def test_a_ratio_takes_the_place_of_a_number() -> None:
 
 def test_films_close_the_ratios_that_move_them_and_leave_others_open(patient: Patient) -> None:
     """Films of a known chain: regions hold its ratios. Coarsely read, nothing is told."""
-    hidden = some_unknowns(patient)
-    hidden[-TOPS:] = 0.0
+    hidden = some_unknowns(patient)[:-TOPS]
     sd, s = weights_of_a_usual_study(), patient.chain.n_joints
-    fit, population = FilmFit(patient, sd), assumed(s)
-    spine = fit.spine.with_model(fit._model(hidden[:-TOPS]))
-    poses = [spine.at(patient.read.films[position].top).film for position in (RIGHT, LEFT)]
-    filmed = FilmFit(with_films(patient, *poses), sd)
+    population = usual_population(s)
+    filmed = FilmFit(filmed_with(patient, hidden, sd), sd)
     fitted = filmed.fit(population)
     true = np.exp(hidden[:s] - hidden[:s].mean())
     for segment, is_open in ((5, False), (12, True)):
@@ -167,16 +149,20 @@ def test_a_ratio_whose_fit_does_not_arrive_is_left_open(
 ) -> None:
     """After two evaluations nothing has settled: what lies about such a point is no region."""
     monkeypatch.setattr(film_regions, "SETTLED", replace(film_regions.SETTLED, evaluations=2))
-    fit, population = FilmFit(patient, weights_of_a_usual_study()), assumed(patient.chain.n_joints)
+    fit, population = (
+        FilmFit(patient, weights_of_a_usual_study()),
+        usual_population(patient.chain.n_joints),
+    )
     assert region(fit, population, fit.fit(population), 5) is film_regions.OPEN
 
 
 def test_a_patient_without_a_pose_is_told_and_keeps_the_population(
-    cohort: Cohort, patient: Patient, monkeypatch: pytest.MonkeyPatch
+    patient: Patient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    cohort = shipped(2)
     silent = Progress(lambda line: None)
     sd = weights(STUDY, cohort)
-    usual = learn(STUDY, cohort, sd, silent)
+    usual = fit_population(STUDY, cohort, sd, silent)
     assert (usual.patients, usual.unfitted) == (2, ())
     monkeypatch.setattr(FilmFit, "missed", lambda self, unknowns: None)
     with pytest.raises(NoFit, match="uppermost vertebra"):
@@ -187,5 +173,5 @@ def test_a_patient_without_a_pose_is_told_and_keeps_the_population(
     assert positions["message"].str.contains(NO_POSE).all()
     laws = from_rows(LAWS, found["laws"]).to_pandas()
     assert (laws["decided_parameters"] == 0.0).all()
-    none = learn(STUDY, cohort, sd, silent)
+    none = fit_population(STUDY, cohort, sd, silent)
     assert (none.patients, none.unfitted) == (0, ("p01", "p02"))

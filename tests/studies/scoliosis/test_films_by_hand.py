@@ -13,24 +13,31 @@ import pandas as pd
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scoliosis_cases import mirrored
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.status import PrescribedStatus
-from spinepipe.studies.scoliosis import reading_noise as noise_of
-from spinepipe.studies.scoliosis.curve_angles import SpinalCurve, curves, lumbar_apex
+from spinepipe.studies.scoliosis import films as film_module
+from spinepipe.studies.scoliosis.curve_angles import (
+    SpinalCurve,
+    curves,
+    lumbar_apex,
+    main_curve,
+    region,
+)
 from spinepipe.studies.scoliosis.films import (
     CORNERS,
     FILMS,
     PATIENTS,
     Film,
-    Read,
+    PatientFilms,
+    film_of_rows,
     height,
-    placed,
     read_films,
+    reading_noise,
 )
-from spinepipe.studies.scoliosis.reading_noise import reading_noise
-from spinepipe.studies.scoliosis.residuals import miss_of
+from spinepipe.studies.scoliosis.personal import Patient
 from spinepipe.studies.scoliosis.settings import Scoliosis
 
 STUDY = {"study": "s", "kind": "scoliosis", "cohort": "ais"}
@@ -93,6 +100,7 @@ def tilted(*tilts: float) -> Film:
         ((0, 8, 8, -10), [(0, 2), (1, 3)]),
         ((0, 8, 6, 8, 0), [(0, 3), (1, 4)]),
         ((10, 0, 0), [(0, 2)]),
+        ((0, 10, 0, -10, -20), [(1, 4)]),
     ],
 )
 def test_ends_lie_where_the_tilt_turns_back_by_more_than_five_degrees(
@@ -109,9 +117,14 @@ STEPS = st.one_of(st.integers(-30, 30), st.integers(-300, 300).map(lambda tenths
 def test_upside_down_and_mirrored_a_film_has_the_same_curves(tilts: list[float]) -> None:
     """And no two vertebrae of a curve have a larger angle, if the spine has one at all."""
     erect, last = tilted(*tilts), len(tilts) - 1
-    rolled, mirrored = tilted(*tilts[::-1]), erect.mirrored()
+    rolled, flipped = tilted(*tilts[::-1]), mirrored(erect)
     found = [(one.lower, one.upper, one.cobb(erect)) for one in curves(erect)]
-    assert found == [(one.lower, one.upper, one.cobb(mirrored)) for one in curves(mirrored)]
+    assert found == [(one.lower, one.upper, one.cobb(flipped)) for one in curves(flipped)]
+    for one, other in zip(curves(erect), curves(flipped), strict=True):
+        assert one.apex == other.apex
+        if one.cobb(erect) != 0.0:  # ends that are equally tilted have no side
+            assert one.side == -other.side
+            assert one.ferguson(erect) == pytest.approx(other.ferguson(flipped), abs=1e-12)
     turned = [(last - one.upper, last - one.lower, one.cobb(rolled)) for one in curves(rolled)]
     assert found == turned[::-1]
     for low, high, cobb in found:
@@ -120,11 +133,12 @@ def test_upside_down_and_mirrored_a_film_has_the_same_curves(tilts: list[float])
             assert cobb == np.ptp(within) > np.deg2rad(5.0)
 
 
-def test_the_lowest_curve_begins_where_it_is_tilted_farthest() -> None:
-    """26.5 deg between the second vertebra and the seventh; from the lowest one it was 22."""
-    lowest, *_ = curves(tilted(0, -4.5, -4.5, 0, 8, 16, 22, 18, 12, 8, 4, 2, 0, 0, 0))
-    assert (lowest.lower, lowest.upper) == (1, 6)
-    assert np.rad2deg(lowest.cobb(tilted(0, -4.5, -4.5, 0, 8, 16, 22))) == pytest.approx(26.5)
+def test_the_main_curve_is_that_of_the_largest_angle() -> None:
+    film = tilted(0, 10, 20, 5, -10)
+    lower, upper = curves(film)
+    assert (main_curve(film), main_curve(tilted(0, 15, 30, 20, 5))) == (upper, lower)
+    assert (lower.side, upper.side) == (-1, 1)
+    assert np.rad2deg([lower.cobb(film), upper.cobb(film)]) == pytest.approx([20.0, 30.0])
 
 
 def test_a_spine_of_two_vertebrae_has_no_curve() -> None:
@@ -141,19 +155,24 @@ def test_a_curve_at_the_sacrum_or_high_up_is_no_lumbar_one() -> None:
     assert lumbar_apex(zigzag, ("S1", "T10", "x", "T9", "T8")) == 1
 
 
-def test_joints_lie_on_the_way_to_the_vertebra_above() -> None:
-    np.testing.assert_allclose(
-        ROOF.joints(0.25), [[0.25, 0.25], [1.125, 1.25], [1.125, 2.0]], atol=1e-15
-    )
+@sweep(
+    "apex, named",
+    [
+        *(("C7", "PT"), ("T1", "PT"), ("T3", "PT"), ("T5", "PT")),
+        *(("T6", "MT"), ("T9", "MT"), ("T10", "MT"), ("T11", "MT")),
+        *(("T12", "TL/L"), ("L1", "TL/L"), ("L2", "TL/L"), ("S1", "TL/L")),
+    ],
+)
+def test_a_curve_is_named_by_its_apex(apex: str, named: str) -> None:
+    assert region(apex) == named
 
 
-def test_a_film_in_every_dress() -> None:
+def test_what_is_read_off_a_film() -> None:
     np.testing.assert_allclose(np.rad2deg(ROOF.turned), [-30, -15, -25])
     np.testing.assert_allclose(ROOF.top, [0.0, 2.0, np.deg2rad(-30)])
     np.testing.assert_allclose(ROOF.rows, [ROOF.right, ROOF.up, ROOF.tilt])
-    large = ROOF.scaled(3.0)
-    np.testing.assert_allclose(large.rows, [3.0 * ROOF.right, 3.0 * ROOF.up, ROOF.tilt])
-    np.testing.assert_allclose(ROOF.mirrored().rows, [-ROOF.right, ROOF.up, -ROOF.tilt])
+    joints = [[0.25, 0.25], [1.125, 1.25], [1.125, 2.0]]  # on the way to the vertebra above
+    np.testing.assert_allclose(ROOF.joints(0.25), joints, atol=1e-15)
 
 
 def test_from_its_lowest_vertebra_a_film_is_turned_back_by_its_tilt() -> None:
@@ -179,7 +198,7 @@ def test_the_centre_of_a_wedge_is_where_its_diagonals_cross() -> None:
     rows = cornered(
         lower_left=(30, 0), lower_right=(-30, 0), upper_left=(10, 20), upper_right=(-10, 20)
     )
-    found = placed(rows, ("L4",))
+    found = film_of_rows(rows, ("L4",))
     np.testing.assert_allclose([found.right[0], found.up[0]], [0.0, 0.015], atol=1e-15)
     assert found.tilt[0] == 0.0
     assert height(rows) == pytest.approx(0.020)
@@ -190,7 +209,7 @@ def test_a_vertebra_leans_with_the_line_through_its_endplates() -> None:
     rows = cornered(
         lower_left=(30, 0), lower_right=(-10, 0), upper_left=(15, 20), upper_right=(-25, 20)
     )
-    found = placed(rows, ("L4",))
+    found = film_of_rows(rows, ("L4",))
     assert np.tan(found.tilt[0]) == pytest.approx(0.75)
     assert found.right[0] == pytest.approx(-0.0025)
     assert height(rows) == pytest.approx(0.025)
@@ -199,7 +218,7 @@ def test_a_vertebra_leans_with_the_line_through_its_endplates() -> None:
 def test_one_corner_short_the_centre_is_taken() -> None:
     rows = cornered(lower_left=(30, 0), lower_right=(-30, 0), upper_left=(10, 20))
     rows = rows.assign(y_mm=-3.0, z_mm=7.0, orientation_deg=-8.0)
-    found = placed(rows, ("L4",))
+    found = film_of_rows(rows, ("L4",))
     np.testing.assert_allclose(found.rows[:, 0], [0.003, 0.007, np.deg2rad(8.0)])
     assert height(rows) is None
 
@@ -240,20 +259,8 @@ def test_scatter_of_readings_is_pooled_by_how_many_there_are(tmp_path: Path) -> 
     np.testing.assert_allclose(np.rad2deg(read.films["right_bending"].tilt), [0.0, -4.5, -4.5])
 
 
-def test_what_no_film_shows_is_refused_by_the_reader() -> None:
-    """Places within 2 m, tilts within a right angle, a thousand repeats; ages, Cobb angles."""
-    limits = {c.name: (c.low, c.high) for form in (FILMS, PATIENTS) for c in form.columns}
-    assert {limits[name] for name in ("y_mm", "z_mm", *CORNERS)} == {(-2000.0, 2000.0)}
-    assert limits["orientation_deg"] == (-90.0, 90.0)
-    assert (limits["repeat"], limits["age_years"]) == ((1, 1000), (0, 130))
-    assert limits["cobb_deg"] == (0, 180)
-    assert FILMS.places
-    required = {c.name for form in (FILMS, PATIENTS) for c in form.columns if not c.nullable}
-    assert required == {"specimen", "position", "vertebra"}
-
-
 def posed(status: PrescribedStatus, shown: Film, r: list[float]) -> Any:
-    return SimpleNamespace(held=SimpleNamespace(status=status), film=shown, r=np.deg2rad(r))
+    return SimpleNamespace(result=SimpleNamespace(status=status), film=shown, r=np.deg2rad(r))
 
 
 @sweep(
@@ -268,8 +275,9 @@ def test_a_pose_misses_a_film_by_root_mean_squares_above_the_lowest(
     erect = film((0, 0, 0), (0, 1, 0), (0, 2, 0))
     shown = film((9, 9, 9), (0.103, 1.004, 5), (0.2, 2, 0))
     nothing: dict[str, Any] = {}
-    whole = Read({"erect": erect, "neutral": read}, nothing, nothing, np.full(3, np.nan), nothing)
-    found = miss_of(SimpleNamespace(read=whole), "neutral", posed(status, shown, [1.0, -5.0]))
+    films = {"erect": erect, "neutral": read}
+    patient: Any = SimpleNamespace(read=PatientFilms(films, nothing, np.full(3, np.nan), nothing))
+    found = Patient.errors(patient, "neutral", posed(status, shown, [1.0, -5.0]))
     if status is PrescribedStatus.UNSTABLE:
         assert set(found.values()) == {None}
         return
@@ -314,7 +322,7 @@ def test_readings_tell_how_films_are_read_and_else_the_study(
         f"p{number}": SimpleNamespace(sd=np.array(sd), readings=dict(enumerate(counts)))
         for number, (sd, counts) in enumerate(zip(sds, readings, strict=True))
     }
-    monkeypatch.setattr(noise_of, "read_films", lambda _, name: told[name])
+    monkeypatch.setattr(film_module, "read_films", lambda _, name: told[name])
     study = Scoliosis.model_validate(STUDY | stated)
     cohort: Any = SimpleNamespace(specimen_names=tuple(told))
     np.testing.assert_allclose(reading_noise(study, cohort), expected)

@@ -5,17 +5,14 @@ it, and size of stiffness that seeps into poses.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scoliosis_cases import write_shipped
+from scoliosis_cases import STUDY, mirrored, shipped
 from sweeps import sweep
 
-from spinepipe import cohort as cohorts
-from spinepipe.cohort import Cohort
 from spinepipe.studies.scoliosis.film_fit import TOPS, FilmFit
-from spinepipe.studies.scoliosis.films import ERECT, FILMS, LEFT, PATIENTS, RIGHT, Read
+from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, PatientFilms
 from spinepipe.studies.scoliosis.fixed_end_spine import geometry, with_laws
 from spinepipe.studies.scoliosis.personal import (
     WAYS,
@@ -24,30 +21,21 @@ from spinepipe.studies.scoliosis.personal import (
     patient_of,
     tangent,
 )
-from spinepipe.studies.scoliosis.population import assumed
+from spinepipe.studies.scoliosis.population import usual_population
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import Pairs
 
-STUDY = Scoliosis.model_validate({"study": "s", "kind": "scoliosis", "cohort": "ais"})
-
 
 @pytest.fixture(scope="module")
-def cohort(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
-    folder = tmp_path_factory.mktemp("films") / "ais"
-    write_shipped(folder, 1)
-    return cohorts.read(folder, (FILMS, PATIENTS))
+def patient() -> Patient:
+    return patient_of(STUDY, shipped(1), "p01")
 
 
-@pytest.fixture(scope="module")
-def patient(cohort: Cohort) -> Patient:
-    return patient_of(STUDY, cohort, "p01")
-
-
-def mirrored(patient: Patient) -> Patient:
+def turned_over(patient: Patient) -> Patient:
     """The same patient on films that are turned over."""
     exchanged = {RIGHT: LEFT, LEFT: RIGHT}
-    films = {exchanged.get(n, n): film.mirrored() for n, film in patient.read.films.items()}
-    read: Read = replace(patient.read, films=films)
+    films = {exchanged.get(n, n): mirrored(film) for n, film in patient.read.films.items()}
+    read: PatientFilms = replace(patient.read, films=films)
     pairs = patient.pairs
     return Patient(
         patient.name,
@@ -62,13 +50,13 @@ def mirrored(patient: Patient) -> Patient:
 
 @sweep("model", list(WAYS))
 def test_a_mirrored_patient_has_mirrored_poses(patient: Patient, model: str) -> None:
-    other = mirrored(patient)
+    other = turned_over(patient)
     for position, opposite in ((RIGHT, LEFT), ("neutral", "neutral")):
         one, two = (
-            who.held(WAYS[model](who, STUDY).model).at(who.read.films[film].top)
+            who.fixed_end(WAYS[model](who, STUDY).model).at(who.read.films[film].top)
             for who, film in ((patient, position), (other, opposite))
         )
-        assert one.held.status == two.held.status == "converged"
+        assert one.result.status == two.result.status == "converged"
         # the two forces of a tangent law are searched for, to a hundred-millionth
         np.testing.assert_allclose(two.r, -one.r, rtol=0, atol=1e-6)
         np.testing.assert_allclose(two.film.up, one.film.up, rtol=0, atol=1e-7)
@@ -76,19 +64,19 @@ def test_a_mirrored_patient_has_mirrored_poses(patient: Patient, model: str) -> 
 
 @sweep("model", list(WAYS))
 def test_the_uppermost_vertebra_is_where_the_film_has_it(patient: Patient, model: str) -> None:
-    spine = patient.held(WAYS[model](patient, STUDY).model)
+    spine = patient.fixed_end(WAYS[model](patient, STUDY).model)
     for film in patient.read.films.values():
         posed = spine.at(film.top)
-        assert posed.held.status == "converged"
+        assert posed.result.status == "converged"
         np.testing.assert_allclose(posed.film.top, film.top, rtol=0, atol=1e-12)
-        assert not posed.held.q.reshape(-1, 6)[:, :3].any()
+        assert not posed.result.q.reshape(-1, 6)[:, :3].any()
         assert posed.r.sum() == pytest.approx(film.turned.sum() - patient.erect.turned.sum())
 
 
 def test_the_erect_film_takes_no_push(patient: Patient) -> None:
-    spine = patient.held(tangent(patient, STUDY).model)
+    spine = patient.fixed_end(tangent(patient, STUDY).model)
     posed = spine.at(patient.erect.top)
-    assert np.abs(posed.held.pushes).max() < 1e-9
+    assert np.abs(posed.result.pushes).max() < 1e-9
     assert np.abs(posed.r).max() < 1e-12
 
 
@@ -100,14 +88,14 @@ def test_films_do_not_tell_how_stiff_a_spine_is_in_all(patient: Patient) -> None
     stiffer = with_laws(patient.chain, 10.0 * springs, laws)
     for position in (RIGHT, "traction"):
         top = patient.read.films[position].top
-        one, two = (patient.held(m).at(top) for m in (personal.model, stiffer))
+        one, two = (patient.fixed_end(m).at(top) for m in (personal.model, stiffer))
         np.testing.assert_allclose(two.r, one.r, rtol=0, atol=1e-6)
 
 
-def test_a_stated_mean_stiffness_is_the_mean(cohort: Cohort) -> None:
+def test_a_stated_mean_stiffness_is_the_mean() -> None:
     scale = {"of": "mean_stiffness", "mean_stiffness_nm_per_rad": 80.0}
     study = Scoliosis.model_validate({**STUDY.model_dump(), "scale": scale})
-    patient = patient_of(study, cohort, "p01")
+    patient = patient_of(study, shipped(1), "p01")
     for way in WAYS.values():
         assert geometric_mean(way(patient, study).at_rest) == pytest.approx(80.0)
 
@@ -123,17 +111,10 @@ def test_models_say_how_much_they_take_from_the_films(patient: Patient) -> None:
     }
 
 
-def test_segments_that_the_films_turn_backwards_are_named(cohort: Cohort, tmp_path: Path) -> None:
-    patient = patient_of(STUDY, cohort, "p01")
-    assert patient.pairs.opposite.any()
-    personal = tangent(patient, STUDY)
-    assert set(np.flatnonzero(personal.constrained)) <= set(np.flatnonzero(patient.pairs.opposite))
-
-
 def test_a_mirrored_patient_has_the_mirrored_fit(patient: Patient) -> None:
     """The fit to films: ratios alike, ends exchanged, as many optima."""
-    population = assumed(patient.chain.n_joints)
-    one, other = (FilmFit(p, np.array([1e-3, 1e-3, 0.01])) for p in (patient, mirrored(patient)))
+    population = usual_population(patient.chain.n_joints)
+    one, other = (FilmFit(p, np.array([1e-3, 1e-3, 0.01])) for p in (patient, turned_over(patient)))
     fits = one.fit(population), other.fit(population)
     assert fits[0].n_optima == fits[1].n_optima
     assert fits[0].cost == pytest.approx(fits[1].cost, rel=1e-3)

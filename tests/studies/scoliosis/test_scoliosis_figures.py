@@ -6,24 +6,22 @@ unknown noise, and marks that are not where the tables have them.
 
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from drawn import caption, drawings
 from matplotlib.figure import Figure
-from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of, write_shipped
+from scoliosis_cases import Size, cohort_of, shipped, study_of, tables_of
 from sweeps import sweep
 
-from spinepipe import cohort as cohorts
 from spinepipe.report.style import WIDTH_MM, style
 from spinepipe.studies.scoliosis.errors import held_out_error
 from spinepipe.studies.scoliosis.figures.errors_by_range import classified
 from spinepipe.studies.scoliosis.figures.film_overlay import chosen, places, posed
 from spinepipe.studies.scoliosis.figures.fitted_and_held_out import errors_of_patients
 from spinepipe.studies.scoliosis.figures.load_displacement import curve
-from spinepipe.studies.scoliosis.films import FILMS, LEFT, PATIENTS, RIGHT
+from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.kind import KIND
 from spinepipe.studies.scoliosis.personal import patient_of, tangent
 from spinepipe.studies.scoliosis.personalise import rows_of
@@ -39,17 +37,6 @@ SIZES = {
     ),
 }
 """Each figure is drawn once of each, and looked at by all tests."""
-
-FURTHER = {
-    "three patients": Size(),
-    "one patient": Size(1),
-    "nothing held out": Size(positions=(RIGHT, LEFT)),
-    "one held-out film": Size(positions=(RIGHT, LEFT, "neutral")),
-    "one linear model": Size(errors={"uniform": 0.3}),
-    "exact": Size(errors=dict.fromkeys(ERRORS, 0.0)),
-    "reading unknown": Size(noise_deg=None),
-    "nobody has all poses": Size(lost=3),
-}
 
 
 @cache
@@ -84,13 +71,6 @@ def test_every_figure_has_a_caption_and_tables_that_the_kind_makes() -> None:
 @sweep("size", SIZES)
 def test_no_words_leave_the_page_or_stand_on_each_other(name: str, size: str) -> None:
     fits_the_page(drawn(name, size))
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("name", DRAW)
-@sweep("size", FURTHER.values())
-def test_no_words_leave_the_page_of_other_sizes(name: str, size: Size) -> None:
-    fits_the_page(draw(name, size))
 
 
 def fits_the_page(figure: Figure) -> None:
@@ -152,17 +132,15 @@ def test_errors_of_patients_leave_out_who_has_no_pose() -> None:
     assert float(kept["error"].iloc[0]) == pytest.approx(0.8 * 1.2)
 
 
-def test_models_stand_where_their_poses_are(tmp_path: Path) -> None:
+def test_models_stand_where_their_poses_are() -> None:
     """Places of the overlay are those of the solved pose, out of the plane and all."""
-    write_shipped(tmp_path / "ais", 1)
-    cohort = cohorts.read(tmp_path / "ais", (FILMS, PATIENTS))
-    study = study_of(Size(1))
+    cohort, study = shipped(1), study_of(Size(1))
     patient = patient_of(study, cohort, "p01")
     rows = from_rows(
         DISPLACEMENTS, rows_of(study, cohort, "p01", "tangent")["displacements"]
     ).to_pandas()
     film = patient.read.films["traction"]
-    held = patient.held(tangent(patient, study).model).at(film.top)
+    held = patient.fixed_end(tangent(patient, study).model).at(film.top)
     at = posed(film, rows[rows["position"] == "traction"])
     np.testing.assert_allclose(at, places(held.film), rtol=0, atol=1e-9)
     np.testing.assert_allclose(at[-1], places(film)[-1], rtol=0, atol=1e-9)

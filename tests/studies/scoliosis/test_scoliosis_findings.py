@@ -1,6 +1,7 @@
-"""Sentences of the report: each turns out otherwise when the numbers do.
+"""Sentences of the report: each turns out otherwise when the numbers do, at a limit and beside it.
 
-Would catch a sentence that stays when its table says otherwise, or counts wrongly.
+Would catch a sentence that stays when its table says otherwise, or counts wrongly, and a comparison
+that includes its limit where it should not.
 """
 
 from typing import Any
@@ -11,8 +12,15 @@ from sweeps import sweep
 
 from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
-from spinepipe.studies.scoliosis.findings import findings
-from spinepipe.studies.scoliosis.headline import headline
+from spinepipe.studies.scoliosis.findings import both_ways, findings
+from spinepipe.studies.scoliosis.headline import (
+    ModelRanking,
+    _answer,
+    _compared,
+    above_noise,
+    headline,
+    p_of,
+)
 
 PAIR = ("tangent_fitted", "tangent")
 
@@ -32,7 +40,7 @@ def told(size: Size, **changed: pd.DataFrame) -> str:
     return "\n".join(findings(study_of(size), results(size, **changed))).replace("\u00a0", " ")
 
 
-def statistics(*rows: dict[str, Any]) -> pd.DataFrame:
+def pairs_tested(*rows: dict[str, Any]) -> pd.DataFrame:
     """Tests of pairs of models, as far as sentences read them."""
     return pd.DataFrame(rows)
 
@@ -78,18 +86,18 @@ def test_when_nothing_personal_helps_that_is_said() -> None:
 def test_best_is_said_only_where_the_difference_is_significant() -> None:
     size = Size()
     assert "is not known: there is no test of it" in answer(size).how_sure
-    sure = answer(size, statistics=statistics(paired_test("held_out", "rotation", PAIR, 0.002)))
+    sure = answer(size, statistics=pairs_tested(paired_test("held_out", "rotation", PAIR, 0.002)))
     assert "reproduces rotations of segments best on positions that it has not seen" in sure.words
     assert "The difference over 3 patients, by paired Wilcoxon tests" in sure.how_sure
     assert "from the next it is significant (p 0.0020), from the model that is" in sure.how_sure
     assert "linear by region it is not tested." in sure.how_sure
-    other = statistics(paired_test("held_out", "rotation", PAIR[::-1], 0.3))
+    other = pairs_tested(paired_test("held_out", "rotation", PAIR[::-1], 0.3))
     unsure = answer(size, statistics=other)
     assert "has the least error" in unsure.words
     assert unsure.words.endswith("From the next it cannot be told apart.")
     assert "from the next it is not significant (p 0.30)" in unsure.how_sure
     reference = paired_test("held_out", "rotation", ("tangent_fitted", "linear_regions"), 0.04)
-    both = answer(size, statistics=pd.concat([other, statistics(reference)])).how_sure
+    both = answer(size, statistics=pd.concat([other, pairs_tested(reference)])).how_sure
     assert "from the model that is linear by region it is significant (p 0.040)." in both
 
 
@@ -103,16 +111,12 @@ def test_best_is_said_only_where_the_difference_is_significant() -> None:
     ],
 )
 def test_a_test_of_something_else_says_nothing_of_the_answer(row: dict[str, Any]) -> None:
-    assert "is not known" in answer(Size(), statistics=statistics(row)).how_sure
+    assert "is not known" in answer(Size(), statistics=pairs_tested(row)).how_sure
 
 
 def test_errors_are_held_against_what_reading_makes() -> None:
     # a rotation is made of four readings: 2 x 0.7 deg
     assert "makes 1.4°; no model is above that" in answer(Size()).how_sure
-    few = answer(Size(noise_deg=0.2)).how_sure
-    assert "makes 0.40°; 1 model is not above that" in few
-    none = answer(Size(noise_deg=0.01)).how_sure
-    assert "the error is above that, so the model itself is off" in none
     assert "How exactly the films are read is not known" in answer(Size(noise_deg=None)).how_sure
 
 
@@ -151,7 +155,7 @@ def test_a_film_that_cannot_be_reached_is_told_with_what_is_missed() -> None:
 def test_models_are_told_in_the_order_of_their_errors() -> None:
     size = Size()
     assert "tangent, fitted (0.331°); tangent, as published (0.441°); linear by seg" in told(size)
-    same = statistics(
+    same = pairs_tested(
         paired_test("held_out", "rotation", PAIR, 0.4),
         paired_test("held_out", "cobb", ("tangent_fitted", "uniform"), 0.2),
     )
@@ -160,13 +164,6 @@ def test_models_are_told_in_the_order_of_their_errors() -> None:
     assert "tangent, fitted (0.331°, not told apart from uniform) in Cobb angles" in found
     turned = told(Size(errors=ERRORS | {"uniform": 0.2}))
     assert "least error first: uniform (0.221°)" in turned
-
-
-@sweep("error, words", [(0.3, "50 % less"), (0.9, "50 % more")])
-def test_the_tangent_is_told_beside_linear_regions(error: float, words: str) -> None:
-    found = told(Size(errors={"tangent": error, "linear_regions": 0.6}))
-    assert f"{words} on fitted films, {words} on held-out films" in found
-    assert "Beside the model" not in told(Size(errors={"tangent": error}))
 
 
 def test_segments_against_a_bend_and_held_stiffness_are_counted() -> None:
@@ -214,8 +211,6 @@ def test_rotations_beyond_the_ends_are_counted_on_held_out_films() -> None:
     found = told(Size())
     assert "12 of 84 held-out rotations (14 %) lie beyond an end" in found
     assert "published law: T3T4 in 3 patients; T2T3 in 3 patients." in found
-    rows = tables_of(Size())["displacements"].assign(share_of_range=0.5)
-    assert "0 of 84 held-out rotations (0 %) lie beyond" in told(Size(), displacements=rows)
 
 
 def test_whether_films_were_brought_to_one_size_is_told() -> None:
@@ -257,3 +252,186 @@ def test_a_population_that_still_moves_casts_doubt() -> None:
     moving = pd.DataFrame({"status": ["not_converged"]})
     (doubt,) = answer(Size(), population=moving).warnings
     assert "did not stand still" in doubt
+
+
+def of_pair(p: float, measure: str = "rotation") -> pd.DataFrame:
+    return pd.DataFrame([paired_test("held_out", measure, PAIR, p)])
+
+
+@sweep("p, significant", [(0.0499, True), (0.05, False), (0.0501, False)])
+def test_five_per_cent_is_not_significant(p: float, significant: bool) -> None:
+    found = answer(Size(), statistics=of_pair(p))
+    assert ("reproduces rotations of segments best" in found.words) is significant
+    assert ("cannot be told apart" in found.words) is not significant
+    assert ("it is significant" in found.how_sure) is significant
+    same = "not told apart from the first"
+    assert (same in told(Size(), statistics=of_pair(p))) is not significant
+    alike = "not told apart from tangent, as published"
+    assert (alike in told(Size(), statistics=of_pair(p, "place"))) is not significant
+
+
+def standing(errors: dict[str, float], noise: float | None) -> ModelRanking:
+    rows = pd.DataFrame({"model": list(errors), "rmse": list(errors.values())})
+    known = {"films": "held_out", "measure": "rotation", "unit": "deg", "n_patients": 3}
+    return ModelRanking.of(rows.assign(**known, reading_noise=noise), "held_out", "rotation")
+
+
+@sweep(
+    "errors, words",
+    [
+        ((1.01, 2.0), "the error is above that"),
+        ((1.0, 2.0), "1 model is not above that"),
+        ((0.5, 1.0), "no model is above that"),
+        ((0.5, 1.01), "1 model is not above that"),
+        ((0.5, 0.9, 2.0), "2 models are not above that"),
+    ],
+)
+def test_an_error_as_large_as_reading_makes_is_not_above_it(
+    errors: tuple[float, ...], words: str
+) -> None:
+    assert words in above_noise(standing({f"m{n}": one for n, one in enumerate(errors)}, 1.0))
+
+
+def test_models_are_ordered_by_error_and_held_against_one_another() -> None:
+    found = standing({"a": 3.0, "b": 1.0, "c": 2.0}, None)
+    assert found.models == ["b", "c", "a"]
+    assert found.noise is None
+    assert (found.error("c"), found.sized("c")) == (2.0, "2.00°")
+    assert found.less("b", "c") == 0.5
+    assert ModelRanking.of(pd.DataFrame(), "held_out", "rotation").models == []
+    assert ModelRanking.of(pd.DataFrame(), "held_out", "rotation").noise is None
+
+
+def compared(**errors: float) -> str:
+    held_out = standing(errors, None)
+    return _answer(held_out, dict.fromkeys(_compared(held_out)))
+
+
+def test_the_reference_is_named_once_where_it_is_the_next() -> None:
+    """And where it is later, beside the next; other models are not."""
+    words = compared(tangent=0.3, linear_regions=0.35, uniform=0.8, linear_per_segment=0.9)
+    assert words.count("% less than") == 1
+    assert "the next, the model that is linear by region" in words
+    later = compared(tangent=0.3, uniform=0.35, linear_per_segment=0.4, linear_regions=0.6)
+    assert later.count("% less than") == 2
+    assert "50 % less than the model that is linear by region (0.600°)." in later
+
+
+@sweep("other, words", [(0.3, "as much as the next"), (0.4, "25 % less than")])
+def test_models_with_one_error_are_as_good(other: float, words: str) -> None:
+    assert words in compared(tangent=0.3, linear_regions=other)
+
+
+def test_a_model_alone_is_compared_with_none() -> None:
+    assert compared(tangent=0.4).endswith("There is no other model to compare it with.")
+
+
+def test_p_is_that_of_the_pair_whichever_is_named_first() -> None:
+    rows = pd.DataFrame(
+        [
+            paired_test("held_out", "rotation", ("a", "c"), 0.9),
+            paired_test("held_out", "rotation", ("b", "a"), 0.2),
+            paired_test("held_out", "place", ("a", "b"), 0.3),
+            paired_test("fitted", "rotation", ("a", "b"), 0.4),
+        ]
+    )
+    for pair in (("a", "b"), ("b", "a")):
+        assert p_of(rows, "held_out", "rotation", *pair) == 0.2
+    assert p_of(rows, "held_out", "rotation", "b", "c") is None
+    assert p_of(rows.iloc[:0], "held_out", "rotation", "a", "b") is None
+
+
+def lost(*places: int) -> pd.DataFrame:
+    rows = tables_of(Size())["positions"]
+    chosen = rows.index[list(places)]
+    rows.loc[chosen, ["status", "message"]] = ["unstable", "x"]
+    return rows
+
+
+@sweep("count, more", [(6, ""), (7, "; and 1 more"), (9, "; and 3 more")])
+def test_six_places_are_named_and_more_are_counted(count: int, more: str) -> None:
+    first = told(Size(), positions=lost(*range(count))).splitlines()[0]
+    assert first.startswith(f"{count} of 60 poses ended unstable: p01, right")
+    assert first.count("(x)") == 6
+    assert first.endswith(f"(x){more}.")
+
+
+@sweep(
+    "status, words",
+    [("unstable", 1), ("not_converged", 1), ("unreachable", 0), ("converged", 0)],
+)
+def test_poses_that_were_not_found_are_warned_of(status: str, words: int) -> None:
+    rows = tables_of(Size())["positions"]
+    rows.loc[rows.index[:2], "status"] = status
+    warnings = answer(Size(), positions=rows).warnings
+    assert sum("2 of 60 poses were not found, in 1 patient;" in one for one in warnings) == words
+
+
+def identifiable(patients: int) -> pd.DataFrame:
+    """Of four patients so many whose films tell both ends of the ratio of one joint."""
+    rows = [
+        {
+            "specimen": f"p{n}",
+            "joint": joint,
+            "identifiable": joint == "a" or n < patients,
+            "open_below": not (joint == "a" or n < patients),
+            "open_above": n == 3 and joint == "b",
+        }
+        for n in range(4)
+        for joint in "ab"
+    ]
+    usual = {"model": "tangent_fitted", "opposite": False, "constrained": False}
+    return pd.DataFrame(rows).assign(**usual, fit_status=None, n_optima=None)
+
+
+@sweep("patients, few", [(1, True), (2, False), (3, False)])
+def test_half_of_the_patients_are_not_fewer_than_half(patients: int, few: bool) -> None:
+    words = told(Size(), laws=identifiable(patients))
+    assert ("At b films tell both ends in fewer than half" in words) is few
+    ends = f"{4 + patients} of 8 ratios"
+    assert ends in words
+    assert f"one end of {3 - patients} and neither of 1" in words
+
+
+@sweep("decided, told_of", [(40.8, True), (40.9, False), (43.0, False)])
+def test_parameters_that_films_decide_are_told_where_they_are_fewer(
+    decided: float, told_of: bool
+) -> None:
+    """Than 95 % of 43: 40.85."""
+    rows = tables_of(Size())["positions"]
+    rows.loc[rows["model"] == "tangent_fitted", "decided_parameters"] = decided
+    assert ("of which the films decide" in told(Size(), positions=rows)) is told_of
+
+
+@sweep("share, count", [(1.0, 0), (1.0001, 84)])
+def test_a_rotation_at_its_end_is_not_beyond(share: float, count: int) -> None:
+    rows = tables_of(Size())["displacements"].assign(share_of_range=share)
+    assert f"{count} of 84 held-out rotations" in told(Size(), displacements=rows)
+
+
+@sweep("scale, films", [(1.0 + 2e-9, 3), (1.0 - 2e-9, 3), (1.0 + 5e-10, 0)])
+def test_a_film_is_brought_to_size_by_more_than_rounding(scale: float, films: int) -> None:
+    rows = tables_of(Size())["positions"]
+    rows.loc[rows["position"] == "traction", "film_scale"] = scale
+    assert (f"{films} of 12 films were brought" in told(Size(), positions=rows)) is bool(films)
+
+
+@sweep("error, words", [(0.6, "as much on fitted films"), (0.59, "less on"), (0.61, "more on")])
+def test_the_tangent_beside_linear_regions_as_good_better_and_worse(
+    error: float, words: str
+) -> None:
+    held_out = standing({"tangent": error, "linear_regions": 0.6}, None).rows
+    rows = held_out.assign(films="fitted")
+    (sentence,) = both_ways(study_of(Size()), ResultTables({}, {}, {}), rows)
+    assert words in sentence
+    assert "Beside the model" not in told(Size(errors={"tangent": error}))
+
+
+def test_held_out_errors_come_before_those_of_fitted_films() -> None:
+    lines = [line for line in told(Size()).splitlines() if "least error first" in line]
+    assert [line.split()[0] for line in lines] == ["Held-out", "Fitted"]
+
+
+def test_without_tables_nothing_is_said() -> None:
+    empty: Any = ResultTables({}, {}, {})
+    assert findings(study_of(Size()), empty) == []

@@ -2,27 +2,20 @@
 
 Would catch a page that loads something, hides doubt behind the answer or shows a table without
 rows. That its figures and page are made of files is seen by the run of the kind
-(`tests/workflow/test_every_kind.py`) and, alone, by `make test-full`.
+(`tests/workflow/test_every_kind.py`).
 """
 
 import re
 from functools import cache
-from pathlib import Path
 
 import pandas as pd
-import pytest
-from drawn import caption
-from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of, write_shipped
-from study_cases import Size as OtherSize
-from study_cases import project
+from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of
 from sweeps import sweep
 
-from spinepipe.jobs import draw, report
 from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.kind import KIND
 from spinepipe.studies.scoliosis.page import READ, document, left_out, shown_tables
-from spinepipe.tables import to_arrow, write
 
 PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 SIZES = {
@@ -68,10 +61,6 @@ def test_page_of_any_films_fetches_nothing_and_has_no_view_in_space(size: str) -
     assert "nan" not in re.sub("<[^>]*>", " ", before_scripts).lower().split()
 
 
-def test_page_has_the_same_bytes_twice() -> None:
-    assert page_of(SIZES["a pose lost"]) == page("a pose lost")
-
-
 def test_the_answer_stands_before_all_else() -> None:
     text = page("a pose lost")
     order = ["Look at this first", "Verdict", 'class="headline"', "Figure 1.", "Table 1."]
@@ -96,32 +85,3 @@ def test_what_is_left_out_is_told_with_its_reason() -> None:
     told = left_out(study_of(bare), cohort_of(bare))
     assert told[-1] == "position traction (nobody has a film of it)"
     assert {f"{name} (models)" for name in ERRORS if name not in bare.errors} < set(told)
-
-
-@pytest.mark.full
-def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
-    project(tmp_path, OtherSize())
-    root = tmp_path
-    write_shipped(root / "config/cohorts/ais", 2)
-    text = "study: s\nkind: scoliosis\ncohort: ais\nmodels: [tangent, uniform]\n"
-    (root / "config/studies/s.yaml").write_text(text)
-    tables = tables_of(Size(2, errors={"tangent": 0.4, "uniform": 0.8}))
-    files = {}
-    for name, rows in tables.items():
-        files[name] = root / f"{name}.parquet"
-        empty = rows.astype(object).where(rows.notna(), None)  # texts too
-        write(to_arrow(KIND.table(name), empty), files[name], {"study": "s"})
-    pictures = []
-    for figure in KIND.figures:
-        places = [str(root / f"{figure.name}.{kind}") for kind in ("svg", "png")]
-        read = [str(files[name]) for name in figure.reads]
-        draw.run(str(root), "s", figure.name, read, *places)
-        pictures.append(places[0])
-    page = root / "report.html"
-    captions = [str(caption("scoliosis", figure.name)) for figure in KIND.figures]
-    report.run(
-        str(root), "s", "full", [str(f) for f in files.values()], pictures, captions, str(page)
-    )
-    text = page.read_text(encoding="utf-8")
-    for figure in KIND.figures:
-        assert f"{figure.title}." in text

@@ -119,11 +119,6 @@ def test_of_three_patients_there_is_no_p() -> None:
     assert "uniform has the smaller errors, by a median of 1 mm" in found["message"]
 
 
-def test_without_held_out_films_fitted_ones_are_tested_alone() -> None:
-    found = statistics(sizes(uniform=1.0), {})
-    assert set(found["stratum"]) == {"fitted"}
-
-
 def test_a_patient_counts_by_the_root_mean_square_over_all_films() -> None:
     positions, displacements, curves = tables(sizes(), sizes())
     more = displacements.assign(simulated_deg=displacements["measured_deg"] + 7.0)

@@ -8,7 +8,7 @@ import pytest
 from sweeps import sweep
 
 from spinepipe.effects.contract import Array
-from spinepipe.studies.scoliosis.tangent_laws import Pairs, Straight, characterise, ends_of
+from spinepipe.studies.scoliosis.tangent_laws import LinearShape, Pairs, characterise, ends_of
 
 SEGMENTS = 14
 
@@ -125,7 +125,7 @@ def test_films_of_springs_give_the_springs_back() -> None:
     """Linear laws from the same pairs: Eq 4 with r in the place of tan(B r + C) + D."""
     stiffness, arm = np.linspace(50.0, 120.0, SEGMENTS), np.linspace(0.4, 0.02, SEGMENTS)
     right, left = 90.0 * arm / stiffness, -1.4 * 90.0 * 0.9 * arm / stiffness
-    found = characterise(Pairs(right, left, arm, 0.9 * arm, 2), Straight(), 63.0)
+    found = characterise(Pairs(right, left, arm, 0.9 * arm, 2), LinearShape(), 63.0)
     assert found.ratio == pytest.approx(1.4, rel=1e-6)
     np.testing.assert_allclose(found.stretch / found.stretch[0], stretch_of(stiffness), rtol=1e-6)
     assert np.abs(found.errors).max() < 1e-9

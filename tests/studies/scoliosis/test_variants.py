@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from scoliosis_cases import write_shipped
+import scoliosis_cases
+from scoliosis_cases import shipped
 
-from spinepipe import cohort as cohorts
-from spinepipe.cohort import Cohort
-from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT
+from spinepipe.studies.scoliosis.films import RIGHT
 from spinepipe.studies.scoliosis.fixed_end_spine import with_laws
 from spinepipe.studies.scoliosis.personal import Patient, RegionFit, _regions, patient_of, tangent
 from spinepipe.studies.scoliosis.settings import Scoliosis
@@ -21,31 +20,18 @@ from spinepipe.studies.scoliosis.variants import variant_rows
 from spinepipe.studies.scoliosis.variation import variation_rows
 from spinepipe.tables import from_rows
 
-STUDY = Scoliosis.model_validate(
-    {
-        "study": "s",
-        "kind": "scoliosis",
-        "cohort": "ais",
-        "variants": {"enlargement_percent": [0, 20, 40], "scale": [0.3, 3.0]},
-    }
-)
+VARIANTS_ASKED = {"enlargement_percent": [0, 20, 40], "scale": [0.3, 3.0]}
+STUDY = Scoliosis.model_validate(scoliosis_cases.STUDY.model_dump() | {"variants": VARIANTS_ASKED})
 
 
 @pytest.fixture(scope="module")
-def cohort(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
-    folder = tmp_path_factory.mktemp("films") / "ais"
-    write_shipped(folder, 1)
-    return cohorts.read(folder, (FILMS, PATIENTS))
+def patient() -> Patient:
+    return patient_of(STUDY, shipped(1), "p01")
 
 
 @pytest.fixture(scope="module")
-def patient(cohort: Cohort) -> Patient:
-    return patient_of(STUDY, cohort, "p01")
-
-
-@pytest.fixture(scope="module")
-def variants(cohort: Cohort) -> pd.DataFrame:
-    return from_rows(VARIANTS, list(variant_rows(STUDY, cohort, "p01"))).to_pandas()
+def variants() -> pd.DataFrame:
+    return from_rows(VARIANTS, list(variant_rows(STUDY, shipped(1), "p01"))).to_pandas()
 
 
 def test_films_on_the_ends_are_singular_and_have_no_pose(variants: pd.DataFrame) -> None:
@@ -69,7 +55,7 @@ def test_stiffness_in_all_moves_nothing_and_lateral_alone_does(
     laws = model.effects[1].values * np.array([10.0, 1.0, 1.0])
     stiffer = with_laws(patient.chain, 10.0 * patient.springs, laws)
     top = patient.read.films[RIGHT].top
-    one, two = (patient.held(which).at(top) for which in (model, stiffer))
+    one, two = (patient.fixed_end(which).at(top) for which in (model, stiffer))
     # the least bushing of a tangent does not grow along: a millionth of a joint
     np.testing.assert_allclose(two.r, one.r, rtol=0, atol=1e-7)
     assert variants.loc[variants["varied"] == "scale", "moved_deg"].max() > 0.1
@@ -103,10 +89,10 @@ def test_variants_are_pooled_over_whole_patients() -> None:
 
 def test_the_top_is_kept_from_tipping_unless_it_may(patient: Patient) -> None:
     top, model = patient.read.films["traction"].top, tangent(patient, STUDY).model
-    level, free = (replace(patient, level=one).held(model).at(top) for one in (True, False))
-    assert len(level.held.pushes) == len(free.held.pushes) + 1
-    extension = level.held.q.reshape(-1, 6)[:, 3].sum()
-    assert abs(extension) < np.deg2rad(0.5) < abs(free.held.q.reshape(-1, 6)[:, 3].sum())
+    level, free = (replace(patient, level=one).fixed_end(model).at(top) for one in (True, False))
+    assert len(level.result.pushes) == len(free.result.pushes) + 1
+    extension = level.result.q.reshape(-1, 6)[:, 3].sum()
+    assert abs(extension) < np.deg2rad(0.5) < abs(free.result.q.reshape(-1, 6)[:, 3].sum())
 
 
 def test_ferguson_angles_change_with_places_as_told(patient: Patient) -> None:

@@ -11,39 +11,39 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.report.panels import explain_marks, log_ticks
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, SMALL_PT, VERMILLION, saying
+from spinepipe.sensitivity.global_indices.design import DUMMY
 from spinepipe.studies.global_sensitivity.figures.panels import (
     NAME,
     OUTPUT,
     Measures,
     Panel,
+    choose_panels,
     factor_name,
     leading,
-    measures_of,
     no_index,
-    outputs,
-    pooled,
+    pool,
     sections_of,
-    shown,
+    shown_outputs,
     title,
     unit_of,
     with_results,
 )
-from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 
 MOST_PANELS = 9
-_LOOKS = (
+_STYLES: tuple[Mapping[str, Any], ...] = (
     {"color": BLUE, "marker": "o"},
     {"color": VERMILLION, "marker": "s"},
     {"color": GREEN, "marker": "^"},
 )
 """Of the first, second and third factor of a panel."""
 
-_DUMMY_LOOK = {"color": GREY, "marker": "x", "ls": "--"}
+_DUMMY_STYLE: Mapping[str, Any] = {"color": GREY, "marker": "x", "ls": "--"}
 _PANEL_MM, _KEY_MM = 56.0, 10.0
 _ROOM_FOR_KEY = 0.55
 """Height for the names of factors, as a part of the height of the lines."""
 
-Looks = Mapping[str, Mapping[str, Any]]
+Styles = dict[str, Mapping[str, Any]]
 
 
 def convergence_figure(
@@ -51,36 +51,33 @@ def convergence_figure(
 ) -> Figure:
     """The main index of each panel's leading factors against the runs, from ``convergence``."""
     convergence, indices = tables["convergence"], tables["indices"]
-    measures = measures_of(indices)
-    found = outputs(cohort, indices, measures) if measures else []
+    found, measures = shown_outputs(cohort, indices)
     if not found or measures is None:
         return no_index(indices)
     grown = with_results(convergence, measures)
     grown = grown[grown["index"] == measures.main]
     if grown["runs"].nunique() < 2:
         return saying("No convergence can be shown: this design has no smaller part of its own.")
-    kept = shown(found, cohort.joint_names, MOST_PANELS)
+    kept = choose_panels(found, cohort.joint_names, MOST_PANELS)
     panels, figure = sections_of(kept, dict.fromkeys(OUTPUT, _PANEL_MM), _KEY_MM)
     for index, (axis, panel) in enumerate(zip(panels, kept, strict=True)):
-        _draw(axis, panel.of(grown), _looks(leading([panel], measures)), measures)
+        factors = leading([panel], measures)
+        first = [name for name in factors if name != DUMMY]
+        styles: Styles = dict(zip(first, _STYLES, strict=False))
+        if DUMMY in factors:
+            styles[DUMMY] = _DUMMY_STYLE
+        _draw(axis, panel.of(grown), styles, measures)
         axis.set_title(title(index, panel))
     explain_marks(figure, [], _words(kept, measures), 1)
     return figure
 
 
-def _looks(factors: Sequence[str]) -> Looks:
-    """How the leading factors and the dummy are drawn."""
-    first = [name for name in factors if name != DUMMY]
-    looks: dict[str, Mapping[str, Any]] = dict(zip(first, _LOOKS, strict=False))
-    return looks | ({DUMMY: _DUMMY_LOOK} if DUMMY in factors else {})
-
-
-def _draw(axis: Axes, panel: Panel, looks: Looks, measures: Measures) -> None:
-    rows = pooled(panel.rows, ["factor", "runs"]).sort_values("runs", kind="stable")
-    for name, look in looks.items():
+def _draw(axis: Axes, panel: Panel, styles: Styles, measures: Measures) -> None:
+    rows = pool(panel.rows, ["factor", "runs"]).sort_values("runs", kind="stable")
+    for name, style in styles.items():
         one = rows[rows["factor"] == name]
         axis.fill_between(
-            one["runs"], one["low"], one["high"], color=look["color"], alpha=0.18, lw=0, zorder=2
+            one["runs"], one["low"], one["high"], color=style["color"], alpha=0.18, lw=0, zorder=2
         )
         axis.plot(
             one["runs"],
@@ -90,7 +87,7 @@ def _draw(axis: Axes, panel: Panel, looks: Looks, measures: Measures) -> None:
             lw=1.0,
             zorder=3,
             label=factor_name(name),
-            **look,
+            **style,
         )
     axis.axhline(0.0, color=BLACK, lw=0.5, zorder=1)
     axis.set_xscale("log")
@@ -99,7 +96,7 @@ def _draw(axis: Axes, panel: Panel, looks: Looks, measures: Measures) -> None:
     unit = f" ({unit_of(panel.output, panel.coordinate)})" if measures.in_units else ""
     axis.set_ylabel(f"{NAME[measures.main]}{unit}")
     axis.tick_params(axis="y", length=2.5)
-    _limit(axis, rows[rows["factor"].isin(list(looks))])
+    _limit(axis, rows[rows["factor"].isin(list(styles))])
     axis.legend(
         loc="upper right", fontsize=SMALL_PT, handlelength=2.2, labelspacing=0.25, borderaxespad=0.0
     )

@@ -13,6 +13,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.panels import MOST_ACROSS, explain_marks
 from spinepipe.report.style import BLACK, GREY, INK, TALLEST_MM, WHITE
 from spinepipe.report.words import count, number
+from spinepipe.sensitivity.global_indices.design import DUMMY
 from spinepipe.sensitivity.global_indices.floor import NEGLIGIBLE
 from spinepipe.studies.global_sensitivity.figures.panels import (
     COLORS,
@@ -21,22 +22,21 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     Measures,
     Panel,
     above_floor,
+    choose_panels,
     factor_name,
     floor_seen,
+    footnote,
     leading,
-    measures_of,
     no_index,
     not_negligible,
-    outputs,
-    pooled,
+    pool,
     screened,
     sections_of,
-    shown,
+    shown_outputs,
     title,
-    told,
     unit_of,
 )
-from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 
 MOST, FEWEST = 24, 6
 SMALL = 0.01
@@ -49,15 +49,12 @@ def drawn_factors(found: Sequence[Panel], measures: Measures) -> tuple[list[str]
     own = [name for name in order if name != DUMMY]
     seen = _seen(found, measures)
     worth = [name for name in own if name in seen][:MOST]
-    kept = worth if len(worth) >= FEWEST else _filled(worth, own)
+    kept = worth
+    if len(worth) < FEWEST:  # the fewest rows, in their order
+        others = [name for name in own if name not in worth][: FEWEST - len(worth)]
+        kept = [name for name in own if name in worth or name in others]
     drawn = kept + [DUMMY] * (DUMMY in order)
     return drawn, _of_others([name for name in own if name not in kept], found, measures)
-
-
-def _filled(worth: Sequence[str], own: Sequence[str]) -> list[str]:
-    """The fewest rows, in their order."""
-    others = [name for name in own if name not in worth][: FEWEST - len(worth)]
-    return [name for name in own if name in worth or name in others]
 
 
 def _seen(found: Sequence[Panel], measures: Measures) -> set[str]:
@@ -65,7 +62,7 @@ def _seen(found: Sequence[Panel], measures: Measures) -> set[str]:
     names: set[str] = set()
     for panel in found:
         main = panel.rows[panel.rows["index"] == measures.main]
-        means = pooled(main, ["factor"]).set_index("factor")["estimate"]
+        means = pool(main, ["factor"]).set_index("factor")["estimate"]
         large = set(means.index[means >= SMALL * means.max()])
         floor = main["noise_floor"].notna().any()
         names |= large & above_floor(main) if floor else large
@@ -97,14 +94,18 @@ def indices_figure(
 ) -> Figure:
     """A panel for each output, a row for each factor, a bar for each index, from ``indices``."""
     indices = tables["indices"]
-    measures = measures_of(indices)
-    found = outputs(cohort, indices, measures) if measures else []
+    found, measures = shown_outputs(cohort, indices)
     if not found or measures is None:
         return no_index(indices)
     orders = {name: drawn_factors(part, measures) for name, part in _by_output(found).items()}
     rows = {name: len(order) for name, (order, _) in orders.items()}
-    kept = shown(found, cohort.joint_names, _most_panels(rows))
-    row = min(_ROW_MM, (TALLEST_MM - _KEY_MM - _AROUND_MM * _lines(kept)) / _rows(kept, rows))
+    # as many panels as a page holds, if every line of them is as high as the mean
+    line = _LEAST_ROW_MM * sum(rows.values()) / len(rows) + _AROUND_MM
+    most = MOST_ACROSS * max(len(rows), int((TALLEST_MM - _KEY_MM) // line))
+    kept = choose_panels(found, cohort.joint_names, most)
+    lines = {name: -(-len(part) // MOST_ACROSS) for name, part in _by_output(kept).items()}
+    room = TALLEST_MM - _KEY_MM - _AROUND_MM * sum(lines.values())
+    row = min(_ROW_MM, room / sum(n * rows[name] for name, n in lines.items()))
     heights = {name: n * row + _AROUND_MM for name, n in rows.items()}
     panels, figure = sections_of(kept, heights, _KEY_MM)
     for index, (axis, panel) in enumerate(zip(panels, kept, strict=True)):
@@ -116,37 +117,18 @@ def indices_figure(
         axes = [axis for axis, panel in zip(panels, kept, strict=True) if panel.output == name]
         _name(axes, part, orders[name][0], measures)
     handles = _handles(kept, measures)
-    missing = _missing({name: words for name, (_, words) in orders.items() if words})
-    explain_marks(figure, handles, told(kept, found, missing), len(handles))
+    # what is said of factors without a row, output by output where that differs
+    others = {name: words for name, (_, words) in orders.items() if words}
+    missing = next(iter(others.values()), "")
+    if len(set(others.values())) > 1:
+        missing = "; ".join(f"{OUTPUT[name]}: {words}" for name, words in others.items())
+    explain_marks(figure, handles, footnote(kept, found, missing), len(handles))
     return figure
-
-
-def _missing(words: Mapping[str, str]) -> str:
-    """What is said of factors without a row, output by output where that differs."""
-    if len(set(words.values())) < 2:
-        return next(iter(words.values()), "")
-    return "; ".join(f"{OUTPUT[name]}: {told_}" for name, told_ in words.items())
 
 
 def _by_output(panels: Sequence[Panel]) -> dict[str, list[Panel]]:
     names = dict.fromkeys(panel.output for panel in panels)
     return {name: [panel for panel in panels if panel.output == name] for name in names}
-
-
-def _most_panels(rows: Mapping[str, int]) -> int:
-    """How many panels a page holds, if every line of them is as high as the mean."""
-    line = _LEAST_ROW_MM * sum(rows.values()) / len(rows) + _AROUND_MM
-    return MOST_ACROSS * max(len(rows), int((TALLEST_MM - _KEY_MM) // line))
-
-
-def _lines(kept: Sequence[Panel]) -> int:
-    return sum(-(-len(part) // MOST_ACROSS) for part in _by_output(kept).values())
-
-
-def _rows(kept: Sequence[Panel], rows: Mapping[str, int]) -> int:
-    """Rows below each other on the page."""
-    parts = _by_output(kept).items()
-    return sum(-(-len(part) // MOST_ACROSS) * rows[name] for name, part in parts)
 
 
 def _draw(axis: Axes, panel: Panel, order: Sequence[str], measures: Measures) -> None:
@@ -170,7 +152,7 @@ def _bars(
     axis: Axes, rows: pd.DataFrame, order: Sequence[str], at: float, height: float, color: str
 ) -> None:
     """One index: bars, lines for their intervals, dots for single joints where several are one."""
-    one = pooled(rows).set_index("factor").reindex(list(order)).dropna(subset="estimate")
+    one = pool(rows).set_index("factor").reindex(list(order)).dropna(subset="estimate")
     y = np.array([len(order) - 1 - order.index(name) for name in one.index], dtype=float) + at
     axis.barh(y, one["estimate"], height=height, color=color, lw=0, zorder=3)
     for at_y, low, high in zip(y, one["low"], one["high"], strict=True):

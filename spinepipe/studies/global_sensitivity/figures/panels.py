@@ -12,8 +12,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.panels import lettered, sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
 from spinepipe.report.words import AXIS, capital, case, count, plain, short, unit
-from spinepipe.studies.global_sensitivity.loaded import loaded
-from spinepipe.studies.global_sensitivity.settings import DUMMY
+from spinepipe.sensitivity.global_indices.design import DUMMY
+from spinepipe.studies.global_sensitivity.largest_moment import largest_moment
 from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
@@ -104,6 +104,12 @@ def measures_of(indices: pd.DataFrame) -> Measures | None:
     return next((known for known in _KNOWN if known.main in names), None)
 
 
+def shown_outputs(cohort: Cohort, indices: pd.DataFrame) -> tuple[list[Panel], Measures | None]:
+    """The outputs of a study, and the measures of its indices; none where no index is known."""
+    measures = measures_of(indices) if len(indices) else None
+    return (outputs(cohort, indices, measures) if measures else []), measures
+
+
 def outputs(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> list[Panel]:
     """One panel for each output and test: the coordinate that the test loads, at its peak.
 
@@ -112,7 +118,7 @@ def outputs(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> list[P
     rows = with_results(indices, measures)
     found = []
     for (output, test), part in rows.groupby(["output", "test"], sort=False):
-        known = loaded(cohort, str(test))
+        known = largest_moment(cohort, str(test))
         steps = set(part["step"])
         step = known[1] if known and known[1] in steps else max(steps)
         for name in _coordinates(part[part["step"] == step], known[0] if known else ""):
@@ -142,7 +148,7 @@ def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
     return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
 
 
-def shown(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
+def choose_panels(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
     """At most so many panels; of a single specimen a joint each, where there is room."""
     apart = [one for panel in found for one in by_joint(panel, joints)]
     several = any(panel.rows["specimen"].nunique() > 1 for panel in found)
@@ -170,7 +176,7 @@ def by_joint(panel: Panel, joints: Sequence[str]) -> list[Panel]:
     ] or [panel]
 
 
-def pooled(rows: pd.DataFrame, by: Sequence[str] = ("index", "factor")) -> pd.DataFrame:
+def pool(rows: pd.DataFrame, by: Sequence[str] = ("index", "factor")) -> pd.DataFrame:
     """Mean estimate and mean ends over joints and specimens, in the order of the rows.
 
     The mean of the ends is no narrower than the interval of the mean: SDs add up at most.
@@ -222,7 +228,8 @@ def leading(found: Sequence[Panel], measures: Measures) -> list[str]:
     """
     every = []
     for panel in found:
-        rows = pooled(panel.rows[panel.rows["index"] == measures.main])
+        rows = pool(panel.rows[panel.rows["index"] == measures.main])
+        # effects in mm and N m cannot be averaged: as shares of the panel's largest they can
         largest = rows["estimate"].abs().max() if measures.in_units and len(rows) else 1.0
         every.append(rows.set_index("factor")["estimate"] / (largest or 1.0))
     mean = pd.concat(every).groupby(level=0, sort=False).mean()
@@ -291,7 +298,7 @@ def no_index(rows: pd.DataFrame) -> Figure:
     return saying(f"No index can be shown: {reason}.")
 
 
-def told(kept: Sequence[Panel], found: Sequence[Panel], not_drawn: str) -> str:
+def footnote(kept: Sequence[Panel], found: Sequence[Panel], not_drawn: str) -> str:
     """Below the panels: runs, what is together, the dummy, and what is only in the table."""
     rows = pd.concat([panel.rows for panel in kept])
     parts = [_runs(rows), _together(kept), _dummy(rows), _more(kept, found), not_drawn]

@@ -16,6 +16,7 @@ from spinepipe.report.glyphs import Array
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
 from spinepipe.report.style import BLUE, GREY, VERMILLION, blank, saying
 from spinepipe.report.words import capital, count, fixed, number
+from spinepipe.sensitivity.global_indices.design import DUMMY
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.figures.panels import (
     NAME,
@@ -23,14 +24,13 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     Panel,
     factor_name,
     first_of,
-    measures_of,
     no_index,
-    outputs,
+    shown_outputs,
     unit_of,
     what,
     where,
 )
-from spinepipe.studies.global_sensitivity.settings import DUMMY, GlobalSensitivity
+from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, TRANSLATIONS
 
 TOP = 3
@@ -127,6 +127,7 @@ def running(x: Array, y: Array, few: int = 12) -> tuple[Array, Array]:
     if len(levels) <= few:
         groups = [x == level for level in levels]
     else:
+        # a hundred different values a part, from four parts to twenty
         parts = min(20, max(4, len(levels) // 100))
         part = np.searchsorted(np.quantile(levels, np.arange(1, parts) / parts), x)
         groups = [part == number for number in range(parts)]
@@ -149,8 +150,7 @@ def scatter_figure(
 ) -> Figure:
     """A line of panels for each output: all runs over the values of its three leading factors."""
     responses, design, indices = tables["responses"], tables["design"], tables["indices"]
-    measures = measures_of(indices)
-    found = outputs(cohort, indices, measures) if measures else []
+    found, measures = shown_outputs(cohort, indices)
     if not found or measures is None:
         return no_index(indices)
     values, units = _values(design)
@@ -210,6 +210,7 @@ def _cloud(axis: Axes, x: Array, y: Array, unit: str, lost: Array) -> None:
     ----------
     lost : values of the factor at runs that failed and have no output: crosses at the bottom.
     """
+    # the same dots each time a figure is drawn
     kept = np.random.default_rng(0).permutation(len(x))[:MOST_DOTS]
     axis.plot(
         x[kept], y[kept], "o", color=GREY, ms=1.6, mew=0.0, alpha=0.45, zorder=2, rasterized=True

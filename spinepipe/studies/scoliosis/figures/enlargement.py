@@ -18,12 +18,19 @@ from spinepipe.studies.scoliosis.tables import GROUPS
 from spinepipe.studies.scoliosis.words import OF_FILMS
 
 ROTATION, MOVED = "rotation_rmse_deg", "moved_deg"
-_LOOKS: Mapping[str, tuple[str, str, Dashes]] = {
+_STYLES: Mapping[str, tuple[str, str, Dashes]] = {
     "fitted": (VERMILLION, "s", (0, (4, 2))),
     "held_out": (BLUE, "o", "-"),
 }
 LEAST_DEG = 1e-3
 """Axes reach to this at least, where all is rounding."""
+
+_TITLES = {
+    ("enlargement", ROTATION): "Ends beyond the films",
+    ("scale", ROTATION): "Scale: error",
+    ("scale", MOVED): "Scale: largest change",
+}
+"""Of panels, by what is varied and the column that is shown."""
 
 _HEIGHT_MM, _KEY_MM = 62.0, 16.0
 
@@ -33,16 +40,11 @@ def enlargement_figure(
 ) -> Figure:
     """Errors over the enlargement, then errors and largest change over the scale."""
     rows = tables["variation"]
-    parts = {name: _curves(rows, name) for name in ("enlargement", "scale")}
-    panels = [
-        (name, column)
-        for name, column in (
-            ("enlargement", ROTATION),
-            ("scale", ROTATION),
-            ("scale", MOVED),
-        )
-        if parts[name][column].notna().any()
-    ]
+    parts = {
+        name: rows[rows["varied"] == name].sort_values("value", kind="stable")
+        for name in ("enlargement", "scale")
+    }
+    panels = [(name, column) for name, column in _TITLES if parts[name][column].notna().any()]
     if not panels:
         return saying("Nothing was varied, or no patient has a pose on every film.")
     figure = blank(_HEIGHT_MM + _KEY_MM)
@@ -58,35 +60,16 @@ def enlargement_figure(
     return figure
 
 
-_TITLES = {
-    ("enlargement", ROTATION): "Ends beyond the films",
-    ("scale", ROTATION): "Scale: error",
-    ("scale", MOVED): "Scale: largest change",
-}
-
-
-def _curves(rows: pd.DataFrame, varied: str) -> pd.DataFrame:
-    return rows[rows["varied"] == varied].sort_values("value", kind="stable")
-
-
 def _line(axis: Axes, rows: pd.DataFrame, group: str, column: str) -> None:
     """A line of one group of films, its least marked; nothing is drawn where nobody has a pose."""
-    color, marker, dashes = _LOOKS[group]
+    color, marker, dashes = _STYLES[group]
     own = rows[rows["films"] == group].dropna(subset=[column])
     values = own[column].to_numpy(float)
     axis.plot(own["value"], values, color=color, ls=dashes, marker=marker, ms=3.5, mew=0)
     if column == ROTATION and len(values):
         least = int(np.argmin(values))
-        axis.plot(
-            [float(own["value"].iloc[least])],
-            [values[least]],
-            marker,
-            ms=6.5,
-            mfc=WHITE,
-            mec=color,
-            mew=1.2,
-            zorder=4,
-        )
+        place = [float(own["value"].iloc[least])], [values[least]]
+        axis.plot(*place, marker, ms=6.5, mfc=WHITE, mec=color, mew=1.2, zorder=4)
 
 
 def _axes(axis: Axes, rows: pd.DataFrame, name: str, column: str, studied: float) -> None:
@@ -110,7 +93,7 @@ def _axes(axis: Axes, rows: pd.DataFrame, name: str, column: str, studied: float
 def _explain(figure: Figure, groups: Sequence[str], rows: pd.DataFrame) -> None:
     handles = [
         Line2D([], [], color=c, marker=m, ls=dashes, ms=3.5, mew=0, label=OF_FILMS[g].lower())
-        for g, (c, m, dashes) in _LOOKS.items()
+        for g, (c, m, dashes) in _STYLES.items()
         if g in groups
     ]
     handles.append(

@@ -13,7 +13,8 @@ from spinepipe.effects.contract import Array
 from spinepipe.report.glyphs import finite
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, blank, saying
-from spinepipe.studies.scoliosis.figures.line_styles import LOOKS, axis_lines
+from spinepipe.studies.scoliosis.errors import of_rotations, reading_floor
+from spinepipe.studies.scoliosis.figures.line_styles import DASHED, STYLES, axis_lines
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import BEYOND, GROUPS, RANGES
 from spinepipe.studies.scoliosis.words import IN_WORDS, OF_FILMS, in_order
@@ -32,7 +33,6 @@ FEWEST_FOR_A_BOX = 5
 WHISKERS = (5.0, 95.0)
 
 _WIDTH, _HEIGHT_MM, _KEY_MM = 0.8, 70.0, 18.0
-_DASHES = (0, (4, 2))
 
 
 def errors_by_range_figure(
@@ -46,12 +46,12 @@ def errors_by_range_figure(
     groups = [name for name in GROUPS if (rows["films"] == name).any()]
     figure = blank(_HEIGHT_MM + _KEY_MM)
     axes = side_by_side(figure, len(groups), len(groups), sharey=True)
-    floor = _floor(tables["accuracy"])
+    floor = reading_floor(tables["accuracy"], "rotation")
     for index, (axis, group) in enumerate(zip(axes, groups, strict=True)):
         head(axis, index, OF_FILMS[group])
         axis_lines(axis)
         _boxes(axis, rows[rows["films"] == group], models)
-        axis.axhline(floor, color=GREY, ls=_DASHES, lw=0.9, zorder=1)
+        axis.axhline(floor, color=GREY, ls=DASHED, lw=0.9, zorder=1)
         axis.set_xlabel("size of the rotation on the film, share of the published end")
     axes[0].set_ylabel("size of the error (°)")
     axes[0].set_ylim(bottom=0.0)
@@ -61,14 +61,14 @@ def errors_by_range_figure(
 
 def classified(displacements: pd.DataFrame) -> pd.DataFrame:
     """Columns films, range, model, error (deg, without sign) of all segments with a pose."""
-    error = (displacements["simulated_deg"] - displacements["measured_deg"]).abs()
+    error = of_rotations(displacements).abs()
     share = displacements["share_of_range"].to_numpy(float)
     names = [*RANGES, BEYOND]
     tops = [high for _, high in RANGES.values()]
     at = np.searchsorted(tops, share, side="right")
     ranges = np.where(displacements["opposite"], OPPOSITE, np.array(names)[at])
     films = np.where(displacements["fitted"], "fitted", "held_out")
-    found = displacements[["model"]].assign(films=films, range=ranges, error=error.astype(float))
+    found = displacements[["model"]].assign(films=films, range=ranges, error=error)
     return found.dropna(subset=["error"])
 
 
@@ -82,7 +82,7 @@ def _boxes(axis: Axes, rows: pd.DataFrame, models: Sequence[str]) -> None:
         for number, model in enumerate(models):
             values = finite(there.loc[there["model"] == model, "error"])
             at = x + (number - 0.5 * (len(models) - 1)) * step
-            _box(axis, values, at, 0.8 * step, LOOKS[model].color)
+            _box(axis, values, at, 0.8 * step, STYLES[model].color)
         most = int(there.groupby("model").size().max())
         labels.append(f"{CLASSES[name]}\nn = {most}")
     axis.set_xticks(range(len(classes)), labels)
@@ -110,14 +110,9 @@ def _box(axis: Axes, values: Array, x: float, width: float, color: str) -> None:
     )
 
 
-def _floor(accuracy: pd.DataFrame) -> float:
-    known = accuracy.loc[accuracy["measure"] == "rotation", "reading_noise"].dropna()
-    return float(known.iloc[0]) if len(known) else np.nan
-
-
 def _explain(figure: Figure, models: Sequence[str], groups: Sequence[str], floor: float) -> None:
     handles = [
-        Patch(facecolor=LOOKS[name].color, alpha=0.55, label=IN_WORDS[name]) for name in models
+        Patch(facecolor=STYLES[name].color, alpha=0.55, label=IN_WORDS[name]) for name in models
     ]
     words = "In each cluster the models in this order. Box: middle half, whiskers: middle 90 %."
     if "held_out" not in groups:

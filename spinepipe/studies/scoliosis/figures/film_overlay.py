@@ -15,10 +15,10 @@ from spinepipe.report.panels import explain_marks
 from spinepipe.report.style import BLACK, GREY, WHITE, blank, note, saying
 from spinepipe.report.words import capital, fixed, number, plain, short
 from spinepipe.studies.scoliosis.errors import held_out_error
-from spinepipe.studies.scoliosis.figures.line_styles import LOOKS, axis_lines, key_of_lines
-from spinepipe.studies.scoliosis.films import ERECT, Film, read_films
+from spinepipe.studies.scoliosis.figures.line_styles import STYLES, axis_lines, key_of_lines
+from spinepipe.studies.scoliosis.films import ERECT, HELD_OUT, LEFT, RIGHT, Film, read_films
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.words import in_order, positions_in_order
+from spinepipe.studies.scoliosis.words import in_order
 from spinepipe.units import MM_PER_M
 
 MOST_POSITIONS = 4
@@ -46,7 +46,11 @@ def film_overlay_figure(
         return saying("No pose can be shown: no model has one on any film.")
     patients = chosen(errors)
     rows = rows[rows["specimen"].isin(patients)]
-    shown = positions_in_order(positions["position"])[:MOST_POSITIONS]
+    # the usual films first, any further ones after them; at the erect one all begin
+    there = list(dict.fromkeys(positions["position"]))
+    usual = [name for name in (RIGHT, LEFT, *HELD_OUT) if name in there]
+    further = [name for name in there if name not in (*usual, ERECT)]
+    shown = [*usual, *further][:MOST_POSITIONS]
     figure = blank(_ROW_MM * len(patients) + _ABOVE_MM + _KEY_MM)
     axes = figure.subplots(
         len(patients),
@@ -63,7 +67,8 @@ def film_overlay_figure(
         line[0].set_ylabel(f"{short(patient)}, error {number(float(errors[patient]), 2)}°\nup (mm)")
     _scales(axes, rows)
     for axis, position in zip(axes[0, ::2], shown, strict=True):
-        axis.set_title(_title(position, positions))
+        fitted = positions.loc[positions["position"] == position, "fitted"].any()
+        axis.set_title(f"{capital(plain(position))} ({'fitted' if fitted else 'held out'})")
     _explain(figure, models, positions)
     return figure
 
@@ -109,9 +114,9 @@ def _row(
         for name in models:
             own = rows[(rows["position"] == position) & (rows["model"] == name)]
             if len(own) and own[_OFF].notna().all(axis=None):
-                axis.plot(*posed(films[position], own).T, **LOOKS[name].line(zorder=3, lw=0.8))
+                axis.plot(*posed(films[position], own).T, **STYLES[name].line(zorder=3, lw=0.8))
                 off = np.append(0.0, own[_OFF[0]].to_numpy(float))
-                beside.plot(off, measured[:, 1], **LOOKS[name].line(zorder=3))
+                beside.plot(off, measured[:, 1], **STYLES[name].line(zorder=3))
 
 
 def _scales(axes: "np.ndarray[tuple[int, int], np.dtype[np.object_]]", rows: pd.DataFrame) -> None:
@@ -129,11 +134,6 @@ def _scales(axes: "np.ndarray[tuple[int, int], np.dtype[np.object_]]", rows: pd.
     for axis, beside in zip(axes[-1, ::2], axes[-1, 1::2], strict=True):
         axis.set_xlabel("right (mm)")
         beside.set_xlabel("off (mm)")
-
-
-def _title(position: str, positions: pd.DataFrame) -> str:
-    fitted = positions.loc[positions["position"] == position, "fitted"].any()
-    return f"{capital(plain(position))} ({'fitted' if fitted else 'held out'})"
 
 
 def _explain(figure: Figure, models: Sequence[str], positions: pd.DataFrame) -> None:

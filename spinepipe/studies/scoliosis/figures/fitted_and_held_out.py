@@ -15,8 +15,8 @@ from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, WHITE, blank, note, saying
 from spinepipe.report.words import count
 from spinepipe.statistics import mean_of
-from spinepipe.studies.scoliosis.errors import by_patient, of_group, squares
-from spinepipe.studies.scoliosis.figures.line_styles import LOOKS
+from spinepipe.studies.scoliosis.errors import by_patient, errors_by_measure, reading_floor
+from spinepipe.studies.scoliosis.figures.line_styles import DASHED, STYLES
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import GROUPS
 from spinepipe.studies.scoliosis.words import IN_WORDS, in_order
@@ -38,7 +38,6 @@ _HEIGHT = {"held_out": 0.2, "fitted": -0.2}
 """Where each group of films stands in the row of a model."""
 
 _STRIP, _ROW_MM, _AROUND_MM, _KEY_MM = 0.14, 9.0, 15.0, 16.0
-_DASHES = (0, (4, 2))
 
 
 def fitted_and_held_out_figure(
@@ -63,8 +62,8 @@ def fitted_and_held_out_figure(
         rows = found[found["measure"] == measure]
         for name in models:
             _strips(axis, models.index(name), rows[rows["model"] == name], groups)
-        floor = _floor(tables["accuracy"], measure)
-        axis.axvline(floor, color=GREY, ls=_DASHES, lw=0.9, zorder=1)
+        floor = reading_floor(tables["accuracy"], measure)
+        axis.axvline(floor, color=GREY, ls=DASHED, lw=0.9, zorder=1)
         largest = np.nanmax([*rows["error"].to_numpy(float), floor, LEAST])
         axis.set_xlim(0.0, 1.05 * float(largest))
     _explain(figure, groups, tables["accuracy"])
@@ -76,15 +75,13 @@ def errors_of_patients(
 ) -> pd.DataFrame:
     """Columns films, measure, model, specimen, error: of patients with a pose on every film."""
     parts = []
-    for group in GROUPS:
-        chosen = [of_group(one, group) for one in (positions, displacements, curves)]
-        for measure in PANELS:
-            own = by_patient(squares(measure, *chosen))
-            each = own.melt(ignore_index=False, var_name="model", value_name="error").dropna()
-            each = each.rename_axis("specimen").reset_index()
-            parts.append(each.assign(films=group, measure=measure))
+    for group, measure, errors in errors_by_measure(positions, displacements, curves, PANELS):
+        own = by_patient(errors)
+        each = own.melt(ignore_index=False, var_name="model", value_name="error").dropna()
+        each = each.rename_axis("specimen").reset_index()
+        parts.append(each.assign(films=group, measure=measure))
     columns = ["films", "measure", "model", "specimen", "error"]
-    return pd.concat(parts)[columns] if parts else pd.DataFrame(columns=columns)
+    return pd.concat(parts)[columns]
 
 
 def _rows(axis: Axes, models: Sequence[str]) -> None:
@@ -103,7 +100,7 @@ def _strips(axis: Axes, y: int, rows: pd.DataFrame, groups: Sequence[str]) -> No
         if not len(values):
             note(axis, 0.02, middle, "no patient has all poses", GREY)
             continue
-        color = LOOKS[str(rows["model"].iloc[0])].color
+        color = STYLES[str(rows["model"].iloc[0])].color
         filled = group == "held_out"
         _dots(axis, values, middle, color if filled else WHITE, color)
         _mean(axis, values, middle)
@@ -122,12 +119,6 @@ def _mean(axis: Axes, values: Array, y: float) -> None:
     axis.plot([values.mean()], [y], "D", color=BLACK, ms=3.2, mec=WHITE, mew=0.4, zorder=5)
 
 
-def _floor(accuracy: pd.DataFrame, measure: str) -> float:
-    """What reading films alone makes; NaN where nobody knows."""
-    known = accuracy.loc[accuracy["measure"] == measure, "reading_noise"].dropna()
-    return float(known.iloc[0]) if len(known) else np.nan
-
-
 def _explain(figure: Figure, groups: Sequence[str], accuracy: pd.DataFrame) -> None:
     dot = {"color": GREY, "marker": "o", "ms": 3.0, "ls": "", "mew": 0.6}
     handles = [Line2D([], [], **dot, mfc=WHITE, label="a patient, fitted films")]  # type: ignore[arg-type]
@@ -138,7 +129,7 @@ def _explain(figure: Figure, groups: Sequence[str], accuracy: pd.DataFrame) -> N
     words = ["" if "held_out" in groups else NOTHING_HELD_OUT]
     if accuracy["reading_noise"].notna().any():
         handles.append(
-            Line2D([], [], color=GREY, ls=_DASHES, lw=0.9, label="what reading films alone makes")
+            Line2D([], [], color=GREY, ls=DASHED, lw=0.9, label="what reading films alone makes")
         )
     else:
         words.append("How exactly the films are read is not known.")

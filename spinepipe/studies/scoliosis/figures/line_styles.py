@@ -24,7 +24,10 @@ class ModelStyle:
         return {"color": self.color, "ls": self.dashes, "lw": 1.0, **how}
 
 
-LOOKS = {
+DASHED: Dashes = (0, (4, 2))
+"""What reading films alone makes."""
+
+STYLES = {
     "tangent": ModelStyle(BLUE, "o", "-"),
     "tangent_fitted": ModelStyle(GREEN, "s", (0, (6.0, 1.5))),
     "linear_regions": ModelStyle(VERMILLION, "^", (0, (4.0, 2.0))),
@@ -35,7 +38,7 @@ LOOKS = {
 
 def key_of_lines(models: list[str]) -> list[Line2D]:
     """Lines of a legend."""
-    return [Line2D([], [], **LOOKS[name].line(), label=IN_WORDS[name]) for name in models]
+    return [Line2D([], [], **STYLES[name].line(), label=IN_WORDS[name]) for name in models]
 
 
 def axis_lines(axis: Axes) -> None:

@@ -16,7 +16,7 @@ from spinepipe.report.style import BLACK, GREY, SMALL_PT, blank, saying
 from spinepipe.report.words import short
 from spinepipe.studies.scoliosis.errors import held_out_error
 from spinepipe.studies.scoliosis.figures.film_overlay import chosen
-from spinepipe.studies.scoliosis.figures.line_styles import LOOKS, axis_lines, key_of_lines
+from spinepipe.studies.scoliosis.figures.line_styles import STYLES, axis_lines, key_of_lines
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import EndRotations
@@ -41,10 +41,13 @@ def load_displacement_figure(
     ended = laws[laws[_ENDS].notna().all(axis=1)]
     if ended.empty:
         return saying("No law can be shown: no model of this study has laws that end.")
-    patient = median_patient(tables["positions"], ended)
+    # the patient whose error is in the middle; the first one where no model has a pose
+    names, positions = ended["specimen"].unique(), tables["positions"]
+    errors = held_out_error(positions[positions["specimen"].isin(names)])
+    patient = str(names[0]) if errors.empty else chosen(errors, (0.5,))[0]
     own = ended[ended["specimen"] == patient]
     joints = [name for name in reversed(cohort.joint_names) if (own["joint"] == name).any()]
-    pairs = pairs_of(tables["displacements"], patient)
+    pairs = _measured(tables["displacements"], patient)
     reach = _reach(own, pairs)
     down = -(-len(joints) // ACROSS)
     figure = blank(down * _PANEL_MM + _AROUND_MM + _KEY_MM)
@@ -55,20 +58,23 @@ def load_displacement_figure(
         _laws(axis, rows, reach)
         for position, mark in _MARKS.items():
             axis.plot([pairs[position].get(joint, np.nan)], [0.0], mark, color=BLACK, ms=3.5, mew=0)
-        _told(axis, rows)
+        words = ["against a bend"] if rows["opposite"].any() else []
+        words += ["held at a bound"] if rows["constrained"].any() else []
+        axis.text(
+            *(0.98, 0.03, "\n".join(words)),
+            transform=axis.transAxes,
+            ha="right",
+            va="bottom",
+            fontsize=SMALL_PT,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4},
+            zorder=6,
+        )
     _scales(axes, own, reach)
     _explain(figure, own, patient)
     return figure
 
 
-def median_patient(positions: pd.DataFrame, laws: pd.DataFrame) -> str:
-    """The patient whose error is in the middle; the first one where no model has a pose."""
-    names = laws["specimen"].unique()
-    errors = held_out_error(positions[positions["specimen"].isin(names)])
-    return str(names[0]) if errors.empty else chosen(errors, (0.5,))[0]
-
-
-def pairs_of(displacements: pd.DataFrame, patient: str) -> dict[str, pd.Series]:
+def _measured(displacements: pd.DataFrame, patient: str) -> dict[str, pd.Series]:
     """Measured rotations (deg) by joint, on each bending film."""
     rows = displacements[displacements["specimen"] == patient]
     found = {}
@@ -83,10 +89,14 @@ def curve(row: pd.Series, reach: float) -> tuple[Array, Array]:
 
     The stretch A is the stiffness at rest over the slope of ``tan(B r + C)`` at rest.
     """
-    ends = EndRotations(*(np.array([row[name]], dtype=float) / DEG_PER_RAD for name in _ENDS))
+    ends = _ends(row)
     moments = np.linspace(-reach, reach, POINTS)
     found: Array = DEG_PER_RAD * ends.rotation(moments / _stretch(ends, row))
     return found, moments
+
+
+def _ends(row: pd.Series) -> EndRotations:
+    return EndRotations(*(np.array([row[name]], dtype=float) / DEG_PER_RAD for name in _ENDS))
 
 
 def _stretch(ends: EndRotations, row: pd.Series) -> float:
@@ -98,7 +108,7 @@ def _reach(rows: pd.DataFrame, pairs: Mapping[str, pd.Series]) -> float:
     """The largest moment to draw, N m: beyond those at the rotations of the bending films."""
     found = [1.0]
     for _, row in rows.iterrows():
-        ends = EndRotations(*(np.array([row[name]], dtype=float) / DEG_PER_RAD for name in _ENDS))
+        ends = _ends(row)
         for position in _MARKS:
             r = float(pairs[position].get(row["joint"], 0.0)) / DEG_PER_RAD
             if ends.lower[0] < r < ends.upper[0]:
@@ -111,27 +121,10 @@ def _laws(axis: Axes, rows: pd.DataFrame, reach: float) -> None:
     axis.axhline(0.0, color=GREY, lw=0.3, zorder=0)
     axis.axvline(0.0, color=GREY, lw=0.3, zorder=0)
     for _, row in rows.iterrows():
-        look = LOOKS[str(row["model"])]
+        look = STYLES[str(row["model"])]
         axis.plot(*curve(row, reach), **look.line(zorder=3))
         for name in _ENDS:
             axis.axvline(float(row[name]), color=look.color, lw=0.6, ls=(0, (1, 1.5)), zorder=2)
-
-
-def _told(axis: Axes, rows: pd.DataFrame) -> None:
-    """What is special about a segment."""
-    words = ["against a bend"] if rows["opposite"].any() else []
-    words += ["held at a bound"] if rows["constrained"].any() else []
-    axis.text(
-        0.98,
-        0.03,
-        "\n".join(words),
-        transform=axis.transAxes,
-        ha="right",
-        va="bottom",
-        fontsize=SMALL_PT,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4},
-        zorder=6,
-    )
 
 
 def _scales(axes: Sequence[Axes], rows: pd.DataFrame, reach: float) -> None:

@@ -7,7 +7,6 @@ under it, as the parabolas hold near the fits alone.
 
 import sys
 from collections.abc import Iterator, Mapping
-from functools import partial
 
 import numpy as np
 
@@ -18,15 +17,20 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.progress import Progress
 from spinepipe.studies.scoliosis.film_fit import (
     FilmFit,
+    FilmFitResult,
     FilmInformation,
-    FittedFilms,
     fit_alike,
     weighed_with,
 )
+from spinepipe.studies.scoliosis.films import reading_noise
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
-from spinepipe.studies.scoliosis.population import Population, assumed, learned
-from spinepipe.studies.scoliosis.population_table import PopulationEstimate, population_rows
-from spinepipe.studies.scoliosis.reading_noise import reading_noise
+from spinepipe.studies.scoliosis.population import (
+    Population,
+    PopulationEstimate,
+    population_rows,
+    update_population,
+    usual_population,
+)
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import POPULATION
 from spinepipe.tables import from_rows, write
@@ -43,15 +47,11 @@ LAST_STEP = 1e-4
 def run(root: str, study: str, output: str) -> None:
     """Write ``population.parquet``."""
     settings, cohort = study_of_kind(Scoliosis, root, study)
-    progress = Progress(partial(_say, study))
+    progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
     sd = weights(settings, cohort)
-    found = learn(settings, cohort, sd, progress)
+    found = fit_population(settings, cohort, sd, progress)
     rows = population_rows(found, cohort.joint_names, sd)
     write(from_rows(POPULATION, list(rows)), output, provenance("population", settings, cohort))
-
-
-def _say(study: str, line: str) -> None:
-    print(f"{study}: {line}", file=sys.stderr, flush=True)
 
 
 def weights(settings: Scoliosis, cohort: Cohort) -> Array:
@@ -61,15 +61,19 @@ def weights(settings: Scoliosis, cohort: Cohort) -> Array:
     return weighed_with(*seen, settings.model_sd_mm, settings.model_sd_deg)
 
 
-def learn(settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress) -> PopulationEstimate:
+def fit_population(
+    settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress
+) -> PopulationEstimate:
     """Rounds of fits of all patients, until the population stands still."""
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
-    population, change, fits = assumed(len(cohort.joint_names)), np.inf, dict[str, FittedFilms]()
-    rounds = 0
+    population = usual_population(len(cohort.joint_names))
+    rounds, change, fits = 0, np.inf, dict[str, FilmFitResult]()
     for _ in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
         rounds += 1
+        # fits of all under the population, then the population that their parabolas make likeliest
         fits = dict(_fits(patients, sd, population, fits))
-        before, population = population, _settled(population, [one.told for one in fits.values()])
+        before = population
+        population = _likeliest(before, [one.information for one in fits.values()])
         change = _change(before, population)
         if change < LAST_ROUND or not fits:
             break
@@ -81,20 +85,22 @@ def _fits(
     patients: Mapping[str, Patient],
     sd: Array,
     population: Population,
-    before: Mapping[str, FittedFilms],
-) -> Iterator[tuple[str, FittedFilms]]:
+    before: Mapping[str, FilmFitResult],
+) -> Iterator[tuple[str, FilmFitResult]]:
     """The patients that can be fitted, from the fits before or, without these, from all starts."""
     problems = [FilmFit(patient, sd) for patient in patients.values()]
     found = fit_alike(problems, population, [before.get(name) for name in patients])
     return ((name, one) for name, one in zip(patients, found, strict=True) if one is not None)
 
 
-def _settled(population: Population, patients: list[FilmInformation]) -> Population:
-    """The population that is likeliest for what the films of all patients say."""
-    for _ in range(MOST_STEPS):
-        if not patients:
-            break
-        after = learned(population, [one.known(population) for one in patients])
+def _likeliest(population: Population, patients: list[FilmInformation]) -> Population:
+    """The population that is likeliest for what the films of all patients say.
+
+    Expectation and maximisation: posteriors of the patients under a population, then the population
+    of these posteriors, until it stands still.
+    """
+    for _ in range(MOST_STEPS if patients else 0):
+        after = update_population(population, [one.known(population) for one in patients])
         change, population = _change(population, after), after
         if change < LAST_STEP:
             break

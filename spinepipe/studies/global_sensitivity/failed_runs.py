@@ -15,7 +15,7 @@ from scipy.stats import binom
 
 from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import Design
-from spinepipe.sensitivity.global_indices.indices import kept
+from spinepipe.sensitivity.global_indices.indices import complete_blocks
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.tables import read
@@ -60,7 +60,7 @@ def failed_rows(
     """
     ended = dict(of_runs(responses))
     if calibrated:
-        ended[EVERY] = _ways(_read(calibrated, ["status"]))
+        ended[EVERY] = _ways(read_blocks(calibrated, ["status"]))
     for test, how in ended.items():
         for row in rows_of(design, values, units, how):
             yield {"test": test, **row}
@@ -68,7 +68,7 @@ def failed_rows(
 
 def of_runs(blocks: Sequence[str]) -> Mapping[str, Ends]:
     """How each sample ended in each test: the first load step that failed, else the last."""
-    rows = _read(blocks, ["sample", "test", "status"])
+    rows = read_blocks(blocks, ["sample", "test", "status"])
     head = rows.filter(pc.equal(rows["sample"], rows["sample"][0]))["test"].to_pylist()
     ended = _ways(rows).reshape(-1, len(head))
     found = {}
@@ -97,7 +97,7 @@ def rows_of(
     """
     failed = ~_USABLE[ended]
     counts = {name: int((ended == WAYS.index(way)).sum()) for way, name in _AS.items()}
-    out = int((~kept(design, ~failed).rows).sum())
+    out = int((~complete_blocks(design, ~failed).rows).sum())
     common = {"runs": design.n, "failed": int(failed.sum()), **counts, "left_out": out}
     for column, factor in enumerate(design.factors):
         own = values[failed, column]
@@ -122,9 +122,11 @@ def _thirds(design: Design, column: int, failed: NDArray[np.bool_]) -> dict[str,
     row: dict[str, Any] = {f"{name}_third": n for name, n in zip(THIRDS, counts, strict=True)}
     if not failed.any():
         return {**row, "p": None, "mostly": "nowhere"}
+    # of each block with a failure the first failed run is an independent draw of its third
     blocks = failed.reshape(-1, design.block)
     spoiled = np.flatnonzero(blocks.any(axis=1))
     drawn = third[spoiled * design.block + blocks[spoiled].argmax(axis=1)]
+    # Bonferroni: both ends of every factor are looked at
     looked_at = len(ENDS) * len(design.factors)
     chances = {}
     for place, name in enumerate(THIRDS):
@@ -137,5 +139,6 @@ def _thirds(design: Design, column: int, failed: NDArray[np.bool_]) -> dict[str,
     return {**row, "p": chances[best], "mostly": ENDS[best] if sure else "nowhere"}
 
 
-def _read(blocks: Sequence[str], columns: list[str]) -> pa.Table:
+def read_blocks(blocks: Sequence[str], columns: list[str]) -> pa.Table:
+    """Rows of all blocks; they come in the order of the samples."""
     return pa.concat_tables([read(path, columns) for path in blocks])
