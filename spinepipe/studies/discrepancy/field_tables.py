@@ -9,9 +9,8 @@ import pandas as pd
 from spinepipe.report.words import number
 from spinepipe.schema import Column
 from spinepipe.studies.discrepancy.tables import MODELS
-from spinepipe.studies.discrepancy.verdict import EVERY
-from spinepipe.studies.discrepancy.verdict_imperfections import WithheldEffect
-from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
+from spinepipe.studies.discrepancy.verdict import EVERY, WithheldEffect
+from spinepipe.studies.discrepancy.verdict_unnamed import Formula
 from spinepipe.studies.discrepancy.words import TOWARDS, general, motion_of, readable
 from spinepipe.units import DEG_PER_RAD, LOAD_UNITS
 
@@ -82,7 +81,9 @@ def _of_joint(
         words = _WORDS.get(name) or _WORDS[kind]
         other = told.get(f"{kind}_{'plus' if side == 'minus' else 'minus'}")
         if kind in _SIDED and name not in _WORDS:
-            if other is not None and _alike(row, other):
+            if other is not None and (
+                abs(abs(row["value"]) - abs(other["value"])) <= 1e-6 * abs(row["value"])
+            ):
                 if side == "minus":
                     continue
                 words += ", to either side"
@@ -91,10 +92,6 @@ def _of_joint(
         load = f"{row['load']:.3g} {LOAD_UNITS[coordinate]}"
         unit = _UNITS.get(row["unit"], row["unit"])
         yield (motion_of(coordinate), words.format(load=load), unit), _cell(row)
-
-
-def _alike(one: Mapping[Any, Any], other: Mapping[Any, Any]) -> bool:
-    return abs(abs(one["value"]) - abs(other["value"])) <= 1e-6 * abs(one["value"])
 
 
 def _cell(row: Mapping[Any, Any], name: str = "value") -> str:
@@ -148,18 +145,22 @@ def tabulated_shown(rows: pd.DataFrame) -> Shown:
 
 def formula_shown(formula: Formula | None) -> Shown:
     """A row for each term."""
-    terms = () if formula is None else formula.terms
-    rows = [
-        {
-            "place": _place(term),
-            "on": f"{'reading' if term.acts == 'reading' else 'load'} in "
-            f"{motion_of(term.coordinate)}",
-            "term": printed(readable(term.term)),
-            **_coefficient(term),
-            "explained": 100.0 * term.explained,
-        }
-        for term in terms
-    ]
+    rows = []
+    for term in () if formula is None else formula.terms:
+        joint = "every joint" if term.joint == EVERY[0] else term.joint
+        value, unit = per_degree(term.coefficient, term.unit)
+        sd, _ = per_degree(term.sd, term.unit)
+        rows.append(
+            {
+                "place": joint if term.specimen == EVERY[0] else f"{joint} of {term.specimen}",
+                "on": f"{'reading' if term.acts == 'reading' else 'load'} in "
+                f"{motion_of(term.coordinate)}",
+                "term": printed(readable(term.term)),
+                "coefficient": f"{number(value)} (SD {number(sd, 2)})",
+                "unit": unit,
+                "explained": 100.0 * term.explained,
+            }
+        )
     columns = (
         Column("place", "text", "joint and specimen"),
         Column("on", "text", "what the term adds to"),
@@ -169,17 +170,6 @@ def formula_shown(formula: Formula | None) -> Shown:
         Column("explained", "number", "share of the excess misfit (chi squared) that it adds", "%"),
     )
     return pd.DataFrame(rows), columns
-
-
-def _place(term: FormulaTerm) -> str:
-    joint = "every joint" if term.joint == EVERY[0] else term.joint
-    return joint if term.specimen == EVERY[0] else f"{joint} of {term.specimen}"
-
-
-def _coefficient(term: FormulaTerm) -> dict[str, str]:
-    value, unit = per_degree(term.coefficient, term.unit)
-    sd, _ = per_degree(term.sd, term.unit)
-    return {"coefficient": f"{number(value)} (SD {number(sd, 2)})", "unit": unit}
 
 
 def per_degree(value: float, unit: str) -> tuple[float, str]:

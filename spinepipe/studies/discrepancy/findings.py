@@ -5,24 +5,23 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.report.page.document import ResultTables
-from spinepipe.report.words import capital, fixed, listed, number
-from spinepipe.studies.discrepancy.advice_words import advice_sentences
-from spinepipe.studies.discrepancy.gap_words import before_and_after, where_most
-from spinepipe.studies.discrepancy.quantities import quantities
-from spinepipe.studies.discrepancy.unnamed_words import (
-    described,
+from spinepipe.report.words import capital, count, fixed, listed, number
+from spinepipe.studies.discrepancy.misfit_words import (
+    before_and_after,
+    descriptions,
     more_stays,
     of_another_coordinate,
     shape_sentence,
     what_stays,
+    where_most,
     why_no_name,
     why_not_all,
     without_a_name,
 )
+from spinepipe.studies.discrepancy.quantities import quantities
 from spinepipe.studies.discrepancy.verdict import (
     DECLARED,
     Conclusion,
-    Missing,
     Verdict,
     share_of_gap,
 )
@@ -42,6 +41,9 @@ _ALIKE = 0.3
 
 _MOST_SIZES = 4
 
+USEFUL = ("advised", "offered", "would_do")
+"""Status of runs, and of imperfections known better, that would tell something."""
+
 NUISANCES = (
     "Gaps allow for small errors of posture, frames, joint centres and loads (the study's "
     "nuisances). Model files, and the figure of the gap along the load, do not have them."
@@ -59,7 +61,13 @@ def headline(verdict: Verdict, where: pd.DataFrame) -> str:
         return without_a_name(verdict, where)
     if verdict.verdict is Conclusion.NULL:
         return _nothing(verdict)
-    told = _one_of(verdict) if verdict.verdict is Conclusion.SET else _lacks(verdict.effects)
+    lacks = f"The model lacks {'; and '.join(what_of(effect) for effect in verdict.effects)}."
+    told = lacks
+    if verdict.verdict is Conclusion.SET:
+        names = [with_article(general(one)) for one in verdict.candidates_in_set]
+        one_of = "one of these is missing, and these tests cannot tell which"
+        told = f"{one_of}: {listed(names, 8, 'or')}."
+        told = f"{lacks} Besides, {told}" if verdict.effects else capital(told)
     return f"{told} {more_stays(verdict, where)}".strip()
 
 
@@ -75,59 +83,41 @@ def _nothing(verdict: Verdict) -> str:
     )
 
 
-def _one_of(verdict: Verdict) -> str:
-    names = listed([with_article(general(one)) for one in verdict.candidates_in_set], 8, "or")
-    told = f"one of these is missing, and these tests cannot tell which: {names}."
-    return f"{_lacks(verdict.effects)} Besides, {told}" if verdict.effects else capital(told)
-
-
-def _lacks(effects: tuple[Missing, ...]) -> str:
-    return f"The model lacks {'; and '.join(what_of(effect) for effect in effects)}."
-
-
 def how_sure(verdict: Verdict) -> str:
     """Evidence, margin to the runner-up, and what held-out motion says."""
-    parts = [
-        *(_evidence(effect, verdict) for effect in verdict.effects),
-        why_no_name(verdict),
-        why_not_all(verdict),
-        shape_sentence(verdict),
-        _misfit(verdict),
-        _closed(verdict),
-    ]
+    parts = []
+    for effect in verdict.effects:
+        told = f"{capital(called(effect))}: log evidence {number(effect.log_evidence)}"
+        if verdict.threshold.log_evidence is not None:
+            told += f", {number(verdict.threshold.log_evidence, 2)} is needed"
+        if effect.rivals:
+            first = min(effect.rivals, key=lambda rival: rival.log_evidence_margin)
+            behind = number(first.log_evidence_margin, 2)
+            told += f"; next best {general(first.name)}, {behind} behind"
+        parts.append(f"{told}.")
+    parts += [why_no_name(verdict), why_not_all(verdict), shape_sentence(verdict)]
+
+    # residuals in noise SD before and with the effects
+    rms = verdict.rms_residual
+    if rms.base is not None:
+        told = f"Residuals of {fixed(rms.base)} noise SD"
+        if rms.with_effects is not None and rms.with_effects != rms.base:
+            told += f" become {fixed(rms.with_effects)}"
+        parts.append(f"{told} (1 is noise).")
+
+    gap = verdict.gap
+    if gap.held_out_closed is not None and _stands(verdict):
+        before, after, sizes = gap.held_out_base, gap.held_out_with_effects, ""
+        if before is not None and after is not None:
+            sizes = f" from {fixed(before)} to {fixed(after)}"
+        share = _share(share_of_gap(gap.held_out_closed))
+        parts.append(f"On motion held out of the fits the gap falls{sizes}, by {share}.")
     return " ".join(part for part in parts if part)
 
 
-def _evidence(effect: Missing, verdict: Verdict) -> str:
-    told = f"{capital(called(effect))}: log evidence {number(effect.log_evidence)}"
-    if verdict.threshold.log_evidence is not None:
-        told += f", {number(verdict.threshold.log_evidence, 2)} is needed"
-    if effect.rivals:
-        first = min(effect.rivals, key=lambda rival: rival.log_evidence_margin)
-        told += f"; next best {general(first.name)}, {number(first.log_evidence_margin, 2)} behind"
-    return f"{told}."
-
-
-def _misfit(verdict: Verdict) -> str:
-    """Residuals in noise SD before and with the effects."""
-    rms = verdict.rms_residual
-    if rms.base is None:
-        return ""
-    told = f"Residuals of {fixed(rms.base)} noise SD"
-    if rms.with_effects is not None and rms.with_effects != rms.base:
-        told += f" become {fixed(rms.with_effects)}"
-    return f"{told} (1 is noise)."
-
-
-def _closed(verdict: Verdict) -> str:
-    closed = verdict.gap.held_out_closed
-    if closed is None or not (verdict.effects or verdict.candidates_in_set):
-        return ""
-    before, after = verdict.gap.held_out_base, verdict.gap.held_out_with_effects
-    sizes = "" if before is None or after is None else f" from {fixed(before)} to {fixed(after)}"
-    return (
-        f"On motion held out of the fits the gap falls{sizes}, by {_share(share_of_gap(closed))}."
-    )
+def _stands(verdict: Verdict) -> bool:
+    """Whether effects are named, or tied."""
+    return bool(verdict.effects or verdict.candidates_in_set)
 
 
 TRAINED_ON = {
@@ -143,7 +133,7 @@ def by_what_was_fitted(verdict: Verdict) -> str:
     """Kinds of folds apart, as their fits have seen more or less of what they predict."""
     closed = [(one.kind, one.excess_closed) for one in verdict.left_out]
     shares = [(kind, share) for kind, share in closed if share is not None]
-    if len(shares) < 2 or not (verdict.effects or verdict.candidates_in_set):
+    if len(shares) < 2 or not _stands(verdict):
         return ""
     told = [
         f"by {_share(share_of_gap(share))} {TRAINED_ON[kind]} "
@@ -180,7 +170,7 @@ def findings(verdict: Verdict, results: ResultTables) -> list[str]:
         where_most(where),
         what_stays(verdict, where),
         of_another_coordinate(verdict, where),
-        *described(verdict),
+        *descriptions(verdict),
         confused(verdict, results.table("confusions")),
         imitating(verdict, results.table("candidates")),
         not_testable(verdict),
@@ -283,3 +273,29 @@ def not_testable(verdict: Verdict) -> str:
     if none:
         parts.append(f"No single addition that was tried shows {listed(none, 8, 'or')}.")
     return " ".join(parts)
+
+
+def advice_sentences(next_tests: pd.DataFrame) -> list[str]:
+    """The advised test of each subject; nothing where there is no advice."""
+    if next_tests.empty:
+        return []
+    told = []
+    for row in next_tests[next_tests["status"] == "advised"].to_dict("records"):
+        subject, test = readable(row["effect_or_pair"]), readable(row["test"])
+        if row["message"].startswith("withheld"):
+            told.append(
+                f"{subject.capitalize()} is not named, as it is no larger than the imperfections "
+                f"allowed for: {readable(str(row['message']))}."
+            )
+            continue
+        gain = number(float(row["gain_in_log_evidence"]), 2)
+        each = count(int(row["cycles"]), "cycle")
+        told.append(
+            f"Next test for {subject}: {test}; expected gain in log evidence {gain} in {each}."
+        )
+    # subjects for which no run of the menu tells anything
+    helped = next_tests[next_tests["status"].isin(USEFUL)]["effect_or_pair"]
+    left = next_tests[~next_tests["effect_or_pair"].isin(helped)]["effect_or_pair"].unique()
+    return told + [
+        f"No single test that was tried would tell more of {readable(one)}." for one in left
+    ]

@@ -1,5 +1,7 @@
-"""Rows of the five tables, from what a search found and its proof."""
+"""Rows of the tables, from what a search found, its proof and its advice."""
 
+import csv
+import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -8,19 +10,20 @@ import numpy as np
 
 from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array
-from spinepipe.model import LoadStep, Support
+from spinepipe.model import Support
 from spinepipe.status import Status
+from spinepipe.studies.discrepancy.design.advice import Advice
 from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
-from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
-from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, GapPlace, places, residual_frame
+from spinepipe.studies.discrepancy.proof.held_out import HeldOut
+from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, places, residual_frame
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, shape_at
+from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, NuisancePlace
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import display_value, fitted_values
-from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SearchStage
-from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
+from spinepipe.studies.discrepancy.tables import NEXT_TESTS, NOT_TESTABLE
 from spinepipe.studies.discrepancy.verdict import share_of_gap
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, DISPLAY_PER_SI, LOAD_UNITS
 
@@ -29,14 +32,10 @@ Row = dict[str, Any]
 MOST_FORMS_SHOWN = 5
 """Forms of one effect on a screen that get a row; the others are far behind."""
 
+HELD_OUT_MODELS = ("held_out_base", "held_out_with_effects")
+
 NOT_FITTED = "the linear problem, no fit"
 DEGENERATE = "a shape ran to its bound: no more what its name says"
-
-
-_MODELLED = (
-    *("measured", "base", "with_effects", "with_table"),
-    *("held_out_base", "held_out_with_effects"),
-)
 
 
 def gap_rows(
@@ -53,8 +52,8 @@ def gap_rows(
     tabulated : the fit with tables besides, where there are some.
     """
     collected: dict[tuple[Any, ...], list[Row]] = {}
-    for name, readings in found.base.readings.items():
-        for key, row in _rows_of(found, name, readings, joints, held_out.get(name), tabulated):
+    for name in found.base.readings:
+        for key, row in _rows_of(found, name, joints, held_out.get(name), tabulated):
             collected.setdefault(key, []).append(row)
     return [_averaged(key, rows) for key, rows in collected.items()]
 
@@ -62,61 +61,53 @@ def gap_rows(
 def _rows_of(
     found: SearchResult,
     name: str,
-    readings: SpecimenReadings,
     joints: Sequence[str],
     held_out: Sequence[tuple[Array, Array, Array]] | None,
     tabulated: JointFit | None,
 ) -> Iterator[tuple[tuple[Any, ...], Row]]:
-    noise = found.base.noise
-    base, final = found.base.fit.predicted[name], found.final.fit.predicted[name]
-    table = None if tabulated is None else tabulated.predicted[name]
-    loads = readings.applied
+    """Place and row of each reading of a specimen, in display units."""
+    readings, noise = found.base.readings[name], found.base.noise
+    fits = {"base": found.base.fit, "with_effects": found.final.fit, "with_table": tabulated}
+    modelled = {model: None if fit is None else fit.predicted[name] for model, fit in fits.items()}
     for number, test in enumerate(readings.tests):
         size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))  # zeroing adds to the SD
         sd = size[:, None] * noise.sd * DISPLAY_PER_SI
         for t, j, c in zip(*np.nonzero(test.count), strict=True):
             factor, count = DISPLAY_PER_SI[c], int(test.count[t, j, c])
-            fold, out_base, out_final = ("", None, None)
-            if held_out is not None:
-                folds, of_base, of_final = held_out[number]
-                if folds[t, j, c]:
-                    fold = str(folds[t, j, c])
-                    out_base = float(of_base[t, j, c] * factor)
-                    out_final = float(of_final[t, j, c] * factor)
-            key = (name, test.case.test, test.case.steps[t].step, joints[j], COORDINATES[c])
-            rig = _rig(test.case.steps[t], j, c)
             row: Row = {
                 "unit": COORDINATE_UNITS[COORDINATES[c]],
                 "held_at": None,
-                "load": float(loads[number][t, j, c]),
+                "load": float(readings.applied[number][t, j, c]),
                 "measured": float(test.mean[t, j, c] * factor),
                 "readings": count,
-                "base": float(base[number][t, j, c] * factor),
-                "with_effects": float(final[number][t, j, c] * factor),
-                "with_table": None if table is None else float(table[number][t, j, c] * factor),
                 "noise_sd": float(sd[t, c] / np.sqrt(count)),
-                "held_out_fold": fold,
-                "held_out_base": out_base,
-                "held_out_with_effects": out_final,
+                "held_out_fold": "",
+                "held_out_base": None,
+                "held_out_with_effects": None,
             }
+            for model, motion in modelled.items():
+                row[model] = None if motion is None else float(motion[number][t, j, c] * factor)
+            if held_out is not None and held_out[number][0][t, j, c]:
+                folds, of_base, of_final = held_out[number]
+                row["held_out_fold"] = str(folds[t, j, c])
+                row["held_out_base"] = float(of_base[t, j, c] * factor)
+                row["held_out_with_effects"] = float(of_final[t, j, c] * factor)
+            step = test.case.steps[t]
+            rig = next((one for one in step.supports if one.place == 6 * j + c), None)
+            key = (name, test.case.test, step.step, joints[j], COORDINATES[c])
             yield key, row if rig is None else _as_load(rig, row, int(c))
-
-
-def _rig(step: LoadStep, joint: int, coordinate: int) -> Support | None:
-    """What fixes a coordinate in a load step."""
-    place = 6 * joint + coordinate
-    return next((one for one in step.supports if one.place == place), None)
 
 
 def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
     """A row of a reaction, in loads: what is listed, and what the models hold at that motion."""
     assert rig.read_as is not None
     per, load = float(DISPLAY_PER_SI[coordinate]) * rig.read_as, row["load"]
-    told: Row = {"noise_sd": row["noise_sd"] / per}
-    for name in _MODELLED:
-        told[name] = None if row.get(name) is None else load + row[name] / per
     held_at = rig.value * float(DISPLAY_PER_SI[coordinate])
-    return row | told | {"unit": LOAD_UNITS[COORDINATES[coordinate]], "held_at": held_at}
+    found = row | {"unit": LOAD_UNITS[COORDINATES[coordinate]], "held_at": held_at}
+    found["noise_sd"] = row["noise_sd"] / per
+    for name in (*("measured", "base", "with_effects", "with_table"), *HELD_OUT_MODELS):
+        found[name] = None if row[name] is None else load + row[name] / per
+    return found
 
 
 def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
@@ -134,7 +125,7 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
     found["noise_sd"] = rows[0]["noise_sd"] * float(np.sqrt(rows[0]["readings"] / readings))
     same = len({row["held_out_fold"] for row in rows}) == 1 and rows[0]["held_out_fold"]
     found["held_out_fold"] = rows[0]["held_out_fold"] if same else ""
-    for name in ("held_out_base", "held_out_with_effects"):
+    for name in HELD_OUT_MODELS:
         values = [row[name] * row["readings"] for row in rows] if same else []
         found[name] = sum(values) / readings if values else None
     return at | found
@@ -142,26 +133,23 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
 
 def where_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
     """Gaps of both models in every way of pooling."""
-    return [
-        _place_row(place, model)
-        for model, fit in (("base", found.base.fit), ("with_effects", found.final.fit))
-        for place in places(residual_frame(found.base, fit, joints))
-    ]
-
-
-def _place_row(place: GapPlace, model: str) -> Row:
-    low, high = place.gap.interval
-    at = {key: str(place.at.get(key, "*")) for key in KEYS}
-    return {
-        "by": place.by,
-        **at,
-        "readings": place.gap.readings,
-        "model": model,
-        "gap": place.gap.gap,
-        "gap_low": low,
-        "gap_high": high,
-        "rms_residual": place.gap.rms,
-    }
+    rows = []
+    for model, fit in (("base", found.base.fit), ("with_effects", found.final.fit)):
+        for place in places(residual_frame(found.base, fit, joints)):
+            low, high = place.gap.interval
+            rows.append(
+                {
+                    "by": place.by,
+                    **{key: str(place.at.get(key, "*")) for key in KEYS},
+                    "readings": place.gap.readings,
+                    "model": model,
+                    "gap": place.gap.gap,
+                    "gap_low": low,
+                    "gap_high": high,
+                    "rms_residual": place.gap.rms,
+                }
+            )
+    return rows
 
 
 def candidate_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
@@ -192,6 +180,8 @@ def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[
 
 
 def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, joints: Sequence[str]) -> Row:
+    scope = [joints[form.joint]] if form.joint is not None else []
+    scope += [form.specimen] if form.specimen is not None else []
     return {
         "stage": stage,
         "beside": ", ".join(beside),
@@ -199,7 +189,7 @@ def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, joints: Se
         "kind": form.variant.create().kind,
         "variant": json.dumps(dict(form.variant.options)),
         "spread": form.spread,
-        "scope": scope_words(form, joints),
+        "scope": " of ".join(scope) or "*",
         "absorbed": None,
         "detectable_gap": None,
     }
@@ -323,26 +313,26 @@ def confusion_rows(told: Distinguishability) -> list[Row]:
 
 def held_out_rows(proof: HeldOut) -> list[Row]:
     """One row per fold."""
-    return [_fold_row(row) for row in proof.folds]
-
-
-def _fold_row(row: FoldRow) -> Row:
-    return {
-        "fold": row.name,
-        "kind": row.kind,
-        "readings": row.readings,
-        "rms_base": _rms(row.base, row.expected),
-        "rms_with_effects": _rms(row.with_effects, row.expected),
-        "rms_surrogate": _rms(row.surrogate, row.expected),
-        **_held_out_gap("base", row.base, row.expected),
-        **_held_out_gap("with_effects", row.with_effects, row.expected),
-        **_held_out_gap("surrogate", row.surrogate, row.expected),
-        "closed": row.closed,
-        "gap_closed": None if row.closed is None else share_of_gap(row.closed),
-        "worse": row.worse,
-        "status": Status.CONVERGED if row.base is not None else Status.NOT_CONVERGED,
-        "message": row.message,
-    }
+    rows = []
+    for one in proof.folds:
+        models = {
+            "base": one.base,
+            "with_effects": one.with_effects,
+            "surrogate": one.surrogate,
+        }
+        row: Row = {"fold": one.name, "kind": one.kind, "readings": one.readings}
+        for model, gap in models.items():
+            row[f"rms_{model}"] = None if gap is None else gap.against(one.expected).rms
+            row |= _held_out_gap(model, gap, one.expected)
+        row |= {
+            "closed": one.closed,
+            "gap_closed": None if one.closed is None else share_of_gap(one.closed),
+            "worse": one.worse,
+            "status": Status.CONVERGED if one.base is not None else Status.NOT_CONVERGED,
+            "message": one.message,
+        }
+        rows.append(row)
+    return rows
 
 
 def _held_out_gap(model: str, gap: Gap | None, expected: float) -> Row:
@@ -352,10 +342,6 @@ def _held_out_gap(model: str, gap: Gap | None, expected: float) -> Row:
         return dict.fromkeys(names)
     beyond = gap.against(expected)
     return dict(zip(names, (beyond.gap, *beyond.interval), strict=True))
-
-
-def _rms(gap: Gap | None, expected: float) -> float | None:
-    return None if gap is None else gap.against(expected).rms
 
 
 def held_out_readings(
@@ -372,8 +358,64 @@ def held_out_readings(
     }
 
 
-def scope_words(form: CandidateForm, joints: Sequence[str]) -> str:
-    """Where a form acts, in words; ``*`` for everywhere."""
-    words = [joints[form.joint]] if form.joint is not None else []
-    words += [form.specimen] if form.specimen is not None else []
-    return " of ".join(words) or "*"
+def imperfection_rows(taken: AbsorbedGap, model: str) -> Iterator[Row]:
+    """One row per imperfection, and one per mean over several."""
+    for one in taken.each:
+        yield _size_row(one.at, model, one.size, one.sd) | {
+            "taken_chi2": one.chi2,
+            "places": 1,
+            "chance": None,
+            "common": False,
+        }
+    for mean in taken.common:
+        yield _size_row(mean.at, model, mean.size, mean.sd) | {
+            "taken_chi2": None,
+            "places": mean.count,
+            "chance": mean.chance,
+            "common": mean.certain,
+        }
+
+
+def _size_row(at: NuisancePlace, model: str, size: float, sd: float) -> Row:
+    prior, unit = display_value(at.unit, at.sd)
+    return {
+        "model": model,
+        "specimen": at.specimen,
+        "kind": at.kind,
+        "component": at.component,
+        "joint": at.joint,
+        "test": at.test,
+        "value": size * prior,
+        "unit": unit,
+        "prior_sd": prior,
+        "in_prior_sds": size,
+        "posterior_sd": sd,
+    }
+
+
+def advice_rows(found: Sequence[Advice]) -> list[Row]:
+    """One row per subject and run, in the order of the advice; of several the first one's."""
+    rows: dict[tuple[str, str], Row] = {}
+    for one in reversed(found):
+        rows[one.subject, one.test] = {
+            "effect_or_pair": one.subject,
+            "test": one.test,
+            "cycles": one.cycles,
+            "gain_in_log_evidence": one.gain,
+            "gain_per_cycle": one.per_cycle,
+            "status": one.status,
+            "message": one.message,
+        }
+    return list(rows.values())[::-1]
+
+
+def advice_csv(rows: Sequence[Row]) -> str:
+    """The rows as comma-separated text under the names of the table's columns, rounded."""
+    content = io.StringIO()
+    names = [column.name for column in NEXT_TESTS.columns]
+    writer = csv.DictWriter(content, names, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        values = ((name, row[name]) for name in names)
+        writer.writerow({n: f"{v:.4g}" if isinstance(v, float) else v for n, v in values})
+    return content.getvalue()

@@ -33,7 +33,7 @@ from spinepipe.jobs import draw, report
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.style import picture, style
-from spinepipe.studies.discrepancy.figures.gap_map import worst_places
+from spinepipe.studies.discrepancy.figures.load_displacement import worst_places
 from spinepipe.studies.discrepancy.findings import (
     by_what_was_fitted,
     findings,

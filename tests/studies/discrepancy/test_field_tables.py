@@ -12,7 +12,7 @@ from spinepipe.studies.discrepancy.field_tables import (
     tabulated_shown,
     withheld_shown,
 )
-from spinepipe.studies.discrepancy.verdict_imperfections import WithheldEffect
+from spinepipe.studies.discrepancy.verdict import WithheldEffect
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 from spinepipe.units import DEG_PER_RAD
 

@@ -21,8 +21,8 @@ from spinepipe.studies.discrepancy.search.search_state import (
     SearchStage,
     SelectedTerm,
 )
+from spinepipe.studies.discrepancy.summary import nearest_candidates
 from spinepipe.studies.discrepancy.verdict import Candidate, Conclusion, SuspectedError
-from spinepipe.studies.discrepancy.verdict_found import near_alone
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 MARGIN = 3.0
@@ -455,5 +455,5 @@ def test_a_set_is_told_where_its_names_are_near() -> None:
     far = Candidate("nonlinear_stiffening", ("anterior",), 7.9)
     least, most = Candidate("creep", ("extension",), 4.0), Candidate("creep", ("anterior",), 9.0)
     untold = Candidate("hysteresis", ("extension",), None)
-    told = near_alone([stands, near, far, near, most, least, untold], margin=3.0)
+    told = nearest_candidates([stands, near, far, near, most, least, untold], margin=3.0)
     assert told == (stands, near, least, untold)

@@ -11,7 +11,7 @@ from test_held_out import row
 from test_held_out_linear import linear_model
 
 from spinepipe.studies.discrepancy.proof import held_out
-from spinepipe.studies.discrepancy.proof.fold_linear import FoldPrediction, _bounded, lengthened
+from spinepipe.studies.discrepancy.proof.fold_linear import FoldPrediction, _bounded
 from spinepipe.studies.discrepancy.proof.fold_models import Predictions
 from spinepipe.studies.discrepancy.proof.folds import (
     SPECIMEN,
@@ -22,8 +22,13 @@ from spinepipe.studies.discrepancy.proof.folds import (
     only,
     step_fold,
 )
-from spinepipe.studies.discrepancy.proof.formula_folds import ChosenTerm, with_terms
-from spinepipe.studies.discrepancy.proof.held_out import HeldOutMotion, fill, together
+from spinepipe.studies.discrepancy.proof.held_out import (
+    ChosenTerm,
+    HeldOutMotion,
+    fill,
+    together,
+    with_terms,
+)
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.whitening import Whitening
 
@@ -163,7 +168,6 @@ def test_what_nuisances_shortened_is_lengthened_again() -> None:
     rows = np.array([[3.0, 1.0], [4.0, -2.0], [5.0, 7.0]])
     short = white.shortened(rows)
     assert along.T @ short == pytest.approx(along.T @ rows / 3.0)
-    assert lengthened(white, short) == pytest.approx(rows)
     assert white.lengthened(short) == pytest.approx(rows)
     assert white.lengthened(short[:, 0]) == pytest.approx(rows[:, 0])
 

@@ -65,7 +65,7 @@ class MaskedEffects:
     needed: float | None
 
 
-def withheld(
+def masked_effects(
     grounds: BaselineFit,
     trials: Sequence[Trials],
     threshold: float,
@@ -81,7 +81,9 @@ def withheld(
     kinds = kinds_of(grounds)
     if not kinds:
         return ()
-    without = run(look, narrowed(grounds, dict.fromkeys(kinds, 0.0)), trials, 0, 0.0, 0, threshold)
+    without = run(
+        look, with_narrower_priors(grounds, dict.fromkeys(kinds, 0.0)), trials, 0, 0.0, 0, threshold
+    )
     by_name = {one.effect: one for one in trials}
     most = without.effects[0].log_evidence
     return tuple(
@@ -109,7 +111,7 @@ def _hidden(
     for kind, (prior, unit) in kinds.items():
 
         def at(factor: float, kind: str = kind) -> float:
-            return evidence.under(narrowed(grounds, {kind: factor}))
+            return evidence.under(with_narrower_priors(grounds, {kind: factor}))
 
         told = {factor: at(factor) for factor in FACTORS}
         needed = None
@@ -129,7 +131,7 @@ def kinds_of(grounds: BaselineFit) -> dict[str, tuple[float, str]]:
     return {one.kind: (one.sd, one.unit) for one in labels}
 
 
-def narrowed(grounds: BaselineFit, factors: Mapping[str, float]) -> BaselineFit:
+def with_narrower_priors(grounds: BaselineFit, factors: Mapping[str, float]) -> BaselineFit:
     """The grounds with prior SDs of some kinds of imperfections times a factor; the fit stays."""
     whitenings, residuals, jacobians = {}, {}, {}
     for name, white in grounds.setting.whitenings.items():

@@ -4,7 +4,7 @@ A pattern belongs to a fit of the other model. It is the difference of two fits,
 effect or of generic terms times the strengths that the readings suggest, less what noise makes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -28,6 +28,9 @@ from spinepipe.studies.discrepancy.search.projected import (
 from spinepipe.studies.discrepancy.search.screen import Group, summed
 from spinepipe.studies.discrepancy.search.search_state import linearised_for
 
+ModelChange = Callable[[SpineModel], SpineModel]
+"""What a run does to a model, such as a preload."""
+
 
 class Pattern(Protocol):
     """What another model predicts beyond that of ``fit``."""
@@ -42,7 +45,7 @@ class Pattern(Protocol):
         ...
 
     def under(
-        self, specimen: str, changed: "ModelChange", cases: Sequence[LoadCase]
+        self, specimen: str, changed: ModelChange, cases: Sequence[LoadCase]
     ) -> Sequence[Array]:
         """(T, J, 6) m and rad in each run, not zeroed, of the specimen's models as changed.
 
@@ -52,12 +55,6 @@ class Pattern(Protocol):
             When a load step has no stable pose.
         """
         ...
-
-
-class ModelChange(Protocol):
-    """What a run does to a model, such as a preload."""
-
-    def __call__(self, model: SpineModel) -> SpineModel: ...
 
 
 @dataclass(frozen=True)
@@ -130,7 +127,10 @@ def strengths(
 
 
 def _beyond_noise(group: Group, gram: Array, moments: Array) -> Array:
-    """(k,) strengths that explain most, less the share that so many explain of noise alone."""
+    """(k,) strengths that explain most, less the share that so many explain of noise alone.
+
+    Each free strength explains one unit of chi2 by chance, so that much is taken off its square.
+    """
     estimate = group.estimate(moments)
     explained = float(2.0 * estimate @ moments - estimate @ gram @ estimate)
     free = float(np.sum(group.eigenvalues > 1.0))

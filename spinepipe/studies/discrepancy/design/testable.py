@@ -166,15 +166,18 @@ def judgements(
     of : what each specimen's tests see. needed : log evidence, the screen's threshold and margin.
     """
     design = CohortSignatures(candidates(trials, joints, tests), of)
-    return tuple(judged(design, number, needed, seed) for number in range(len(trials)))
+    return tuple(judge(design, number, needed, seed) for number in range(len(trials)))
 
 
-def judged(design: CohortSignatures, number: int, needed: float, seed: int) -> Judgement:
+def judge(design: CohortSignatures, number: int, needed: float, seed: int) -> Judgement:
     """What a design could tell of one effect: by the variant that shows best."""
     trials = design.those.trials[number]
     variants = [_best_spread(design, number, variant) for variant in trials.variants]
     found = [(one, _detectable(one, trials, design.freedom, needed, seed)) for one in variants]
-    best, weakest = min(found, key=lambda pair: _rank(*pair))
+    # shown before not shown, then by how little is absorbed; a trace before none
+    best, weakest = min(
+        found, key=lambda pair: (not _shown(*pair), pair[0].absorbed, -pair[0].squared(pair[0].raw))
+    )
     shown = _shown(best, weakest)
     gaps = [least for one, least in found if least is not None and _shown(one, least) == shown]
     least = min(gaps, key=lambda one: one.gap, default=None)
@@ -202,38 +205,10 @@ def _detectable(
     if times is None:
         return None
     gap = times * float(np.sqrt(one.squared(one.refitted) / freedom))
-    return Detectable(times, gap, _values(one.form.variant, times))
+    return Detectable(times, gap, _strengths(one.form.variant, times))
 
 
-def _least(one: Typical, needed: float, seed: int) -> float | None:
-    """Times the typical strength at which all but a few draws have the evidence needed."""
-    rng, count = np.random.default_rng(seed), len(one.mean)
-    if one.squared(one.left) <= NO_TRACE:
-        return None
-    moved = one.left @ _patterns(one, rng.standard_normal((count, DRAWS)))
-    group = one.group
-    noise = np.sqrt(group.eigenvalues)[:, None] * rng.standard_normal((count, DRAWS))
-    noise = group.vectors @ noise
-
-    def short(log_times: float) -> float:
-        evidence: Array = group.log_evidence(np.exp(log_times) * moved + noise)
-        return float(np.quantile(evidence, 1.0 - OFTEN)) - needed
-
-    ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
-    if short(ends[1]) <= 0.0:
-        return None
-    return float(np.exp(brentq(short, *ends, xtol=1e-3))) if short(ends[0]) < 0.0 else 0.0
-
-
-def _patterns(one: Typical, normal: Array) -> Array:
-    """(k, D) strengths in random proportion, each of the squared size that is expected."""
-    patterns = one.mean[:, None] + one.sd[:, None] * normal
-    sizes = np.einsum("id,ij,jd->d", patterns, one.left, patterns)
-    result: Array = patterns * np.sqrt(one.squared(one.left) / np.maximum(sizes, NO_TRACE))
-    return result
-
-
-def _values(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...]:
+def _strengths(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...]:
     """Strengths that many times as far from off as their defaults, in the units of tables."""
     found = []
     for column in variant.strengths:
@@ -248,9 +223,28 @@ def _values(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...
     return tuple(found)
 
 
-def _rank(one: Typical, least: Detectable | None) -> tuple[bool, float, float]:
-    """Smaller is better: shown, then little absorbed; a trace before none."""
-    return not _shown(one, least), one.absorbed, -one.squared(one.raw)
+def _least(one: Typical, needed: float, seed: int) -> float | None:
+    """Times the typical strength at which all but a few draws have the evidence needed."""
+    rng, count = np.random.default_rng(seed), len(one.mean)
+    if one.squared(one.left) <= NO_TRACE:
+        return None
+    # strengths (k, D) in random proportion, each of the squared size that is expected
+    patterns = one.mean[:, None] + one.sd[:, None] * rng.standard_normal((count, DRAWS))
+    squares = np.einsum("id,ij,jd->d", patterns, one.left, patterns)
+    patterns = patterns * np.sqrt(one.squared(one.left) / np.maximum(squares, NO_TRACE))
+    moved = one.left @ patterns
+    group = one.group
+    noise = np.sqrt(group.eigenvalues)[:, None] * rng.standard_normal((count, DRAWS))
+    noise = group.vectors @ noise
+
+    def short(log_times: float) -> float:
+        evidence: Array = group.log_evidence(np.exp(log_times) * moved + noise)
+        return float(np.quantile(evidence, 1.0 - OFTEN)) - needed
+
+    ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
+    if short(ends[1]) <= 0.0:
+        return None
+    return float(np.exp(brentq(short, *ends, xtol=1e-3))) if short(ends[0]) < 0.0 else 0.0
 
 
 def _shown(one: Typical, least: Detectable | None) -> bool:
@@ -275,7 +269,12 @@ def typical(design: CohortSignatures, number: int, form: CandidateForm) -> Typic
     places, strengths = index.places(form, middle, tuple(design.of), design.those.tests)
     count = len(strengths)
     signs = sides(form, strengths)
-    sizes = typical_strengths(form.variant)
+    sizes = {}  # default of each strength, in prior SDs from off
+    for column in form.variant.strengths:
+        p = form.variant.create().parameters[column]
+        assert p.off is not None
+        off = np.log(p.default / p.off) if p.logarithmic else p.default - p.off
+        sizes[column] = float(off) / p.prior_scale
     away = np.array([sizes[column] for column in strengths])
     raw, refitted, left = (np.zeros((count, count)) for _ in range(3))
     for specimen, columns, owners in places:
@@ -294,14 +293,3 @@ def summing(owners: Indices, count: int) -> Array:
     onto = np.zeros((count, len(owners)))
     onto[owners, np.arange(len(owners))] = 1.0
     return onto
-
-
-def typical_strengths(variant: Variant) -> dict[int, float]:
-    """Default of each strength, in prior SDs from off, by its column."""
-    found = {}
-    for column in variant.strengths:
-        p = variant.create().parameters[column]
-        assert p.off is not None
-        away = np.log(p.default / p.off) if p.logarithmic else p.default - p.off
-        found[column] = float(away) / p.prior_scale
-    return found

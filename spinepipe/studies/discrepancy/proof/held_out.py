@@ -13,8 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.proof.fold_linear import FoldPrediction
-from spinepipe.studies.discrepancy.proof.fold_models import Both, FoldModels, NoFold, Predictions
+from spinepipe.studies.discrepancy.proof.fold_linear import (
+    FoldPrediction,
+    LinearFolds,
+    LinearModel,
+    tangent,
+)
+from spinepipe.studies.discrepancy.proof.fold_models import (
+    Both,
+    FoldModels,
+    NoFold,
+    Predictions,
+    nuisance_size,
+)
 from spinepipe.studies.discrepancy.proof.folds import (
     STEPS,
     ChosenSteps,
@@ -27,7 +38,6 @@ from spinepipe.studies.discrepancy.proof.folds import (
 )
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.search_state import SearchResult
 from spinepipe.studies.discrepancy.store import PieceRunner, at_once
 
@@ -176,28 +186,76 @@ class Asked:
 def held_out(found: SearchResult, asked: Asked, run: PieceRunner) -> HeldOut:
     """Each fold's readings as predicted by fits without them."""
     if asked.refit:  # each fit is kept
-        return _proof(found.base, found.final, asked, run)
+        return _proof(FoldModels(found.base, found.final, True, run), asked)
     return run(to_first_order, found.base, found.final, asked)
 
 
 def to_first_order(base: BaselineFit, final: BaselineFit, asked: Asked) -> HeldOut:
     """The same by models that are straight about the fit to all readings."""
-    return _proof(base, final, asked, at_once)
+    return _proof(FoldModels(base, final, False, at_once), asked)
 
 
-def _proof(base: BaselineFit, final: BaselineFit, asked: Asked, run: PieceRunner) -> HeldOut:
-    models = FoldModels(base, final, asked.refit, run)
-    return proven(models, base.readings, base.tests, asked)
+@dataclass(frozen=True)
+class ChosenTerm:
+    """A term of a formula.
+
+    Attributes
+    ----------
+    moved : per test (T, J, 6) by one unit of its coefficient, of the specimens that have it.
+    sd : prior of the coefficient: as large as makes the term a joint's whole load.
+    """
+
+    moved: Mapping[str, tuple[Array, ...]]
+    sd: float
 
 
-def proven(
-    models: FoldModels,
-    readings: Mapping[str, SpecimenReadings],
-    tests: Sequence[str],
-    asked: Asked,
+def proof_of_terms(
+    before: BaselineFit, after: BaselineFit, terms: Sequence[ChosenTerm] = ()
 ) -> HeldOut:
+    """Two fits, the second one with terms besides, on each test and specimen left out.
+
+    Which terms was found with all readings; their coefficients are fitted without those left out.
+    """
+    return _proof(FormulaFolds(before, after, terms), Asked())
+
+
+class FormulaFolds(FoldModels):
+    """One fit as the base, another and terms besides as the model with effects."""
+
+    def __init__(
+        self, before: BaselineFit, after: BaselineFit, terms: Sequence[ChosenTerm]
+    ) -> None:
+        self.grounds = (before, after)
+        self.refit, self.run, self.named = False, at_once, True
+        self.chosen = ChosenSteps(before.readings, before.noise)
+        size = nuisance_size(after)
+        self.base = LinearFolds(tangent(before, size), self.chosen)
+        self.final = LinearFolds(with_terms(tangent(after, size), terms), self.chosen)
+        self.surrogate, self.why_none = None, ""
+
+
+def with_terms(plain: LinearModel, terms: Sequence[ChosenTerm]) -> LinearModel:
+    """A linear model with a coefficient more for each term, in prior SDs."""
+    columns, numbers = {}, {}
+    for name, one in plain.members.items():
+        own = [number for number, term in enumerate(terms) if name in term.moved]
+        if own:
+            columns[name] = [
+                np.stack([terms[n].sd * terms[n].moved[name][test] for n in own], axis=-1)
+                for test in range(len(one.by_x))
+            ]
+            numbers[name] = np.array(own, dtype=np.int64)
+    return plain.with_coefficients(columns, numbers, len(terms))
+
+
+def _proof(models: FoldModels, asked: Asked) -> HeldOut:
     """Each fold's readings as these models predict them."""
-    motion = nothing_held_out(readings)
+    readings, tests = models.grounds[0].readings, models.grounds[0].tests
+    motion = {}
+    for name, one in readings.items():
+        shapes = [test.count.shape for test in one.tests]
+        base, final = (tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(2))
+        motion[name] = HeldOutMotion(tuple(np.full(shape, -1) for shape in shapes), base, final)
     folds: list[Fold] = []
     if asked.tests:
         folds += folds_by_test(readings, tests)
@@ -212,9 +270,9 @@ def proven(
 def _rows(
     models: FoldModels, folds: Sequence[Fold], first: int, motion: Mapping[str, HeldOutMotion]
 ) -> list[FoldRow]:
-    placed = iter(models.placed([part for fold in folds for part in fold.parts]))
+    predicted = iter(models.predict([part for fold in folds for part in fold.parts]))
     return [
-        _row(models, fold, number, list(islice(placed, len(fold.parts))), motion)
+        _row(models, fold, number, list(islice(predicted, len(fold.parts))), motion)
         for number, fold in enumerate(folds, first)
     ]
 
@@ -223,7 +281,7 @@ def _row(
     models: FoldModels,
     fold: Fold,
     number: int,
-    placed: Sequence[Both],
+    predicted: Sequence[Both],
     motion: Mapping[str, HeldOutMotion],
 ) -> FoldRow:
     count = sum(
@@ -233,38 +291,30 @@ def _row(
         for test in tests
     )
     try:
-        pairs = zip(fold.parts, placed, strict=True)
+        pairs = zip(fold.parts, predicted, strict=True)
         parts = [models.predictions(fold, part, both) for part, both in pairs]
     except NoFold as trouble:
         return FoldRow(fold.name, fold.kind, 0, count, None, None, None, 0.0, NO_FIT, str(trouble))
     for part in parts:
         fill(motion, number, part)
-    return _scored_row(models, fold, parts, count)
-
-
-def _scored_row(
-    models: FoldModels, fold: Fold, parts: Sequence[Predictions], left_out: int
-) -> FoldRow:
     chosen = models.chosen
     base = scored_gap(chosen, [(part.scored, part.base) for part in parts])
     if not base.readings:
         why = "the other tests do not determine what these readings would be"
-        return FoldRow(
-            fold.name, fold.kind, 0, left_out, None, None, None, 0.0, NOT_DETERMINED, why
-        )
+        return FoldRow(fold.name, fold.kind, 0, count, None, None, None, 0.0, NOT_DETERMINED, why)
     final = scored_gap(chosen, [(part.scored, part.with_effects) for part in parts])
     by_surrogate = [(p.scored, p.surrogate) for p in parts if p.surrogate is not None]
     surrogate = scored_gap(chosen, by_surrogate) if by_surrogate else None
     said = [models.why_none] if models.why_none else []
-    if base.readings < left_out:
-        said.append(f"the other tests determine {base.readings} of {left_out} readings")
+    if base.readings < count:
+        said.append(f"the other tests determine {base.readings} of {count} readings")
     if fold.kind == STEPS:
         said.append("one specimen and no test that others determine: halves of the load steps")
     return FoldRow(
         fold.name,
         fold.kind,
         base.readings,
-        left_out,
+        count,
         base,
         final,
         surrogate,
@@ -305,8 +355,8 @@ def _margin(other: Sequence[Gap], ours: Sequence[Gap]) -> Margin | None:
 def scored_gap(chosen: ChosenSteps, parts: Sequence[tuple[Masks, FoldPrediction]]) -> Gap:
     """The gap over the scored readings of all parts, noise whitened within each test."""
     white = [
-        _missed(chosen, name, test, there, placed)
-        for scored, placed in parts
+        _missed(chosen, name, test, there, predicted)
+        for scored, predicted in parts
         for name, tests in scored.items()
         for test, there in enumerate(tests)
         if there.any()
@@ -328,11 +378,11 @@ def _moved(chosen: ChosenSteps, part: Predictions) -> float:
 
 
 def _missed(
-    chosen: ChosenSteps, specimen: str, test: int, there: Flags, placed: FoldPrediction
+    chosen: ChosenSteps, specimen: str, test: int, there: Flags, predicted: FoldPrediction
 ) -> Array:
     """(N,) residuals with SD one and independent where only noise is left."""
-    predicted = placed.motion[specimen][test] + placed.nuisances[specimen][test]
-    errors = chosen.mean(specimen, test) - predicted
+    reading = predicted.motion[specimen][test] + predicted.nuisances[specimen][test]
+    errors = chosen.mean(specimen, test) - reading
     return chosen.whitening(specimen, test, there).noise_only([errors])
 
 
@@ -345,17 +395,6 @@ def pooled(gaps: Sequence[Gap]) -> Gap | None:
         sum(gap.dof for gap in gaps),
         sum(gap.readings for gap in gaps),
     )
-
-
-def nothing_held_out(readings: Mapping[str, SpecimenReadings]) -> dict[str, HeldOutMotion]:
-    """Empty sheets, to be filled by `fill`."""
-    return {name: _empty(one) for name, one in readings.items()}
-
-
-def _empty(one: SpecimenReadings) -> HeldOutMotion:
-    shapes = [test.count.shape for test in one.tests]
-    arrays = [tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(2)]
-    return HeldOutMotion(tuple(np.full(shape, -1) for shape in shapes), *arrays)
 
 
 def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -> None:
