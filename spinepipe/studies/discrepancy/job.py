@@ -17,6 +17,7 @@ from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import KEY, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.progress import Progress
+from spinepipe.schema import all_declared
 from spinepipe.studies.discrepancy.curve_numbers import (
     field_number_rows,
     reaches,
@@ -54,17 +55,6 @@ from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, b
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner, Store
 from spinepipe.studies.discrepancy.summary import noise_summary, summarise
-from spinepipe.studies.discrepancy.tables import (
-    CANDIDATES,
-    CONFUSIONS,
-    FIELD_NUMBERS,
-    GAP,
-    HELD_OUT,
-    IMPERFECTIONS,
-    NEXT_TESTS,
-    TABULATED,
-    WHERE,
-)
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
     Conclusion,
@@ -107,24 +97,17 @@ def run(
     root: str,
     study: str,
     verdict: str,
-    gap: str,
-    candidates: str,
-    where: str,
-    confusions: str,
-    held_out: str,
-    imperfections: str,
-    next_tests: str,
-    field_numbers: str,
-    tabulated: str,
     design: str,
     model_base: str,
     model_with_effects: str,
     threads: int = 1,
+    **tables: str,
 ) -> None:
     """Write the verdict, its tables and the two model files of a study.
 
     Parameters
     ----------
+    design : the advice as a laboratory opens it. tables : where each goes, by its name.
     threads : pieces of the search that are computed at the same time.
     """
     settings, cohort = study_of_kind(Discrepancy, root, study)
@@ -135,21 +118,10 @@ def run(
 
     results = searched(settings, cohort, root, store, Progress(say))
     metadata = provenance(JOB, settings, cohort, None, base_marks(root, settings.base.model))
-    files = {
-        gap: GAP,
-        candidates: CANDIDATES,
-        where: WHERE,
-        confusions: CONFUSIONS,
-        held_out: HELD_OUT,
-        imperfections: IMPERFECTIONS,
-        next_tests: NEXT_TESTS,
-        field_numbers: FIELD_NUMBERS,
-        tabulated: TABULATED,
-    }
-    for path, table in files.items():
-        write(from_rows(table, results.rows.get(table.name, ())), path, metadata)
-    advised = advice_csv(results.rows.get(NEXT_TESTS.name, ()))
-    write_marked(advised, design, metadata[KEY])
+    for table in all_declared(__file__):
+        rows = results.rows.get(table.name, ())
+        write(from_rows(table, rows), tables[table.name], metadata)
+    write_marked(advice_csv(results.rows.get("next_tests", ())), design, metadata[KEY])
     write_model(results.model_base, model_base, metadata[KEY])
     write_model(results.model_with_effects, model_with_effects, metadata[KEY])
     write_verdict(results.verdict, verdict, metadata[KEY])
@@ -232,17 +204,17 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     return DiscrepancyResults(
         verdict=summarise(ready, ended, told, stays, numbers, taken["with_effects"], hidden, run),
         rows={
-            GAP.name: gap,
-            CANDIDATES.name: [*design_rows(told), *candidate_rows(found, joints)],
-            WHERE.name: where_rows(found, joints),
-            CONFUSIONS.name: confusion_rows(told),
-            HELD_OUT.name: held_out_rows(ended.proof),
-            FIELD_NUMBERS.name: numbers,
-            TABULATED.name: () if table is None else tabulated_rows(base, table),
-            IMPERFECTIONS.name: [
+            "gap": gap,
+            "candidates": [*design_rows(told), *candidate_rows(found, joints)],
+            "where": where_rows(found, joints),
+            "confusions": confusion_rows(told),
+            "held_out": held_out_rows(ended.proof),
+            "field_numbers": numbers,
+            "tabulated": () if table is None else tabulated_rows(base, table),
+            "imperfections": [
                 row for model, one in taken.items() for row in imperfection_rows(one, model)
             ],
-            NEXT_TESTS.name: advice_rows(
+            "next_tests": advice_rows(
                 advice(found, outcome, rules, bench(ended.grounds, ready.declared), run, hidden)
             ),
         },

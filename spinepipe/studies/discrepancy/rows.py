@@ -166,22 +166,28 @@ def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[
     rows = []
     for one in stage.screen.effects:
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
-            row = _form_row(f"screen {stage.name}", stage.beside, tried.form, joints)
+            scope = _scope(tried.form, joints)
+            row = _form_row(f"screen {stage.name}", stage.beside, tried.form, scope)
             row |= _of_screen(tried) | {
                 # the effect's evidence is that of all its forms: on the row of the best
                 "log_evidence": one.log_evidence if not place else tried.log_evidence,
                 "gap_share": _share(tried.explained, excess),
                 "threshold": stage.screen.threshold,
-                "status": Status.CONVERGED,
                 "message": NOT_FITTED,
             }
             rows.append(row)
     return rows
 
 
-def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, joints: Sequence[str]) -> Row:
-    scope = [joints[form.joint]] if form.joint is not None else []
-    scope += [form.specimen] if form.specimen is not None else []
+def _scope(form: CandidateForm, joints: Sequence[str]) -> str:
+    """Where a form acts, in words; ``*`` for everywhere."""
+    words = [joints[form.joint]] if form.joint is not None else []
+    words += [form.specimen] if form.specimen is not None else []
+    return " of ".join(words) or "*"
+
+
+def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, scope: str) -> Row:
+    """What is known of a form before it is tried; the rest is empty."""
     return {
         "stage": stage,
         "beside": ", ".join(beside),
@@ -189,9 +195,19 @@ def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, joints: Se
         "kind": form.variant.create().kind,
         "variant": json.dumps(dict(form.variant.options)),
         "spread": form.spread,
-        "scope": " of ".join(scope) or "*",
+        "scope": scope,
+        "shape": "{}",
+        "parameters": 0,
+        "estimate": None,
+        "unit": "",
+        "log_evidence": None,
+        "delta_chi2": None,
+        "gap_share": None,
         "absorbed": None,
         "detectable_gap": None,
+        "threshold": None,
+        "status": Status.CONVERGED,
+        "message": "",
     }
 
 
@@ -231,7 +247,8 @@ def _share(drop: float, excess: float) -> float | None:
 def _refitted(stage: SearchStage, joints: Sequence[str], excess: float) -> list[Row]:
     rows, seen = [], set()
     for one in stage.refits:
-        row = _form_row(f"refit {stage.name}", stage.beside, one.form, joints)
+        scope = _scope(one.form, joints)
+        row = _form_row(f"refit {stage.name}", stage.beside, one.form, scope)
         row |= _of_refit(one, excess)
         row["threshold"] = stage.screen.threshold
         key = (row["effect"], row["variant"], row["spread"], row["scope"], row["shape"])
@@ -245,10 +262,6 @@ def _of_refit(one: Refit, excess: float) -> Row:
     possible = bool(np.isfinite(one.log_evidence))
     status = Status.CONVERGED if possible and not one.fit.status else Status.NOT_CONVERGED
     row: Row = {
-        "shape": "{}",
-        "parameters": 0,
-        "estimate": None,
-        "unit": "",
         "log_evidence": one.log_evidence if possible else None,
         "delta_chi2": one.gain if possible else None,
         "gap_share": _share(one.gain, excess) if possible else None,
@@ -272,30 +285,16 @@ def _of_refit(one: Refit, excess: float) -> Row:
 
 def design_rows(told: Distinguishability) -> list[Row]:
     """Rows of the table candidates: what the tests could tell of each effect."""
-    return [
-        {
-            "stage": "design",
-            "beside": "",
-            "effect": one.effect,
-            "kind": one.best.form.variant.create().kind,
-            "variant": json.dumps(dict(one.best.form.variant.options)),
-            "spread": one.best.form.spread,
-            "scope": "*",
-            "shape": "{}",
+    rows = []
+    for one in told.judgements:
+        row = _form_row("design", (), one.best.form, "*") | {
             "parameters": len(one.best.mean),
-            "estimate": None,
-            "unit": "",
-            "log_evidence": None,
-            "delta_chi2": None,
-            "gap_share": None,
             "absorbed": float(np.clip(one.absorbed, 0.0, 1.0)),
             "detectable_gap": one.detectable.gap if one.detectable else None,
-            "threshold": None,
-            "status": Status.CONVERGED if one.testable else NOT_TESTABLE,
             "message": one.why,
         }
-        for one in told.judgements
-    ]
+        rows.append(row if one.testable else row | {"status": NOT_TESTABLE})
+    return rows
 
 
 def confusion_rows(told: Distinguishability) -> list[Row]:

@@ -23,14 +23,11 @@ from discrepancy_cases import (
     VERDICTS,
     frames,
     project,
-    results,
     tables,
 )
 from matplotlib.figure import Figure
 from sweeps import sweep
 
-from spinepipe.jobs import draw, report
-from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.style import picture, style
 from spinepipe.studies.discrepancy.figures.load_displacement import worst_places
@@ -41,7 +38,7 @@ from spinepipe.studies.discrepancy.findings import (
     how_sure,
     warnings,
 )
-from spinepipe.studies.discrepancy.kind import KIND, DiscrepancyFiles
+from spinepipe.studies.discrepancy.kind import KIND
 from spinepipe.studies.discrepancy.page import document, left_out, shown_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import Conclusion, Verdict, plain_data, verdict_of
@@ -266,23 +263,13 @@ def test_a_value_that_is_open_to_one_side_is_told_by_its_other_end() -> None:
     assert "half width: at least 1.42° (95 %, no upper end)" in words
     assert "1.55" not in words
     verdict = verdict_of(VERDICTS["NAMED"] | changed)
+    text = json.dumps(plain_data(verdict), allow_nan=False)
+    assert '"ci95": [1.42, null]' in text
+    assert verdict_of(json.loads(text)) == verdict
     shown = shown_tables(verdict, rows_of(frames("NAMED")))
     (row,) = next(one for one in shown if one.title.startswith("What is missing")).rows
     assert "at least 1.42, no upper end" in str(row)
     assert "1.55" not in str(row)
-
-
-def test_an_open_end_is_null_in_the_file_and_is_read_again() -> None:
-    (named,) = VERDICTS["NAMED"]["effects"]
-    verdict = verdict_of(VERDICTS["NAMED"] | {"effects": [named | {"parameters": [OPEN_WIDTH]}]})
-    text = json.dumps(plain_data(verdict), allow_nan=False)
-    assert '"ci95": [1.42, null]' in text
-    assert verdict_of(json.loads(text)) == verdict
-
-
-def test_files_of_before_regions_say_nothing_of_them() -> None:
-    (effect,) = verdict_of(VERDICTS["NAMED"]).effects
-    assert {one.identifiable for one in effect.parameters} == {None}
 
 
 @sweep("answer", VERDICTS)
@@ -394,36 +381,6 @@ def test_what_settings_leave_out_is_told(tmp_path: Path) -> None:
         "nuisance load_gain (nuisance: load_gain: 0)",
         "nuisance rotation_order (nuisance: rotation_order: 0)",
     ]
-
-
-def test_jobs_draw_and_write_what_the_search_left(tmp_path: Path) -> None:
-    root, folder = str(tmp_path), results(project(tmp_path), "NAMED")
-    verdict, figure = str(folder / "verdict.json"), KIND.figure("evidence_by_round")
-    made = {kind: str(folder / f"{figure.name}.{kind}") for kind in ("svg", "png")}
-    paths = [str(folder / f"{name}.parquet") for name in figure.tables]
-    draw.run(root, STUDY, figure.name, paths, **made, verdict=verdict)
-    assert Path(made["png"]).read_bytes().startswith(b"\x89PNG")
-    files = DiscrepancyFiles.of(*study_of_kind(Discrepancy, root, STUDY))
-    page = folder / "report.html"
-    report.run(
-        root,
-        STUDY,
-        "report",
-        [str(folder / f"{table.name}.parquet") for table in KIND.tables],
-        [made["svg"]],
-        [str(ROOT / files.caption(figure.name))],
-        str(page),
-        verdict=verdict,
-    )
-    assert figure.title in page.read_text()
-    assert json.loads((folder / "verdict.json").read_text())["verdict"] == "NAMED"
-
-
-def test_every_figure_has_a_caption_and_a_title(root: Path) -> None:
-    files = DiscrepancyFiles.of(*study_of(root))
-    assert list(files.figures()) == FIGURES
-    assert all((ROOT / files.caption(name)).read_text().strip() for name in FIGURES)
-    assert all(figure.title for figure in KIND.figures)
 
 
 def test_what_stays_beside_what_is_certain() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut, Margin
+from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
@@ -106,8 +106,7 @@ def first_look(standing: Sequence[SelectedTerm]) -> SearchStage:
 
 
 def proof(over_base: float | None) -> HeldOut:
-    margin = None if over_base is None else Margin(over_base, None)
-    return HeldOut((), {}, None, None, None, 0.0, margin, None)
+    return HeldOut((), {}, None, None, 0.0, over_base)
 
 
 def says(found: SearchResult, **more: Any) -> tuple[str, str]:

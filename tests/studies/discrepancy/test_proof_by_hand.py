@@ -69,29 +69,12 @@ def test_what_was_not_scored_is_not_worse() -> None:
 def test_a_model_beats_another_by_any_margin_and_equals_do_not() -> None:
     for effects, beats in ((99.0, True), (100.0, False), (101.0, False)):
         assert together([row("a", 100.0, effects, 0.0)], {}).beats_base is beats
-    assert not together([], {}).beats_base
 
 
 @sweep("differs, tells", [(2e-6, True), (-2e-6, True), (5e-7, False)])
 def test_folds_tell_where_predictions_differ_by_a_millionth(differs: float, tells: bool) -> None:
     found = together([row("a", 100.0, 100.0 * (1.0 - differs), 0.0)], {})
     assert found.tells is tells
-    assert not together([], {}).tells
-
-
-def test_a_margin_has_an_error_from_three_folds_on() -> None:
-    rows = [row(name, 100.0, 90.0 - n, 0.0) for n, name in enumerate("abc")]
-    for count, known in ((1, False), (2, False), (3, True)):
-        margin = together(rows[:count], {}).over_base
-        assert margin is not None
-        assert (margin.se is not None) is known
-
-
-def test_surrogates_count_where_there_are_any() -> None:
-    rows = [replace(row("a", 100.0, 12.0, 30.0), surrogate=None)]
-    found = together(rows, {})
-    assert (found.surrogate, found.over_surrogate) == (None, None)
-    assert found.base == Gap(100.0, 10.0, 10)
 
 
 def test_the_share_closed_is_of_what_is_above_what_is_expected() -> None:

@@ -92,17 +92,6 @@ def test_what_a_piece_raises_is_passed_on_and_nothing_is_kept(tmp_path: Path) ->
     assert list(tmp_path.iterdir()) == []
 
 
-def wordless(_: Repeats) -> object:
-    """A piece whose result is no plain data."""
-    return object()
-
-
-def test_a_result_that_is_no_plain_data_is_refused_and_not_kept(tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match="cannot be kept as data"):
-        Store(tmp_path, MODULE)(wordless, of(1.0))
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_only_data_is_kept_and_pydra_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -114,6 +103,14 @@ def test_only_data_is_kept_and_pydra_leaves_nothing(
     assert piece.read_bytes().startswith(MARK)
     assert piece.read_bytes()[len(MARK) + 65 :] == encoded(of(2.0))
     assert list((tmp_path / "scratch").iterdir()) == []
+
+
+def test_what_is_no_plain_data_is_refused_and_not_kept(tmp_path: Path) -> None:
+    """As argument, alone or in an array, and as the result of a piece."""
+    for function, argument in ((len, [object()]), (len, [np.array([None])]), (iter, [1])):
+        with pytest.raises(TypeError, match="cannot be kept as data"):
+            Store(tmp_path, MODULE)(function, argument)
+    assert list(tmp_path.iterdir()) == []
 
 
 def search_of(store: Store, pieces: int, ends_at: int | None = None) -> float:
@@ -204,12 +201,6 @@ def test_content_is_what_a_value_holds(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 1 + len(values)
 
 
-def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
-    for value in (object(), np.array([None])):
-        with pytest.raises(TypeError, match="cannot be kept"):
-            Store(tmp_path, MODULE)(len, [value])
-
-
 def started(folder: Path, what: str, seed: str = "0") -> subprocess.Popen[str]:
     """A process of its own that runs ``what`` with a store in that folder."""
     program = (
@@ -248,17 +239,6 @@ def test_another_process_finds_the_piece_and_nothing_is_said_or_left(tmp_path: P
     outside = [path for path in tmp_path.rglob("*") if "store" not in path.parts]
     assert sorted(path.name for path in outside if path.is_file()) == []
     assert os.environ["NO_ET"] == "1"
-
-
-def test_what_is_thrown_away_is_said_in_one_line(tmp_path: Path) -> None:
-    search = "store(scaled, of(1.0), 4.0); print(CALLS)"
-    assert ended(started(tmp_path, search))[:2] == (0, "[4.0]")
-    (piece,) = (tmp_path / "store").iterdir()
-    piece.write_bytes(b"garbage")
-    code, said, complained = ended(started(tmp_path, search))
-    assert (code, said) == (0, "[4.0]")
-    assert complained.startswith(f"{piece}: ")
-    assert complained.count("\n") == 1
 
 
 def killed(held: Repeats) -> Repeats:

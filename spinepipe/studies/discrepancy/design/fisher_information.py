@@ -46,10 +46,6 @@ class Candidates:
         """Columns of all effects."""
         return tuple(column for index in self.indices for column in index.columns)
 
-    def slice(self, number: int) -> slice:
-        """Columns of an effect among all."""
-        return slice(self.starts[number], self.starts[number + 1])
-
 
 def candidates(trials: Sequence[Trials], joints: int, tests: Sequence[str]) -> Candidates:
     """Columns of effects in a chain of that many joints."""

@@ -49,9 +49,6 @@ SCORED, NOT_DETERMINED, NO_FIT = "scored", "not determined", "no fit"
 CLEARLY = 2.5
 """SDs of noise by which an unseen test or specimen must be worse to count as worse: 1 in 160."""
 
-FEWEST_FOLDS = 3
-"""Folds from which a margin has a standard error."""
-
 
 @dataclass(frozen=True)
 class HeldOutMotion:
@@ -111,37 +108,22 @@ class FoldRow:
 
 
 @dataclass(frozen=True)
-class Margin:
-    """By how much chi2 a model is better than another, over all folds; SE from three folds on."""
-
-    chi2: float
-    se: float | None
-
-    @property
-    def beats(self) -> bool:
-        """Whether the model is the better one."""
-        return self.chi2 > 0.0
-
-
-@dataclass(frozen=True)
 class HeldOut:
     """All folds, and what they say together.
 
     Attributes
     ----------
-    motion : by specimen. base, with_effects, surrogate : over all scored readings; None of none.
+    motion : by specimen. base, with_effects : over all scored readings; None of none.
     expected : chi2 of a model that is right: noise, and nuisances that training left open.
-    over_base, over_surrogate : margins of the model with effects; None where nothing compares.
+    over_base : chi2 by which the model with effects is better; None where nothing was scored.
     """
 
     folds: tuple[FoldRow, ...]
     motion: Mapping[str, HeldOutMotion]
     base: Gap | None
     with_effects: Gap | None
-    surrogate: Gap | None
     expected: float
-    over_base: Margin | None
-    over_surrogate: Margin | None
+    over_base: float | None
 
     @property
     def closed(self) -> float | None:
@@ -166,12 +148,12 @@ class HeldOut:
         """Whether any scored reading is predicted otherwise with the effects than without."""
         if self.over_base is None:
             return False
-        return abs(self.over_base.chi2) > (SAME * self.base.chi2 if self.base else 0.0)
+        return abs(self.over_base) > (SAME * self.base.chi2 if self.base else 0.0)
 
     @property
     def beats_base(self) -> bool:
         """Whether the effects predict better than the base alone."""
-        return self.over_base is not None and self.over_base.beats
+        return self.over_base is not None and self.over_base > 0.0
 
 
 @dataclass(frozen=True)
@@ -329,27 +311,15 @@ def together(rows: Sequence[FoldRow], motion: Mapping[str, HeldOutMotion]) -> He
     """All folds pooled."""
     base = [row.base for row in rows if row.base is not None]
     final = [row.with_effects for row in rows if row.with_effects is not None]
-    surrogate = [row.surrogate for row in rows if row.surrogate is not None]
+    drops = [a.chi2 - b.chi2 for a, b in zip(base, final, strict=True)]
     return HeldOut(
         tuple(rows),
         motion,
         pooled(base),
         pooled(final),
-        pooled(surrogate),
         sum(row.expected for row in rows),
-        _margin(base, final),
-        _margin(surrogate, final) if surrogate else None,
+        float(np.sum(drops)) if drops else None,
     )
-
-
-def _margin(other: Sequence[Gap], ours: Sequence[Gap]) -> Margin | None:
-    """Sum of the folds' differences; its SE by how folds differ."""
-    drops = np.array([a.chi2 - b.chi2 for a, b in zip(other, ours, strict=True)])
-    if not len(drops):
-        return None
-    enough = len(drops) >= FEWEST_FOLDS
-    se = float(np.sqrt(len(drops)) * np.std(drops, ddof=1)) if enough else None
-    return Margin(float(drops.sum()), se)
 
 
 def scored_gap(chosen: ChosenSteps, parts: Sequence[tuple[Masks, FoldPrediction]]) -> Gap:
