@@ -54,7 +54,7 @@ _COEFFICIENT = re.compile(r"([+-]?\d[\d.e+-]*) \(SD ([\d.e+-]+)\) ([^*;=]+?) \* 
 _PRINTED = (("^2", "²"), ("^3", "³"), (" * ", " × "), (" x ", " × "))
 
 
-def numbers_shown(rows: pd.DataFrame) -> Shown:
+def numbers_table(rows: pd.DataFrame) -> Shown:
     """A row for each number of a coordinate, a column for each joint.
 
     Parameters
@@ -122,7 +122,7 @@ def _matrix(cells: Mapping[tuple[str, ...], Mapping[str, str]], names: Sequence[
     return pd.DataFrame(rows), tuple(columns)
 
 
-def tabulated_shown(rows: pd.DataFrame) -> Shown:
+def tabulated_table(rows: pd.DataFrame) -> Shown:
     """A row for each motion, a column for each joint: the load with the table, and the base's.
 
     Parameters
@@ -143,7 +143,7 @@ def tabulated_shown(rows: pd.DataFrame) -> Shown:
     return frame, columns
 
 
-def formula_shown(formula: Formula | None) -> Shown:
+def formula_table(formula: Formula | None) -> Shown:
     """A row for each term."""
     rows = []
     for term in () if formula is None else formula.terms:
@@ -155,7 +155,7 @@ def formula_shown(formula: Formula | None) -> Shown:
                 "place": joint if term.specimen == EVERY[0] else f"{joint} of {term.specimen}",
                 "on": f"{'reading' if term.acts == 'reading' else 'load'} in "
                 f"{motion_of(term.coordinate)}",
-                "term": printed(readable(term.term)),
+                "term": typeset(readable(term.term)),
                 "coefficient": f"{number(value)} (SD {number(sd, 2)})",
                 "unit": unit,
                 "explained": 100.0 * term.explained,
@@ -177,10 +177,10 @@ def per_degree(value: float, unit: str) -> tuple[float, str]:
     below = unit.partition("/")[2]
     powers = sum(int(found[1] or 1) for found in _RAD.finditer(below))
     told = _RAD.sub(lambda at: "°" + ("²" if at[1] == "2" else "³" if at[1] == "3" else ""), unit)
-    return value / DEG_PER_RAD**powers, printed(told)
+    return value / DEG_PER_RAD**powers, typeset(told)
 
 
-def printed(text: str) -> str:
+def typeset(text: str) -> str:
     """Powers and products as they are printed."""
     for typed, shown in _PRINTED:
         text = text.replace(typed, shown)
@@ -195,10 +195,10 @@ def formula_text(formula: Formula) -> str:
         sd, _ = per_degree(float(at[2]), at[3])
         return f"{number(value)} (SD {number(sd, 2)}) {unit} × "
 
-    return printed(_COEFFICIENT.sub(told, readable(formula.text)))
+    return typeset(_COEFFICIENT.sub(told, readable(formula.text)))
 
 
-def withheld_shown(effects: Sequence[WithheldEffect]) -> Shown:
+def withheld_table(effects: Sequence[WithheldEffect]) -> Shown:
     """A row for each effect and kind of imperfection."""
     rows = [
         {

@@ -27,10 +27,10 @@ from spinepipe.studies.discrepancy.verdict import (
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import (
-    called,
-    differing,
     general,
+    label_of,
     readable,
+    spread_words,
     what_of,
     with_article,
 )
@@ -87,7 +87,7 @@ def how_sure(verdict: Verdict) -> str:
     """Evidence, margin to the runner-up, and what held-out motion says."""
     parts = []
     for effect in verdict.effects:
-        told = f"{capital(called(effect))}: log evidence {number(effect.log_evidence)}"
+        told = f"{capital(label_of(effect))}: log evidence {number(effect.log_evidence)}"
         if verdict.threshold.log_evidence is not None:
             told += f", {number(verdict.threshold.log_evidence, 2)} is needed"
         if effect.rivals:
@@ -129,7 +129,7 @@ TRAINED_ON = {
 """What the fits have seen of a specimen whose motion they predict, by the kind of fold."""
 
 
-def by_what_was_fitted(verdict: Verdict) -> str:
+def share_closed_by_kind(verdict: Verdict) -> str:
     """Kinds of folds apart, as their fits have seen more or less of what they predict."""
     closed = [(one.kind, one.excess_closed) for one in verdict.left_out]
     shares = [(kind, share) for kind, share in closed if share is not None]
@@ -164,15 +164,15 @@ def findings(verdict: Verdict, results: ResultTables) -> list[str]:
     where = results.table("where")
     told = [
         *_sizes(verdict),
-        would_have_been_seen(verdict),
+        detectable_gaps(verdict),
         before_and_after(where),
-        by_what_was_fitted(verdict),
+        share_closed_by_kind(verdict),
         where_most(where),
         what_stays(verdict, where),
         of_another_coordinate(verdict, where),
         *descriptions(verdict),
-        confused(verdict, results.table("confusions")),
-        imitating(verdict, results.table("candidates")),
+        similar_effects(verdict, results.table("confusions")),
+        nearest_effect(verdict, results.table("candidates")),
         not_testable(verdict),
         *([readable(verdict.imperfections.message)] if verdict.imperfections else []),
         *advice_sentences(results.table("next_tests")),
@@ -188,9 +188,9 @@ def _sizes(verdict: Verdict) -> Iterator[str]:
         sizes = [one.words for one in quantities(effect)]
         if sizes:
             more = " (more in table 1)" if len(sizes) > _MOST_SIZES else ""
-            spread = f"; {differing(effect)}" if differing(effect) else ""
+            spread = f"; {spread_words(effect)}" if spread_words(effect) else ""
             told = ", ".join(sizes[:_MOST_SIZES])
-            yield f"{capital(called(effect))}: {told}{more}{spread}."
+            yield f"{capital(label_of(effect))}: {told}{more}{spread}."
 
 
 def _noise(verdict: Verdict) -> str:
@@ -206,7 +206,7 @@ def _noise(verdict: Verdict) -> str:
     return f"Noise:{size}, from repeated cycles, {along}."
 
 
-def would_have_been_seen(verdict: Verdict) -> str:
+def detectable_gaps(verdict: Verdict) -> str:
     """Of a search that named nothing: the gaps from which effects would have been found."""
     if verdict.verdict is not Conclusion.NULL or not verdict.smallest_detectable:
         return ""
@@ -221,7 +221,7 @@ def would_have_been_seen(verdict: Verdict) -> str:
     )
 
 
-def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
+def similar_effects(verdict: Verdict, confusions: pd.DataFrame) -> str:
     """What these tests could take each named effect for."""
     told = []
     for effect in verdict.effects if len(confusions) else ():
@@ -232,11 +232,11 @@ def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
             for row in others.head(_MOST_ALIKE).to_dict("records")
         ]
         if alike:
-            told.append(f"{listed(alike)} of the gap that {called(effect)} makes")
+            told.append(f"{listed(alike)} of the gap that {label_of(effect)} makes")
     return f"What it could be taken for with these tests: {'; '.join(told)}." if told else ""
 
 
-def imitating(verdict: Verdict, candidates: pd.DataFrame) -> str:
+def nearest_effect(verdict: Verdict, candidates: pd.DataFrame) -> str:
     """Of what no known effect explains: the one that comes nearest, and why it is not named."""
     threshold = verdict.threshold.log_evidence
     if verdict.reason is not Reason.NO_KNOWN_EFFECT or threshold is None or candidates.empty:

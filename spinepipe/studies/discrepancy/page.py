@@ -20,10 +20,10 @@ from spinepipe.studies.discrepancy.field_tables import (
     NUMBERS_ABOUT,
     TABULATED_ABOUT,
     WITHHELD_ABOUT,
-    formula_shown,
-    numbers_shown,
-    tabulated_shown,
-    withheld_shown,
+    formula_table,
+    numbers_table,
+    tabulated_table,
+    withheld_table,
 )
 from spinepipe.studies.discrepancy.findings import (
     USEFUL,
@@ -38,12 +38,12 @@ from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, NEXT_TEST
 from spinepipe.studies.discrepancy.verdict import EVERY, Conclusion, Missing, Verdict, read_verdict
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula
 from spinepipe.studies.discrepancy.words import (
-    called,
-    differing,
     general,
+    label_of,
     motion_of,
     name_at,
     readable,
+    spread_words,
     where_of,
 )
 
@@ -109,14 +109,14 @@ def document(study: Discrepancy, cohort: Cohort, results: ResultTables) -> Docum
         question=QUESTION,
         findings=findings(verdict, results),
         pictures=pictures,
-        tables=shown_tables(verdict, results),
+        tables=page_tables(verdict, results),
         metadata=results.metadata,
         left_out=tuple(left_out(study)),
         headline=Headline(headline(verdict, results.table("where")), sure, warnings(verdict)),
     )
 
 
-def shown_tables(verdict: Verdict, results: ResultTables) -> list[Sortable]:
+def page_tables(verdict: Verdict, results: ResultTables) -> list[Sortable]:
     """Tables with rows, those that say most first."""
     first, last = _named_tables(verdict), _other_tables(verdict)
     parts = (*first, *in_field_units(verdict, results), *last, *file_tables(results))
@@ -143,7 +143,7 @@ def _named_tables(verdict: Verdict) -> Iterator[Parts]:
     )
     parameters = [
         {
-            "effect": called(effect),
+            "effect": label_of(effect),
             "parameter": one.name,
             "value [95 % interval]": one.in_brackets,
             "unit": one.unit,
@@ -183,14 +183,14 @@ _EFFECT = Column("effect", "text", "effect")
 
 def _place(effect: Missing, own: str) -> str:
     """Where a value holds: where the effect is, and the places of its own or how values differ."""
-    return "; ".join(part for part in (where_of(effect), own or differing(effect)) if part)
+    return "; ".join(part for part in (where_of(effect), own or spread_words(effect)) if part)
 
 
 def _other_tables(verdict: Verdict) -> Iterator[Parts]:
     """What the verdict says of the effects that it does not name."""
     rivals = [
         {
-            "effect": called(effect),
+            "effect": label_of(effect),
             "rival": general(rival.name),
             "margin": rival.log_evidence_margin,
         }
@@ -240,16 +240,16 @@ def in_field_units(verdict: Verdict, results: ResultTables) -> Iterator[Parts]:
     """Tables in the field's units."""
     told = verdict.part or verdict.unknown
     formula = None if told is None else told.formula
-    numbers = numbers_shown(results.table("field_numbers"))
+    numbers = numbers_table(results.table("field_numbers"))
     which = "" if verdict.effects else " Of the likeliest of those that cannot be told apart."
     title = "What a tester reads off the curves"
     yield "field_numbers", title, NUMBERS_ABOUT + which, *numbers
     title = "A formula in the place of a name"
-    yield "verdict", title, FORMULA_ABOUT + _share_told(formula), *formula_shown(formula)
-    table = tabulated_shown(results.table("tabulated"))
+    yield "verdict", title, FORMULA_ABOUT + _share_told(formula), *formula_table(formula)
+    table = tabulated_table(results.table("tabulated"))
     yield "tabulated", "A table in the place of a name", TABULATED_ABOUT, *table
     title = "Hidden by imperfections"
-    yield "verdict", title, WITHHELD_ABOUT, *withheld_shown(verdict.withheld)
+    yield "verdict", title, WITHHELD_ABOUT, *withheld_table(verdict.withheld)
 
 
 def _share_told(formula: Formula | None) -> str:

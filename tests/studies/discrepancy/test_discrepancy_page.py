@@ -32,14 +32,14 @@ from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.style import picture, style
 from spinepipe.studies.discrepancy.figures.load_displacement import worst_places
 from spinepipe.studies.discrepancy.findings import (
-    by_what_was_fitted,
     findings,
     headline,
     how_sure,
+    share_closed_by_kind,
     warnings,
 )
 from spinepipe.studies.discrepancy.kind import KIND
-from spinepipe.studies.discrepancy.page import document, left_out, shown_tables
+from spinepipe.studies.discrepancy.page import document, left_out, page_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import Conclusion, Verdict, plain_data, verdict_of
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
@@ -182,13 +182,13 @@ def test_how_sure_a_name_is() -> None:
             | {"excess_closed": 0.67, "gap_closed": 0.43},
         ]
     }
-    assert by_what_was_fitted(verdict_of(apart)) == (
+    assert share_closed_by_kind(verdict_of(apart)) == (
         "Held out, the gap falls by 24 % in tests left out, with fits to the other tests of the "
         "same specimens (42 % of the excess misfit); by 43 % in specimens left out, with their own "
         "stiffness and sizes fitted to half of their load steps (67 % of the excess misfit). The "
         "excess misfit (chi squared) is the square of the gap."
     )
-    assert by_what_was_fitted(verdict_of(VERDICTS["NAMED"])) == ""
+    assert share_closed_by_kind(verdict_of(VERDICTS["NAMED"])) == ""
     assert "Its shape: one side only" in how_sure(verdict_of(VERDICTS["UNKNOWN"]))
 
 
@@ -212,7 +212,7 @@ def test_keys_that_are_not_there_are_not_needed() -> None:
         assert headline(bare, NOWHERE)
         assert how_sure(bare) == ""
         assert findings(bare, rows_of({})) == []
-        assert shown_tables(bare, rows_of({})) == []
+        assert page_tables(bare, rows_of({})) == []
     with pytest.raises(ValueError, match="PERHAPS"):
         verdict_of({"cohort": "c", "verdict": "PERHAPS"})
 
@@ -266,7 +266,7 @@ def test_a_value_that_is_open_to_one_side_is_told_by_its_other_end() -> None:
     text = json.dumps(plain_data(verdict), allow_nan=False)
     assert '"ci95": [1.42, null]' in text
     assert verdict_of(json.loads(text)) == verdict
-    shown = shown_tables(verdict, rows_of(frames("NAMED")))
+    shown = page_tables(verdict, rows_of(frames("NAMED")))
     (row,) = next(one for one in shown if one.title.startswith("What is missing")).rows
     assert "at least 1.42, no upper end" in str(row)
     assert "1.55" not in str(row)
@@ -292,7 +292,7 @@ def test_the_page_opens_with_the_verdict(answer: str, root: Path) -> None:
 
 def test_tables_of_the_page_hold_the_verdict() -> None:
     found = rows_of(frames("NAMED"))
-    titles = [table.title for table in shown_tables(verdict_of(VERDICTS["NAMED"]), found)]
+    titles = [table.title for table in page_tables(verdict_of(VERDICTS["NAMED"]), found)]
     assert titles[:4] == [
         "What is missing, and how large it is",
         "What a tester reads off the curves",
@@ -300,7 +300,7 @@ def test_tables_of_the_page_hold_the_verdict() -> None:
         "What these tests cannot show",
     ]
     assert "One of these is missing" not in titles
-    in_set = shown_tables(verdict_of(VERDICTS["SET"]), found)
+    in_set = page_tables(verdict_of(VERDICTS["SET"]), found)
     assert [table.title for table in in_set][:2] == [
         "Suspected errors of the data",
         "One of these is missing",

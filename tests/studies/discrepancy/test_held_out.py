@@ -29,7 +29,7 @@ from spinepipe.studies.discrepancy.proof.held_out import (
     Asked,
     FoldRow,
     held_out,
-    together,
+    pool_folds,
 )
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
@@ -214,13 +214,13 @@ def row(name: str, base: float, effects: float, other: float) -> FoldRow:
 
 def test_folds_are_pooled_by_their_sums() -> None:
     rows = [row("a", 100.0, 12.0, 30.0), row("b", 60.0, 9.0, 8.0), row("c", 80.0, 15.0, 40.0)]
-    result = together(rows, {})
+    result = pool_folds(rows, {})
     assert result.base == Gap(240.0, 30.0, 30)
     # noise and open nuisances make 11 of each fold's chi2
     assert result.closed == pytest.approx((240.0 - 36.0) / (240.0 - 33.0))
     assert rows[1].closed == 1.0  # no more than all of it
     assert result.over_base == 204.0
-    nothing = together([], {})
+    nothing = pool_folds([], {})
     assert (nothing.over_base, nothing.beats_base, nothing.tells) == (None, False, False)
 
 
@@ -230,7 +230,7 @@ def test_tests_and_specimens_left_out_are_told_apart() -> None:
         replace(row("s", 80.0, 40.0, 30.0), kind="specimen"),
         replace(rows[0], base=None, with_effects=None, surrogate=None),
     ]
-    found = together(rows, {}).by_kind()
+    found = pool_folds(rows, {}).by_kind()
     assert list(found) == ["test", "specimen"]
     assert found["test"].closed == pytest.approx((160.0 - 80.0) / (160.0 - 22.0))
     assert found["specimen"].closed == pytest.approx(40.0 / 69.0)

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from spinepipe import cohort as cohorts
-from spinepipe.studies.discrepancy.codec import encoded
+from spinepipe.studies.discrepancy.codec import encode
 from spinepipe.studies.discrepancy.job import searched
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
@@ -69,7 +69,7 @@ def verdict_of(folder: Path, root: Path, effects: list[str]) -> dict[str, object
         }
     )
     found = searched(study, cohorts.read(folder), str(root), at_once)
-    assert encoded(found.verdict)  # can be kept
+    assert encode(found.verdict)  # can be kept
     return dict(json.loads(json.dumps(plain_data(found.verdict))))
 
 

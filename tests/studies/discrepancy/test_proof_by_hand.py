@@ -26,7 +26,7 @@ from spinepipe.studies.discrepancy.proof.held_out import (
     ChosenTerm,
     HeldOutMotion,
     fill,
-    together,
+    pool_folds,
     with_terms,
 )
 from spinepipe.studies.discrepancy.search.gaps import Gap
@@ -68,12 +68,12 @@ def test_what_was_not_scored_is_not_worse() -> None:
 
 def test_a_model_beats_another_by_any_margin_and_equals_do_not() -> None:
     for effects, beats in ((99.0, True), (100.0, False), (101.0, False)):
-        assert together([row("a", 100.0, effects, 0.0)], {}).beats_base is beats
+        assert pool_folds([row("a", 100.0, effects, 0.0)], {}).beats_base is beats
 
 
 @sweep("differs, tells", [(2e-6, True), (-2e-6, True), (5e-7, False)])
 def test_folds_tell_where_predictions_differ_by_a_millionth(differs: float, tells: bool) -> None:
-    found = together([row("a", 100.0, 100.0 * (1.0 - differs), 0.0)], {})
+    found = pool_folds([row("a", 100.0, 100.0 * (1.0 - differs), 0.0)], {})
     assert found.tells is tells
 
 
@@ -91,7 +91,7 @@ def test_the_share_closed_is_of_what_is_above_what_is_expected() -> None:
 def test_of_the_base_alone_there_is_nothing_that_beats_it() -> None:
     one = np.zeros((1, 1, 6))
     sheet = HeldOutMotion((np.zeros((1, 1, 6), dtype=int),), (one,), (one + 1.0,))
-    found = together([row("a", 100.0, 12.0, 30.0)], {"a": sheet}).of_base()
+    found = pool_folds([row("a", 100.0, 12.0, 30.0)], {"a": sheet}).of_base()
     assert found.with_effects == found.base
     assert found.folds[0].with_effects == found.folds[0].base
     assert found.motion["a"].with_effects[0] is found.motion["a"].base[0]

@@ -24,7 +24,7 @@ from sweeps import sweep
 
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy import store as store_module
-from spinepipe.studies.discrepancy.codec import encoded
+from spinepipe.studies.discrepancy.codec import encode
 from spinepipe.studies.discrepancy.search.readings import Repeats
 from spinepipe.studies.discrepancy.store import MARK, SUFFIX, Store
 
@@ -101,7 +101,7 @@ def test_only_data_is_kept_and_pydra_leaves_nothing(
     (piece,) = (path for path in tmp_path.rglob("*") if path.is_file())
     assert (piece.parent.name, piece.suffix) == ("store", SUFFIX)
     assert piece.read_bytes().startswith(MARK)
-    assert piece.read_bytes()[len(MARK) + 65 :] == encoded(of(2.0))
+    assert piece.read_bytes()[len(MARK) + 65 :] == encode(of(2.0))
     assert list((tmp_path / "scratch").iterdir()) == []
 
 

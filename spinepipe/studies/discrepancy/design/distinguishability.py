@@ -30,7 +30,7 @@ from spinepipe.studies.discrepancy.design.testable import (
     Judgement,
     Typical,
     judgements,
-    summing,
+    summation,
 )
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, shape_grid
@@ -161,7 +161,7 @@ def _target(design: CohortSignatures, number: int, one: Typical) -> _Target:
     start, directions = design.those.starts[number], one.directions
     made = {}
     for specimen, columns, owners in one.places:
-        onto = summing(owners, len(one.mean))
+        onto = summation(owners, len(one.mean))
         made[specimen] = design.of[specimen].left[:, start + columns] @ onto.T @ directions
     gap = float(np.sqrt(one.squared(one.refitted) / design.freedom))
     return _Target(one.form, made, one.squared(one.left), gap)
@@ -202,7 +202,7 @@ def _explained(
     widths = [next(iter(target.made.values())).shape[1] for target in targets]
     moments = [np.zeros((count, width)) for width in widths]
     for specimen, columns, owners in places:
-        onto, mine = summing(owners, count), start + columns
+        onto, mine = summation(owners, count), start + columns
         gram += onto @ design.of[specimen].left[np.ix_(mine, mine)] @ onto.T
         for moment, target in zip(moments, targets, strict=True):
             if specimen in target.made:

@@ -21,18 +21,18 @@ from spinepipe.studies.discrepancy.design.plans import (
     SLOWER,
     STEP_S,
     Plan,
-    as_made,
     at_times,
-    back_down,
-    comes_back,
     has_times,
-    largest_held,
     peak,
-    scaled,
+    plan_of_readings,
+    scale_loads,
     summed_loads,
-    thinned,
+    thin_steps,
     times,
+    unloads,
+    with_hold,
     with_preloads,
+    with_unloading,
 )
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
 from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_parameters
@@ -82,8 +82,8 @@ class Bench:
         model, free = g.fit.models[self.specimen], g.start.base[self.specimen]
         alike = all(len(p.rows) == len(model.effects[p.effect].values) for p in free)
         grouping = PER_SPECIMEN if alike else "per_joint"
-        own = as_made(g.readings[self.specimen], g.noise.zeroed, grouping)
-        return thinned(own, MOST_STEPS)
+        own = plan_of_readings(g.readings[self.specimen], g.noise.zeroed, grouping)
+        return thin_steps(own, MOST_STEPS)
 
 
 def not_testable(
@@ -167,9 +167,9 @@ def _each(plan: Plan, change: Callable[[LoadCase], LoadCase]) -> Plan:
 
 
 def _unloaded(plan: Plan) -> Plan | None:
-    if all(comes_back(one.case) for one in plan.tests):
+    if all(unloads(one.case) for one in plan.tests):
         return None
-    return _each(plan, back_down)
+    return _each(plan, with_unloading)
 
 
 def _opposite(plan: Plan) -> Plan | None:
@@ -179,7 +179,7 @@ def _opposite(plan: Plan) -> Plan | None:
         # opposite: a load (6,) with at least half of the largest one, turned round
         largest = peak(one.case)
         if not any(-(load @ largest) >= 0.5 * (largest @ largest) > 0.0 for load in loads):
-            case = replace(scaled(one.case, -1.0), test=f"{one.case.test}, opposite")
+            case = replace(scale_loads(one.case, -1.0), test=f"{one.case.test}, opposite")
             missing.append(one.renamed(case))
     return replace(plan, tests=(*plan.tests, *missing)) if missing else None
 
@@ -207,12 +207,12 @@ MENU = (
     Addition("the same loads in the opposite direction as well", _opposite),
     Addition(
         f"loads {LARGER:g} times as large",
-        lambda plan: _each(plan, lambda case: scaled(case, LARGER)),
+        lambda plan: _each(plan, lambda case: scale_loads(case, LARGER)),
     ),
     Addition(f"every test once more under a follower load of {PRELOAD_N:g} N", _preloaded),
     Addition(
         f"the largest load held for {HELD_S[-1] / 60:g} min, read along the way",
-        lambda plan: _each(plan, largest_held),
+        lambda plan: _each(plan, with_hold),
     ),
     Addition(
         f"{SLOWER:g} times as long between load steps, times recorded",

@@ -17,7 +17,12 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
 from spinepipe.studies.discrepancy.design.extra_tests import Bench
 from spinepipe.studies.discrepancy.design.patterns import Pattern, RivalFits
-from spinepipe.studies.discrepancy.design.plans import Plan, as_made, thinned, with_preloads
+from spinepipe.studies.discrepancy.design.plans import (
+    Plan,
+    plan_of_readings,
+    thin_steps,
+    with_preloads,
+)
 from spinepipe.studies.discrepancy.design.runs import ExtraCycle, runs
 from spinepipe.studies.discrepancy.search.base import (
     PER_SPECIMEN,
@@ -378,5 +383,5 @@ def _whitening(place: Bench, run: ExtraCycle) -> Whitening:
 
 def _menu(place: Bench, name: str) -> list[ExtraCycle]:
     g = place.grounds
-    plan = as_made(g.readings[name], g.noise.zeroed, PER_SPECIMEN)
-    return runs(thinned(plan, MOST_STEPS).tests, g.noise.zeroed)
+    plan = plan_of_readings(g.readings[name], g.noise.zeroed, PER_SPECIMEN)
+    return runs(thin_steps(plan, MOST_STEPS).tests, g.noise.zeroed)

@@ -64,7 +64,7 @@ def peak(case: LoadCase) -> Array:
     return summed_loads(case)[farthest(case)]
 
 
-def comes_back(case: LoadCase) -> bool:
+def unloads(case: LoadCase) -> bool:
     """Whether a load falls again along its own direction, to where it was on the way up.
 
     A machine never gives the same load twice, and a thinned test has no equal steps left: it is
@@ -85,7 +85,7 @@ def comes_back(case: LoadCase) -> bool:
     return False
 
 
-def back_down(case: LoadCase) -> LoadCase:
+def with_unloading(case: LoadCase) -> LoadCase:
     timed = has_times(case)
     last = times(case)[-1]
     extra = [
@@ -100,7 +100,7 @@ def back_down(case: LoadCase) -> LoadCase:
     return replace(case, steps=(*case.steps, *extra))
 
 
-def scaled(case: LoadCase, factor: float) -> LoadCase:
+def scale_loads(case: LoadCase, factor: float) -> LoadCase:
     steps = tuple(
         replace(
             step,
@@ -113,7 +113,7 @@ def scaled(case: LoadCase, factor: float) -> LoadCase:
     return replace(case, steps=steps)
 
 
-def largest_held(case: LoadCase) -> LoadCase:
+def with_hold(case: LoadCase) -> LoadCase:
     """Steps after the one with the largest load, all others later."""
     timed, at = at_times(case, times(case)).steps, farthest(case)
     start = timed[at].time or 0.0
@@ -178,7 +178,7 @@ class Plan:
         return tuple(found)
 
 
-def as_made(one: SpecimenReadings, zeroed: bool, grouping: str) -> Plan:
+def plan_of_readings(one: SpecimenReadings, zeroed: bool, grouping: str) -> Plan:
     """The tests that a specimen has had; cycles whose loads differ a little are one test."""
     planned: dict[str, PlannedTest] = {}
     for test in one.tests:
@@ -191,7 +191,7 @@ def as_made(one: SpecimenReadings, zeroed: bool, grouping: str) -> Plan:
     return Plan(tuple(planned.values()), zeroed, grouping)
 
 
-def thinned(plan: Plan, steps: int) -> Plan:
+def thin_steps(plan: Plan, steps: int) -> Plan:
     """A plan with about that many load steps per test at most: first, farthest and last stay."""
     tests = []
     for one in plan.tests:

@@ -20,14 +20,14 @@ from spinepipe.studies.discrepancy.design.plans import (
     STEP_S,
     PlannedTest,
     at_times,
-    back_down,
-    comes_back,
     has_times,
-    largest_held,
     peak,
-    scaled,
+    scale_loads,
     summed_loads,
     times,
+    unloads,
+    with_hold,
+    with_unloading,
 )
 
 ALONG = 0.9
@@ -112,10 +112,10 @@ def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
                 count[:, part] = 1
                 words = f"{name}: {what} read as well"
                 yield ExtraCycle(words, replace(once, count=count), zeroed)
-        yield run(f"{name}: in twice as many load steps", refined(case))
-        if not comes_back(case):
-            yield run(f"{name}: unloading too, the same loads back down", back_down(case))
-        yield run(f"{name}: loads {LARGER:g} times as large", scaled(case, LARGER))
+        yield run(f"{name}: in twice as many load steps", with_half_steps(case))
+        if not unloads(case):
+            yield run(f"{name}: unloading too, the same loads back down", with_unloading(case))
+        yield run(f"{name}: loads {LARGER:g} times as large", scale_loads(case, LARGER))
         squeezed = replace(once, preload=PRELOAD_N)
         yield ExtraCycle(f"{name}: under a follower load of {PRELOAD_N:g} N more", squeezed, zeroed)
         if not has_times(case):
@@ -124,12 +124,12 @@ def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
         slow = at_times(case, [SLOWER * time for time in times(case)])
         yield run(f"{name}: {SLOWER:g} times as slow, time recorded", slow)
         held = f"{name}: largest load held for {HELD_S[-1] / 60:g} min, read along the way"
-        yield run(held, largest_held(case))
+        yield run(held, with_hold(case))
         if zeroed:
             yield ExtraCycle(f"{name}: readings kept as they are, not zeroed", once, False)
 
 
-def refined(case: LoadCase) -> LoadCase:
+def with_half_steps(case: LoadCase) -> LoadCase:
     """A step half-way between each two."""
     steps: list[LoadStep] = []
     for before, after in zip(case.steps[:-1], case.steps[1:], strict=True):

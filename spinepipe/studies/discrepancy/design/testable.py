@@ -191,7 +191,7 @@ def _best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typ
     """
     forms = [form for form in design.those.trials[number].forms if form.variant == variant]
     usual = [form for form in forms if form.spread in SPREADS]
-    ones = [typical(design, number, form) for form in usual or forms]
+    ones = [typical_form(design, number, form) for form in usual or forms]
     if usual:
         return min(ones, key=lambda one: round(one.absorbed, 2))
     return max(ones, key=lambda one: one.squared(one.left))
@@ -262,7 +262,7 @@ def _why(one: Typical, least: Detectable | None) -> str:
     return f"{taken}; it would be found only at {least.times:.1f} times its typical strength"
 
 
-def typical(design: CohortSignatures, number: int, form: CandidateForm) -> Typical:
+def typical_form(design: CohortSignatures, number: int, form: CandidateForm) -> Typical:
     """A form of effect ``number`` under a design."""
     index, start = design.those.indices[number], design.those.starts[number]
     middle = usual_shapes(form.variant)
@@ -278,7 +278,7 @@ def typical(design: CohortSignatures, number: int, form: CandidateForm) -> Typic
     away = np.array([sizes[column] for column in strengths])
     raw, refitted, left = (np.zeros((count, count)) for _ in range(3))
     for specimen, columns, owners in places:
-        part, here, onto = design.of[specimen], np.ix_(columns, columns), summing(owners, count)
+        part, here, onto = design.of[specimen], np.ix_(columns, columns), summation(owners, count)
         among_all = np.ix_(start + columns, start + columns)
         raw += onto @ part.raw[number][here] @ onto.T
         refitted += onto @ part.refitted[number][here] @ onto.T
@@ -288,7 +288,7 @@ def typical(design: CohortSignatures, number: int, form: CandidateForm) -> Typic
     return Typical(form, places, mean, sd, signs, raw, refitted, left)
 
 
-def summing(owners: Indices, count: int) -> Array:
+def summation(owners: Indices, count: int) -> Array:
     """(k, c) sums columns onto the strengths that own them."""
     onto = np.zeros((count, len(owners)))
     onto[owners, np.arange(len(owners))] = 1.0

@@ -142,7 +142,7 @@ def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: StudyTa
     every = rounds(tables["candidates"], end)
     if not every:
         return saying("No evidence can be shown: no effect was tried.")
-    shown = chosen(every)
+    shown = rounds_shown(every)
     wide = pd.concat([one.shown.rename(column) for column, one in enumerate(shown)], axis=1)
     # effects with evidence for or against them in some round, most evidence first
     traced = wide[(wide.abs() >= _NO_TRACE).any(axis=1)]
@@ -188,7 +188,7 @@ def _panel(figure: Figure, columns: int) -> Axes:
     return panel
 
 
-def chosen(every: Sequence[EvidenceRound]) -> list[EvidenceRound]:
+def rounds_shown(every: Sequence[EvidenceRound]) -> list[EvidenceRound]:
     """Of many rounds those that led to something first, in their order."""
     if len(every) <= MOST_ROUNDS:
         return list(every)

@@ -112,7 +112,7 @@ def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[JointTestCu
     Of many each in the specimen where it is worst.
     """
     rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)].sort_values("step", kind="stable")
-    chosen = driven(rows)
+    chosen = driven_coordinates(rows)
     found = [
         JointTestCurve(str(specimen), str(test), str(joint), str(coordinate), part, _off(part))
         for (specimen, test, joint, coordinate), part in rows.groupby(PLACE, sort=False)
@@ -128,7 +128,7 @@ def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[JointTestCu
     return [curve for n, curve in enumerate(shown) if n < FEWEST_PANELS or curve.off > CLEARLY]
 
 
-def driven(gap: pd.DataFrame) -> set[tuple[str, str, str]]:
+def driven_coordinates(gap: pd.DataFrame) -> set[tuple[str, str, str]]:
     """Test, joint and the coordinate in which the load does the most work there, over specimens."""
     factors = dict(zip(COORDINATES, DISPLAY_PER_SI, strict=True))
     per_si = gap["coordinate"].map(factors).astype(float)
@@ -183,7 +183,7 @@ def _draw(axis: Axes, curve: JointTestCurve, lines: Sequence[str]) -> bool:
             fill_between(drive[steps], low, high, color=GREY, alpha=0.3, lw=0, zorder=1)
         for name in lines:
             modelled = rows[name].to_numpy(float)
-            line = placed(modelled, drawn_once(drive, modelled, way))
+            line = placed(modelled, line_order(drive, modelled, way))
             axis.plot(*line, zorder=3, **_LINES[name])
     for chosen, fill in ((~back, BLACK), (back, WHITE)):
         axis.plot(*placed(measured, chosen), mfc=fill, zorder=5, **_DOT)
@@ -203,7 +203,7 @@ def ways(load: Array) -> list[Steps]:
     return [np.r_[0, way] if unloaded and way[0] else way for way in found]
 
 
-def drawn_once(drive: Array, seen: Array, way: Steps) -> Steps:
+def line_order(drive: Array, seen: Array, way: Steps) -> Steps:
     """The steps in the order of what drives them, if that is one line: no dash is drawn twice."""
     order: Steps = way[np.argsort(drive[way], kind="stable")]
     rise = np.diff(seen[order])
@@ -256,7 +256,7 @@ def _handles(lines: Sequence[str], unloaded: bool) -> list[Line2D | Patch]:
 
 
 def _words(gap: pd.DataFrame, curves: Sequence[JointTestCurve], cohort: Cohort) -> str:
-    places = len(driven(gap))
+    places = len(driven_coordinates(gap))
     each = len(curves) == len({(curve.test, curve.joint) for curve in curves})
     whose = ", each in the specimen where it is worst" if len(cohort.specimen_names) > 1 else ""
     some = f"{len(curves)} of {count(places, 'curve')} (joint and test)"
@@ -270,7 +270,7 @@ def _words(gap: pd.DataFrame, curves: Sequence[JointTestCurve], cohort: Cohort) 
 def _aside(gap: pd.DataFrame) -> str:
     """That the base is farther off in a coordinate that no load drives there, if it is."""
     rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)]
-    drives = driven(rows)
+    drives = driven_coordinates(rows)
     off = {place: _off(part) for place, part in rows.groupby(PLACE[1:], sort=False)}
     most = max(off, key=lambda place: off[place])
     if most in drives or off[most] <= CLEARLY:

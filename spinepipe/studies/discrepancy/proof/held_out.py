@@ -104,7 +104,7 @@ class FoldRow:
     def closed(self) -> float | None:
         """Share of the base's excess misfit (chi2) that the effects take away; None where noise
         hides the excess."""
-        return closed(self.base, self.with_effects, self.expected)
+        return closed_share(self.base, self.with_effects, self.expected)
 
 
 @dataclass(frozen=True)
@@ -129,13 +129,13 @@ class HeldOut:
     def closed(self) -> float | None:
         """Share of the base's excess misfit (chi2) that the effects take away; None where noise
         hides the excess."""
-        return closed(self.base, self.with_effects, self.expected)
+        return closed_share(self.base, self.with_effects, self.expected)
 
     def by_kind(self) -> Mapping[str, "HeldOut"]:
         """Folds of each kind that were scored, together: their training knows other things."""
         scored = [row for row in self.folds if row.base is not None]
         kinds = dict.fromkeys(row.kind for row in scored)
-        return {kind: together([row for row in scored if row.kind == kind], {}) for kind in kinds}
+        return {kind: pool_folds([row for row in scored if row.kind == kind], {}) for kind in kinds}
 
     def of_base(self) -> "HeldOut":
         """The base in the place of the model with effects."""
@@ -244,9 +244,9 @@ def _proof(models: FoldModels, asked: Asked) -> HeldOut:
     if asked.specimens:
         folds += folds_by_specimen(readings)
     rows = _rows(models, folds, 0, motion)
-    if asked.tests and len(readings) == 1 and not together(rows, motion).tells:
+    if asked.tests and len(readings) == 1 and not pool_folds(rows, motion).tells:
         rows += _rows(models, [step_fold(readings)], len(rows), motion)
-    return together(rows, motion)
+    return pool_folds(rows, motion)
 
 
 def _rows(
@@ -307,7 +307,7 @@ def _row(
     )
 
 
-def together(rows: Sequence[FoldRow], motion: Mapping[str, HeldOutMotion]) -> HeldOut:
+def pool_folds(rows: Sequence[FoldRow], motion: Mapping[str, HeldOutMotion]) -> HeldOut:
     """All folds pooled."""
     base = [row.base for row in rows if row.base is not None]
     final = [row.with_effects for row in rows if row.with_effects is not None]
@@ -315,8 +315,8 @@ def together(rows: Sequence[FoldRow], motion: Mapping[str, HeldOutMotion]) -> He
     return HeldOut(
         tuple(rows),
         motion,
-        pooled(base),
-        pooled(final),
+        pool_gaps(base),
+        pool_gaps(final),
         sum(row.expected for row in rows),
         float(np.sum(drops)) if drops else None,
     )
@@ -356,7 +356,7 @@ def _missed(
     return chosen.whitening(specimen, test, there).noise_only([errors])
 
 
-def pooled(gaps: Sequence[Gap]) -> Gap | None:
+def pool_gaps(gaps: Sequence[Gap]) -> Gap | None:
     """All together; None of none."""
     if not gaps:
         return None
@@ -382,7 +382,7 @@ def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -
                 column[test][new] = values[test][new]
 
 
-def closed(base: Gap | None, new: Gap | None, expected: float) -> float | None:
+def closed_share(base: Gap | None, new: Gap | None, expected: float) -> float | None:
     """Share of the excess misfit: (chi2 of base - chi2 of new) / (chi2 of base - expected), at most
     1. It is no share of the gap, which is its root.
 
