@@ -258,6 +258,7 @@ def _changes(fit: JointFit, form: CandidateForm, joint: int, coordinate: str, lo
 
 def _read(joints: Sequence[Laws], coordinate: str, load: float) -> list[Array]:
     """(N,) numbers of each joint in the order of `NUMBERS`; joints with the same laws together."""
+    # reading a curve solves for motions at loads: joints with the same laws are one stack
     alike: dict[tuple[Effect, ...], list[int]] = {}
     for index, laws in enumerate(joints):
         alike.setdefault(tuple(effect for effect, _ in laws), []).append(index)

@@ -1,7 +1,8 @@
 """The report of a search: its verdict first, then tables of the result files in plain words."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -126,59 +127,63 @@ def page_tables(verdict: Verdict, results: ResultTables) -> list[Sortable]:
 
 def _named_tables(verdict: Verdict) -> Iterator[Parts]:
     """What the verdict says of errors, and of the effects that it names."""
-    about = "Readings that no model should be bent to."
-    errors = [
-        {key: readable(words) for key, words in vars(one).items()}
-        for one in verdict.suspected_data_errors
-    ]
-    columns: tuple[Column, ...] = (
-        Column("where", "text", "readings in question"),
-        Column("what", "text", "what it looks like"),
-        Column("evidence", "text", "why"),
+    yield _table(
+        "Suspected errors of the data",
+        "Readings that no model should be bent to.",
+        (
+            Column("where", "text", "readings in question"),
+            Column("what", "text", "what it looks like"),
+            Column("evidence", "text", "why"),
+        ),
+        [
+            (readable(one.where), readable(one.what), readable(one.evidence))
+            for one in verdict.suspected_data_errors
+        ],
     )
-    yield "verdict", "Suspected errors of the data", about, pd.DataFrame(errors), columns
-    about = (
+    yield _table(
+        "What is missing, and how large it is",
         "Parameters of the named effects, with all that the readings allow where everything else "
-        "is fitted anew. Where an end is open, the value is not known."
+        "is fitted anew. Where an end is open, the value is not known.",
+        (
+            _EFFECT,
+            Column("parameter", "text", "parameter of the effect"),
+            Column(
+                "value [95 % interval]", "text", "estimate and interval, or the end that is known"
+            ),
+            Column("unit", "text", "unit; none for a ratio"),
+            Column("place", "text", "joints, coordinates, specimens and tests it is of"),
+        ),
+        [
+            (label_of(effect), one.name, one.in_brackets, one.unit, _place(effect, one.place))
+            for effect in verdict.effects
+            for one in quantities(effect)
+        ],
     )
-    parameters = [
-        {
-            "effect": label_of(effect),
-            "parameter": one.name,
-            "value [95 % interval]": one.in_brackets,
-            "unit": one.unit,
-            "place": _place(effect, one.place),
-        }
-        for effect in verdict.effects
-        for one in quantities(effect)
-    ]
-    columns = (
-        _EFFECT,
-        Column("parameter", "text", "parameter of the effect"),
-        Column("value [95 % interval]", "text", "estimate and interval, or the end that is known"),
-        Column("unit", "text", "unit; none for a ratio"),
-        Column("place", "text", "joints, coordinates, specimens and tests it is of"),
+    yield _table(
+        "One of these is missing",
+        "Effects that these tests cannot tell apart.",
+        (
+            _EFFECT,
+            Column("where", "text", "coordinates that it would load; none where it names none"),
+            Column("behind", "text", "log evidence by which it is behind the likeliest"),
+        ),
+        [
+            (
+                name_at(one.name, one.coordinates),
+                "" if one.coordinates == EVERY else listed(map(plain, one.coordinates)),
+                "not told" if one.behind is None else f"{one.behind:.1f}",
+            )
+            for one in verdict.in_set
+        ],
     )
-    title = "What is missing, and how large it is"
-    yield "verdict", title, about, pd.DataFrame(parameters), columns
-    about = "Effects that these tests cannot tell apart."
-    in_set = [
-        {
-            "effect": name_at(one.name, one.coordinates),
-            "where": "" if one.coordinates == EVERY else listed(map(plain, one.coordinates)),
-            "behind": "not told" if one.behind is None else f"{one.behind:.1f}",
-        }
-        for one in verdict.in_set
-    ]
-    columns = (
-        _EFFECT,
-        Column("where", "text", "coordinates that it would load; none where it names none"),
-        Column("behind", "text", "log evidence by which it is behind the likeliest"),
-    )
-    yield "verdict", "One of these is missing", about, pd.DataFrame(in_set), columns
 
 
 _EFFECT = Column("effect", "text", "effect")
+
+
+def _table(title: str, about: str, columns: tuple[Column, ...], rows: Sequence[Any]) -> Parts:
+    frame = pd.DataFrame(rows, columns=[column.name for column in columns])
+    return "verdict", title, about, frame, columns
 
 
 def _place(effect: Missing, own: str) -> str:
@@ -188,52 +193,50 @@ def _place(effect: Missing, own: str) -> str:
 
 def _other_tables(verdict: Verdict) -> Iterator[Parts]:
     """What the verdict says of the effects that it does not name."""
-    rivals = [
-        {
-            "effect": label_of(effect),
-            "rival": general(rival.name),
-            "margin": rival.log_evidence_margin,
-        }
-        for effect in verdict.effects
-        for rival in effect.rivals
-    ]
-    columns: tuple[Column, ...] = (
-        _EFFECT,
-        Column("rival", "text", "another name for the same discrepancy"),
-        Column("margin", "number", "log evidence by which it is behind"),
+    yield _table(
+        "Next best names",
+        "Log evidence below a few units is too little to decide.",
+        (
+            _EFFECT,
+            Column("rival", "text", "another name for the same discrepancy"),
+            Column("margin", "number", "log evidence by which it is behind"),
+        ),
+        [
+            (label_of(effect), general(rival.name), rival.log_evidence_margin)
+            for effect in verdict.effects
+            for rival in effect.rivals
+        ],
     )
-    about = "Log evidence below a few units is too little to decide."
-    yield "verdict", "Next best names", about, pd.DataFrame(rivals), columns
-    hidden = [
-        {
-            "effect": general(one.name),
-            "why": readable(one.why),
-            "test_that_would_tell": readable(one.test_that_would_tell) or "none of those tried",
-        }
-        for one in verdict.not_testable
-    ]
-    columns = (
-        _EFFECT,
-        Column("why", "text", "why these tests cannot show it"),
-        Column("test_that_would_tell", "text", "what a test must have to show it"),
+    yield _table(
+        "What these tests cannot show",
+        "Base or nuisance take it up.",
+        (
+            _EFFECT,
+            Column("why", "text", "why these tests cannot show it"),
+            Column("test_that_would_tell", "text", "what a test must have to show it"),
+        ),
+        [
+            (
+                general(one.name),
+                readable(one.why),
+                readable(one.test_that_would_tell) or "none of those tried",
+            )
+            for one in verdict.not_testable
+        ],
     )
-    about = "Base or nuisance take it up."
-    yield "verdict", "What these tests cannot show", about, pd.DataFrame(hidden), columns
-    gaps = [
-        {
-            "effect": general(one.name),
-            "gap": one.gap,
-            "by_name": "never" if one.by_name is None else f"{one.by_name:.2f}",
-        }
-        for one in sorted(verdict.smallest_detectable, key=lambda one: one.gap)
-    ]
-    columns = (
-        _EFFECT,
-        Column("gap", "number", "smallest gap at which it would be found", "noise SD"),
-        Column("by_name", "text", "the same, told from every other effect", "noise SD"),
+    yield _table(
+        "What would have been seen",
+        "A smaller gap may be there unseen.",
+        (
+            _EFFECT,
+            Column("gap", "number", "smallest gap at which it would be found", "noise SD"),
+            Column("by_name", "text", "the same, told from every other effect", "noise SD"),
+        ),
+        [
+            (general(one.name), one.gap, "never" if one.by_name is None else f"{one.by_name:.2f}")
+            for one in sorted(verdict.smallest_detectable, key=lambda one: one.gap)
+        ],
     )
-    about = "A smaller gap may be there unseen."
-    yield "verdict", "What would have been seen", about, pd.DataFrame(gaps), columns
 
 
 def in_field_units(verdict: Verdict, results: ResultTables) -> Iterator[Parts]:

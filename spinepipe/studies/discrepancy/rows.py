@@ -236,6 +236,7 @@ def _estimate(effect: Effect, tried: ScreenedVariant) -> tuple[float | None, str
     p = effect.parameters[tried.strengths[0]]
     assert p.off is not None
     away = float(tried.estimate[0]) * p.prior_scale
+    # the clip keeps exp finite for estimates of the linear problem that are absurdly large
     value = p.off * float(np.exp(np.clip(away, -50.0, 50.0))) if p.logarithmic else p.off + away
     return display_value(p.unit, value)
 

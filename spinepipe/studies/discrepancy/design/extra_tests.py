@@ -155,21 +155,18 @@ def _translations_too(plan: Plan) -> Plan | None:
     return replace(plan, tests=tuple(tests))
 
 
-def _timed(plan: Plan) -> Plan | None:
-    if all(has_times(one.case) for one in plan.tests):
-        return None
-    return _each(plan, lambda case: at_times(case, times(case)))
+def _each(
+    change: Callable[[LoadCase], LoadCase], unless: Callable[[LoadCase], bool] | None = None
+) -> Callable[[Plan], Plan | None]:
+    """A change of every test of a plan, unless all of them have it."""
 
+    def to(plan: Plan) -> Plan | None:
+        if unless is not None and all(unless(one.case) for one in plan.tests):
+            return None
+        tests = tuple(replace(one, case=change(one.case)) for one in plan.tests)
+        return replace(plan, tests=tests)
 
-def _each(plan: Plan, change: Callable[[LoadCase], LoadCase]) -> Plan:
-    tests = tuple(replace(one, case=change(one.case)) for one in plan.tests)
-    return replace(plan, tests=tests)
-
-
-def _unloaded(plan: Plan) -> Plan | None:
-    if all(unloads(one.case) for one in plan.tests):
-        return None
-    return _each(plan, with_unloading)
+    return to
 
 
 def _opposite(plan: Plan) -> Plan | None:
@@ -192,31 +189,32 @@ def _preloaded(plan: Plan) -> Plan | None:
     return replace(plan, tests=(*plan.tests, *again))
 
 
-def _slower(case: LoadCase) -> LoadCase:
-    return at_times(case, [SLOWER * time for time in times(case)])
-
-
 MENU = (
     Addition("translations read as well", _translations_too),
     Addition(
         "readings kept as they are, not zeroed at step 0",
         lambda plan: replace(plan, zeroed=False) if plan.zeroed else None,
     ),
-    Addition(f"times recorded, {STEP_S:g} s from load step to load step", _timed),
-    Addition("unloading steps added: the same loads back down", _unloaded),
+    Addition(
+        f"times recorded, {STEP_S:g} s from load step to load step",
+        _each(lambda case: at_times(case, times(case)), unless=has_times),
+    ),
+    Addition(
+        "unloading steps added: the same loads back down", _each(with_unloading, unless=unloads)
+    ),
     Addition("the same loads in the opposite direction as well", _opposite),
     Addition(
         f"loads {LARGER:g} times as large",
-        lambda plan: _each(plan, lambda case: scale_loads(case, LARGER)),
+        _each(lambda case: scale_loads(case, LARGER)),
     ),
     Addition(f"every test once more under a follower load of {PRELOAD_N:g} N", _preloaded),
     Addition(
         f"the largest load held for {HELD_S[-1] / 60:g} min, read along the way",
-        lambda plan: _each(plan, with_hold),
+        _each(with_hold),
     ),
     Addition(
         f"{SLOWER:g} times as long between load steps, times recorded",
-        lambda plan: _each(plan, _slower),
+        _each(lambda case: at_times(case, [SLOWER * time for time in times(case)])),
     ),
     Addition(
         "no other test, but a base that shares stiffness: per_specimen",

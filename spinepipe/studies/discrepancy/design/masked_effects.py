@@ -116,6 +116,7 @@ def _hidden(
         told = {factor: at(factor) for factor in FACTORS}
         needed = None
         if told[0.0] > threshold:
+            # evidence falls with the prior SD: above the threshold at 0, below at 1 (Brent)
             root = float(brentq(lambda f, at=at: at(f) - threshold, 0.0, 1.0, xtol=5e-3))
             needed = root if root > AS_GOOD_AS_KNOWN else None
         found.append(
@@ -137,6 +138,7 @@ def with_narrower_priors(grounds: BaselineFit, factors: Mapping[str, float]) -> 
     for name, white in grounds.setting.whitenings.items():
         by_column = np.array([factors.get(one.kind, 1.0) for one in labels_of(grounds, name)])
         narrow = rescaled(white, by_column)
+        # residuals are whitened by the old covariance: back to noise SD, then by the new one
         whitenings[name] = narrow
         residuals[name] = narrow.shortened(white.lengthened(grounds.fit.residuals[name]))
         jacobians[name] = narrow.shortened(white.lengthened(grounds.fit.jacobians[name]))

@@ -130,6 +130,7 @@ class Sums:
 
 def noncentrality(of: Mapping[str, Sums], prior_sds: Array) -> float:
     """What all specimens together leave between the models; unknowns (m,) are common to all."""
+    # generalised least squares: the unknowns' normal equations, summed over specimens
     parts = [one.without_nuisances for one in of.values()]
     jj = np.sum([part[0] for part in parts], axis=0) + np.diag(prior_sds**-2.0)
     jd = np.sum([part[1] for part in parts], axis=0)
@@ -316,6 +317,7 @@ def _nuisances(
 def _among_all(fit: JointFit, name: str, own: Array) -> Array:
     """(N, m) derivatives by all unknowns of those by a specimen's own."""
     whole = np.zeros((len(own), len(fit.x)))
+    # added, not set: several of a specimen's own parameters may be one unknown
     np.add.at(whole.T, np.array(fit.hypothesis.members[name].numbers), own.T)
     return whole
 
@@ -334,6 +336,7 @@ def remaining_chi2(pattern: RivalFits, place: Bench, words: str | None) -> float
         name: next((run for run in _menu(place, name) if run.words == words), None)
         for name in (g.readings if words is not None else ())
     }
+    # the other model's predictions take the place of the readings, without noise
     readings, whitenings = {}, {}
     for name, one in g.readings.items():
         pairs = zip(one.tests, pattern.other.predicted[name], strict=True)

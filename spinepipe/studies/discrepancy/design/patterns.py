@@ -177,6 +177,7 @@ def generic(
     onto = _onto(terms, lack, tuple(parts))
     if not len(next(iter(onto.values()))):  # shifts of these tests say nothing of others
         return TangentPattern(grounds, terms_of, {name: np.zeros(len(terms)) for name in onto})
+    # normal equations of the strengths, what is common to all specimens eliminated
     problem, count = linearised(parts), len(next(iter(onto.values())))
     gram, moments = np.zeros((count, count)), np.zeros((count, 1))
     coupled = np.zeros((count, len(problem.gram_shared)))

@@ -74,6 +74,7 @@ def unloads(case: LoadCase) -> bool:
     sizes = np.linalg.norm(loads, axis=1)
     near = NEAR * float(sizes.max(initial=0.0))
     for now in np.flatnonzero(sizes > near):
+        # each load in turn as the peak: loads along its direction, and away from that line
         direction = loads[now] / sizes[now]
         along = loads @ direction
         aside = np.linalg.norm(loads - along[:, None] * direction, axis=1)

@@ -234,6 +234,7 @@ def _least(one: Typical, needed: float, seed: int) -> float | None:
     patterns = patterns * np.sqrt(one.squared(one.left) / np.maximum(squares, NO_TRACE))
     moved = one.left @ patterns
     group = one.group
+    # noise of the moments is N(0, G), drawn by the eigenvectors of G
     noise = np.sqrt(group.eigenvalues)[:, None] * rng.standard_normal((count, DRAWS))
     noise = group.vectors @ noise
 
@@ -241,6 +242,7 @@ def _least(one: Typical, needed: float, seed: int) -> float | None:
         evidence: Array = group.log_evidence(np.exp(log_times) * moved + noise)
         return float(np.quantile(evidence, 1.0 - OFTEN)) - needed
 
+    # the same draws at every size (common random numbers): evidence rises with it, one root
     ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
     if short(ends[1]) <= 0.0:
         return None

@@ -194,6 +194,7 @@ def _draw(axis: Axes, curve: JointTestCurve, lines: Sequence[str]) -> bool:
 
 def ways(load: Array) -> list[Steps]:
     """Steps that a line may join: a jump to the other side starts anew, from where all began."""
+    # a change of side is usual where a test sweeps through zero: there the change is small
     change = np.abs(np.diff(load))
     sides = load[1:] * load[:-1] < 0.0
     usual = float(np.median(change)) if len(change) else 0.0

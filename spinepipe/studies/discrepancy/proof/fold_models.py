@@ -221,6 +221,7 @@ def _again(
     fit: JointFit, linear: LinearModel, specimens: Sequence[str], free: Indices, x: Array
 ) -> Hypothesis:
     """The fit's hypothesis of some specimens, started where it ended, moved by x."""
+    # unknowns are counted anew among the free ones; bounds and priors move with the start
     order = {int(number): place for place, number in enumerate(free)}
     members = {}
     for name in specimens:

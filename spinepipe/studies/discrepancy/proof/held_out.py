@@ -97,6 +97,7 @@ class FoldRow:
         """
         if self.base is None or self.with_effects is None:
             return False
+        # n'd has variance d'd times that of a reading, which open nuisances make larger than one
         sd = 2.0 * float(np.sqrt(self.moved * max(self.expected / self.readings, 1.0)))
         return self.base.chi2 - self.with_effects.chi2 < -CLEARLY * sd
 
