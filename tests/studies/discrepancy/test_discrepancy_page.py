@@ -108,7 +108,7 @@ def test_the_map_shows_each_test_before_and_after(root: Path) -> None:
     assert (alone.count("base"), alone.count("with effects")) == (3, 0)
 
 
-def test_the_map_takes_six_joints_six_coordinates_and_many_tests(root: Path) -> None:
+def test_the_map_takes_six_coordinates(root: Path) -> None:
     one = frames("NAMED")["where"]
     one = one[one["by"] == "joint x coordinate x test"]
     every = [one.assign(coordinate=name) for name in ("anterior", "superior", "right")]

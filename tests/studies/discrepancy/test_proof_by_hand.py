@@ -30,7 +30,6 @@ from spinepipe.studies.discrepancy.proof.held_out import (
     with_terms,
 )
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.whitening import Whitening
 
 # Margins
 
@@ -142,17 +141,6 @@ def test_models_differ_by_what_both_predict_and_nuisances_are_part_of_it() -> No
     none = {"a": (np.zeros(shape, dtype=bool),)}
     assert held_out.scored_gap(chosen, [(none, base)]) == Gap(0.0, 0.0, 0)
     assert held_out._moved(chosen, replace(part, scored=none)) == 0.0
-
-
-def test_what_nuisances_shortened_is_lengthened_again() -> None:
-    """Along a direction to a third; what lies across is left as it is."""
-    along = np.array([[0.6], [0.8], [0.0]])
-    white = Whitening((), (), along, np.array([1.0 / 3.0 - 1.0]), np.ones((1, 1)))
-    rows = np.array([[3.0, 1.0], [4.0, -2.0], [5.0, 7.0]])
-    short = white.shortened(rows)
-    assert along.T @ short == pytest.approx(along.T @ rows / 3.0)
-    assert white.lengthened(short) == pytest.approx(rows)
-    assert white.lengthened(short[:, 0]) == pytest.approx(rows[:, 0])
 
 
 # Folds

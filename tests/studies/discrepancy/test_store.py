@@ -158,16 +158,6 @@ def test_a_damaged_piece_counts_as_not_there(
         assert {one: one.read_bytes() for one in tmp_path.iterdir()} == whole
 
 
-def test_pieces_of_other_code_or_data_are_forgotten(tmp_path: Path) -> None:
-    Store(tmp_path, MODULE)(scaled, of(5.0))
-    store = Store(tmp_path, MODULE)
-    search_of(store, 2)
-    store.forget_the_rest()
-    assert len(list(tmp_path.iterdir())) == 2
-    search_of(Store(tmp_path, MODULE), 2)
-    assert CALLS == [2.0, 1.0, 2.0]
-
-
 def test_a_store_that_is_a_link_works_and_loses_nothing(tmp_path: Path) -> None:
     """As a link to a faster disk, which other studies may use as well."""
     (tmp_path / "behind").mkdir()
@@ -239,24 +229,6 @@ def test_another_process_finds_the_piece_and_nothing_is_said_or_left(tmp_path: P
     outside = [path for path in tmp_path.rglob("*") if "store" not in path.parts]
     assert sorted(path.name for path in outside if path.is_file()) == []
     assert os.environ["NO_ET"] == "1"
-
-
-def killed(held: Repeats) -> Repeats:
-    """A piece in the midst of which the power goes off, the first time."""
-    if "DIES" in os.environ:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return scaled(held, 9.0)
-
-
-def test_a_killed_process_leaves_nothing_that_one_waits_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    search = "held = store(scaled, of(1.0), 4.0); store(killed, held); print(CALLS)"
-    monkeypatch.setenv("DIES", "1")
-    assert ended(started(tmp_path, search))[0] == -signal.SIGKILL
-    assert len(list((tmp_path / "store").iterdir())) == 1
-    monkeypatch.delenv("DIES")
-    assert ended(started(tmp_path, search)) == (0, "[9.0]", "")
 
 
 def test_a_piece_whose_writing_was_cut_off_is_computed_again(tmp_path: Path) -> None:
