@@ -34,7 +34,6 @@ from spinepipe.studies.discrepancy.rows import (
     confusion_rows,
     design_rows,
     gap_rows,
-    held_out_readings,
     held_out_rows,
     imperfection_rows,
     where_rows,
@@ -195,7 +194,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     stays = _beyond(ended, run)
     table = None if stays.table is None else stays.grounds.fit
     hidden = hidden_effects(found, outcome, rules, run)
-    gap = gap_rows(found, joints, held_out_readings(ended.proof), table)
+    gap = gap_rows(found, joints, ended.proof, table)
 
     # what a tester reads off the curves that effects which stand, named or tied, change
     names = {one.name for one in outcome.named} | set(outcome.tied)

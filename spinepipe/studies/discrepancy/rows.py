@@ -3,19 +3,18 @@
 import csv
 import io
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from spinepipe.effects import Effect
-from spinepipe.effects.contract import Array
 from spinepipe.model import Support
 from spinepipe.status import Status
 from spinepipe.studies.discrepancy.design.advice import Advice
 from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
-from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, places, residual_frame
+from spinepipe.studies.discrepancy.search.gaps import KEYS, places, residual_frame
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, shape_at
 from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, NuisancePlace
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
@@ -41,19 +40,18 @@ DEGENERATE = "a shape ran to its bound: no more what its name says"
 def gap_rows(
     found: SearchResult,
     joints: Sequence[str],
-    held_out: Mapping[str, Sequence[tuple[Array, Array, Array]]],
+    proof: HeldOut,
     tabulated: JointFit | None = None,
 ) -> list[Row]:
     """Every reading with both models; tests of one name with several load histories averaged.
 
     Parameters
     ----------
-    held_out : by specimen, per load history (T, J, 6): fold, base and with effects held out.
     tabulated : the fit with tables besides, where there are some.
     """
     collected: dict[tuple[Any, ...], list[Row]] = {}
     for name in found.base.readings:
-        for key, row in _rows_of(found, name, joints, held_out.get(name), tabulated):
+        for key, row in _rows_of(found, name, joints, proof, tabulated):
             collected.setdefault(key, []).append(row)
     return [_averaged(key, rows) for key, rows in collected.items()]
 
@@ -62,13 +60,14 @@ def _rows_of(
     found: SearchResult,
     name: str,
     joints: Sequence[str],
-    held_out: Sequence[tuple[Array, Array, Array]] | None,
+    proof: HeldOut,
     tabulated: JointFit | None,
 ) -> Iterator[tuple[tuple[Any, ...], Row]]:
     """Place and row of each reading of a specimen, in display units."""
     readings, noise = found.base.readings[name], found.base.noise
     fits = {"base": found.base.fit, "with_effects": found.final.fit, "with_table": tabulated}
     modelled = {model: None if fit is None else fit.predicted[name] for model, fit in fits.items()}
+    held_out = proof.motion.get(name)
     for number, test in enumerate(readings.tests):
         size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))  # zeroing adds to the SD
         sd = size[:, None] * noise.sd * DISPLAY_PER_SI
@@ -87,11 +86,12 @@ def _rows_of(
             }
             for model, motion in modelled.items():
                 row[model] = None if motion is None else float(motion[number][t, j, c] * factor)
-            if held_out is not None and held_out[number][0][t, j, c]:
-                folds, of_base, of_final = held_out[number]
-                row["held_out_fold"] = str(folds[t, j, c])
-                row["held_out_base"] = float(of_base[t, j, c] * factor)
-                row["held_out_with_effects"] = float(of_final[t, j, c] * factor)
+            if held_out is not None and held_out.fold[number][t, j, c] >= 0:
+                row["held_out_fold"] = proof.folds[held_out.fold[number][t, j, c]].name
+                row["held_out_base"] = float(held_out.base[number][t, j, c] * factor)
+                row["held_out_with_effects"] = float(
+                    held_out.with_effects[number][t, j, c] * factor
+                )
             step = test.case.steps[t]
             rig = next((one for one in step.supports if one.place == 6 * j + c), None)
             key = (name, test.case.test, step.step, joints[j], COORDINATES[c])
@@ -322,8 +322,12 @@ def held_out_rows(proof: HeldOut) -> list[Row]:
         }
         row: Row = {"fold": one.name, "kind": one.kind, "readings": one.readings}
         for model, gap in models.items():
-            row[f"rms_{model}"] = None if gap is None else gap.against(one.expected).rms
-            row |= _held_out_gap(model, gap, one.expected)
+            beyond = None if gap is None else gap.against(one.expected)
+            row[f"rms_{model}"] = None if beyond is None else beyond.rms
+            sized = None if one.expected <= 0.0 else beyond
+            row[f"gap_{model}"] = None if sized is None else sized.gap
+            ends = (None, None) if sized is None else sized.interval
+            row[f"gap_{model}_low"], row[f"gap_{model}_high"] = ends
         row |= {
             "closed": one.closed,
             "gap_closed": None if one.closed is None else share_of_gap(one.closed),
@@ -333,29 +337,6 @@ def held_out_rows(proof: HeldOut) -> list[Row]:
         }
         rows.append(row)
     return rows
-
-
-def _held_out_gap(model: str, gap: Gap | None, expected: float) -> Row:
-    """The gap of a model in a fold, with its interval."""
-    names = [f"gap_{model}{end}" for end in ("", "_low", "_high")]
-    if gap is None or expected <= 0.0:
-        return dict.fromkeys(names)
-    beyond = gap.against(expected)
-    return dict(zip(names, (beyond.gap, *beyond.interval), strict=True))
-
-
-def held_out_readings(
-    proof: HeldOut,
-) -> Mapping[str, Sequence[tuple[Array, Array, Array]]]:
-    """By specimen and load history: fold's name, base and with effects (T, J, 6), SI."""
-    names = np.array([*(row.name for row in proof.folds), ""])
-    return {
-        specimen: [
-            (names[fold], base, final)
-            for fold, base, final in zip(m.fold, m.base, m.with_effects, strict=True)
-        ]
-        for specimen, m in proof.motion.items()
-    }
 
 
 def imperfection_rows(taken: AbsorbedGap, model: str) -> Iterator[Row]:

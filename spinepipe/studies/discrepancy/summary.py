@@ -99,6 +99,14 @@ def summarise(
     evident = found.lack.log_evidence > max(LEAST_THRESHOLD, found.generic_threshold)
     shape = found.lack.shape if evident else None
     coordinate = found.lack.coordinate if shape else None
+
+    withheld = []
+    for one in hidden:
+        allowed, unit = display_value(one.unit, one.prior)
+        known_to = None if one.needed is None else one.needed * allowed
+        withheld.append(
+            WithheldEffect(one.effect, one.kind, allowed, known_to, unit, one.now, one.at[0.0])
+        )
     return Verdict(
         cohort=cohort.name,
         verdict=ended.verdict,
@@ -128,7 +136,7 @@ def summarise(
         families=told.families,
         imperfections=imperfection_summary(taken),
         tabulated=stays.table,
-        withheld=tuple(map(_withheld, hidden)),
+        withheld=tuple(withheld),
         left_out=tuple(_left_out(proof)),
     )
 
@@ -294,10 +302,3 @@ def _change_of_gap(taken: AbsorbedGap) -> str:
 
 def _size(value: float, unit: str) -> str:
     return f"{100.0 * value:.2g} %" if unit == "1" else f"{value:.2g} {unit}"
-
-
-def _withheld(one: MaskedEffects) -> WithheldEffect:
-    """An effect that an imperfection hides, and to what that would have to be known."""
-    allowed, unit = display_value(one.unit, one.prior)
-    known = None if one.needed is None else one.needed * allowed
-    return WithheldEffect(one.effect, one.kind, allowed, known, unit, one.now, one.at[0.0])

@@ -166,10 +166,10 @@ def judgements(
     of : what each specimen's tests see. needed : log evidence, the screen's threshold and margin.
     """
     design = CohortSignatures(candidates(trials, joints, tests), of)
-    return tuple(judge(design, number, needed, seed) for number in range(len(trials)))
+    return tuple(_judge(design, number, needed, seed) for number in range(len(trials)))
 
 
-def judge(design: CohortSignatures, number: int, needed: float, seed: int) -> Judgement:
+def _judge(design: CohortSignatures, number: int, needed: float, seed: int) -> Judgement:
     """What a design could tell of one effect: by the variant that shows best."""
     trials = design.those.trials[number]
     variants = [_best_spread(design, number, variant) for variant in trials.variants]

@@ -41,7 +41,9 @@ def imperfections_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables
     rows = tables["imperfections"]
     if rows.empty:
         return saying("No imperfection can be shown: none is allowed for, or the base has no fit.")
-    shown = [name for name in MODELS if _differs(rows, name)]
+    # without effects both models are the same, and one panel tells of both
+    sizes = {name: rows.loc[rows["model"] == name, "in_prior_sds"].to_numpy() for name in MODELS}
+    shown = [n for n in MODELS if n == "base" or not np.array_equal(sizes[n], sizes["base"])]
     kinds = list(dict.fromkeys(rows["kind"]))[::-1]
     lanes = (EVERY, *cohort.joint_names)
     here = [joint for joint in lanes if (rows["joint"] == joint).any()]
@@ -69,13 +71,6 @@ def imperfections_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables
         handles.append(Line2D([], [], color=THEIRS, marker="D", ms=4.5, lw=0, label=words))
     explain_marks(figure, handles, WORDS, min(len(handles), 6))
     return figure
-
-
-def _differs(rows: pd.DataFrame, model: str) -> bool:
-    """Whether a model has rows of its own: without effects both are the same."""
-    own = rows.loc[rows["model"] == model, "in_prior_sds"].to_numpy()
-    base = rows.loc[rows["model"] == "base", "in_prior_sds"].to_numpy()
-    return model == "base" or not np.array_equal(own, base)
 
 
 def _draw(

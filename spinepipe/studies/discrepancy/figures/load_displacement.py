@@ -106,7 +106,7 @@ class JointTestCurve:
     off: float
 
 
-def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[JointTestCurve]:
+def worst_curves(gap: pd.DataFrame) -> list[JointTestCurve]:
     """Of each joint in each test the driven coordinate, the base's farthest first.
 
     Of many each in the specimen where it is worst.
@@ -119,12 +119,12 @@ def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[JointTestCu
         if (test, joint, coordinate) in chosen
     ]
     ordered = sorted(found, key=lambda curve: -curve.off)
-    if len(ordered) <= most:
+    if len(ordered) <= MOST_PANELS:
         return ordered
     of_place: dict[tuple[str, str], JointTestCurve] = {}
     for curve in ordered:
         of_place.setdefault((curve.test, curve.joint), curve)
-    shown = list(of_place.values())[:most]
+    shown = list(of_place.values())[:MOST_PANELS]
     return [curve for n, curve in enumerate(shown) if n < FEWEST_PANELS or curve.off > CLEARLY]
 
 
