@@ -1,6 +1,6 @@
 """From which gap an effect has its own name in a scored cohort, and not only a place in a set.
 
-Asked of the base fit and the tests alone, to first order (`design/told_apart.py`), for cohorts with
+Asked of the base fit and the tests alone, to first order (`design/distinguishability.py`), for cohorts with
 one effect; entered into their rows.
 """
 
