@@ -1,7 +1,7 @@
 """From which gap an effect has its own name in a scored cohort, and not only a place in a set.
 
-Asked of the base fit and the tests alone, to first order (`design/distinguishability.py`), for cohorts with
-one effect; entered into their rows.
+Asked of the base fit and the tests alone, to first order (`design/distinguishability.py`), for
+cohorts with one effect; entered into their rows.
 """
 
 from multiprocessing import get_context
