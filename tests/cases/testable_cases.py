@@ -7,7 +7,7 @@ from spinepipe.effects import PlaceSpread, Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
-from spinepipe.studies.discrepancy.design.fisher_information import seen_in
+from spinepipe.studies.discrepancy.design.fisher_information import specimen_signatures
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
 from spinepipe.studies.discrepancy.search.base import BUSHING, DAMPING, base_parameters
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit, BaselineModels, fit_baseline
@@ -84,7 +84,7 @@ def grounds_of(
 def judged(grounds: BaselineFit, effects) -> dict[str, Judgement]:
     tried = tried_in(grounds, effects) if isinstance(effects[0], str) else effects
     joints = next(iter(grounds.fit.models.values())).n_joints
-    of = {name: seen_in(grounds, name, tried) for name in grounds.readings}
+    of = {name: specimen_signatures(grounds, name, tried) for name in grounds.readings}
     found = judgements(tried, of, joints, grounds.tests, NEEDED, 0)
     return {one.effect: one for one in found}
 

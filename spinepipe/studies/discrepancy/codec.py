@@ -23,7 +23,7 @@ PACKAGE = "spinepipe"
 _SEQUENCES: dict[str, type] = {"tuple": tuple, "list": list, "frozenset": frozenset}
 
 
-def encoded(value: Any) -> bytes:
+def encode(value: Any) -> bytes:
     """The value as bytes, the same for the same value.
 
     None, bool, int, float, str, enums, arrays and scalars of numpy, tuples, lists, dicts, frozen
@@ -40,13 +40,13 @@ def encoded(value: Any) -> bytes:
     return b"\n".join([structure.encode(), *writer.numbers])
 
 
-def decoded(data: bytes) -> Any:
+def decode(data: bytes) -> Any:
     """The value that was encoded; ``data`` is to be verified by who kept it.
 
     Raises
     ------
     ValueError
-        For what `encoded` never writes, as arrays of objects, names outside of spinepipe, which
+        For what `encode` never writes, as arrays of objects, names outside of spinepipe, which
         are never looked up, and values that are no fields of their class.
     """
     structure, _, numbers = data.partition(b"\n")

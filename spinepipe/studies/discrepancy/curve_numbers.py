@@ -1,25 +1,41 @@
-"""Numbers that a tester reads off the curves of fitted joints, with intervals.
+"""Numbers read off the curves of fitted joints, with intervals.
 
-A number is that of the joint with all laws that the model has there.
+A number is that of the joint with all laws that the model has there. For the interval each fitted
+value is moved a little both ways and the number read off again; with the covariance of the fit that
+gives the variance of the number (delta method, central differences).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from spinepipe.calibrate.profile import NORMAL_95
 from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array, JointLaw, PathLaw
-from spinepipe.effects.field_numbers import NUMBERS, numbers_of, usual_load
-from spinepipe.studies.discrepancy.read_off import Laws, laws_at, mean_of, told
+from spinepipe.effects.field_numbers import NUMBERS, load_over, numbers_of, usual_load
+from spinepipe.effects.tabulated_law import KNOTS, TabulatedLaw
+from spinepipe.model import SpineModel
+from spinepipe.statics import with_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.studies.discrepancy.verdict import EVERY, FieldNumber
-from spinepipe.units import COORDINATES, DEG_PER_RAD, LOAD_UNITS, MM_PER_M, TRANSLATIONS
+from spinepipe.units import (
+    COORDINATE_UNITS,
+    COORDINATES,
+    DEG_PER_RAD,
+    DISPLAY_PER_SI,
+    LOAD_UNITS,
+    MM_PER_M,
+    TRANSLATIONS,
+)
 
 Row = dict[str, Any]
+
+STEP = 0.05
+"""Standard errors that a fitted value is moved by."""
 
 NEARLY = 0.8
 """Share of the usual load from which tests are said to reach it."""
@@ -28,7 +44,102 @@ ONE_SIDED = 0.05
 """Share of the load that a side must have seen, for numbers to be told of it."""
 
 _NOT_NEGATIVE = ("zone", "loop_area")
-_SIDES = {"minus": 0, "plus": 1}
+
+Laws = list[tuple[Effect, Array]]
+
+
+def laws_at(model: SpineModel, joint: int) -> Laws:
+    """Laws of a joint in all tests, with their parameters (P,), in order."""
+    return [
+        (one.effect, one.values[one.joints.index(joint) if one.effect.per_joint else 0])
+        for one in model.effects
+        if isinstance(one.effect, JointLaw | PathLaw) and joint in one.joints
+        if one.tests == EVERY
+    ]
+
+
+@dataclass(frozen=True)
+class JointNumbers:
+    """Numbers (N,) of one joint of a specimen; NaN where one is not there.
+
+    Attributes
+    ----------
+    slopes : (N, m) by all unknowns of the fit. at_bound : (N,) whether it hangs on one at a bound.
+    """
+
+    values: Array
+    slopes: Array
+    at_bound: Array
+
+
+def mean_of(ones: Sequence[JointNumbers], number: int, spread: Array) -> tuple[float, float | None]:
+    """Mean of a number over joints, and half its 95 % interval.
+
+    None where the number comes and goes within the errors.
+
+    Parameters
+    ----------
+    spread : (m, m) covariance of the unknowns.
+    """
+    value = float(np.mean([one.values[number] for one in ones]))
+    slope = np.mean([one.slopes[number] for one in ones], axis=0)
+    variance = float(slope @ spread @ slope)
+    return value, NORMAL_95 * float(np.sqrt(variance)) if np.isfinite(variance) else None
+
+
+def read_off(
+    fit: JointFit,
+    specimens: Sequence[str],
+    joint: str,
+    read: Callable[[Sequence[Laws]], list[Array]],
+) -> dict[str, JointNumbers]:
+    """Numbers by specimen, read off where the fit stands and beside it.
+
+    Parameters
+    ----------
+    read : (N,) numbers of each of many joints, whose laws it is given. All are read at once.
+    """
+    errors = np.sqrt(np.diagonal(covariance(fit)))
+    places: list[tuple[str, int | None, float]] = []  # specimen, unknown, how far it was moved
+    curves: list[Laws] = []
+    for specimen in specimens:
+        member = fit.hypothesis.members[specimen]
+        at = fit.models[specimen].joints.index(joint)
+        own = fit.x[list(member.numbers)]
+        here = laws_at(with_parameters(member.model, member.free, own), at)
+        places.append((specimen, None, 0.0))
+        curves.append(here)
+        for place, unknown in enumerate(member.numbers):
+            limits = fit.hypothesis.unknowns[unknown]
+            for side in (-1.0, 1.0):
+                moved = own.copy()
+                to = own[place] + side * STEP * errors[unknown]
+                moved[place] = np.clip(to, limits.low, limits.high)
+                there = laws_at(with_parameters(member.model, member.free, moved), at)
+                # a value of another joint, or one that is at its bound on this side, moves nothing
+                if any(np.any(a != b) for (_, a), (_, b) in zip(here, there, strict=True)):
+                    places.append((specimen, unknown, float(moved[place] - own[place])))
+                    curves.append(there)
+    values: dict[str, Array] = {}
+    sides: dict[str, dict[int, list[tuple[float, Array]]]] = {name: {} for name in specimens}
+    for (specimen, moved_one, away), numbers in zip(places, read(curves), strict=True):
+        if moved_one is None:
+            values[specimen] = numbers
+        else:
+            sides[specimen].setdefault(moved_one, []).append((away, numbers))
+    return {name: _with_slopes(fit, values[name], sides[name]) for name in specimens}
+
+
+def _with_slopes(
+    fit: JointFit, values: Array, sides: Mapping[int, Sequence[tuple[float, Array]]]
+) -> JointNumbers:
+    """Central differences; one-sided ones at a bound."""
+    slopes, at_bound = np.zeros((len(values), len(fit.x))), np.zeros(len(values), dtype=bool)
+    for unknown, pair in sides.items():
+        (low, first), (high, last) = pair if len(pair) == 2 else ((0.0, values), pair[0])
+        slopes[:, unknown] = (last - first) / (high - low)
+        at_bound |= fit.at_bound[unknown] & (slopes[:, unknown] != 0.0)
+    return JointNumbers(values, slopes, at_bound)
 
 
 @dataclass(frozen=True)
@@ -81,24 +192,14 @@ def field_number_rows(
         for (joint, coordinate), load in places.items()
         if any(_changes(final, form, joint, coordinate, load) for form in forms)
     }
-    return [
-        row
-        for name, fit in (("base", base), ("with_effects", final))
-        for (joint, coordinate), load in changed.items()
-        for row in _of_place(
-            {"model": name, "joint": joint, "coordinate": coordinate, "load": load},
-            fit,
-            tuple(_specimens(fit, forms, joints.index(joint))),
-            tested[joint, coordinate],
-        )
-    ]
-
-
-def _specimens(fit: JointFit, forms: Sequence[CandidateForm], joint: int) -> Iterator[str]:
-    """Specimens in which one of the forms acts on the joint."""
-    for name in fit.models:
-        if any(form.acts_in(name) and form.joint in (None, joint) for form in forms):
-            yield name
+    rows: list[Row] = []
+    for model, fit in (("base", base), ("with_effects", final)):
+        for (joint, coordinate), load in changed.items():
+            here = [form for form in forms if form.joint in (None, joints.index(joint))]
+            acting = [name for name in fit.models if any(form.acts_in(name) for form in here)]
+            place = {"model": model, "joint": joint, "coordinate": coordinate, "load": load}
+            rows += _of_place(place, fit, acting, tested[joint, coordinate])
+    return rows
 
 
 def numbers_at(
@@ -157,6 +258,7 @@ def _changes(fit: JointFit, form: CandidateForm, joint: int, coordinate: str, lo
 
 def _read(joints: Sequence[Laws], coordinate: str, load: float) -> list[Array]:
     """(N,) numbers of each joint in the order of `NUMBERS`; joints with the same laws together."""
+    # reading a curve solves for motions at loads: joints with the same laws are one stack
     alike: dict[tuple[Effect, ...], list[int]] = {}
     for index, laws in enumerate(joints):
         alike.setdefault(tuple(effect for effect, _ in laws), []).append(index)
@@ -178,7 +280,7 @@ def _of_place(
 ) -> Iterator[Row]:
     """Rows of each specimen, and of their mean, at a joint, coordinate and load."""
     coordinate, load = place["coordinate"], place["load"]
-    found = told(fit, specimens, place["joint"], lambda laws: _read(laws, coordinate, load))
+    found = read_off(fit, specimens, place["joint"], lambda laws: _read(laws, coordinate, load))
     spread = covariance(fit)
     for number, name in enumerate(NUMBERS):
         if not _seen(name, reach, load):
@@ -202,8 +304,9 @@ def _seen(number: str, reach: LoadRange, load: float) -> bool:
     sides = (-reach.low > ONE_SIDED * load, reach.high > ONE_SIDED * load)
     if number in ("zone", "loop_area"):
         return all(sides)
-    side = _SIDES.get("plus" if number == "drift_per_decade" else number.rpartition("_")[2])
-    return side is None or sides[side]
+    if number.endswith("_minus"):
+        return sides[0]
+    return sides[1] if number.endswith("_plus") or number == "drift_per_decade" else True
 
 
 def _in_field_units(name: str, coordinate: str, value: float, away: float | None) -> Row:
@@ -230,3 +333,60 @@ def unit_of(name: str, coordinate: str) -> tuple[str, float]:
     if name.startswith("stiffness"):
         return ("N/mm", 1.0 / MM_PER_M) if shift else ("N m/deg", 1.0 / DEG_PER_RAD)
     return ("mm", MM_PER_M) if shift else ("deg", DEG_PER_RAD)
+
+
+def tabulated_rows(base: JointFit, final: JointFit) -> list[Row]:
+    """Each table of the final fit at each knot, joint and specimen, and the mean of specimens.
+
+    Parameters
+    ----------
+    base : fit of the base model, whose load at the same motion is told beside it.
+    """
+    joints = next(iter(final.models.values())).joints
+    rows: dict[tuple[Any, ...], Row] = {}
+    for one in final.hypothesis.supposed:
+        law = one.form.variant.create()
+        if isinstance(law, TabulatedLaw):
+            acting = [name for name in final.models if one.form.acts_in(name)]
+            for joint in joints if one.form.joint is None else (joints[one.form.joint],):
+                for row in _table_of_joint(base, final, acting, joint, law):
+                    key = ("specimen", "joint", "coordinate", "over", "motion")
+                    rows.setdefault(tuple(row[name] for name in key), row)
+    return list(rows.values())
+
+
+def _table_of_joint(
+    base: JointFit, final: JointFit, specimens: Sequence[str], joint: str, law: TabulatedLaw
+) -> Iterator[Row]:
+    along = COORDINATES.index(law.along)
+    motions = law.furthest * KNOTS
+
+    def loads(joints: Sequence[Laws]) -> list[Array]:
+        return [load_over(laws, law.coordinate, law.along, motions) for laws in joints]
+
+    found = read_off(final, specimens, joint, loads)
+    spread = covariance(final)
+    of_each = {}
+    for name in specimens:
+        model = base.models[name]
+        (of_each[name],) = loads([laws_at(model, model.joints.index(joint))])
+    groups = [*((name, [name]) for name in specimens), (EVERY[0], list(specimens))]
+    for specimen, names in groups:
+        of_base = np.mean([of_each[name] for name in names], axis=0)
+        for number, motion in enumerate(motions):
+            value, away = mean_of([found[name] for name in names], number, spread)
+            assert away is not None
+            yield {
+                "specimen": specimen,
+                "joint": joint,
+                "coordinate": law.coordinate,
+                "over": law.along,
+                "motion": float(motion * DISPLAY_PER_SI[along]),
+                "motion_unit": COORDINATE_UNITS[law.along],
+                "load": value,
+                "low": value - away,
+                "high": value + away,
+                "base": float(of_base[number]),
+                "load_unit": LOAD_UNITS[law.coordinate],
+                "specimens": len(names),
+            }

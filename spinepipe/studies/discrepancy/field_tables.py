@@ -9,9 +9,8 @@ import pandas as pd
 from spinepipe.report.words import number
 from spinepipe.schema import Column
 from spinepipe.studies.discrepancy.tables import MODELS
-from spinepipe.studies.discrepancy.verdict import EVERY
-from spinepipe.studies.discrepancy.verdict_imperfections import WithheldEffect
-from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
+from spinepipe.studies.discrepancy.verdict import EVERY, WithheldEffect
+from spinepipe.studies.discrepancy.verdict_unnamed import Formula
 from spinepipe.studies.discrepancy.words import TOWARDS, general, motion_of, readable
 from spinepipe.units import DEG_PER_RAD, LOAD_UNITS
 
@@ -55,7 +54,7 @@ _COEFFICIENT = re.compile(r"([+-]?\d[\d.e+-]*) \(SD ([\d.e+-]+)\) ([^*;=]+?) \* 
 _PRINTED = (("^2", "²"), ("^3", "³"), (" * ", " × "), (" x ", " × "))
 
 
-def numbers_shown(rows: pd.DataFrame) -> Shown:
+def numbers_table(rows: pd.DataFrame) -> Shown:
     """A row for each number of a coordinate, a column for each joint.
 
     Parameters
@@ -82,7 +81,9 @@ def _of_joint(
         words = _WORDS.get(name) or _WORDS[kind]
         other = told.get(f"{kind}_{'plus' if side == 'minus' else 'minus'}")
         if kind in _SIDED and name not in _WORDS:
-            if other is not None and _alike(row, other):
+            if other is not None and (
+                abs(abs(row["value"]) - abs(other["value"])) <= 1e-6 * abs(row["value"])
+            ):
                 if side == "minus":
                     continue
                 words += ", to either side"
@@ -91,10 +92,6 @@ def _of_joint(
         load = f"{row['load']:.3g} {LOAD_UNITS[coordinate]}"
         unit = _UNITS.get(row["unit"], row["unit"])
         yield (motion_of(coordinate), words.format(load=load), unit), _cell(row)
-
-
-def _alike(one: Mapping[Any, Any], other: Mapping[Any, Any]) -> bool:
-    return abs(abs(one["value"]) - abs(other["value"])) <= 1e-6 * abs(one["value"])
 
 
 def _cell(row: Mapping[Any, Any], name: str = "value") -> str:
@@ -125,7 +122,7 @@ def _matrix(cells: Mapping[tuple[str, ...], Mapping[str, str]], names: Sequence[
     return pd.DataFrame(rows), tuple(columns)
 
 
-def tabulated_shown(rows: pd.DataFrame) -> Shown:
+def tabulated_table(rows: pd.DataFrame) -> Shown:
     """A row for each motion, a column for each joint: the load with the table, and the base's.
 
     Parameters
@@ -146,20 +143,24 @@ def tabulated_shown(rows: pd.DataFrame) -> Shown:
     return frame, columns
 
 
-def formula_shown(formula: Formula | None) -> Shown:
+def formula_table(formula: Formula | None) -> Shown:
     """A row for each term."""
-    terms = () if formula is None else formula.terms
-    rows = [
-        {
-            "place": _place(term),
-            "on": f"{'reading' if term.acts == 'reading' else 'load'} in "
-            f"{motion_of(term.coordinate)}",
-            "term": printed(readable(term.term)),
-            **_coefficient(term),
-            "explained": 100.0 * term.explained,
-        }
-        for term in terms
-    ]
+    rows = []
+    for term in () if formula is None else formula.terms:
+        joint = "every joint" if term.joint == EVERY[0] else term.joint
+        value, unit = per_degree(term.coefficient, term.unit)
+        sd, _ = per_degree(term.sd, term.unit)
+        rows.append(
+            {
+                "place": joint if term.specimen == EVERY[0] else f"{joint} of {term.specimen}",
+                "on": f"{'reading' if term.acts == 'reading' else 'load'} in "
+                f"{motion_of(term.coordinate)}",
+                "term": typeset(readable(term.term)),
+                "coefficient": f"{number(value)} (SD {number(sd, 2)})",
+                "unit": unit,
+                "explained": 100.0 * term.explained,
+            }
+        )
     columns = (
         Column("place", "text", "joint and specimen"),
         Column("on", "text", "what the term adds to"),
@@ -171,26 +172,15 @@ def formula_shown(formula: Formula | None) -> Shown:
     return pd.DataFrame(rows), columns
 
 
-def _place(term: FormulaTerm) -> str:
-    joint = "every joint" if term.joint == EVERY[0] else term.joint
-    return joint if term.specimen == EVERY[0] else f"{joint} of {term.specimen}"
-
-
-def _coefficient(term: FormulaTerm) -> dict[str, str]:
-    value, unit = per_degree(term.coefficient, term.unit)
-    sd, _ = per_degree(term.sd, term.unit)
-    return {"coefficient": f"{number(value)} (SD {number(sd, 2)})", "unit": unit}
-
-
 def per_degree(value: float, unit: str) -> tuple[float, str]:
     """A coefficient by radians as one by degrees, and its unit as it is printed."""
     below = unit.partition("/")[2]
     powers = sum(int(found[1] or 1) for found in _RAD.finditer(below))
     told = _RAD.sub(lambda at: "°" + ("²" if at[1] == "2" else "³" if at[1] == "3" else ""), unit)
-    return value / DEG_PER_RAD**powers, printed(told)
+    return value / DEG_PER_RAD**powers, typeset(told)
 
 
-def printed(text: str) -> str:
+def typeset(text: str) -> str:
     """Powers and products as they are printed."""
     for typed, shown in _PRINTED:
         text = text.replace(typed, shown)
@@ -205,10 +195,10 @@ def formula_text(formula: Formula) -> str:
         sd, _ = per_degree(float(at[2]), at[3])
         return f"{number(value)} (SD {number(sd, 2)}) {unit} × "
 
-    return printed(_COEFFICIENT.sub(told, readable(formula.text)))
+    return typeset(_COEFFICIENT.sub(told, readable(formula.text)))
 
 
-def withheld_shown(effects: Sequence[WithheldEffect]) -> Shown:
+def withheld_table(effects: Sequence[WithheldEffect]) -> Shown:
     """A row for each effect and kind of imperfection."""
     rows = [
         {

@@ -5,33 +5,32 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.report.page.document import ResultTables
-from spinepipe.report.words import capital, fixed, listed, number
-from spinepipe.studies.discrepancy.advice_words import advice_sentences
-from spinepipe.studies.discrepancy.gap_words import before_and_after, where_most
-from spinepipe.studies.discrepancy.quantities import quantities
-from spinepipe.studies.discrepancy.unnamed_words import (
-    described,
+from spinepipe.report.words import capital, count, fixed, listed, number
+from spinepipe.studies.discrepancy.misfit_words import (
+    before_and_after,
+    descriptions,
     more_stays,
     of_another_coordinate,
     shape_sentence,
     what_stays,
+    where_most,
     why_no_name,
     why_not_all,
     without_a_name,
 )
+from spinepipe.studies.discrepancy.quantities import quantities
 from spinepipe.studies.discrepancy.verdict import (
     DECLARED,
     Conclusion,
-    Missing,
     Verdict,
     share_of_gap,
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import (
-    called,
-    differing,
     general,
+    label_of,
     readable,
+    spread_words,
     what_of,
     with_article,
 )
@@ -41,6 +40,9 @@ _ALIKE = 0.3
 """Share of an effect's gap from which another is said to be like it."""
 
 _MOST_SIZES = 4
+
+USEFUL = ("advised", "offered", "would_do")
+"""Status of runs, and of imperfections known better, that would tell something."""
 
 NUISANCES = (
     "Gaps allow for small errors of posture, frames, joint centres and loads (the study's "
@@ -59,7 +61,13 @@ def headline(verdict: Verdict, where: pd.DataFrame) -> str:
         return without_a_name(verdict, where)
     if verdict.verdict is Conclusion.NULL:
         return _nothing(verdict)
-    told = _one_of(verdict) if verdict.verdict is Conclusion.SET else _lacks(verdict.effects)
+    lacks = f"The model lacks {'; and '.join(what_of(effect) for effect in verdict.effects)}."
+    told = lacks
+    if verdict.verdict is Conclusion.SET:
+        names = [with_article(general(one)) for one in verdict.candidates_in_set]
+        one_of = "one of these is missing, and these tests cannot tell which"
+        told = f"{one_of}: {listed(names, 8, 'or')}."
+        told = f"{lacks} Besides, {told}" if verdict.effects else capital(told)
     return f"{told} {more_stays(verdict, where)}".strip()
 
 
@@ -75,59 +83,41 @@ def _nothing(verdict: Verdict) -> str:
     )
 
 
-def _one_of(verdict: Verdict) -> str:
-    names = listed([with_article(general(one)) for one in verdict.candidates_in_set], 8, "or")
-    told = f"one of these is missing, and these tests cannot tell which: {names}."
-    return f"{_lacks(verdict.effects)} Besides, {told}" if verdict.effects else capital(told)
-
-
-def _lacks(effects: tuple[Missing, ...]) -> str:
-    return f"The model lacks {'; and '.join(what_of(effect) for effect in effects)}."
-
-
 def how_sure(verdict: Verdict) -> str:
     """Evidence, margin to the runner-up, and what held-out motion says."""
-    parts = [
-        *(_evidence(effect, verdict) for effect in verdict.effects),
-        why_no_name(verdict),
-        why_not_all(verdict),
-        shape_sentence(verdict),
-        _misfit(verdict),
-        _closed(verdict),
-    ]
+    parts = []
+    for effect in verdict.effects:
+        told = f"{capital(label_of(effect))}: log evidence {number(effect.log_evidence)}"
+        if verdict.threshold.log_evidence is not None:
+            told += f", {number(verdict.threshold.log_evidence, 2)} is needed"
+        if effect.rivals:
+            first = min(effect.rivals, key=lambda rival: rival.log_evidence_margin)
+            behind = number(first.log_evidence_margin, 2)
+            told += f"; next best {general(first.name)}, {behind} behind"
+        parts.append(f"{told}.")
+    parts += [why_no_name(verdict), why_not_all(verdict), shape_sentence(verdict)]
+
+    # residuals in noise SD before and with the effects
+    rms = verdict.rms_residual
+    if rms.base is not None:
+        told = f"Residuals of {fixed(rms.base)} noise SD"
+        if rms.with_effects is not None and rms.with_effects != rms.base:
+            told += f" become {fixed(rms.with_effects)}"
+        parts.append(f"{told} (1 is noise).")
+
+    gap = verdict.gap
+    if gap.held_out_closed is not None and _stands(verdict):
+        before, after, sizes = gap.held_out_base, gap.held_out_with_effects, ""
+        if before is not None and after is not None:
+            sizes = f" from {fixed(before)} to {fixed(after)}"
+        share = _share(share_of_gap(gap.held_out_closed))
+        parts.append(f"On motion held out of the fits the gap falls{sizes}, by {share}.")
     return " ".join(part for part in parts if part)
 
 
-def _evidence(effect: Missing, verdict: Verdict) -> str:
-    told = f"{capital(called(effect))}: log evidence {number(effect.log_evidence)}"
-    if verdict.threshold.log_evidence is not None:
-        told += f", {number(verdict.threshold.log_evidence, 2)} is needed"
-    if effect.rivals:
-        first = min(effect.rivals, key=lambda rival: rival.log_evidence_margin)
-        told += f"; next best {general(first.name)}, {number(first.log_evidence_margin, 2)} behind"
-    return f"{told}."
-
-
-def _misfit(verdict: Verdict) -> str:
-    """Residuals in noise SD before and with the effects."""
-    rms = verdict.rms_residual
-    if rms.base is None:
-        return ""
-    told = f"Residuals of {fixed(rms.base)} noise SD"
-    if rms.with_effects is not None and rms.with_effects != rms.base:
-        told += f" become {fixed(rms.with_effects)}"
-    return f"{told} (1 is noise)."
-
-
-def _closed(verdict: Verdict) -> str:
-    closed = verdict.gap.held_out_closed
-    if closed is None or not (verdict.effects or verdict.candidates_in_set):
-        return ""
-    before, after = verdict.gap.held_out_base, verdict.gap.held_out_with_effects
-    sizes = "" if before is None or after is None else f" from {fixed(before)} to {fixed(after)}"
-    return (
-        f"On motion held out of the fits the gap falls{sizes}, by {_share(share_of_gap(closed))}."
-    )
+def _stands(verdict: Verdict) -> bool:
+    """Whether effects are named, or tied."""
+    return bool(verdict.effects or verdict.candidates_in_set)
 
 
 TRAINED_ON = {
@@ -139,11 +129,11 @@ TRAINED_ON = {
 """What the fits have seen of a specimen whose motion they predict, by the kind of fold."""
 
 
-def by_what_was_fitted(verdict: Verdict) -> str:
+def share_closed_by_kind(verdict: Verdict) -> str:
     """Kinds of folds apart, as their fits have seen more or less of what they predict."""
     closed = [(one.kind, one.excess_closed) for one in verdict.left_out]
     shares = [(kind, share) for kind, share in closed if share is not None]
-    if len(shares) < 2 or not (verdict.effects or verdict.candidates_in_set):
+    if len(shares) < 2 or not _stands(verdict):
         return ""
     told = [
         f"by {_share(share_of_gap(share))} {TRAINED_ON[kind]} "
@@ -174,15 +164,15 @@ def findings(verdict: Verdict, results: ResultTables) -> list[str]:
     where = results.table("where")
     told = [
         *_sizes(verdict),
-        would_have_been_seen(verdict),
+        detectable_gaps(verdict),
         before_and_after(where),
-        by_what_was_fitted(verdict),
+        share_closed_by_kind(verdict),
         where_most(where),
         what_stays(verdict, where),
         of_another_coordinate(verdict, where),
-        *described(verdict),
-        confused(verdict, results.table("confusions")),
-        imitating(verdict, results.table("candidates")),
+        *descriptions(verdict),
+        similar_effects(verdict, results.table("confusions")),
+        nearest_effect(verdict, results.table("candidates")),
         not_testable(verdict),
         *([readable(verdict.imperfections.message)] if verdict.imperfections else []),
         *advice_sentences(results.table("next_tests")),
@@ -198,9 +188,9 @@ def _sizes(verdict: Verdict) -> Iterator[str]:
         sizes = [one.words for one in quantities(effect)]
         if sizes:
             more = " (more in table 1)" if len(sizes) > _MOST_SIZES else ""
-            spread = f"; {differing(effect)}" if differing(effect) else ""
+            spread = f"; {spread_words(effect)}" if spread_words(effect) else ""
             told = ", ".join(sizes[:_MOST_SIZES])
-            yield f"{capital(called(effect))}: {told}{more}{spread}."
+            yield f"{capital(label_of(effect))}: {told}{more}{spread}."
 
 
 def _noise(verdict: Verdict) -> str:
@@ -216,7 +206,7 @@ def _noise(verdict: Verdict) -> str:
     return f"Noise:{size}, from repeated cycles, {along}."
 
 
-def would_have_been_seen(verdict: Verdict) -> str:
+def detectable_gaps(verdict: Verdict) -> str:
     """Of a search that named nothing: the gaps from which effects would have been found."""
     if verdict.verdict is not Conclusion.NULL or not verdict.smallest_detectable:
         return ""
@@ -231,7 +221,7 @@ def would_have_been_seen(verdict: Verdict) -> str:
     )
 
 
-def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
+def similar_effects(verdict: Verdict, confusions: pd.DataFrame) -> str:
     """What these tests could take each named effect for."""
     told = []
     for effect in verdict.effects if len(confusions) else ():
@@ -242,11 +232,11 @@ def confused(verdict: Verdict, confusions: pd.DataFrame) -> str:
             for row in others.head(_MOST_ALIKE).to_dict("records")
         ]
         if alike:
-            told.append(f"{listed(alike)} of the gap that {called(effect)} makes")
+            told.append(f"{listed(alike)} of the gap that {label_of(effect)} makes")
     return f"What it could be taken for with these tests: {'; '.join(told)}." if told else ""
 
 
-def imitating(verdict: Verdict, candidates: pd.DataFrame) -> str:
+def nearest_effect(verdict: Verdict, candidates: pd.DataFrame) -> str:
     """Of what no known effect explains: the one that comes nearest, and why it is not named."""
     threshold = verdict.threshold.log_evidence
     if verdict.reason is not Reason.NO_KNOWN_EFFECT or threshold is None or candidates.empty:
@@ -283,3 +273,29 @@ def not_testable(verdict: Verdict) -> str:
     if none:
         parts.append(f"No single addition that was tried shows {listed(none, 8, 'or')}.")
     return " ".join(parts)
+
+
+def advice_sentences(next_tests: pd.DataFrame) -> list[str]:
+    """The advised test of each subject; nothing where there is no advice."""
+    if next_tests.empty:
+        return []
+    told = []
+    for row in next_tests[next_tests["status"] == "advised"].to_dict("records"):
+        subject, test = readable(row["effect_or_pair"]), readable(row["test"])
+        if row["message"].startswith("withheld"):
+            told.append(
+                f"{subject.capitalize()} is not named, as it is no larger than the imperfections "
+                f"allowed for: {readable(str(row['message']))}."
+            )
+            continue
+        gain = number(float(row["gain_in_log_evidence"]), 2)
+        each = count(int(row["cycles"]), "cycle")
+        told.append(
+            f"Next test for {subject}: {test}; expected gain in log evidence {gain} in {each}."
+        )
+    # subjects for which no run of the menu tells anything
+    helped = next_tests[next_tests["status"].isin(USEFUL)]["effect_or_pair"]
+    left = next_tests[~next_tests["effect_or_pair"].isin(helped)]["effect_or_pair"].unique()
+    return told + [
+        f"No single test that was tried would tell more of {readable(one)}." for one in left
+    ]

@@ -39,7 +39,7 @@ class DiscrepancyFiles(StudyFiles):
         Figure(
             "gap_by_step",
             "The gap along the load",
-            "figures.gap_map:gap_by_step_figure",
+            "figures.load_displacement:gap_by_step_figure",
             ("gap",),
         ),
         Figure(

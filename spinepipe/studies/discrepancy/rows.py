@@ -1,26 +1,28 @@
-"""Rows of the five tables, from what a search found and its proof."""
+"""Rows of the tables, from what a search found, its proof and its advice."""
 
+import csv
+import io
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from spinepipe.effects import Effect
-from spinepipe.effects.contract import Array
-from spinepipe.model import LoadStep, Support
+from spinepipe.model import Support
 from spinepipe.status import Status
+from spinepipe.studies.discrepancy.design.advice import Advice
 from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
-from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
-from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, GapPlace, places, residual_frame
+from spinepipe.studies.discrepancy.proof.held_out import HeldOut
+from spinepipe.studies.discrepancy.search.gaps import KEYS, places, residual_frame
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, shape_at
+from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, NuisancePlace
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import display_value, fitted_values
-from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SearchStage
-from spinepipe.studies.discrepancy.tables import NOT_TESTABLE
+from spinepipe.studies.discrepancy.tables import NEXT_TESTS, NOT_TESTABLE
 from spinepipe.studies.discrepancy.verdict import share_of_gap
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, DISPLAY_PER_SI, LOAD_UNITS
 
@@ -29,32 +31,27 @@ Row = dict[str, Any]
 MOST_FORMS_SHOWN = 5
 """Forms of one effect on a screen that get a row; the others are far behind."""
 
+HELD_OUT_MODELS = ("held_out_base", "held_out_with_effects")
+
 NOT_FITTED = "the linear problem, no fit"
 DEGENERATE = "a shape ran to its bound: no more what its name says"
-
-
-_MODELLED = (
-    *("measured", "base", "with_effects", "with_table"),
-    *("held_out_base", "held_out_with_effects"),
-)
 
 
 def gap_rows(
     found: SearchResult,
     joints: Sequence[str],
-    held_out: Mapping[str, Sequence[tuple[Array, Array, Array]]],
+    proof: HeldOut,
     tabulated: JointFit | None = None,
 ) -> list[Row]:
     """Every reading with both models; tests of one name with several load histories averaged.
 
     Parameters
     ----------
-    held_out : by specimen, per load history (T, J, 6): fold, base and with effects held out.
     tabulated : the fit with tables besides, where there are some.
     """
     collected: dict[tuple[Any, ...], list[Row]] = {}
-    for name, readings in found.base.readings.items():
-        for key, row in _rows_of(found, name, readings, joints, held_out.get(name), tabulated):
+    for name in found.base.readings:
+        for key, row in _rows_of(found, name, joints, proof, tabulated):
             collected.setdefault(key, []).append(row)
     return [_averaged(key, rows) for key, rows in collected.items()]
 
@@ -62,61 +59,55 @@ def gap_rows(
 def _rows_of(
     found: SearchResult,
     name: str,
-    readings: SpecimenReadings,
     joints: Sequence[str],
-    held_out: Sequence[tuple[Array, Array, Array]] | None,
+    proof: HeldOut,
     tabulated: JointFit | None,
 ) -> Iterator[tuple[tuple[Any, ...], Row]]:
-    noise = found.base.noise
-    base, final = found.base.fit.predicted[name], found.final.fit.predicted[name]
-    table = None if tabulated is None else tabulated.predicted[name]
-    loads = readings.applied
+    """Place and row of each reading of a specimen, in display units."""
+    readings, noise = found.base.readings[name], found.base.noise
+    fits = {"base": found.base.fit, "with_effects": found.final.fit, "with_table": tabulated}
+    modelled = {model: None if fit is None else fit.predicted[name] for model, fit in fits.items()}
+    held_out = proof.motion.get(name)
     for number, test in enumerate(readings.tests):
         size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))  # zeroing adds to the SD
         sd = size[:, None] * noise.sd * DISPLAY_PER_SI
         for t, j, c in zip(*np.nonzero(test.count), strict=True):
             factor, count = DISPLAY_PER_SI[c], int(test.count[t, j, c])
-            fold, out_base, out_final = ("", None, None)
-            if held_out is not None:
-                folds, of_base, of_final = held_out[number]
-                if folds[t, j, c]:
-                    fold = str(folds[t, j, c])
-                    out_base = float(of_base[t, j, c] * factor)
-                    out_final = float(of_final[t, j, c] * factor)
-            key = (name, test.case.test, test.case.steps[t].step, joints[j], COORDINATES[c])
-            rig = _rig(test.case.steps[t], j, c)
             row: Row = {
                 "unit": COORDINATE_UNITS[COORDINATES[c]],
                 "held_at": None,
-                "load": float(loads[number][t, j, c]),
+                "load": float(readings.applied[number][t, j, c]),
                 "measured": float(test.mean[t, j, c] * factor),
                 "readings": count,
-                "base": float(base[number][t, j, c] * factor),
-                "with_effects": float(final[number][t, j, c] * factor),
-                "with_table": None if table is None else float(table[number][t, j, c] * factor),
                 "noise_sd": float(sd[t, c] / np.sqrt(count)),
-                "held_out_fold": fold,
-                "held_out_base": out_base,
-                "held_out_with_effects": out_final,
+                "held_out_fold": "",
+                "held_out_base": None,
+                "held_out_with_effects": None,
             }
+            for model, motion in modelled.items():
+                row[model] = None if motion is None else float(motion[number][t, j, c] * factor)
+            if held_out is not None and held_out.fold[number][t, j, c] >= 0:
+                row["held_out_fold"] = proof.folds[held_out.fold[number][t, j, c]].name
+                row["held_out_base"] = float(held_out.base[number][t, j, c] * factor)
+                row["held_out_with_effects"] = float(
+                    held_out.with_effects[number][t, j, c] * factor
+                )
+            step = test.case.steps[t]
+            rig = next((one for one in step.supports if one.place == 6 * j + c), None)
+            key = (name, test.case.test, step.step, joints[j], COORDINATES[c])
             yield key, row if rig is None else _as_load(rig, row, int(c))
-
-
-def _rig(step: LoadStep, joint: int, coordinate: int) -> Support | None:
-    """What fixes a coordinate in a load step."""
-    place = 6 * joint + coordinate
-    return next((one for one in step.supports if one.place == place), None)
 
 
 def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
     """A row of a reaction, in loads: what is listed, and what the models hold at that motion."""
     assert rig.read_as is not None
     per, load = float(DISPLAY_PER_SI[coordinate]) * rig.read_as, row["load"]
-    told: Row = {"noise_sd": row["noise_sd"] / per}
-    for name in _MODELLED:
-        told[name] = None if row.get(name) is None else load + row[name] / per
     held_at = rig.value * float(DISPLAY_PER_SI[coordinate])
-    return row | told | {"unit": LOAD_UNITS[COORDINATES[coordinate]], "held_at": held_at}
+    found = row | {"unit": LOAD_UNITS[COORDINATES[coordinate]], "held_at": held_at}
+    found["noise_sd"] = row["noise_sd"] / per
+    for name in (*("measured", "base", "with_effects", "with_table"), *HELD_OUT_MODELS):
+        found[name] = None if row[name] is None else load + row[name] / per
+    return found
 
 
 def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
@@ -134,7 +125,7 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
     found["noise_sd"] = rows[0]["noise_sd"] * float(np.sqrt(rows[0]["readings"] / readings))
     same = len({row["held_out_fold"] for row in rows}) == 1 and rows[0]["held_out_fold"]
     found["held_out_fold"] = rows[0]["held_out_fold"] if same else ""
-    for name in ("held_out_base", "held_out_with_effects"):
+    for name in HELD_OUT_MODELS:
         values = [row[name] * row["readings"] for row in rows] if same else []
         found[name] = sum(values) / readings if values else None
     return at | found
@@ -142,26 +133,23 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
 
 def where_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
     """Gaps of both models in every way of pooling."""
-    return [
-        _place_row(place, model)
-        for model, fit in (("base", found.base.fit), ("with_effects", found.final.fit))
-        for place in places(residual_frame(found.base, fit, joints))
-    ]
-
-
-def _place_row(place: GapPlace, model: str) -> Row:
-    low, high = place.gap.interval
-    at = {key: str(place.at.get(key, "*")) for key in KEYS}
-    return {
-        "by": place.by,
-        **at,
-        "readings": place.gap.readings,
-        "model": model,
-        "gap": place.gap.gap,
-        "gap_low": low,
-        "gap_high": high,
-        "rms_residual": place.gap.rms,
-    }
+    rows = []
+    for model, fit in (("base", found.base.fit), ("with_effects", found.final.fit)):
+        for place in places(residual_frame(found.base, fit, joints)):
+            low, high = place.gap.interval
+            rows.append(
+                {
+                    "by": place.by,
+                    **{key: str(place.at.get(key, "*")) for key in KEYS},
+                    "readings": place.gap.readings,
+                    "model": model,
+                    "gap": place.gap.gap,
+                    "gap_low": low,
+                    "gap_high": high,
+                    "rms_residual": place.gap.rms,
+                }
+            )
+    return rows
 
 
 def candidate_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
@@ -178,20 +166,28 @@ def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[
     rows = []
     for one in stage.screen.effects:
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
-            row = _form_row(f"screen {stage.name}", stage.beside, tried.form, joints)
+            scope = _scope(tried.form, joints)
+            row = _form_row(f"screen {stage.name}", stage.beside, tried.form, scope)
             row |= _of_screen(tried) | {
                 # the effect's evidence is that of all its forms: on the row of the best
                 "log_evidence": one.log_evidence if not place else tried.log_evidence,
                 "gap_share": _share(tried.explained, excess),
                 "threshold": stage.screen.threshold,
-                "status": Status.CONVERGED,
                 "message": NOT_FITTED,
             }
             rows.append(row)
     return rows
 
 
-def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, joints: Sequence[str]) -> Row:
+def _scope(form: CandidateForm, joints: Sequence[str]) -> str:
+    """Where a form acts, in words; ``*`` for everywhere."""
+    words = [joints[form.joint]] if form.joint is not None else []
+    words += [form.specimen] if form.specimen is not None else []
+    return " of ".join(words) or "*"
+
+
+def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, scope: str) -> Row:
+    """What is known of a form before it is tried; the rest is empty."""
     return {
         "stage": stage,
         "beside": ", ".join(beside),
@@ -199,9 +195,19 @@ def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, joints: Se
         "kind": form.variant.create().kind,
         "variant": json.dumps(dict(form.variant.options)),
         "spread": form.spread,
-        "scope": scope_words(form, joints),
+        "scope": scope,
+        "shape": "{}",
+        "parameters": 0,
+        "estimate": None,
+        "unit": "",
+        "log_evidence": None,
+        "delta_chi2": None,
+        "gap_share": None,
         "absorbed": None,
         "detectable_gap": None,
+        "threshold": None,
+        "status": Status.CONVERGED,
+        "message": "",
     }
 
 
@@ -230,6 +236,7 @@ def _estimate(effect: Effect, tried: ScreenedVariant) -> tuple[float | None, str
     p = effect.parameters[tried.strengths[0]]
     assert p.off is not None
     away = float(tried.estimate[0]) * p.prior_scale
+    # the clip keeps exp finite for estimates of the linear problem that are absurdly large
     value = p.off * float(np.exp(np.clip(away, -50.0, 50.0))) if p.logarithmic else p.off + away
     return display_value(p.unit, value)
 
@@ -241,7 +248,8 @@ def _share(drop: float, excess: float) -> float | None:
 def _refitted(stage: SearchStage, joints: Sequence[str], excess: float) -> list[Row]:
     rows, seen = [], set()
     for one in stage.refits:
-        row = _form_row(f"refit {stage.name}", stage.beside, one.form, joints)
+        scope = _scope(one.form, joints)
+        row = _form_row(f"refit {stage.name}", stage.beside, one.form, scope)
         row |= _of_refit(one, excess)
         row["threshold"] = stage.screen.threshold
         key = (row["effect"], row["variant"], row["spread"], row["scope"], row["shape"])
@@ -255,10 +263,6 @@ def _of_refit(one: Refit, excess: float) -> Row:
     possible = bool(np.isfinite(one.log_evidence))
     status = Status.CONVERGED if possible and not one.fit.status else Status.NOT_CONVERGED
     row: Row = {
-        "shape": "{}",
-        "parameters": 0,
-        "estimate": None,
-        "unit": "",
         "log_evidence": one.log_evidence if possible else None,
         "delta_chi2": one.gain if possible else None,
         "gap_share": _share(one.gain, excess) if possible else None,
@@ -282,30 +286,16 @@ def _of_refit(one: Refit, excess: float) -> Row:
 
 def design_rows(told: Distinguishability) -> list[Row]:
     """Rows of the table candidates: what the tests could tell of each effect."""
-    return [
-        {
-            "stage": "design",
-            "beside": "",
-            "effect": one.effect,
-            "kind": one.best.form.variant.create().kind,
-            "variant": json.dumps(dict(one.best.form.variant.options)),
-            "spread": one.best.form.spread,
-            "scope": "*",
-            "shape": "{}",
+    rows = []
+    for one in told.judgements:
+        row = _form_row("design", (), one.best.form, "*") | {
             "parameters": len(one.best.mean),
-            "estimate": None,
-            "unit": "",
-            "log_evidence": None,
-            "delta_chi2": None,
-            "gap_share": None,
             "absorbed": float(np.clip(one.absorbed, 0.0, 1.0)),
             "detectable_gap": one.detectable.gap if one.detectable else None,
-            "threshold": None,
-            "status": Status.CONVERGED if one.testable else NOT_TESTABLE,
             "message": one.why,
         }
-        for one in told.judgements
-    ]
+        rows.append(row if one.testable else row | {"status": NOT_TESTABLE})
+    return rows
 
 
 def confusion_rows(told: Distinguishability) -> list[Row]:
@@ -323,57 +313,90 @@ def confusion_rows(told: Distinguishability) -> list[Row]:
 
 def held_out_rows(proof: HeldOut) -> list[Row]:
     """One row per fold."""
-    return [_fold_row(row) for row in proof.folds]
+    rows = []
+    for one in proof.folds:
+        models = {
+            "base": one.base,
+            "with_effects": one.with_effects,
+            "surrogate": one.surrogate,
+        }
+        row: Row = {"fold": one.name, "kind": one.kind, "readings": one.readings}
+        for model, gap in models.items():
+            beyond = None if gap is None else gap.against(one.expected)
+            row[f"rms_{model}"] = None if beyond is None else beyond.rms
+            sized = None if one.expected <= 0.0 else beyond
+            row[f"gap_{model}"] = None if sized is None else sized.gap
+            ends = (None, None) if sized is None else sized.interval
+            row[f"gap_{model}_low"], row[f"gap_{model}_high"] = ends
+        row |= {
+            "closed": one.closed,
+            "gap_closed": None if one.closed is None else share_of_gap(one.closed),
+            "worse": one.worse,
+            "status": Status.CONVERGED if one.base is not None else Status.NOT_CONVERGED,
+            "message": one.message,
+        }
+        rows.append(row)
+    return rows
 
 
-def _fold_row(row: FoldRow) -> Row:
+def imperfection_rows(taken: AbsorbedGap, model: str) -> Iterator[Row]:
+    """One row per imperfection, and one per mean over several."""
+    for one in taken.each:
+        yield _size_row(one.at, model, one.size, one.sd) | {
+            "taken_chi2": one.chi2,
+            "places": 1,
+            "chance": None,
+            "common": False,
+        }
+    for mean in taken.common:
+        yield _size_row(mean.at, model, mean.size, mean.sd) | {
+            "taken_chi2": None,
+            "places": mean.count,
+            "chance": mean.chance,
+            "common": mean.certain,
+        }
+
+
+def _size_row(at: NuisancePlace, model: str, size: float, sd: float) -> Row:
+    prior, unit = display_value(at.unit, at.sd)
     return {
-        "fold": row.name,
-        "kind": row.kind,
-        "readings": row.readings,
-        "rms_base": _rms(row.base, row.expected),
-        "rms_with_effects": _rms(row.with_effects, row.expected),
-        "rms_surrogate": _rms(row.surrogate, row.expected),
-        **_held_out_gap("base", row.base, row.expected),
-        **_held_out_gap("with_effects", row.with_effects, row.expected),
-        **_held_out_gap("surrogate", row.surrogate, row.expected),
-        "closed": row.closed,
-        "gap_closed": None if row.closed is None else share_of_gap(row.closed),
-        "worse": row.worse,
-        "status": Status.CONVERGED if row.base is not None else Status.NOT_CONVERGED,
-        "message": row.message,
+        "model": model,
+        "specimen": at.specimen,
+        "kind": at.kind,
+        "component": at.component,
+        "joint": at.joint,
+        "test": at.test,
+        "value": size * prior,
+        "unit": unit,
+        "prior_sd": prior,
+        "in_prior_sds": size,
+        "posterior_sd": sd,
     }
 
 
-def _held_out_gap(model: str, gap: Gap | None, expected: float) -> Row:
-    """The gap of a model in a fold, with its interval."""
-    names = [f"gap_{model}{end}" for end in ("", "_low", "_high")]
-    if gap is None or expected <= 0.0:
-        return dict.fromkeys(names)
-    beyond = gap.against(expected)
-    return dict(zip(names, (beyond.gap, *beyond.interval), strict=True))
+def advice_rows(found: Sequence[Advice]) -> list[Row]:
+    """One row per subject and run, in the order of the advice; of several the first one's."""
+    rows: dict[tuple[str, str], Row] = {}
+    for one in reversed(found):
+        rows[one.subject, one.test] = {
+            "effect_or_pair": one.subject,
+            "test": one.test,
+            "cycles": one.cycles,
+            "gain_in_log_evidence": one.gain,
+            "gain_per_cycle": one.per_cycle,
+            "status": one.status,
+            "message": one.message,
+        }
+    return list(rows.values())[::-1]
 
 
-def _rms(gap: Gap | None, expected: float) -> float | None:
-    return None if gap is None else gap.against(expected).rms
-
-
-def held_out_readings(
-    proof: HeldOut,
-) -> Mapping[str, Sequence[tuple[Array, Array, Array]]]:
-    """By specimen and load history: fold's name, base and with effects (T, J, 6), SI."""
-    names = np.array([*(row.name for row in proof.folds), ""])
-    return {
-        specimen: [
-            (names[fold], base, final)
-            for fold, base, final in zip(m.fold, m.base, m.with_effects, strict=True)
-        ]
-        for specimen, m in proof.motion.items()
-    }
-
-
-def scope_words(form: CandidateForm, joints: Sequence[str]) -> str:
-    """Where a form acts, in words; ``*`` for everywhere."""
-    words = [joints[form.joint]] if form.joint is not None else []
-    words += [form.specimen] if form.specimen is not None else []
-    return " of ".join(words) or "*"
+def advice_csv(rows: Sequence[Row]) -> str:
+    """The rows as comma-separated text under the names of the table's columns, rounded."""
+    content = io.StringIO()
+    names = [column.name for column in NEXT_TESTS.columns]
+    writer = csv.DictWriter(content, names, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        values = ((name, row[name]) for name in names)
+        writer.writerow({n: f"{v:.4g}" if isinstance(v, float) else v for n, v in values})
+    return content.getvalue()

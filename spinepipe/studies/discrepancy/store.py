@@ -32,7 +32,7 @@ from spinepipe.files import appearing, sweep
 from spinepipe.jobs.code import code_digest
 from spinepipe.jobs.digest import versions
 from spinepipe.jobs.pool import end_with_parent
-from spinepipe.studies.discrepancy.codec import decoded, encoded
+from spinepipe.studies.discrepancy.codec import decode, encode
 
 _log = logging.getLogger(__name__)
 
@@ -105,7 +105,7 @@ class Store(PieceRunner):
             found |= _kept(calls)
         for path, call in calls.items():
             if path not in found:  # not even by a worker: what it raises is raised here
-                found[path] = decoded(call())  # as it will be read, so that all goes on the same
+                found[path] = decode(call())  # as it will be read, so that all goes on the same
         return [found[path] for path in paths]
 
     def _paths(self, function: Callable[..., R], every: Iterable[Arguments]) -> list[Path]:
@@ -115,7 +115,7 @@ class Store(PieceRunner):
         about = self._made_by, function.__module__, function.__qualname__
         known: dict[int, str] = {}  # what many pieces work on is looked at once
         for value in chain.from_iterable(every):
-            known[id(value)] = known.get(id(value)) or _sha256(encoded(value))
+            known[id(value)] = known.get(id(value)) or _sha256(encode(value))
         told = [" ".join([*about, *(known[id(value)] for value in one)]) for one in every]
         return [self._folder / f"{_sha256(one.encode())}{SUFFIX}" for one in told]
 
@@ -139,7 +139,7 @@ def _kept(paths: Iterable[Path]) -> dict[Path, Any]:
             content = path.read_bytes()
             if content[:_HEAD] != _head(path, content[_HEAD:]):
                 raise ValueError("it is not as it was written")
-            found[path] = decoded(content[_HEAD:])
+            found[path] = decode(content[_HEAD:])
         except (OSError, ValueError) as trouble:
             _log.warning("%s: %s; it is computed again and replaced", path, trouble)
     return found
@@ -153,7 +153,7 @@ def _compute(path: Path, function: Callable[..., Any], arguments: Arguments) -> 
     OSError
         With the file's name, when the folder cannot be written or the disk is full.
     """
-    data = encoded(function(*arguments))
+    data = encode(function(*arguments))
     try:
         with appearing(path) as temporary:
             temporary.write_bytes(_head(path, data) + data)

@@ -130,7 +130,7 @@ def what_of(effect: Missing) -> str:
     return f"{with_article(name_at(effect.name, effect.scope.coordinates))} {where_of(effect)}"
 
 
-def called(effect: Missing) -> str:
+def label_of(effect: Missing) -> str:
     """``nonlinear stiffening (tangent)``: its name and the variant of it."""
     options = [plain(str(value)) for key, value in effect.variant.items() if key not in _IN_SCOPE]
     name = name_at(effect.name, effect.scope.coordinates)
@@ -141,7 +141,7 @@ _IN_SCOPE = ("coordinate", "pair", "side")
 """Options that name or scope say as well."""
 
 
-def differing(effect: Missing) -> str:
+def spread_words(effect: Missing) -> str:
     """How its values may differ from place to place; empty where there is one place or no word."""
     return _DIFFERING.get(effect.spread, "")
 

@@ -13,9 +13,9 @@ from spinepipe.studies.discrepancy.design.plans import (
     PRELOAD_N,
     Plan,
     PlannedTest,
-    as_made,
-    comes_back,
-    thinned,
+    plan_of_readings,
+    thin_steps,
+    unloads,
     with_preloads,
 )
 from spinepipe.studies.discrepancy.design.runs import runs
@@ -42,8 +42,8 @@ def test_additions_change_loads_and_times_as_they_say():
     back = added("unloading", plan).tests[0].case
     assert levels(back) == [0.0, 2.0, 4.0, 2.0, 0.0]
     assert [step.time for step in back.steps] == [0.0, 5.0, 10.0, 15.0, 20.0]
-    assert comes_back(back)
-    assert not comes_back(case)
+    assert unloads(back)
+    assert not unloads(case)
     assert levels(added("opposite", plan).tests[1].case) == [0.0, -2.0, -4.0]
     assert levels(added("1.5 times", plan).tests[0].case) == [0.0, 3.0, 6.0]
     assert [s.time for s in added("10 times", plan).tests[0].case.steps] == [0.0, 50.0, 100.0]
@@ -94,7 +94,7 @@ def test_what_a_plan_has_is_not_added():
 
 def test_a_thinned_plan_keeps_first_farthest_and_last_step():
     moments = [*np.linspace(0.0, 7.0, 18), *np.linspace(6.5, 1.0, 23)]
-    kept = levels(thinned(plan_of(case_of("flexion", 2, moments)), 10).tests[0].case)
+    kept = levels(thin_steps(plan_of(case_of("flexion", 2, moments)), 10).tests[0].case)
     assert len(kept) <= 11
     assert [kept[0], max(kept), kept[-1]] == [0.0, 7.0, 1.0]
 
@@ -104,7 +104,7 @@ def test_cycles_whose_loads_differ_a_little_are_one_test():
     read = np.zeros((1, 3, 2, 6))
     read[..., :3] = np.nan
     readings = SpecimenReadings("a", (), tuple(Repeats(case, read) for case in cases))
-    (one,) = as_made(readings, True, "per_joint").tests
+    (one,) = plan_of_readings(readings, True, "per_joint").tests
     assert one.case == cases[0]
     assert one.count.tolist() == [[0, 0, 0, 3, 3, 3]] * 2
 
@@ -123,4 +123,4 @@ def test_cycles_whose_loads_differ_a_little_are_one_test():
     ],
 )
 def test_unloading_is_seen_in_a_machines_loads(moments, back):
-    assert comes_back(case_of("flexion", 1, moments, 5.0)) is back
+    assert unloads(case_of("flexion", 1, moments, 5.0)) is back

@@ -15,7 +15,6 @@ from spinepipe.jobs.expected import Expected
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, write_model
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
-from spinepipe.studies.discrepancy.checks import effects_to_try
 from spinepipe.studies.discrepancy.kind import KIND, DiscrepancyFiles
 from spinepipe.studies.discrepancy.settings import Discrepancy
 
@@ -220,39 +219,19 @@ def test_a_sound_model_file_is_a_base(tmp_path: Path) -> None:
     assert mark_of_search(tmp_path) != before, "the search hangs on this very file"
 
 
-@sweep(
-    "entry, place, found",
-    [
-        (
-            EffectEntry(effect="linear_bushing", scope=Scope(joints=("L1L2",))),
-            "scope.joints",
-            "L1L2",
-        ),
-        (
-            EffectEntry(effect="linear_bushing", values=(Values(joint="L1L2"),)),
-            "values.joint",
-            "L1L2",
-        ),
-        (
-            EffectEntry(effect="linear_bushing", scope=Scope(specimens=("z",))),
-            "scope.specimens",
-            "specimen 'z'",
-        ),
-        (
-            EffectEntry(effect="linear_bushing", values=(Values(specimen="z"),)),
-            "values.specimen",
-            "specimen 'z'",
-        ),
-        (
-            EffectEntry(effect="linear_bushing", scope=Scope(tests=("twist",))),
-            "scope.tests",
-            "test 'twist'",
-        ),
-    ],
-)
-def test_a_model_of_another_spine_is_refused(
-    entry: EffectEntry, place: str, found: str, tmp_path: Path
-) -> None:
+ELSEWHERE = {
+    "scope.joints": ("L1L2", Scope(joints=("L1L2",)), ()),
+    "values.joint": ("L1L2", Scope(), (Values(joint="L1L2"),)),
+    "scope.specimens": ("specimen 'z'", Scope(specimens=("z",)), ()),
+    "values.specimen": ("specimen 'z'", Scope(), (Values(specimen="z"),)),
+    "scope.tests": ("test 'twist'", Scope(tests=("twist",)), ()),
+}
+
+
+@sweep("place", ELSEWHERE)
+def test_a_model_of_another_spine_is_refused(place: str, tmp_path: Path) -> None:
+    found, scope, values = ELSEWHERE[place]
+    entry = EffectEntry(effect="linear_bushing", scope=scope, values=values)
     written(tmp_path, model(tmp_path, entry))
     (problem,) = complaints(tmp_path)
     assert (problem.file, problem.column) == ("model.yaml", f"effects.1.{place}")
@@ -275,12 +254,6 @@ def test_problems_of_the_model_file_are_told(tmp_path: Path) -> None:
     assert "unknown effect 'linear_bush'" in problem.allowed
 
 
-def test_effects_that_say_how_are_tried_and_no_others() -> None:
-    names = effects_to_try()
-    assert "slack" in names
-    assert "linear_bushing" not in names
-
-
 def test_all_results_lie_in_one_folder(tmp_path: Path) -> None:
     written(tmp_path)
     study, cohort = studies.check(tmp_path, STUDY)
@@ -301,10 +274,3 @@ def test_every_setting_counts_for_the_search(tmp_path: Path) -> None:
     study, _ = studies.check(tmp_path, STUDY)
     counted = settings_of(study, KIND.job("search").ignores)
     assert set(counted) == set(Discrepancy.model_fields)
-
-
-def test_every_field_is_described() -> None:
-    schema = Discrepancy.model_json_schema()
-    for part in (schema, *schema["$defs"].values()):
-        for name, field in part["properties"].items():
-            assert field.get("description"), name

@@ -13,8 +13,8 @@ from test_discrepancy_page import drawn, said
 from spinepipe.studies.discrepancy.figures.evidence_by_round import (
     MOST_ROUNDS,
     EvidenceRound,
-    chosen,
     rounds,
+    rounds_shown,
 )
 
 
@@ -154,7 +154,7 @@ def test_of_many_rounds_those_that_led_to_something_are_shown() -> None:
         EvidenceRound(str(n), (), (), False, empty, {"creep": "entered"} if n in (13, 17) else {})
         for n in range(20)
     ]
-    kept = [int(one.stage) for one in chosen(many)]
+    kept = [int(one.stage) for one in rounds_shown(many)]
     assert kept == sorted(kept)
     assert len(kept) == MOST_ROUNDS
     assert {0, 13, 17} <= set(kept)

@@ -5,21 +5,21 @@ import pytest
 from discrepancy_cases import frames
 
 from spinepipe.studies.discrepancy.field_tables import (
-    formula_shown,
+    formula_table,
     formula_text,
-    numbers_shown,
+    numbers_table,
     per_degree,
-    tabulated_shown,
-    withheld_shown,
+    tabulated_table,
+    withheld_table,
 )
-from spinepipe.studies.discrepancy.verdict_imperfections import WithheldEffect
+from spinepipe.studies.discrepancy.verdict import WithheldEffect
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 from spinepipe.units import DEG_PER_RAD
 
 
 def cells(rows: pd.DataFrame) -> dict[tuple[str, str], str]:
     """By number and unit, of the only joint."""
-    shown, columns = numbers_shown(rows)
+    shown, columns = numbers_table(rows)
     assert [column.name for column in columns] == ["motion", "number", "unit", "L4L5"]
     return {(row["number"], row["unit"]): row["L4L5"] for row in shown.to_dict("records")}
 
@@ -43,16 +43,16 @@ def test_sides_that_differ_are_named_as_motions() -> None:
 
 def test_joints_that_are_alike_share_a_column() -> None:
     rows = frames("NAMED")["field_numbers"]
-    shown, columns = numbers_shown(pd.concat([rows, rows.assign(joint="L3L4")]))
+    shown, columns = numbers_table(pd.concat([rows, rows.assign(joint="L3L4")]))
     assert columns[-1].name == "every joint"
     assert len(columns) == 4
     differ = pd.concat([rows, rows.assign(joint="L3L4", value=rows["value"] + 1.0)])
-    assert [column.name for column in numbers_shown(differ)[1]][3:] == ["L4L5", "L3L4"]
+    assert [column.name for column in numbers_table(differ)[1]][3:] == ["L4L5", "L3L4"]
     assert len(shown) == 5
 
 
 def test_a_tabulated_law_has_the_load_and_that_of_the_base() -> None:
-    shown, _ = tabulated_shown(frames("UNKNOWN")["tabulated"])
+    shown, _ = tabulated_table(frames("UNKNOWN")["tabulated"])
     row = shown.to_dict("records")[0]
     assert row["at"] == "\u22122.00 °"
     assert row["L3L4"].endswith(", base \u22125.00")
@@ -85,7 +85,7 @@ def test_a_formula_is_told_by_degrees() -> None:
     told = formula_text(FORMULA)
     assert told.startswith("moment in lateral bending at L4L5 = ")
     assert told.endswith("(SD 0.0014) N m/°² × extension²")
-    shown, _ = formula_shown(FORMULA)
+    shown, _ = formula_table(FORMULA)
     (row,) = shown.to_dict("records")
     assert (row["place"], row["on"]) == ("L4L5", "load in lateral bending")
     assert row["unit"] == "N m/°²"
@@ -96,7 +96,7 @@ def test_what_an_imperfection_would_have_to_be_known_to() -> None:
         WithheldEffect("joint_centre_offset", "joint_centre", 2.0, 0.5, "mm", 1.0, 9.0),
         WithheldEffect("load_offset", "load_gain", 0.02, None, "1", 1.0, 3.0),
     )
-    first, second = withheld_shown(hidden)[0].to_dict("records")
+    first, second = withheld_table(hidden)[0].to_dict("records")
     assert (first["allowed"], first["would have to be known to"]) == ("2.0 mm", "0.50 mm")
     assert (second["allowed"], second["would have to be known to"]) == (
         "2.0 %",

@@ -20,7 +20,6 @@ from spinepipe.studies.discrepancy.proof.folds import (
     Fold,
     FoldFit,
     folds_by_test,
-    step_fold,
 )
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 
@@ -139,21 +138,6 @@ def test_a_fit_to_everything_ends_where_the_full_fit_did(two: BaselineFit) -> No
     assert x[own] == pytest.approx(np.zeros(len(own)), abs=1e-4)
 
 
-def test_a_fit_of_some_load_steps_reads_no_others(two: BaselineFit) -> None:
-    """By hand at one joint's coordinate: stiffness is moment over angle at the steps that train."""
-    (part, _) = step_fold({"a": two.readings["a"]}).parts
-    own = np.array(two.fit.hypothesis.members["a"].numbers)
-    nothing = np.zeros(len(two.fit.x))
-    _, fit = fold_models._fitted(two, lin(two), part, ["a"], own, nothing)
-    for predicted, training, test in zip(
-        fit.predicted["a"], part.training["a"], two.readings["a"].tests, strict=True
-    ):
-        assert predicted.shape == test.mean.shape  # predicted are all steps
-        assert not training.all()
-    used = sum(len(one) for one in fit.residuals.values())
-    assert used == sum(int(steps.sum()) for steps in part.training["a"]) * 2 * 3
-
-
 def test_bounds_and_priors_stay_where_they_are_as_fits_start_elsewhere(two: BaselineFit) -> None:
     """An unknown is its start and its move: what bounds one less far has that much more to go."""
     fit, model = two.fit, lin(two)
@@ -174,17 +158,6 @@ def test_bounds_and_priors_stay_where_they_are_as_fits_start_elsewhere(two: Base
         full = fit.models["b"].effects[0].values[row, parameter.column]
         moved = stiffness[row, parameter.column]
         assert moved == pytest.approx(full * np.exp(away[number]))  # moves are of logarithms
-
-
-def test_unknowns_that_are_held_are_no_longer_free(two: BaselineFit) -> None:
-    member = two.fit.hypothesis.members["a"]
-    free = np.array(member.numbers)[[0, 2]]
-    again = fold_models._again(two.fit, lin(two), ["a"], free, np.zeros(len(two.fit.x)))
-    assert again.members["a"].free == (member.free[0], member.free[2])
-    assert again.members["a"].numbers == (0, 1)
-    assert [one.label for one in again.unknowns] == [
-        two.fit.hypothesis.unknowns[number].label for number in free
-    ]
 
 
 def test_nuisances_are_as_the_training_has_them_beside_the_fit() -> None:

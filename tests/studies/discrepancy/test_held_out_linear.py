@@ -104,8 +104,8 @@ def explicit(
 def check(
     model: LinearModel, readings: dict[str, SpecimenReadings], part: FoldFit, x: Array
 ) -> None:
-    placed = LinearFolds(model, ChosenSteps(readings, noise())).placed(part)
-    assert set(placed.motion) == set(part.scored)
+    predicted = LinearFolds(model, ChosenSteps(readings, noise())).predict(part)
+    assert set(predicted.motion) == set(part.scored)
     for name in part.scored:
         one = model.members[name]
         dense = Dense(one, readings[name], part.training[name])
@@ -113,9 +113,9 @@ def check(
         z = dense.nuisances(move)
         for test in range(len(TESTS)):
             motion = one.predicted[test] + one.by_x[test] @ move
-            assert placed.motion[name][test] == pytest.approx(motion, rel=1e-9, abs=1e-12)
+            assert predicted.motion[name][test] == pytest.approx(motion, rel=1e-9, abs=1e-12)
             added = one.nuisances[test] @ z
-            assert placed.nuisances[name][test] == pytest.approx(added, rel=1e-9, abs=1e-12)
+            assert predicted.nuisances[name][test] == pytest.approx(added, rel=1e-9, abs=1e-12)
 
 
 def trained(

@@ -9,7 +9,7 @@ from imperfect_cases import JOINTS, SPECIMENS, alike, grounds_of, off_centre
 from scipy import stats
 from sweeps import sweep
 
-from spinepipe.studies.discrepancy.imperfection_rows import imperfection_rows, told_imperfections
+from spinepipe.studies.discrepancy.rows import imperfection_rows
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.imperfections import (
     AbsorbedGap,
@@ -21,6 +21,7 @@ from spinepipe.studies.discrepancy.search.imperfections import (
 )
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.store import at_once
+from spinepipe.studies.discrepancy.summary import imperfection_summary
 from spinepipe.studies.discrepancy.tables import IMPERFECTIONS
 from spinepipe.tables import from_rows
 
@@ -173,7 +174,7 @@ def test_rows_and_words_say_what_was_taken_up(shifted):
     (anterior,) = frame[frame["common"] & (frame["component"] == "anterior")].to_dict("records")
     assert (anterior["specimen"], anterior["joint"], anterior["unit"]) == ("*", "*", "mm")
     assert anterior["value"] == pytest.approx(2.0, abs=0.2)
-    told = told_imperfections(shifted[1])
+    told = imperfection_summary(shifted[1])
     assert told.gap_without > told.gap_with
     assert {one.kind for one in told.common} == {"joint_centre"}
     for words in ("Without the small imperfections", "joint_centre", "no random error"):
@@ -185,4 +186,4 @@ def test_where_nothing_is_allowed_for_nothing_is_taken_up():
     taken = taken_up(grounds, grounds.fit, JOINTS, at_once)
     assert (taken.each, taken.common, taken.linear_chi2) == ((), (), 0)
     assert taken.without.gap == pytest.approx(taken.beside.gap, abs=1e-4)
-    assert "change little" in told_imperfections(taken).message
+    assert "change little" in imperfection_summary(taken).message

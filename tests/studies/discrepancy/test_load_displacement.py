@@ -11,8 +11,8 @@ from spinepipe.effects import Wrench
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.discrepancy.figures.load_displacement import (
-    drawn_once,
-    driven,
+    driven_coordinates,
+    line_order,
     unloading,
     ways,
     worst_curves,
@@ -67,7 +67,7 @@ def test_a_joint_above_the_loaded_vertebra_is_not_loaded() -> None:
 
 def test_each_test_drives_one_coordinate_of_each_joint() -> None:
     gap = frames("NAMED")["gap"]
-    found = driven(gap)
+    found = driven_coordinates(gap)
     assert {(test, coordinate) for test, _, coordinate in found} == {
         ("flexion", "extension"),
         ("left_lateral_bending", "right_bending"),
@@ -90,8 +90,10 @@ def test_a_force_drives_the_translation_it_points_along() -> None:
         coordinate="anterior", unit="mm", load=lambda rows: 40.0 * rows["step"]
     )
     both = gap.assign(load=0.1 * gap["load"])
-    assert {c for _, _, c in driven(shear)} == {"anterior"}
-    joined = driven(type(gap)(np.concatenate([both, shear]), columns=gap.columns).infer_objects())
+    assert {c for _, _, c in driven_coordinates(shear)} == {"anterior"}
+    joined = driven_coordinates(
+        type(gap)(np.concatenate([both, shear]), columns=gap.columns).infer_objects()
+    )
     assert ("flexion", "L4L5", "anterior") in joined  # 200 N over 8 mm against 0.5 N m over 8 deg
 
 
@@ -150,10 +152,10 @@ def test_nothing_to_draw_is_said(root: Path) -> None:
 def test_a_line_that_comes_back_on_itself_is_drawn_once() -> None:
     load = np.array([0.0, 1.0, 2.0, 1.0, 0.0, -1.0, -2.0, -1.0, 0.0])
     way = np.arange(9)
-    once = drawn_once(load, 0.5 * load, way)
+    once = line_order(load, 0.5 * load, way)
     assert (np.diff(load[once]) >= 0.0).all()
     loop = 0.5 * load - 0.1 * np.array([0, 1, 1, 1, -1, -1, -1, -1, 1])
-    assert drawn_once(load, loop, way).tolist() == way.tolist()
+    assert line_order(load, loop, way).tolist() == way.tolist()
 
 
 def test_a_gap_aside_of_the_load_is_pointed_to(root: Path) -> None:

@@ -15,9 +15,7 @@ import pytest
 from discrepancy_cases import files_of_a_search
 
 from spinepipe.studies.cohort_stiffness import fit
-from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.discrepancy import job as search
-from spinepipe.studies.read import check
 from spinepipe.tables import read_frame
 
 ROOT = Path(__file__).parents[3]
@@ -91,13 +89,6 @@ def test_the_search_names_what_the_cohort_hides(project: Path) -> None:
         "NAMED",
         ["nonlinear_stiffening"],
     )
-
-
-def test_the_named_model_loads_beneath_a_cohort_study(project: Path) -> None:
-    study, _ = check(project, "beneath")
-    assert isinstance(study, CohortStiffness)
-    assert study.base is not None
-    assert study.base.path(project).is_file()
 
 
 def test_held_out_error_falls(project: Path) -> None:

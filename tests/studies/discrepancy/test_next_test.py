@@ -19,14 +19,24 @@ from search_cases import MARGIN
 from spring_chain_cases import THERE_AND_BACK, cases
 from sweeps import sweep
 
-from spinepipe.studies.discrepancy.advice_rows import advice_csv, advice_rows
-from spinepipe.studies.discrepancy.design.advice import ADVISED, TELLS_NOTHING, advice
-from spinepipe.studies.discrepancy.design.expected import ExpectedReadings, Sums, noncentrality
+from spinepipe.studies.discrepancy.design.advice import (
+    ADVISED,
+    TELLS_NOTHING,
+    advice,
+    hidden_effects,
+)
 from spinepipe.studies.discrepancy.design.extra_tests import bench
-from spinepipe.studies.discrepancy.design.next_test import left_apart, offers
+from spinepipe.studies.discrepancy.design.next_test import (
+    ExpectedReadings,
+    Sums,
+    noncentrality,
+    offers,
+    remaining_chi2,
+)
 from spinepipe.studies.discrepancy.design.patterns import RivalFits
 from spinepipe.studies.discrepancy.design.plans import PlannedTest, at_times
 from spinepipe.studies.discrepancy.design.runs import runs
+from spinepipe.studies.discrepancy.rows import advice_csv, advice_rows
 from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.outcome import outcome
 from spinepipe.studies.discrepancy.search.search import search
@@ -79,7 +89,7 @@ def test_an_advised_run_tells_about_what_was_promised(rival, words, case):
     for seed in range(3):
         grounds, true, other = pair(seed, rival)
         pattern = RivalFits(grounds, other.fit, true.fit)
-        now, then = (left_apart(pattern, bench(grounds, None), one) for one in (None, words))
+        now, then = (remaining_chi2(pattern, bench(grounds, None), one) for one in (None, words))
         promised.append(0.5 * (then - now))
         before = true.log_evidence - other.log_evidence
         told.append(margin_after(seed, rival, case, seed) - before)
@@ -167,7 +177,8 @@ def test_a_set_gets_a_test_that_tells_its_names_apart():
     found = search(grounds, rules, at_once)
     ended = outcome(found, MARGIN)
     assert ended.verdict is Conclusion.SET
-    told = advice(found, ended, rules, bench(grounds, None), at_once)
+    hidden = hidden_effects(found, ended, rules, at_once)
+    told = advice(found, ended, rules, bench(grounds, None), at_once, hidden)
     (best,) = [one for one in told if one.status == ADVISED]
     assert set(best.subject.split(" or ")) == set(effects)
     assert best.test == TURNED_ROUND

@@ -9,7 +9,7 @@ import numpy as np
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut, Margin
+from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
@@ -21,8 +21,8 @@ from spinepipe.studies.discrepancy.search.search_state import (
     SearchStage,
     SelectedTerm,
 )
+from spinepipe.studies.discrepancy.summary import nearest_candidates
 from spinepipe.studies.discrepancy.verdict import Candidate, Conclusion, SuspectedError
-from spinepipe.studies.discrepancy.verdict_found import near_alone
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 MARGIN = 3.0
@@ -106,8 +106,7 @@ def first_look(standing: Sequence[SelectedTerm]) -> SearchStage:
 
 
 def proof(over_base: float | None) -> HeldOut:
-    margin = None if over_base is None else Margin(over_base, None)
-    return HeldOut((), {}, None, None, None, 0.0, margin, None)
+    return HeldOut((), {}, None, None, 0.0, over_base)
 
 
 def says(found: SearchResult, **more: Any) -> tuple[str, str]:
@@ -455,5 +454,5 @@ def test_a_set_is_told_where_its_names_are_near() -> None:
     far = Candidate("nonlinear_stiffening", ("anterior",), 7.9)
     least, most = Candidate("creep", ("extension",), 4.0), Candidate("creep", ("anterior",), 9.0)
     untold = Candidate("hysteresis", ("extension",), None)
-    told = near_alone([stands, near, far, near, most, least, untold], margin=3.0)
+    told = nearest_candidates([stands, near, far, near, most, least, untold], margin=3.0)
     assert told == (stands, near, least, untold)

@@ -11,7 +11,7 @@ from test_held_out import row
 from test_held_out_linear import linear_model
 
 from spinepipe.studies.discrepancy.proof import held_out
-from spinepipe.studies.discrepancy.proof.fold_linear import FoldPrediction, _bounded, lengthened
+from spinepipe.studies.discrepancy.proof.fold_linear import FoldPrediction, _bounded
 from spinepipe.studies.discrepancy.proof.fold_models import Predictions
 from spinepipe.studies.discrepancy.proof.folds import (
     SPECIMEN,
@@ -22,10 +22,14 @@ from spinepipe.studies.discrepancy.proof.folds import (
     only,
     step_fold,
 )
-from spinepipe.studies.discrepancy.proof.formula_folds import ChosenTerm, with_terms
-from spinepipe.studies.discrepancy.proof.held_out import HeldOutMotion, fill, together
+from spinepipe.studies.discrepancy.proof.held_out import (
+    ChosenTerm,
+    HeldOutMotion,
+    fill,
+    pool_folds,
+    with_terms,
+)
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.whitening import Whitening
 
 # Margins
 
@@ -63,30 +67,13 @@ def test_what_was_not_scored_is_not_worse() -> None:
 
 def test_a_model_beats_another_by_any_margin_and_equals_do_not() -> None:
     for effects, beats in ((99.0, True), (100.0, False), (101.0, False)):
-        assert together([row("a", 100.0, effects, 0.0)], {}).beats_base is beats
-    assert not together([], {}).beats_base
+        assert pool_folds([row("a", 100.0, effects, 0.0)], {}).beats_base is beats
 
 
 @sweep("differs, tells", [(2e-6, True), (-2e-6, True), (5e-7, False)])
 def test_folds_tell_where_predictions_differ_by_a_millionth(differs: float, tells: bool) -> None:
-    found = together([row("a", 100.0, 100.0 * (1.0 - differs), 0.0)], {})
+    found = pool_folds([row("a", 100.0, 100.0 * (1.0 - differs), 0.0)], {})
     assert found.tells is tells
-    assert not together([], {}).tells
-
-
-def test_a_margin_has_an_error_from_three_folds_on() -> None:
-    rows = [row(name, 100.0, 90.0 - n, 0.0) for n, name in enumerate("abc")]
-    for count, known in ((1, False), (2, False), (3, True)):
-        margin = together(rows[:count], {}).over_base
-        assert margin is not None
-        assert (margin.se is not None) is known
-
-
-def test_surrogates_count_where_there_are_any() -> None:
-    rows = [replace(row("a", 100.0, 12.0, 30.0), surrogate=None)]
-    found = together(rows, {})
-    assert (found.surrogate, found.over_surrogate) == (None, None)
-    assert found.base == Gap(100.0, 10.0, 10)
 
 
 def test_the_share_closed_is_of_what_is_above_what_is_expected() -> None:
@@ -103,7 +90,7 @@ def test_the_share_closed_is_of_what_is_above_what_is_expected() -> None:
 def test_of_the_base_alone_there_is_nothing_that_beats_it() -> None:
     one = np.zeros((1, 1, 6))
     sheet = HeldOutMotion((np.zeros((1, 1, 6), dtype=int),), (one,), (one + 1.0,))
-    found = together([row("a", 100.0, 12.0, 30.0)], {"a": sheet}).of_base()
+    found = pool_folds([row("a", 100.0, 12.0, 30.0)], {"a": sheet}).of_base()
     assert found.with_effects == found.base
     assert found.folds[0].with_effects == found.folds[0].base
     assert found.motion["a"].with_effects[0] is found.motion["a"].base[0]
@@ -154,18 +141,6 @@ def test_models_differ_by_what_both_predict_and_nuisances_are_part_of_it() -> No
     none = {"a": (np.zeros(shape, dtype=bool),)}
     assert held_out.scored_gap(chosen, [(none, base)]) == Gap(0.0, 0.0, 0)
     assert held_out._moved(chosen, replace(part, scored=none)) == 0.0
-
-
-def test_what_nuisances_shortened_is_lengthened_again() -> None:
-    """Along a direction to a third; what lies across is left as it is."""
-    along = np.array([[0.6], [0.8], [0.0]])
-    white = Whitening((), (), along, np.array([1.0 / 3.0 - 1.0]), np.ones((1, 1)))
-    rows = np.array([[3.0, 1.0], [4.0, -2.0], [5.0, 7.0]])
-    short = white.shortened(rows)
-    assert along.T @ short == pytest.approx(along.T @ rows / 3.0)
-    assert lengthened(white, short) == pytest.approx(rows)
-    assert white.lengthened(short) == pytest.approx(rows)
-    assert white.lengthened(short[:, 0]) == pytest.approx(rows[:, 0])
 
 
 # Folds

@@ -16,7 +16,7 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
 from spinepipe.studies.discrepancy.checks import check_discrepancy
-from spinepipe.studies.discrepancy.rows import _as_load, _rig
+from spinepipe.studies.discrepancy.rows import _as_load
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
@@ -129,13 +129,13 @@ def test_rows_of_a_rig_are_loads(tmp_path: Path) -> None:
     cohort, _ = written(tmp_path, 0.0)
     (first, *_) = prepared(STUDY, cohort, None).readings[0].tests
     step = first.case.steps[3]
-    rig = _rig(step, 0, 0)
-    assert rig is not None
+    rig = next(one for one in step.supports if one.place == 0)
     assert rig.read_as is not None
     held, listed = 50.0, float(step.wrenches[0].force[0])
     reading_mm = (held - listed) * rig.read_as * 1e3
     row = {"load": listed, "measured": 0.0, "base": reading_mm, "with_effects": reading_mm}
-    row |= {"held_out_base": None, "held_out_with_effects": None, "noise_sd": MOTION_SD}
+    row |= dict.fromkeys(("with_table", "held_out_base", "held_out_with_effects"))
+    row["noise_sd"] = MOTION_SD
     told = _as_load(rig, row, 0)
     assert told["unit"] == "N"
     assert told["measured"] == listed

@@ -29,7 +29,7 @@ from spinepipe.studies.discrepancy.design.extra_tests import MENU
 from spinepipe.studies.discrepancy.design.fisher_information import (
     CohortSignatures,
     candidates,
-    seen_in,
+    specimen_signatures,
 )
 from spinepipe.studies.discrepancy.design.testable import Detectable, judgements
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
@@ -76,7 +76,7 @@ def test_an_offset_explains_what_a_constant_does_of_an_absolute_value():
     expected = np.sum(np.abs(m)) ** 2 / (len(m) * np.sum(m**2))
     grounds = one_joint(m)
     tried = (ASYMMETRY, only("load_offset"))
-    of = {"a": seen_in(grounds, "a", tried)}
+    of = {"a": specimen_signatures(grounds, "a", tried)}
     found = judgements(tried, of, 1, grounds.tests, NEEDED, 0)
     pairs = confusions(CohortSignatures(candidates(tried, 1, grounds.tests), of), found, 3.0)
     share = {(one.effect, one.other): one.share for one in pairs}
@@ -138,18 +138,11 @@ def test_a_test_that_shows_an_effect_clearly_goes_before_one_that_hardly_does(mo
     faint = replace(one, detectable=Detectable(2.0, 0.2, ()))
     clear = replace(one, detectable=Detectable(0.5, 0.2, ()))
     answers = iter([(faint,), (faint,), (clear,)])
-    monkeypatch.setattr(extra_tests, "judged_under", lambda *_: next(answers))
+    monkeypatch.setattr(extra_tests, "judge_plan", lambda *_: next(answers))
     tried = tried_in(grounds, ["level_dependence"])
     hidden = [replace(one, testable=False)]
     (told,) = extra_tests.not_testable(extra_tests.bench(grounds, None), tried, hidden, NEEDED, 0)
     assert told.test_that_would_tell == MENU[3].words  # times are recorded already
-
-
-def test_unloading_leaves_more_of_hysteresis():
-    up = (0.0, 1.5, 3.0, 4.5, 6.0)
-    one_way = judged(grounds_of(moments=up), ["hysteresis"])["hysteresis"]
-    both = judged(grounds_of(moments=(*up, *up[-2::-1])), ["hysteresis"])["hysteresis"]
-    assert both.absorbed < 0.5 * one_way.absorbed
 
 
 def test_unloading_tells_hysteresis_from_a_neutral_zone():

@@ -5,9 +5,9 @@ import pytest
 from imperfect_cases import JOINTS, SPECIMENS, alike, grounds_of, off_centre
 from sweeps import sweep
 
-from spinepipe.studies.discrepancy.design.advice import ADVISED, advice
+from spinepipe.studies.discrepancy.design.advice import ADVISED, advice, hidden_effects
 from spinepipe.studies.discrepancy.design.extra_tests import bench
-from spinepipe.studies.discrepancy.design.masked_effects import MaskedEffects, withheld
+from spinepipe.studies.discrepancy.design.masked_effects import MaskedEffects, masked_effects
 from spinepipe.studies.discrepancy.search.hypothesis import Trials, trials
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.search.outcome import outcome
@@ -29,7 +29,9 @@ def all_trials() -> tuple[Trials, ...]:
 @pytest.fixture(scope="module")
 def hidden() -> MaskedEffects:
     """Centres 1 mm off in all joints, where 2 mm are allowed for."""
-    found = withheld(grounds_of(off_centre(alike(SHIFT_M))), all_trials(), NEEDED, (), at_once)
+    found = masked_effects(
+        grounds_of(off_centre(alike(SHIFT_M))), all_trials(), NEEDED, (), at_once
+    )
     (one,) = found
     return one
 
@@ -53,7 +55,7 @@ def test_known_as_well_as_told_the_effect_is_evident(hidden, share, evident):
 
 def test_nothing_is_withheld_where_nothing_is_missing():
     grounds = grounds_of(off_centre(alike(0.0 * SHIFT_M)))
-    assert withheld(grounds, all_trials(), NEEDED, (), at_once) == ()
+    assert masked_effects(grounds, all_trials(), NEEDED, (), at_once) == ()
 
 
 def test_a_null_says_what_would_have_to_be_known_better():
@@ -62,7 +64,8 @@ def test_a_null_says_what_would_have_to_be_known_better():
     found = search(grounds, rules, at_once)
     ended = outcome(found, 3.0)
     assert ended.verdict is Conclusion.NULL
-    told = advice(found, ended, rules, bench(grounds, None), at_once)
+    hidden = hidden_effects(found, ended, rules, at_once)
+    told = advice(found, ended, rules, bench(grounds, None), at_once, hidden)
     (best,) = [one for one in told if one.status == ADVISED]
     assert best.subject == "joint_centre_offset"
     assert best.test.startswith("repeated set-ups: joint_centre known to 0.")

@@ -12,8 +12,8 @@ from spinepipe.effects import create
 from spinepipe.studies.discrepancy.quantities import estimate, quantity
 from spinepipe.studies.discrepancy.verdict import Estimate, Missing, VerdictScope
 from spinepipe.studies.discrepancy.words import (
-    called,
     general,
+    label_of,
     load_axis,
     name_at,
     readable,
@@ -82,10 +82,10 @@ def test_without_a_place_no_coordinate_is_said() -> None:
         "contact (stop)",
         "load offset",
     ]
-    assert called(missing("nonlinear_stiffening", "extension", shape="tangent")) == (
+    assert label_of(missing("nonlinear_stiffening", "extension", shape="tangent")) == (
         "nonlinear stiffening (tangent)"
     )
-    assert called(missing("facet_contact", "anterior", side="positive")) == "contact (stop)"
+    assert label_of(missing("facet_contact", "anterior", side="positive")) == "contact (stop)"
 
 
 def test_sentences_of_results_read_as_words() -> None:

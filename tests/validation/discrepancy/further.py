@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.studies.discrepancy.design.fisher_information import seen_in
+from spinepipe.studies.discrepancy.design.fisher_information import specimen_signatures
 from spinepipe.studies.discrepancy.design.testable import judgements
 from spinepipe.studies.discrepancy.proof.folds import SPECIMEN, TEST
 from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
@@ -83,7 +83,7 @@ def testable_told(found: SearchResult, rules: Rules, names: Sequence[str]) -> To
     if not mine:
         return {}
     grounds = found.base
-    of = {name: seen_in(grounds, name, mine) for name in grounds.readings}
+    of = {name: specimen_signatures(grounds, name, mine) for name in grounds.readings}
     joints = next(iter(grounds.fit.models.values())).n_joints
     needed = found.stages[0].screen.threshold + rules.margin
     judged = judgements(mine, of, joints, grounds.tests, needed, rules.seed)

@@ -1,7 +1,7 @@
 """From which gap an effect has its own name in a scored cohort, and not only a place in a set.
 
-Asked of the base fit and the tests alone, to first order (`design/told_apart.py`), for cohorts with
-one effect; entered into their rows.
+Asked of the base fit and the tests alone, to first order (`design/distinguishability.py`), for
+cohorts with one effect; entered into their rows.
 """
 
 from multiprocessing import get_context
@@ -16,7 +16,7 @@ from spinepipe.studies.discrepancy.design.distinguishability import confusions
 from spinepipe.studies.discrepancy.design.fisher_information import (
     CohortSignatures,
     candidates,
-    seen_in,
+    specimen_signatures,
 )
 from spinepipe.studies.discrepancy.design.testable import judgements
 from spinepipe.studies.discrepancy.search.hypothesis import trials
@@ -62,7 +62,7 @@ def gap_of_own_name(row: Row) -> dict[str, Any]:
         grounds = base_fitted(ready, at_once)
         joints, specimens = len(ready.cohort.joint_names), sorted(ready.cohort.specimen_names)
     every = trials(STUDY.effects, ready.coordinates, specimens, joints)
-    of = {specimen: seen_in(grounds, specimen, every) for specimen in grounds.readings}
+    of = {specimen: specimen_signatures(grounds, specimen, every) for specimen in grounds.readings}
     needed = row["threshold"] + STUDY.margin
     found = judgements(every, of, joints, grounds.tests, needed, STUDY.seed)
     design = CohortSignatures(candidates(every, joints, grounds.tests), of)

@@ -4,7 +4,7 @@ Each subject gets every run of the menu with its expected gain, and the best of 
 effect that imperfections hide gets what these would have to be known to instead.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 
@@ -13,10 +13,10 @@ from spinepipe.studies.discrepancy.design.masked_effects import (
     FACTORS,
     MaskedEffects,
     kinds_of,
-    narrowed,
-    withheld,
+    masked_effects,
+    with_narrower_priors,
 )
-from spinepipe.studies.discrepancy.design.next_test import Offer, left_apart, offers
+from spinepipe.studies.discrepancy.design.next_test import Offer, offers, remaining_chi2
 from spinepipe.studies.discrepancy.design.patterns import RivalFits, generic, strengths
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials
@@ -75,22 +75,21 @@ def advice(
     rules: Rules,
     place: Bench,
     run: PieceRunner,
-    hidden: Sequence[MaskedEffects] | None = None,
+    hidden: Sequence[MaskedEffects],
 ) -> tuple[Advice, ...]:
     """All advice; nothing where data are wrong or everything is named.
 
     Parameters
     ----------
-    hidden : what `hidden_effects` found, where that is known.
+    hidden : what `hidden_effects` found.
     """
     if ended.reason is Reason.DATA_ERRORS:
         return ()
-    grounds = _standing_on(found, ended)
+    grounds = found.final if ended.named or ended.tied else found.base
     rows = [row for pair in _pairs(found, ended, rules) for row in _of_pair(*pair, place, run)]
     if ended.verdict in (Conclusion.PART, Conclusion.UNKNOWN):
         rows += run(_of_unnamed, grounds, rules, place)
     threshold = found.stages[0].screen.threshold
-    hidden = hidden_effects(found, ended, rules, run) if hidden is None else hidden
     for one in hidden:
         rows += _of_withheld(grounds, one, threshold)
     first = {one.effect: one for one in reversed(hidden)}
@@ -108,11 +107,8 @@ def hidden_effects(
         return ()
     named = {one.name for one in ended.named} | set(ended.tied)
     threshold = found.stages[0].screen.threshold
-    return withheld(_standing_on(found, ended), rules.trials, threshold, sorted(named), run)
-
-
-def _standing_on(found: SearchResult, ended: Outcome) -> BaselineFit:
-    return found.final if ended.named or ended.tied else found.base
+    grounds = found.final if named else found.base
+    return masked_effects(grounds, rules.trials, threshold, sorted(named), run)
 
 
 Pair = tuple[str, RivalFits, RivalFits, float]
@@ -186,15 +182,11 @@ def _of_pair(
     checked = _checked((first, second), place, likely, run)
     linear = sum(one.gain or 0.0 for one in found if one.words in checked)
     share = min(1.0, sum(checked.values()) / linear) if linear > 0.0 else 1.0
-    told = [
-        replace(
-            one,
-            gain=checked.get(one.words, None if one.gain is None else share * one.gain),
-            message=_how(one, checked),
-        )
+    corrected = [
+        replace(one, gain=checked.get(one.words, None if one.gain is None else share * one.gain))
         for one in found
     ]
-    return _rows(subject, told, missing)
+    return _rows(subject, corrected, missing, checked)
 
 
 def _checked(
@@ -202,32 +194,33 @@ def _checked(
 ) -> dict[str, float]:
     """Mean gain of each run by refits of both models; of those that both can be asked for."""
     words = [None, *every]  # without any run, and with each
-    left = run.map(left_apart, [(one, place, which) for one in pair for which in words])
-    one, other = (dict(zip(words, left[n:], strict=False)) for n in (0, len(words)))
-    more = ((name, _more(one, name), _more(other, name)) for name in every)
-    return {name: 0.5 * (a + b) for name, a, b in more if a is not None and b is not None}
-
-
-def _more(left: Mapping[str | None, float | None], words: str) -> float | None:
-    """The gain of a run: half of what it adds to the chi2 that stays."""
-    now, then = left[None], left[words]
-    return None if now is None or then is None else 0.5 * max(0.0, then - now)
-
-
-def _how(one: Offer, checked: dict[str, float]) -> str:
-    return one.message or (BY_REFIT if one.words in checked else TO_FIRST_ORDER)
+    left = run.map(remaining_chi2, [(one, place, which) for one in pair for which in words])
+    gains: dict[str, list[float]] = {name: [] for name in every}
+    for start in (0, len(words)):
+        now = left[start]
+        for name, then in zip(every, left[start + 1 :], strict=False):
+            if now is not None and then is not None:
+                # the gain of a run: half of what it adds to the chi2 that stays
+                gains[name].append(0.5 * max(0.0, then - now))
+    return {name: 0.5 * (of[0] + of[1]) for name, of in gains.items() if len(of) == 2}
 
 
 def _of_unnamed(grounds: BaselineFit, rules: Rules, place: Bench) -> list[Advice]:
     """Runs that show more of what the generic basis sees."""
     lack = lack_of_fit(grounds, rules.coordinates, 0, rules.seed)
     pattern = generic(grounds, rules.coordinates, lack)
-    found = [replace(one, message=_how(one, {})) for one in offers([pattern], place)]
-    return _rows(f"{UNNAMED}: {lack.shape}", found, 0.0)
+    return _rows(f"{UNNAMED}: {lack.shape}", offers([pattern], place), 0.0)
 
 
-def _rows(subject: str, found: Sequence[Offer], missing: float) -> list[Advice]:
-    """One row per run; the best per cycle is advised, if it tells anything."""
+def _rows(
+    subject: str, found: Sequence[Offer], missing: float, checked: Collection[str] = ()
+) -> list[Advice]:
+    """One row per run; the best per cycle is advised, if it tells anything.
+
+    Parameters
+    ----------
+    missing : log evidence. checked : runs whose gain is by refits.
+    """
     ranked = sorted(found, key=lambda one: (-one.per_cycle, one.words))
     rows = []
     for number, one in enumerate(ranked):
@@ -237,16 +230,13 @@ def _rows(subject: str, found: Sequence[Offer], missing: float) -> list[Advice]:
             status = TELLS_NOTHING
         else:
             status = OFFERED if number else ADVISED
-        message = one.message
+        message = one.message or (BY_REFIT if one.words in checked else TO_FIRST_ORDER)
         if status == ADVISED and missing > 0.1 and one.gain:
             times = ceil(missing / one.gain)
-            message += f"; {missing:.1f} is missing: do it {_times(times)}"
+            often = "once" if times == 1 else f"about {times} times"
+            message += f"; {missing:.1f} is missing: do it {often}"
         rows.append(Advice(subject, one.words, one.cycles, one.gain, status, message))
     return rows
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"about {count} times"
 
 
 def _of_withheld(grounds: BaselineFit, one: MaskedEffects, threshold: float) -> Iterator[Advice]:
@@ -308,7 +298,6 @@ def _of_effect(
 
     It is as strong as the readings suggest were these known.
     """
-    bare = narrowed(grounds, dict.fromkeys(kinds_of(grounds), 0.0))
+    bare = with_narrower_priors(grounds, dict.fromkeys(kinds_of(grounds), 0.0))
     pattern = replace(strengths(bare, trials, form, sds), grounds=grounds)
-    found = [replace(one, message=_how(one, {})) for one in offers([pattern], place)]
-    return _rows(trials.effect, found, 0.0)
+    return _rows(trials.effect, offers([pattern], place), 0.0)

@@ -22,20 +22,19 @@ from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
 from spinepipe.studies.discrepancy.design.fisher_information import (
     CohortSignatures,
     candidates,
-    seen_in,
+    specimen_signatures,
 )
 from spinepipe.studies.discrepancy.design.testable import (
     NO_TRACE,
     OFTEN,
-    Detectable,
     Judgement,
     Typical,
     judgements,
-    summing,
+    summation,
 )
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, shape_grid
-from spinepipe.studies.discrepancy.search.screen import SIZES, Places
+from spinepipe.studies.discrepancy.search.screen import SIZES
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import NotTestable, SmallestDetectable
 
@@ -69,21 +68,13 @@ class _Target:
     size: float
     gap: float
 
-    @property
-    def effect(self) -> str:
-        """Its name."""
-        return self.form.name
-
-    @property
-    def where(self) -> tuple[PlaceSpread, int | None, str | None]:
-        """How its values differ, and the one place where it is."""
-        return self.form.spread, self.form.joint, self.form.specimen
-
-    def told_from(self, share: float, margin: float) -> float | None:
+    def leading_gap(self, share: float, margin: float) -> float | None:
         """Gap from which it leads over an effect that explains a share of it."""
         left = self.size * (1.0 - share)
         if left <= NO_TRACE:
             return None
+        # s times this target leads by a normal number of mean s^2 L / 2 and SD s sqrt(L), L = left:
+        # with probability OFTEN beyond the margin from s sqrt(L) = z + sqrt(z^2 + 2 margin) on
         often = float(norm.ppf(OFTEN))
         return self.gap * (often + float(np.sqrt(often**2 + 2.0 * margin))) / float(np.sqrt(left))
 
@@ -105,20 +96,18 @@ class Distinguishability:
     @property
     def smallest_detectable(self) -> tuple[SmallestDetectable, ...]:
         """Of all effects that the tests can show: found at all, and by their own name."""
-        return tuple(
-            SmallestDetectable(one.effect, one.detectable.gap, self._by_name(one.detectable, one))
-            for one in self.judgements
-            if one.testable and one.detectable is not None
-        )
-
-    def _by_name(self, found: Detectable, of: Judgement) -> float | None:
-        """Gap from which no other effect is as good; None where one always is."""
-        gaps = [pair.gap for pair in self.confusions if pair.effect == of.effect]
-        told = [gap for gap in gaps if gap is not None]
-        return max([found.gap, *told]) if len(told) == len(gaps) else None
+        found = []
+        for one in self.judgements:
+            if one.testable and one.detectable is not None:
+                # by name: from where no other effect is as good; None where one always is
+                gaps = [pair.gap for pair in self.confusions if pair.effect == one.effect]
+                known = [gap for gap in gaps if gap is not None]
+                by_name = max([one.detectable.gap, *known]) if len(known) == len(gaps) else None
+                found.append(SmallestDetectable(one.effect, one.detectable.gap, by_name))
+        return tuple(found)
 
 
-def told_apart(
+def distinguishability(
     grounds: BaselineFit,
     trials: Sequence[Trials],
     needed: float,
@@ -137,8 +126,8 @@ def told_apart(
     """
     joints = next(iter(grounds.fit.models.values())).n_joints
     names = list(grounds.readings)
-    seen = run.map(seen_in, [(grounds, name, trials) for name in names])
-    of = dict(zip(names, seen, strict=True))
+    each = run.map(specimen_signatures, [(grounds, name, trials) for name in names])
+    of = dict(zip(names, each, strict=True))
     design = CohortSignatures(candidates(trials, joints, grounds.tests), of)
     found = judgements(trials, of, joints, grounds.tests, needed, seed)
     pairs = confusions(design, found, margin)
@@ -159,22 +148,20 @@ def confusions(
     if len(shown) < 2:
         return ()
     targets = {number: _target(design, number, judged[number].best) for number in shown}
-    return tuple(
-        Confusion(target.effect, judged[other].effect, share, target.told_from(share, margin))
-        for other in shown
-        for target, share in zip(
-            (targets[number] for number in shown if number != other),
-            _shares(design, other, [targets[number] for number in shown if number != other]),
-            strict=True,
-        )
-    )
+    found = []
+    for other in shown:
+        others = [targets[number] for number in shown if number != other]
+        for target, share in zip(others, _shares(design, other, others), strict=True):
+            gap = target.leading_gap(share, margin)
+            found.append(Confusion(target.form.name, judged[other].effect, share, gap))
+    return tuple(found)
 
 
 def _target(design: CohortSignatures, number: int, one: Typical) -> _Target:
     start, directions = design.those.starts[number], one.directions
     made = {}
     for specimen, columns, owners in one.places:
-        onto = summing(owners, len(one.mean))
+        onto = summation(owners, len(one.mean))
         made[specimen] = design.of[specimen].left[:, start + columns] @ onto.T @ directions
     gap = float(np.sqrt(one.squared(one.refitted) / design.freedom))
     return _Target(one.form, made, one.squared(one.left), gap)
@@ -185,13 +172,17 @@ def _shares(design: CohortSignatures, other: int, targets: Sequence[_Target]) ->
     forms = design.those.trials[other].forms
     best = np.zeros(len(targets))
     for form in forms:
-        place = form.spread, form.joint, form.specimen
+        # a form of one place competes only with targets of that very place
         usual = form.spread in FREE or not any(one.spread in FREE for one in forms)
-        at = [number for number, one in enumerate(targets) if usual or place == one.where]
+        at = [n for n, one in enumerate(targets) if usual or _place(one.form) == _place(form)]
         for sds in shape_grid(form.variant) if at else ():
             told = _explained(design, other, form, sds, [targets[number] for number in at])
             best[at] = np.maximum(best[at], told)
     return [float(share) for share in np.clip(best, 0.0, 1.0)]
+
+
+def _place(form: CandidateForm) -> tuple[PlaceSpread, int | None, str | None]:
+    return form.spread, form.joint, form.specimen
 
 
 def _explained(
@@ -201,34 +192,31 @@ def _explained(
     sds: tuple[float, ...],
     targets: Sequence[_Target],
 ) -> Array:
+    """Share of each target that a form of effect ``other`` explains: ridge regression on it."""
     index, start = design.those.indices[other], design.those.starts[other]
     places, strengths = index.places(form, sds, tuple(design.of), design.those.tests)
-    gram, moments = _products(design, start, places, len(strengths), targets)
+    count = len(strengths)
+
+    # F'F (k, k), and F'a (k, d) of each target
+    gram = np.zeros((count, count))
+    widths = [next(iter(target.made.values())).shape[1] for target in targets]
+    moments = [np.zeros((count, width)) for width in widths]
+    for specimen, columns, owners in places:
+        onto, mine = summation(owners, count), start + columns
+        gram += onto @ design.of[specimen].left[np.ix_(mine, mine)] @ onto.T
+        for moment, target in zip(moments, targets, strict=True):
+            if specimen in target.made:
+                moment += onto @ target.made[specimen][mine]
+
     prior = np.eye(len(gram)) / SIZES[-1] ** 2
     solution = np.linalg.solve(gram + prior, np.concatenate(moments, axis=1))
-    ends = np.cumsum([m.shape[1] for m in moments])[:-1]
+    ends = np.cumsum(widths)[:-1]
     return np.array(
         [
             float(np.sum(m * x)) / target.size
             for target, m, x in zip(targets, moments, np.split(solution, ends, axis=1), strict=True)
         ]
     )
-
-
-def _products(
-    design: CohortSignatures, start: int, places: Places, count: int, targets: Sequence[_Target]
-) -> tuple[Array, list[Array]]:
-    """F'F (k, k), and F'a (k, d) of each target."""
-    gram = np.zeros((count, count))
-    widths = [next(iter(target.made.values())).shape[1] for target in targets]
-    moments = [np.zeros((count, width)) for width in widths]
-    for specimen, columns, owners in places:
-        onto, mine = summing(owners, count), start + columns
-        gram += onto @ design.of[specimen].left[np.ix_(mine, mine)] @ onto.T
-        for moment, target in zip(moments, targets, strict=True):
-            if specimen in target.made:
-                moment += onto @ target.made[specimen][mine]
-    return gram, moments
 
 
 def families(found: Sequence[Confusion]) -> tuple[tuple[str, ...], ...]:

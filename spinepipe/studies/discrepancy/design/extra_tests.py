@@ -6,18 +6,14 @@ model of one specimen, which stands for all. The first that shows an effect clea
 do; if none does, the first that shows it at all.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, RefusedModel
-from spinepipe.studies.discrepancy.design.fisher_information import (
-    SpecimenSignatures,
-    candidates,
-    seen,
-)
+from spinepipe.studies.discrepancy.design.fisher_information import candidates, signature_products
 from spinepipe.studies.discrepancy.design.plans import (
     HELD_S,
     LARGER,
@@ -25,25 +21,23 @@ from spinepipe.studies.discrepancy.design.plans import (
     SLOWER,
     STEP_S,
     Plan,
-    PlannedTest,
-    as_made,
     at_times,
-    back_down,
-    comes_back,
     has_times,
-    largest_held,
     peak,
-    scaled,
+    plan_of_readings,
+    scale_loads,
     summed_loads,
-    thinned,
+    thin_steps,
     times,
+    unloads,
+    with_hold,
     with_preloads,
+    with_unloading,
 )
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
 from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_parameters
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
-from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.whitening import whitening, with_nuisances
@@ -88,8 +82,8 @@ class Bench:
         model, free = g.fit.models[self.specimen], g.start.base[self.specimen]
         alike = all(len(p.rows) == len(model.effects[p.effect].values) for p in free)
         grouping = PER_SPECIMEN if alike else "per_joint"
-        own = as_made(g.readings[self.specimen], g.noise.zeroed, grouping)
-        return thinned(own, MOST_STEPS)
+        own = plan_of_readings(g.readings[self.specimen], g.noise.zeroed, grouping)
+        return thin_steps(own, MOST_STEPS)
 
 
 def not_testable(
@@ -107,7 +101,7 @@ def not_testable(
     for addition in MENU:
         left = [one for one in trials if one.effect in hidden and one.effect not in clear]
         plan = addition.to(place.plan) if left else None
-        for one in [] if plan is None else judged_under(place, plan, left, needed, seed):
+        for one in [] if plan is None else judge_plan(place, plan, left, needed, seed):
             if one.clear:
                 clear[one.effect] = addition.words
             elif one.testable:
@@ -127,96 +121,64 @@ def bench(grounds: BaselineFit, declared: Array | None) -> Bench:
     return Bench(grounds, specimen, sd)
 
 
-def judged_under(
+def judge_plan(
     place: Bench, plan: Plan, trials: Sequence[Trials], needed: float, seed: int
 ) -> tuple[Judgement, ...]:
     """What a plan could tell of effects, done on all specimens; empty where it has no pose."""
+    grounds = place.grounds
     tests = tuple(dict.fromkeys(one.case.test for one in plan.tests))
-    joints = place.grounds.fit.models[place.specimen].n_joints
-    try:
-        one = seen_under(place, plan, trials, tests)
-    except (NoEquilibrium, RefusedModel):
-        return ()
-    of: Mapping[str, SpecimenSignatures] = dict.fromkeys(place.grounds.readings, one)
-    return judgements(trials, of, joints, tests, needed, seed)
-
-
-def seen_under(
-    place: Bench, plan: Plan, trials: Sequence[Trials], tests: Sequence[str]
-) -> SpecimenSignatures:
-    """What a plan would see on the bench.
-
-    Raises
-    ------
-    NoEquilibrium
-        When a load step has no stable pose.
-    """
-    model = with_preloads(place.grounds.fit.models[place.specimen], plan.tests)
-    repeats = plan.repeats()
     read = np.any([one.count.any(axis=0) for one in plan.tests], axis=0)
     names = [name for name, there in zip(COORDINATES, read, strict=True) if there]
-    solved = SolvedSpecimen(model, [one.case for one in plan.tests], plan.zeroed)
-    plain = whitening(repeats, _noise(place, plan, read))
-    white = with_nuisances(plain, nuisance_signatures(solved, place.grounds.priors, names))
-    free = base_parameters(model, plan.grouping, names)
-    return seen(solved, free, plain, white, candidates(trials, model.n_joints, tests))
-
-
-def _noise(place: Bench, plan: Plan, read: Array) -> Noise:
     sd = np.where(read, place.sd, np.nan)
-    return replace(place.grounds.noise, sd=sd, zeroed=plan.zeroed)
+    plain = whitening(plan.repeats(), replace(grounds.noise, sd=sd, zeroed=plan.zeroed))
+    try:
+        model = with_preloads(grounds.fit.models[place.specimen], plan.tests)
+        solved = SolvedSpecimen(model, [one.case for one in plan.tests], plan.zeroed)
+        white = with_nuisances(plain, nuisance_signatures(solved, grounds.priors, names))
+        free = base_parameters(model, plan.grouping, names)
+        those = candidates(trials, model.n_joints, tests)
+        one = signature_products(solved, free, plain, white, those)
+    except (NoEquilibrium, RefusedModel):
+        return ()
+    of = dict.fromkeys(grounds.readings, one)
+    return judgements(trials, of, model.n_joints, tests, needed, seed)
 
 
 def _translations_too(plan: Plan) -> Plan | None:
     if all(one.count[:, :3].any() for one in plan.tests):
         return None
-    return replace(plan, tests=tuple(map(_with_translations, plan.tests)))
+    tests = []
+    for one in plan.tests:
+        count: Indices = one.count.copy()
+        count[:, :3] = one.count.max(axis=1, keepdims=True)
+        tests.append(replace(one, count=count))
+    return replace(plan, tests=tuple(tests))
 
 
-def _with_translations(one: PlannedTest) -> PlannedTest:
-    count: Indices = one.count.copy()
-    count[:, :3] = one.count.max(axis=1, keepdims=True)
-    return replace(one, count=count)
+def _each(
+    change: Callable[[LoadCase], LoadCase], unless: Callable[[LoadCase], bool] | None = None
+) -> Callable[[Plan], Plan | None]:
+    """A change of every test of a plan, unless all of them have it."""
 
+    def to(plan: Plan) -> Plan | None:
+        if unless is not None and all(unless(one.case) for one in plan.tests):
+            return None
+        tests = tuple(replace(one, case=change(one.case)) for one in plan.tests)
+        return replace(plan, tests=tests)
 
-def _not_zeroed(plan: Plan) -> Plan | None:
-    return replace(plan, zeroed=False) if plan.zeroed else None
-
-
-def _timed(plan: Plan) -> Plan | None:
-    if all(has_times(one.case) for one in plan.tests):
-        return None
-    return _each(plan, lambda case: at_times(case, times(case)))
-
-
-def _each(plan: Plan, change: Callable[[LoadCase], LoadCase]) -> Plan:
-    tests = tuple(replace(one, case=change(one.case)) for one in plan.tests)
-    return replace(plan, tests=tests)
-
-
-def _unloaded(plan: Plan) -> Plan | None:
-    if all(comes_back(one.case) for one in plan.tests):
-        return None
-    return _each(plan, back_down)
+    return to
 
 
 def _opposite(plan: Plan) -> Plan | None:
     loads = [load for one in plan.tests for load in summed_loads(one.case)]
-    missing = [
-        one.renamed(replace(scaled(one.case, -1.0), test=f"{one.case.test}, opposite"))
-        for one in plan.tests
-        if not any(_is_opposite(load, peak(one.case)) for load in loads)
-    ]
+    missing = []
+    for one in plan.tests:
+        # opposite: a load (6,) with at least half of the largest one, turned round
+        largest = peak(one.case)
+        if not any(-(load @ largest) >= 0.5 * (largest @ largest) > 0.0 for load in loads):
+            case = replace(scale_loads(one.case, -1.0), test=f"{one.case.test}, opposite")
+            missing.append(one.renamed(case))
     return replace(plan, tests=(*plan.tests, *missing)) if missing else None
-
-
-def _is_opposite(load: Array, largest: Array) -> bool:
-    """Whether a load (6,) has at least half of the largest one, turned round."""
-    return bool(-(load @ largest) >= 0.5 * (largest @ largest) > 0.0)
-
-
-def _larger(plan: Plan) -> Plan | None:
-    return _each(plan, lambda case: scaled(case, LARGER))
 
 
 def _preloaded(plan: Plan) -> Plan | None:
@@ -227,28 +189,38 @@ def _preloaded(plan: Plan) -> Plan | None:
     return replace(plan, tests=(*plan.tests, *again))
 
 
-def _held(plan: Plan) -> Plan | None:
-    return _each(plan, largest_held)
-
-
-def _slower(plan: Plan) -> Plan | None:
-    return _each(plan, lambda case: at_times(case, [SLOWER * time for time in times(case)]))
-
-
-def _shared_base(plan: Plan) -> Plan | None:
-    return None if plan.grouping == PER_SPECIMEN else replace(plan, grouping=PER_SPECIMEN)
-
-
 MENU = (
     Addition("translations read as well", _translations_too),
-    Addition("readings kept as they are, not zeroed at step 0", _not_zeroed),
-    Addition(f"times recorded, {STEP_S:g} s from load step to load step", _timed),
-    Addition("unloading steps added: the same loads back down", _unloaded),
+    Addition(
+        "readings kept as they are, not zeroed at step 0",
+        lambda plan: replace(plan, zeroed=False) if plan.zeroed else None,
+    ),
+    Addition(
+        f"times recorded, {STEP_S:g} s from load step to load step",
+        _each(lambda case: at_times(case, times(case)), unless=has_times),
+    ),
+    Addition(
+        "unloading steps added: the same loads back down", _each(with_unloading, unless=unloads)
+    ),
     Addition("the same loads in the opposite direction as well", _opposite),
-    Addition(f"loads {LARGER:g} times as large", _larger),
+    Addition(
+        f"loads {LARGER:g} times as large",
+        _each(lambda case: scale_loads(case, LARGER)),
+    ),
     Addition(f"every test once more under a follower load of {PRELOAD_N:g} N", _preloaded),
-    Addition(f"the largest load held for {HELD_S[-1] / 60:g} min, read along the way", _held),
-    Addition(f"{SLOWER:g} times as long between load steps, times recorded", _slower),
-    Addition("no other test, but a base that shares stiffness: per_specimen", _shared_base),
+    Addition(
+        f"the largest load held for {HELD_S[-1] / 60:g} min, read along the way",
+        _each(with_hold),
+    ),
+    Addition(
+        f"{SLOWER:g} times as long between load steps, times recorded",
+        _each(lambda case: at_times(case, [SLOWER * time for time in times(case)])),
+    ),
+    Addition(
+        "no other test, but a base that shares stiffness: per_specimen",
+        lambda plan: (
+            replace(plan, grouping=PER_SPECIMEN) if plan.grouping != PER_SPECIMEN else None
+        ),
+    ),
 )
 """In order of effort."""

@@ -1,7 +1,8 @@
 """What a design of tests sees of the effects: products of their signatures, no residual used.
 
-Signatures are those of effects switched on a little in the base model (see `signatures`). They
-are seen three times: in noise SD alone, with the base refitted, and with nuisances beside it.
+Signatures are those of effects switched on a little in the base model (see `signatures`). Their
+products are taken three times: in noise SD alone, with the base refitted, and with nuisances
+beside it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,10 +46,6 @@ class Candidates:
         """Columns of all effects."""
         return tuple(column for index in self.indices for column in index.columns)
 
-    def slice(self, number: int) -> slice:
-        """Columns of an effect among all."""
-        return slice(self.starts[number], self.starts[number + 1])
-
 
 def candidates(trials: Sequence[Trials], joints: int, tests: Sequence[str]) -> Candidates:
     """Columns of effects in a chain of that many joints."""
@@ -74,7 +71,7 @@ class SpecimenSignatures:
     freedom: int
 
 
-def seen(
+def signature_products(
     solved: SolvedSpecimen,
     free: Sequence[FreeParameter],
     plain: Whitening,
@@ -88,29 +85,34 @@ def seen(
     free : base parameters that are fitted. plain, white : without and with nuisances.
     """
     base = plain.noise_only(solved.by(solved.model, free))
-    bases = orthonormal(base), orthonormal(white.shortened(base))
+    alone, beside_nuisances = orthonormal(base), orthonormal(white.shortened(base))
     raw, refitted, left = [], [], []
     groups = [index.columns for index in those.indices]
     for signature in signatures_of_each(solved, groups):
         moved = plain.noise_only(signature)
         raw.append(moved.T @ moved)
-        rest = _without(bases[0], moved)
+        rest = moved - alone @ (alone.T @ moved)
         refitted.append(rest.T @ rest)
-        rest = _without(bases[1], white.shortened(moved))
+        white_moved = white.shortened(moved)
+        rest = white_moved - beside_nuisances @ (beside_nuisances.T @ white_moved)
+        # what is left by rounding alone counts as nothing
         gone = np.sum(rest**2, axis=0) <= UNSEEN * np.diagonal(raw[-1])
         left.append(np.where(gone, 0.0, rest))
     together = np.concatenate(left, axis=1)
-    freedom = plain.count - bases[0].shape[1]
+    freedom = plain.count - alone.shape[1]
     return SpecimenSignatures(tuple(raw), tuple(refitted), together.T @ together, freedom)
 
 
-def seen_in(grounds: BaselineFit, specimen: str, trials: Sequence[Trials]) -> SpecimenSignatures:
+def specimen_signatures(
+    grounds: BaselineFit, specimen: str, trials: Sequence[Trials]
+) -> SpecimenSignatures:
     """What the tests of a specimen see, at the base fit."""
     model = grounds.fit.models[specimen]
     solved = SolvedSpecimen(model, grounds.readings[specimen].cases, grounds.noise.zeroed)
     white = grounds.setting.whitenings[specimen]
     those = candidates(trials, model.n_joints, grounds.tests)
-    return seen(solved, grounds.start.base[specimen], grounds.plain[specimen], white, those)
+    free = grounds.start.base[specimen]
+    return signature_products(solved, free, grounds.plain[specimen], white, those)
 
 
 def orthonormal(columns: Array) -> Array:
@@ -118,11 +120,6 @@ def orthonormal(columns: Array) -> Array:
     sizes = np.linalg.norm(columns, axis=0)
     there = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
     return orth(there, rcond=SEEN) if there.size else np.zeros((len(columns), 0))
-
-
-def _without(basis: Array, columns: Array) -> Array:
-    result: Array = columns - basis @ (basis.T @ columns)
-    return result
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class MaskedEffects:
     needed: float | None
 
 
-def withheld(
+def masked_effects(
     grounds: BaselineFit,
     trials: Sequence[Trials],
     threshold: float,
@@ -81,7 +81,9 @@ def withheld(
     kinds = kinds_of(grounds)
     if not kinds:
         return ()
-    without = run(look, narrowed(grounds, dict.fromkeys(kinds, 0.0)), trials, 0, 0.0, 0, threshold)
+    without = run(
+        look, with_narrower_priors(grounds, dict.fromkeys(kinds, 0.0)), trials, 0, 0.0, 0, threshold
+    )
     by_name = {one.effect: one for one in trials}
     most = without.effects[0].log_evidence
     return tuple(
@@ -109,11 +111,12 @@ def _hidden(
     for kind, (prior, unit) in kinds.items():
 
         def at(factor: float, kind: str = kind) -> float:
-            return evidence.under(narrowed(grounds, {kind: factor}))
+            return evidence.under(with_narrower_priors(grounds, {kind: factor}))
 
         told = {factor: at(factor) for factor in FACTORS}
         needed = None
         if told[0.0] > threshold:
+            # evidence falls with the prior SD: above the threshold at 0, below at 1 (Brent)
             root = float(brentq(lambda f, at=at: at(f) - threshold, 0.0, 1.0, xtol=5e-3))
             needed = root if root > AS_GOOD_AS_KNOWN else None
         found.append(
@@ -129,12 +132,13 @@ def kinds_of(grounds: BaselineFit) -> dict[str, tuple[float, str]]:
     return {one.kind: (one.sd, one.unit) for one in labels}
 
 
-def narrowed(grounds: BaselineFit, factors: Mapping[str, float]) -> BaselineFit:
+def with_narrower_priors(grounds: BaselineFit, factors: Mapping[str, float]) -> BaselineFit:
     """The grounds with prior SDs of some kinds of imperfections times a factor; the fit stays."""
     whitenings, residuals, jacobians = {}, {}, {}
     for name, white in grounds.setting.whitenings.items():
         by_column = np.array([factors.get(one.kind, 1.0) for one in labels_of(grounds, name)])
         narrow = rescaled(white, by_column)
+        # residuals are whitened by the old covariance: back to noise SD, then by the new one
         whitenings[name] = narrow
         residuals[name] = narrow.shortened(white.lengthened(grounds.fit.residuals[name]))
         jacobians[name] = narrow.shortened(white.lengthened(grounds.fit.jacobians[name]))

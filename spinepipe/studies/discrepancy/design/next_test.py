@@ -1,8 +1,11 @@
 """Which test next: what each run of the menu would add to the evidence, for this very cohort.
 
-To first order at the fit: the log evidence by which a model is expected to fall behind another is
-half the noncentrality of what the other predicts beyond it (see `expected`), with the readings that
-are there and with one more run of every specimen that shows a difference.
+Were another model true, the readings would differ by d from what a fitted model says. The fitted
+one may move its unknowns x (J, weak priors) and nuisances z (U, prior SD one) towards them. What
+stays, ``min |d - J x - U z|^2 + |z|^2 + priors``, is the noncentrality of its chi2: twice the log
+evidence by which it is expected to fall behind, to first order at the fit. A run's gain is what its
+readings, put below those that are there, add to that half; every specimen that shows a difference
+makes it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,16 +15,14 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
-from spinepipe.studies.discrepancy.design.expected import (
-    ExpectedReadings,
-    Key,
-    Sums,
-    key_of,
-    noncentrality,
-)
 from spinepipe.studies.discrepancy.design.extra_tests import Bench
 from spinepipe.studies.discrepancy.design.patterns import Pattern, RivalFits
-from spinepipe.studies.discrepancy.design.plans import Plan, as_made, thinned, with_preloads
+from spinepipe.studies.discrepancy.design.plans import (
+    Plan,
+    plan_of_readings,
+    thin_steps,
+    with_preloads,
+)
 from spinepipe.studies.discrepancy.design.runs import ExtraCycle, runs
 from spinepipe.studies.discrepancy.search.base import (
     PER_SPECIMEN,
@@ -31,10 +32,14 @@ from spinepipe.studies.discrepancy.search.base import (
 from spinepipe.studies.discrepancy.search.hypothesis import LOG_STIFFNESS_SD
 from spinepipe.studies.discrepancy.search.imperfections import labels_of
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
-from spinepipe.studies.discrepancy.search.nuisance import nuisance_labels, nuisance_signatures
+from spinepipe.studies.discrepancy.search.nuisance import (
+    Label,
+    nuisance_labels,
+    nuisance_signatures,
+)
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import EVERY_TEST
-from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.search.readings import Repeats
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.whitening import Whitening, joined, whitening
 from spinepipe.units import COORDINATES, subtract_baseline
@@ -47,6 +52,90 @@ MOST_STEPS = 25
 
 SHOWS = 1e-3
 """Of the largest squared difference of a specimen: one with less does not need the run."""
+
+
+Key = tuple[str, str, int | None, str]
+"""What a nuisance is of; the same in all runs of one set-up."""
+
+
+def key_of(label: Label) -> Key:
+    """Kind, component, joint and test."""
+    return label.kind, label.component, label.joint, label.test
+
+
+@dataclass(frozen=True)
+class ExpectedReadings:
+    """Readings in noise SDs: difference d (N,), by unknowns J (N, m), by nuisances U (N, K).
+
+    ``keys`` (K,): what each nuisance is of.
+    """
+
+    difference: Array
+    by_unknowns: Array
+    moves: Array
+    keys: tuple[Key, ...]
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Products of a specimen's rows: all that is needed of them.
+
+    Attributes
+    ----------
+    uu : (K, K) U'U. uj : (K, m) U'J. ud : (K,) U'd. jj, jd, dd : J'J, J'd, d'd.
+    """
+
+    keys: tuple[Key, ...]
+    uu: Array
+    uj: Array
+    ud: Array
+    jj: Array
+    jd: Array
+    dd: float
+
+    @classmethod
+    def of(cls, rows: ExpectedReadings) -> "Sums":
+        """Products of some rows."""
+        u, j, d = rows.moves, rows.by_unknowns, rows.difference
+        return cls(rows.keys, u.T @ u, u.T @ j, u.T @ d, j.T @ j, j.T @ d, float(d @ d))
+
+    def plus(self, other: "Sums") -> "Sums":
+        """Rows of both; nuisances of one key are one."""
+        keys = tuple(dict.fromkeys((*self.keys, *other.keys)))
+        a, b = self._among(keys), other._among(keys)
+        return Sums(
+            keys, a.uu + b.uu, a.uj + b.uj, a.ud + b.ud, a.jj + b.jj, a.jd + b.jd, a.dd + b.dd
+        )
+
+    def _among(self, keys: Sequence[Key]) -> "Sums":
+        """The same by these keys, those of its own among them."""
+        onto = np.zeros((len(keys), len(self.keys)))
+        place = {key: number for number, key in enumerate(keys)}
+        onto[[place[key] for key in self.keys], np.arange(len(self.keys))] = 1.0
+        uu, uj, ud = onto @ self.uu @ onto.T, onto @ self.uj, onto @ self.ud
+        return Sums(tuple(keys), uu, uj, ud, self.jj, self.jd, self.dd)
+
+    @property
+    def without_nuisances(self) -> tuple[Array, Array, float]:
+        """J'WJ (m, m), J'Wd (m,) and d'Wd with W the inverse of I + UU' (Woodbury)."""
+        inside = np.eye(len(self.keys)) + self.uu
+        solved = np.linalg.solve(inside, np.column_stack([self.uj, self.ud]))
+        of_j, of_d = solved[:, :-1], solved[:, -1]
+        return (
+            self.jj - self.uj.T @ of_j,
+            self.jd - self.uj.T @ of_d,
+            self.dd - float(self.ud @ of_d),
+        )
+
+
+def noncentrality(of: Mapping[str, Sums], prior_sds: Array) -> float:
+    """What all specimens together leave between the models; unknowns (m,) are common to all."""
+    # generalised least squares: the unknowns' normal equations, summed over specimens
+    parts = [one.without_nuisances for one in of.values()]
+    jj = np.sum([part[0] for part in parts], axis=0) + np.diag(prior_sds**-2.0)
+    jd = np.sum([part[1] for part in parts], axis=0)
+    dd = sum(part[2] for part in parts)
+    return max(0.0, dd - float(jd @ np.linalg.solve(jj, jd))) if len(jd) else max(0.0, dd)
 
 
 @dataclass(frozen=True)
@@ -77,25 +166,27 @@ def offers(patterns: Sequence[Pattern], place: Bench) -> list[Offer]:
     patterns : each model against the other, with equal probability to be true; one pattern where a
         model is asked for what it lacks. place : SDs of readings that were not made.
     """
-    tried = [_Tried.of(one, place) for one in patterns]
-    menu = dict.fromkeys(words for one in tried for words, _ in one.added)
-    found = [_offer(words, tried) for words in menu]
+    tried = [TriedRuns.of(one, place) for one in patterns]
+    cycles = max((len(one.showing) for one in tried), default=0)
+    found = []
+    for words in dict.fromkeys(words for one in tried for words, _ in one.added):
+        gains, trouble = [], ""
+        for one in tried:
+            try:
+                gains.append(one.gain(words))
+            except NoPose as why:
+                trouble = trouble or str(why)
+        gain = None if trouble else float(np.mean(gains))
+        found.append(Offer(words, cycles, gain, trouble))
     return sorted(found, key=lambda one: (-one.per_cycle, one.words))
 
 
-def _offer(words: str, tried: Sequence["_Tried"]) -> Offer:
-    cycles = max(len(one.showing) for one in tried)
-    gains = [one.gain(words) for one in tried]
-    trouble = next((gain for gain in gains if isinstance(gain, str)), None)
-    if trouble is not None:
-        return Offer(words, cycles, None, trouble)
-    return Offer(
-        words, cycles, float(np.mean([gain for gain in gains if not isinstance(gain, str)]))
-    )
+class NoPose(RuntimeError):
+    """A run in which a model has no pose; the message says why."""
 
 
 @dataclass(frozen=True)
-class _Tried:
+class TriedRuns:
     """A pattern with the products of the readings that are there, and of those of each run.
 
     Attributes
@@ -112,7 +203,7 @@ class _Tried:
     added: Mapping[tuple[str, str], Sums | str]
 
     @classmethod
-    def of(cls, pattern: Pattern, place: Bench) -> "_Tried":
+    def of(cls, pattern: Pattern, place: Bench) -> "TriedRuns":
         """Try all runs of the menu."""
         there = {name: Sums.of(_rows(pattern, name)) for name in pattern.grounds.readings}
         sizes = {name: one.without_nuisances[2] for name, one in there.items()}
@@ -127,15 +218,19 @@ class _Tried:
         }
         return cls(pattern, there, tuple(showing), whole / tried if tried else 1.0, added)
 
-    def gain(self, words: str) -> float | str:
-        """Half the noncentrality that a run adds in all specimens that show a difference, or why
-        it has none.
+    def gain(self, words: str) -> float:
+        """Half the noncentrality that a run adds in all specimens that show a difference.
+
+        Raises
+        ------
+        NoPose
+            Where a specimen has none in it.
         """
         more = dict(self.there)
         for (run, name), sums in self.added.items():
             if run == words:
                 if isinstance(sums, str):
-                    return sums
+                    raise NoPose(sums)
                 more[name] = more[name].plus(sums)
         sds = np.array([u.sd for u in self.pattern.fit.hypothesis.unknowns])
         gained = noncentrality(more, sds) - noncentrality(self.there, sds)
@@ -159,25 +254,20 @@ def _added(
     for run in menu:
         read = run.test.count.any(axis=0).tobytes()
         groups.setdefault((run.test.preload, read), []).append(run)
-    for group in groups.values():
-        yield from _together(pattern, place, name, group)
-
-
-def _together(
-    pattern: Pattern, place: Bench, name: str, group: Sequence[ExtraCycle]
-) -> Iterator[tuple[ExtraCycle, Sums | str]]:
-    """Of runs in one stack; where one has no pose, in ever smaller ones."""
-    try:
-        rows = _solved(pattern, place, name, group)
-    except (NoEquilibrium, RefusedModel) as trouble:
-        if len(group) == 1:
-            yield group[0], str(trouble)
-            return
-        middle = len(group) // 2
-        for part in (group[:middle], group[middle:]):
-            yield from _together(pattern, place, name, part)
-        return
-    yield from ((run, Sums.of(one)) for run, one in zip(group, rows, strict=True))
+    waiting = list(groups.values())[::-1]
+    while waiting:
+        group = waiting.pop()
+        try:
+            rows = _solved(pattern, place, name, group)
+        except (NoEquilibrium, RefusedModel) as trouble:
+            # where one of a stack has no pose, it is found by halving the stack
+            if len(group) == 1:
+                yield group[0], str(trouble)
+            else:
+                middle = len(group) // 2
+                waiting += [group[middle:], group[:middle]]
+        else:
+            yield from ((run, Sums.of(one)) for run, one in zip(group, rows, strict=True))
 
 
 def _solved(
@@ -227,11 +317,12 @@ def _nuisances(
 def _among_all(fit: JointFit, name: str, own: Array) -> Array:
     """(N, m) derivatives by all unknowns of those by a specimen's own."""
     whole = np.zeros((len(own), len(fit.x)))
+    # added, not set: several of a specimen's own parameters may be one unknown
     np.add.at(whole.T, np.array(fit.hypothesis.members[name].numbers), own.T)
     return whole
 
 
-def left_apart(pattern: RivalFits, place: Bench, words: str | None) -> float | None:
+def remaining_chi2(pattern: RivalFits, place: Bench, words: str | None) -> float | None:
     """chi2 and priors that stay between the models, the fitted one refitted to the other.
 
     A model of many shapes bends further than its tangent.
@@ -245,14 +336,19 @@ def left_apart(pattern: RivalFits, place: Bench, words: str | None) -> float | N
         name: next((run for run in _menu(place, name) if run.words == words), None)
         for name in (g.readings if words is not None else ())
     }
+    # the other model's predictions take the place of the readings, without noise
     readings, whitenings = {}, {}
     for name, one in g.readings.items():
-        tests = [_as_predicted(t, q) for t, q in _pairs(one, pattern.other.predicted[name])]
+        pairs = zip(one.tests, pattern.other.predicted[name], strict=True)
+        tests = [_as_predicted(test, predicted) for test, predicted in pairs]
         white, run = g.setting.whitenings[name], added.get(name)
         if run is not None:
             if run.zeroed != g.noise.zeroed or run.test.preload:
                 return None
-            tests.append(_run_as_predicted(pattern, name, run))
+            model, case = pattern.other.models[name], run.test.case
+            predicted = Simulated(model, [case], run.zeroed, ()).at(np.zeros(0)).readings[0]
+            (planned,) = Plan((run.test,), run.zeroed, PER_SPECIMEN).repeats()
+            tests.append(_as_predicted(planned, predicted))
             white = _white_with(pattern, place, name, run, white)
         readings[name] = replace(one, tests=tuple(tests))
         whitenings[name] = white
@@ -264,19 +360,8 @@ def left_apart(pattern: RivalFits, place: Bench, words: str | None) -> float | N
     return fit.chi2 + float(np.sum(np.square(away)))
 
 
-def _pairs(one: SpecimenReadings, predicted: Sequence[Array]) -> Iterator[tuple[Repeats, Array]]:
-    return zip(one.tests, predicted, strict=True)
-
-
 def _as_predicted(test: Repeats, predicted: Array) -> Repeats:
     return replace(test, cycles=np.where(np.isfinite(test.cycles), predicted, np.nan))
-
-
-def _run_as_predicted(pattern: RivalFits, name: str, run: ExtraCycle) -> Repeats:
-    model, case = pattern.other.models[name], run.test.case
-    predicted = Simulated(model, [case], run.zeroed, ()).at(np.zeros(0)).readings[0]
-    (planned,) = Plan((run.test,), run.zeroed, PER_SPECIMEN).repeats()
-    return _as_predicted(planned, predicted)
 
 
 def _white_with(
@@ -301,5 +386,5 @@ def _whitening(place: Bench, run: ExtraCycle) -> Whitening:
 
 def _menu(place: Bench, name: str) -> list[ExtraCycle]:
     g = place.grounds
-    plan = as_made(g.readings[name], g.noise.zeroed, PER_SPECIMEN)
-    return runs(thinned(plan, MOST_STEPS).tests, g.noise.zeroed)
+    plan = plan_of_readings(g.readings[name], g.noise.zeroed, PER_SPECIMEN)
+    return runs(thin_steps(plan, MOST_STEPS).tests, g.noise.zeroed)

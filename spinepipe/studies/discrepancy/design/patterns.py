@@ -4,7 +4,7 @@ A pattern belongs to a fit of the other model. It is the difference of two fits,
 effect or of generic terms times the strengths that the readings suggest, less what noise makes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,7 +19,6 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFitTest, Term, generic_columns
 from spinepipe.studies.discrepancy.search.prediction import Simulated, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.projected import (
-    VariantColumn,
     linearised,
     products,
     signatures,
@@ -27,6 +26,9 @@ from spinepipe.studies.discrepancy.search.projected import (
 )
 from spinepipe.studies.discrepancy.search.screen import Group, summed
 from spinepipe.studies.discrepancy.search.search_state import linearised_for
+
+ModelChange = Callable[[SpineModel], SpineModel]
+"""What a run does to a model, such as a preload."""
 
 
 class Pattern(Protocol):
@@ -42,7 +44,7 @@ class Pattern(Protocol):
         ...
 
     def under(
-        self, specimen: str, changed: "ModelChange", cases: Sequence[LoadCase]
+        self, specimen: str, changed: ModelChange, cases: Sequence[LoadCase]
     ) -> Sequence[Array]:
         """(T, J, 6) m and rad in each run, not zeroed, of the specimen's models as changed.
 
@@ -52,12 +54,6 @@ class Pattern(Protocol):
             When a load step has no stable pose.
         """
         ...
-
-
-class ModelChange(Protocol):
-    """What a run does to a model, such as a preload."""
-
-    def __call__(self, model: SpineModel) -> SpineModel: ...
 
 
 @dataclass(frozen=True)
@@ -85,38 +81,42 @@ class RivalFits:
 
 
 @dataclass(frozen=True)
-class Strengths:
-    """An effect beside the grounds' fit, to first order; ``weights`` (m,) by specimen."""
+class TangentPattern:
+    """Terms beside the grounds' fit, to first order.
+
+    Attributes
+    ----------
+    columns : (T, J, 6, m) per test by the terms, of a specimen's model: on its own cases as they
+        were read, or, with a change of the model, in cases that are not zeroed.
+    weights : (m,) by specimen.
+    """
 
     grounds: BaselineFit
-    columns: tuple[VariantColumn, ...]
+    columns: Callable[[str, ModelChange | None, Sequence[LoadCase]], Sequence[Array]]
     weights: Mapping[str, Array]
 
     @property
     def fit(self) -> JointFit:
-        """Of the model that lacks it."""
+        """Of the model that lacks the terms."""
         return self.grounds.fit
 
     def there(self, specimen: str) -> Array:
-        """Signatures on the readings."""
+        """The terms on the readings."""
         g, weights = self.grounds, self.weights[specimen]
-        solved = SolvedSpecimen(
-            self.fit.models[specimen], g.readings[specimen].cases, g.noise.zeroed
-        )
-        moved = [one @ weights for one in signatures(solved, self.columns)]
-        return g.plain[specimen].noise_only(moved)
+        moved = self.columns(specimen, None, g.readings[specimen].cases)
+        return g.plain[specimen].noise_only([one @ weights for one in moved])
 
     def under(
         self, specimen: str, changed: ModelChange, cases: Sequence[LoadCase]
     ) -> Sequence[Array]:
-        """Signatures in each run."""
-        solved = SolvedSpecimen(changed(self.fit.models[specimen]), cases, False)
-        return [one @ self.weights[specimen] for one in signatures(solved, self.columns)]
+        """The terms in each run."""
+        weights = self.weights[specimen]
+        return [one @ weights for one in self.columns(specimen, changed, cases)]
 
 
 def strengths(
     grounds: BaselineFit, trials: Trials, form: CandidateForm, sds: tuple[float, ...]
-) -> Strengths:
+) -> TangentPattern:
     """A form at one shape, as strong as the readings suggest."""
     alone = Trials(trials.effect, (form.variant,), (form,))
     ((index, problem),) = linearised_for(grounds, [alone], 0, 0)
@@ -126,11 +126,23 @@ def strengths(
     weights = {name: np.zeros(len(index.columns)) for name in specimens}
     for name, columns, owners in index.places(form, sds, specimens, grounds.tests)[0]:
         np.add.at(weights[name], columns, estimate[owners])
-    return Strengths(grounds, index.columns, weights)
+
+    def signatures_of(
+        specimen: str, changed: ModelChange | None, cases: Sequence[LoadCase]
+    ) -> Sequence[Array]:
+        model = grounds.fit.models[specimen]
+        if changed is None:
+            return signatures(SolvedSpecimen(model, cases, grounds.noise.zeroed), index.columns)
+        return signatures(SolvedSpecimen(changed(model), cases, False), index.columns)
+
+    return TangentPattern(grounds, signatures_of, weights)
 
 
 def _beyond_noise(group: Group, gram: Array, moments: Array) -> Array:
-    """(k,) strengths that explain most, less the share that so many explain of noise alone."""
+    """(k,) strengths that explain most, less the share that so many explain of noise alone.
+
+    Each free strength explains one unit of chi2 by chance, so that much is taken off its square.
+    """
     estimate = group.estimate(moments)
     explained = float(2.0 * estimate @ moments - estimate @ gram @ estimate)
     free = float(np.sum(group.eigenvalues > 1.0))
@@ -138,38 +150,21 @@ def _beyond_noise(group: Group, gram: Array, moments: Array) -> Array:
     return result
 
 
-@dataclass(frozen=True)
-class Generic:
-    """Generic terms beside the grounds' fit; ``weights`` (m,) of all terms by specimen."""
+def generic(
+    grounds: BaselineFit, coordinates: tuple[str, ...], lack: LackOfFitTest
+) -> TangentPattern:
+    """The generic terms that explain most, as strong as the readings suggest."""
 
-    grounds: BaselineFit
-    coordinates: tuple[str, ...]
-    weights: Mapping[str, Array]
-
-    @property
-    def fit(self) -> JointFit:
-        """Of the model that lacks them."""
-        return self.grounds.fit
-
-    def there(self, specimen: str) -> Array:
-        """The terms on the readings."""
-        g, model = self.grounds, self.fit.models[specimen]
-        cases, zeroed = g.readings[specimen].cases, g.noise.zeroed
-        moved = generic_columns(model, cases, zeroed, self.coordinates).moved
-        return g.plain[specimen].noise_only([one @ self.weights[specimen] for one in moved])
-
-    def under(
-        self, specimen: str, changed: ModelChange, cases: Sequence[LoadCase]
+    def terms_of(
+        specimen: str, changed: ModelChange | None, cases: Sequence[LoadCase]
     ) -> Sequence[Array]:
-        """The terms in each run, in units of the motion there was: more goes on as it began."""
-        model = changed(self.fit.models[specimen])
-        reached = [q.reshape(len(q), -1, 6) for q in self.fit.poses[specimen]]
-        moved = generic_columns(model, cases, False, self.coordinates, reached).moved
-        return [one @ self.weights[specimen] for one in moved]
+        model = grounds.fit.models[specimen]
+        if changed is None:
+            return generic_columns(model, cases, grounds.noise.zeroed, coordinates).moved
+        # in units of the motion there was: more goes on as it began
+        reached = [q.reshape(len(q), -1, 6) for q in grounds.fit.poses[specimen]]
+        return generic_columns(changed(model), cases, False, coordinates, reached).moved
 
-
-def generic(grounds: BaselineFit, coordinates: tuple[str, ...], lack: LackOfFitTest) -> Generic:
-    """The terms that explain most, as strong as the readings suggest."""
     parts, taken = {}, taken_out(grounds.fit)
     terms: tuple[Term, ...] = ()
     for name, one in grounds.readings.items():
@@ -181,7 +176,8 @@ def generic(grounds: BaselineFit, coordinates: tuple[str, ...], lack: LackOfFitT
         parts[name] = products(taken[name], white, np.sum(plain**2, axis=0), residual)
     onto = _onto(terms, lack, tuple(parts))
     if not len(next(iter(onto.values()))):  # shifts of these tests say nothing of others
-        return Generic(grounds, coordinates, {name: np.zeros(len(terms)) for name in onto})
+        return TangentPattern(grounds, terms_of, {name: np.zeros(len(terms)) for name in onto})
+    # normal equations of the strengths, what is common to all specimens eliminated
     problem, count = linearised(parts), len(next(iter(onto.values())))
     gram, moments = np.zeros((count, count)), np.zeros((count, 1))
     coupled = np.zeros((count, len(problem.gram_shared)))
@@ -191,7 +187,7 @@ def generic(grounds: BaselineFit, coordinates: tuple[str, ...], lack: LackOfFitT
         coupled += onto[name] @ part.shared
     gram, moments = problem.without_shared(gram, moments, coupled)
     estimate = _beyond_noise(Group.of(gram, np.zeros(count)), gram, moments[:, 0])
-    return Generic(grounds, coordinates, {name: estimate @ one for name, one in onto.items()})
+    return TangentPattern(grounds, terms_of, {name: estimate @ one for name, one in onto.items()})
 
 
 def _onto(terms: Sequence[Term], lack: LackOfFitTest, specimens: Sequence[str]) -> dict[str, Array]:

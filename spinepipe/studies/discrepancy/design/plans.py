@@ -3,7 +3,7 @@
 A plan says which loads there are, what is read, and which base is fitted to it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from spinepipe.cohort.specimen import FOLLOWER_LOAD, cables
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.model import LoadCase, LoadStep, SpineModel
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.units import without_step_0
 
@@ -64,7 +64,7 @@ def peak(case: LoadCase) -> Array:
     return summed_loads(case)[farthest(case)]
 
 
-def comes_back(case: LoadCase) -> bool:
+def unloads(case: LoadCase) -> bool:
     """Whether a load falls again along its own direction, to where it was on the way up.
 
     A machine never gives the same load twice, and a thinned test has no equal steps left: it is
@@ -74,6 +74,7 @@ def comes_back(case: LoadCase) -> bool:
     sizes = np.linalg.norm(loads, axis=1)
     near = NEAR * float(sizes.max(initial=0.0))
     for now in np.flatnonzero(sizes > near):
+        # each load in turn as the peak: loads along its direction, and away from that line
         direction = loads[now] / sizes[now]
         along = loads @ direction
         aside = np.linalg.norm(loads - along[:, None] * direction, axis=1)
@@ -85,7 +86,7 @@ def comes_back(case: LoadCase) -> bool:
     return False
 
 
-def back_down(case: LoadCase) -> LoadCase:
+def with_unloading(case: LoadCase) -> LoadCase:
     timed = has_times(case)
     last = times(case)[-1]
     extra = [
@@ -100,7 +101,7 @@ def back_down(case: LoadCase) -> LoadCase:
     return replace(case, steps=(*case.steps, *extra))
 
 
-def scaled(case: LoadCase, factor: float) -> LoadCase:
+def scale_loads(case: LoadCase, factor: float) -> LoadCase:
     steps = tuple(
         replace(
             step,
@@ -113,7 +114,7 @@ def scaled(case: LoadCase, factor: float) -> LoadCase:
     return replace(case, steps=steps)
 
 
-def largest_held(case: LoadCase) -> LoadCase:
+def with_hold(case: LoadCase) -> LoadCase:
     """Steps after the one with the largest load, all others later."""
     timed, at = at_times(case, times(case)).steps, farthest(case)
     start = timed[at].time or 0.0
@@ -148,16 +149,14 @@ def with_preloads(model: SpineModel, tests: Sequence[PlannedTest]) -> SpineModel
     """
     rigs = {one.case.test: one.rig for one in tests if one.rig}
     tension_n = {one.case.test: one.preload for one in tests if one.preload > 0.0}
-    effects = (_in_rigs(scoped, rigs) for scoped in model.effects)
+    effects = []
+    for scoped in model.effects:
+        if scoped.effect.name == FOLLOWER_LOAD:
+            under = [name for name, rig in rigs.items() if rig in scoped.tests]
+            more = (name for name in under if name not in scoped.tests)
+            scoped = replace(scoped, tests=(*scoped.tests, *more))
+        effects.append(scoped)
     return model.with_effects((*effects, *cables(tension_n, model.n_joints)))
-
-
-def _in_rigs(scoped: ScopedEffect, rigs: Mapping[str, str]) -> ScopedEffect:
-    """A cable with the tests that are done under it; any other effect as it is."""
-    if scoped.effect.name != FOLLOWER_LOAD:
-        return scoped
-    more = (name for name, rig in rigs.items() if rig in scoped.tests and name not in scoped.tests)
-    return replace(scoped, tests=(*scoped.tests, *more))
 
 
 @dataclass(frozen=True)
@@ -170,41 +169,38 @@ class Plan:
 
     def repeats(self) -> tuple[Repeats, ...]:
         """Readings of zero wherever the plan reads."""
-        return tuple(_repeats(one, self.zeroed) for one in self.tests)
+        found = []
+        for one in self.tests:
+            cycle = np.arange(one.count.max())[:, None, None, None]
+            shape = (len(cycle), len(one.case.steps), *one.count.shape)
+            readings = np.where(np.broadcast_to(cycle < one.count, shape), 0.0, np.nan)
+            by_step = without_step_0(readings.swapaxes(0, 1), self.zeroed)
+            found.append(Repeats(one.case, by_step.swapaxes(0, 1)))
+        return tuple(found)
 
 
-def as_made(one: SpecimenReadings, zeroed: bool, grouping: str) -> Plan:
+def plan_of_readings(one: SpecimenReadings, zeroed: bool, grouping: str) -> Plan:
     """The tests that a specimen has had; cycles whose loads differ a little are one test."""
     planned: dict[str, PlannedTest] = {}
     for test in one.tests:
         name, count = test.case.test, test.count.max(axis=0)
         known = planned.get(name)
-        planned[name] = PlannedTest(test.case, count) if known is None else _again(known, count)
+        if known is None:
+            planned[name] = PlannedTest(test.case, count)
+        else:
+            planned[name] = replace(known, count=known.count + count)
     return Plan(tuple(planned.values()), zeroed, grouping)
 
 
-def _again(known: PlannedTest, count: Indices) -> PlannedTest:
-    return replace(known, count=known.count + count)
-
-
-def _repeats(one: PlannedTest, zeroed: bool) -> Repeats:
-    number = np.arange(one.count.max())[:, None, None, None]
-    read = np.broadcast_to(
-        number < one.count, (len(number), len(one.case.steps), *one.count.shape)
-    ).copy()
-    readings = np.where(read, 0.0, np.nan)
-    return Repeats(one.case, without_step_0(readings.swapaxes(0, 1), zeroed).swapaxes(0, 1))
-
-
-def thinned(plan: Plan, steps: int) -> Plan:
+def thin_steps(plan: Plan, steps: int) -> Plan:
     """A plan with about that many load steps per test at most: first, farthest and last stay."""
-    return replace(plan, tests=tuple(_thin(one, steps) for one in plan.tests))
-
-
-def _thin(one: PlannedTest, steps: int) -> PlannedTest:
-    count = len(one.case.steps)
-    if count <= steps:
-        return one
-    even = np.linspace(0, count - 1, steps).round().astype(int)
-    kept = sorted({*even.tolist(), farthest(one.case)})
-    return replace(one, case=replace(one.case, steps=tuple(one.case.steps[k] for k in kept)))
+    tests = []
+    for one in plan.tests:
+        count = len(one.case.steps)
+        if count > steps:
+            even = np.linspace(0, count - 1, steps).round().astype(int)
+            chosen = sorted({*even.tolist(), farthest(one.case)})
+            case = replace(one.case, steps=tuple(one.case.steps[k] for k in chosen))
+            one = replace(one, case=case)
+        tests.append(one)
+    return replace(plan, tests=tuple(tests))

@@ -20,14 +20,14 @@ from spinepipe.studies.discrepancy.design.plans import (
     STEP_S,
     PlannedTest,
     at_times,
-    back_down,
-    comes_back,
     has_times,
-    largest_held,
     peak,
-    scaled,
+    scale_loads,
     summed_loads,
     times,
+    unloads,
+    with_hold,
+    with_unloading,
 )
 
 ALONG = 0.9
@@ -71,7 +71,11 @@ def runs(tests: Sequence[PlannedTest], zeroed: bool) -> list[ExtraCycle]:
     found: dict[tuple[object, ...], ExtraCycle] = {}
     for one in (*_variations(tests, zeroed), *_directions(tests, zeroed)):
         if one.words.endswith(AGAIN) or not any(_has(test, zeroed, one) for test in tests):
-            found.setdefault(_same(one), one)
+            case, read = one.test.case, one.test.count.astype(bool).tobytes()
+            loads = tuple(np.round(load, 9).tobytes() for load in summed_loads(case))
+            seconds = tuple(step.time for step in case.steps)
+            way = (case.test, loads, seconds, read, one.test.preload, one.zeroed)
+            found.setdefault(way, one)
     return list(found.values())
 
 
@@ -91,14 +95,6 @@ def _lasts(case: LoadCase) -> float:
     return every[-1] - every[0]
 
 
-def _same(one: ExtraCycle) -> tuple[object, ...]:
-    test = one.test
-    loads = tuple(np.round(load, 9).tobytes() for load in summed_loads(test.case))
-    seconds = tuple(step.time for step in test.case.steps)
-    read = test.count.astype(bool).tobytes()
-    return (test.case.test, loads, seconds, read, test.preload, one.zeroed)
-
-
 def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCycle]:
     for one in tests:
         case, name = one.case, one.case.test
@@ -110,11 +106,16 @@ def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
         yield run(f"{name}: once more", case)
         anew = once.renamed(replace(case, test=f"{name}, set up anew"))
         yield ExtraCycle(f"{name}: specimen taken out, set up anew, once more", anew, zeroed)
-        yield from _read_more(once, zeroed)
-        yield run(f"{name}: in twice as many load steps", refined(case))
-        if not comes_back(case):
-            yield run(f"{name}: unloading too, the same loads back down", back_down(case))
-        yield run(f"{name}: loads {LARGER:g} times as large", scaled(case, LARGER))
+        for part, what in ((slice(0, 3), "translations"), (slice(3, 6), "rotations")):
+            if not one.count[:, part].any():
+                count = once.count.copy()
+                count[:, part] = 1
+                words = f"{name}: {what} read as well"
+                yield ExtraCycle(words, replace(once, count=count), zeroed)
+        yield run(f"{name}: in twice as many load steps", with_half_steps(case))
+        if not unloads(case):
+            yield run(f"{name}: unloading too, the same loads back down", with_unloading(case))
+        yield run(f"{name}: loads {LARGER:g} times as large", scale_loads(case, LARGER))
         squeezed = replace(once, preload=PRELOAD_N)
         yield ExtraCycle(f"{name}: under a follower load of {PRELOAD_N:g} N more", squeezed, zeroed)
         if not has_times(case):
@@ -123,22 +124,12 @@ def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
         slow = at_times(case, [SLOWER * time for time in times(case)])
         yield run(f"{name}: {SLOWER:g} times as slow, time recorded", slow)
         held = f"{name}: largest load held for {HELD_S[-1] / 60:g} min, read along the way"
-        yield run(held, largest_held(case))
+        yield run(held, with_hold(case))
         if zeroed:
             yield ExtraCycle(f"{name}: readings kept as they are, not zeroed", once, False)
 
 
-def _read_more(one: PlannedTest, zeroed: bool) -> Iterator[ExtraCycle]:
-    """The test with translations, or rotations, read as well."""
-    for part, what in ((slice(0, 3), "translations"), (slice(3, 6), "rotations")):
-        if not one.count[:, part].any():
-            count = one.count.copy()
-            count[:, part] = 1
-            words = f"{one.case.test}: {what} read as well"
-            yield ExtraCycle(words, replace(one, count=count), zeroed)
-
-
-def refined(case: LoadCase) -> LoadCase:
+def with_half_steps(case: LoadCase) -> LoadCase:
     """A step half-way between each two."""
     steps: list[LoadStep] = []
     for before, after in zip(case.steps[:-1], case.steps[1:], strict=True):
@@ -169,40 +160,31 @@ def _directions(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
     loads = [load for one in tests for load in _large(one.case)]
     for start in (3, 0):
         sizes = [float(np.linalg.norm(peak(one.case)[start : start + 3])) for one in tests]
-        template = tests[int(np.argmax(sizes))] if sizes else None
-        if template is None or not _mostly(peak(template.case), start):
+        if not sizes:
+            continue
+        template = tests[int(np.argmax(sizes))]
+        largest = peak(template.case)
+        # a test whose load (6,) is mostly of the other sort is no template
+        if not np.linalg.norm(largest[start : start + 3]) > HALF * np.linalg.norm(largest) > 0.0:
             continue
         once = replace(template, count=np.minimum(template.count, 1))
         for axis in range(3):
             for sign, name in zip((1.0, -1.0), DIRECTIONS[start, axis], strict=True):
                 direction = np.zeros(6)
                 direction[start + axis] = sign
-                if not any(_along(load, direction) for load in loads):
-                    case = replace(_turned(template.case, start, axis, sign), test=f"added {name}")
-                    loads += _large(case)  # a test to both sides needs no other
-                    words = f"new test: {name} ({_axis(start, axis, sign)})"
-                    yield ExtraCycle(words, once.renamed(case), zeroed)
-
-
-def _axis(start: int, axis: int, sign: float) -> str:
-    """``moment about -z of ground``."""
-    what = "moment about" if start else "force along"
-    return f"{what} {'+' if sign > 0.0 else '-'}{'xyz'[axis]} of ground"
+                if any(load @ direction >= ALONG * np.linalg.norm(load) for load in loads):
+                    continue
+                case = replace(_turned(template.case, start, axis, sign), test=f"added {name}")
+                loads += _large(case)  # a test to both sides needs no other
+                what = "moment about" if start else "force along"
+                where = f"{what} {'+' if sign > 0.0 else '-'}{'xyz'[axis]} of ground"
+                yield ExtraCycle(f"new test: {name} ({where})", once.renamed(case), zeroed)
 
 
 def _large(case: LoadCase) -> list[Array]:
     loads = summed_loads(case)
     size = float(np.linalg.norm(peak(case)))
     return [load for load in loads if np.linalg.norm(load) >= HALF * size > 0.0]
-
-
-def _mostly(load: Array, start: int) -> bool:
-    """Whether a load (6,) is mostly a moment (start 3) or a force (start 0)."""
-    return bool(np.linalg.norm(load[start : start + 3]) > HALF * np.linalg.norm(load) > 0.0)
-
-
-def _along(load: Array, direction: Array) -> bool:
-    return bool(load @ direction >= ALONG * np.linalg.norm(load))
 
 
 def _turned(case: LoadCase, start: int, axis: int, sign: float) -> LoadCase:
@@ -214,16 +196,11 @@ def _turned(case: LoadCase, start: int, axis: int, sign: float) -> LoadCase:
     steps = []
     for step, load in zip(case.steps, summed_loads(case), strict=True):
         side = sign * float(np.sign(load @ largest))
-        wrenches = tuple(_one_way(w, start, axis, side) for w in step.wrenches)
+        along = side * np.eye(3)[axis]
+        changed = "moment" if start else "force"
+        wrenches = tuple(
+            replace(w, **{changed: float(np.linalg.norm(getattr(w, changed))) * along})
+            for w in step.wrenches
+        )
         steps.append(replace(step, wrenches=wrenches))
     return replace(case, steps=tuple(steps))
-
-
-def _one_way(wrench: Wrench, start: int, axis: int, side: float) -> Wrench:
-    along = side * np.eye(3)[axis]
-    if start:
-        moment = float(np.linalg.norm(wrench.moment)) * along
-        return Wrench(wrench.body, wrench.point, wrench.force, moment)
-    return Wrench(
-        wrench.body, wrench.point, float(np.linalg.norm(wrench.force)) * along, wrench.moment
-    )

@@ -166,15 +166,18 @@ def judgements(
     of : what each specimen's tests see. needed : log evidence, the screen's threshold and margin.
     """
     design = CohortSignatures(candidates(trials, joints, tests), of)
-    return tuple(judged(design, number, needed, seed) for number in range(len(trials)))
+    return tuple(_judge(design, number, needed, seed) for number in range(len(trials)))
 
 
-def judged(design: CohortSignatures, number: int, needed: float, seed: int) -> Judgement:
+def _judge(design: CohortSignatures, number: int, needed: float, seed: int) -> Judgement:
     """What a design could tell of one effect: by the variant that shows best."""
     trials = design.those.trials[number]
     variants = [_best_spread(design, number, variant) for variant in trials.variants]
     found = [(one, _detectable(one, trials, design.freedom, needed, seed)) for one in variants]
-    best, weakest = min(found, key=lambda pair: _rank(*pair))
+    # shown before not shown, then by how little is absorbed; a trace before none
+    best, weakest = min(
+        found, key=lambda pair: (not _shown(*pair), pair[0].absorbed, -pair[0].squared(pair[0].raw))
+    )
     shown = _shown(best, weakest)
     gaps = [least for one, least in found if least is not None and _shown(one, least) == shown]
     least = min(gaps, key=lambda one: one.gap, default=None)
@@ -188,7 +191,7 @@ def _best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typ
     """
     forms = [form for form in design.those.trials[number].forms if form.variant == variant]
     usual = [form for form in forms if form.spread in SPREADS]
-    ones = [typical(design, number, form) for form in usual or forms]
+    ones = [typical_form(design, number, form) for form in usual or forms]
     if usual:
         return min(ones, key=lambda one: round(one.absorbed, 2))
     return max(ones, key=lambda one: one.squared(one.left))
@@ -202,38 +205,10 @@ def _detectable(
     if times is None:
         return None
     gap = times * float(np.sqrt(one.squared(one.refitted) / freedom))
-    return Detectable(times, gap, _values(one.form.variant, times))
+    return Detectable(times, gap, _strengths(one.form.variant, times))
 
 
-def _least(one: Typical, needed: float, seed: int) -> float | None:
-    """Times the typical strength at which all but a few draws have the evidence needed."""
-    rng, count = np.random.default_rng(seed), len(one.mean)
-    if one.squared(one.left) <= NO_TRACE:
-        return None
-    moved = one.left @ _patterns(one, rng.standard_normal((count, DRAWS)))
-    group = one.group
-    noise = np.sqrt(group.eigenvalues)[:, None] * rng.standard_normal((count, DRAWS))
-    noise = group.vectors @ noise
-
-    def short(log_times: float) -> float:
-        evidence: Array = group.log_evidence(np.exp(log_times) * moved + noise)
-        return float(np.quantile(evidence, 1.0 - OFTEN)) - needed
-
-    ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
-    if short(ends[1]) <= 0.0:
-        return None
-    return float(np.exp(brentq(short, *ends, xtol=1e-3))) if short(ends[0]) < 0.0 else 0.0
-
-
-def _patterns(one: Typical, normal: Array) -> Array:
-    """(k, D) strengths in random proportion, each of the squared size that is expected."""
-    patterns = one.mean[:, None] + one.sd[:, None] * normal
-    sizes = np.einsum("id,ij,jd->d", patterns, one.left, patterns)
-    result: Array = patterns * np.sqrt(one.squared(one.left) / np.maximum(sizes, NO_TRACE))
-    return result
-
-
-def _values(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...]:
+def _strengths(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...]:
     """Strengths that many times as far from off as their defaults, in the units of tables."""
     found = []
     for column in variant.strengths:
@@ -248,9 +223,30 @@ def _values(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...
     return tuple(found)
 
 
-def _rank(one: Typical, least: Detectable | None) -> tuple[bool, float, float]:
-    """Smaller is better: shown, then little absorbed; a trace before none."""
-    return not _shown(one, least), one.absorbed, -one.squared(one.raw)
+def _least(one: Typical, needed: float, seed: int) -> float | None:
+    """Times the typical strength at which all but a few draws have the evidence needed."""
+    rng, count = np.random.default_rng(seed), len(one.mean)
+    if one.squared(one.left) <= NO_TRACE:
+        return None
+    # strengths (k, D) in random proportion, each of the squared size that is expected
+    patterns = one.mean[:, None] + one.sd[:, None] * rng.standard_normal((count, DRAWS))
+    squares = np.einsum("id,ij,jd->d", patterns, one.left, patterns)
+    patterns = patterns * np.sqrt(one.squared(one.left) / np.maximum(squares, NO_TRACE))
+    moved = one.left @ patterns
+    group = one.group
+    # noise of the moments is N(0, G), drawn by the eigenvectors of G
+    noise = np.sqrt(group.eigenvalues)[:, None] * rng.standard_normal((count, DRAWS))
+    noise = group.vectors @ noise
+
+    def short(log_times: float) -> float:
+        evidence: Array = group.log_evidence(np.exp(log_times) * moved + noise)
+        return float(np.quantile(evidence, 1.0 - OFTEN)) - needed
+
+    # the same draws at every size (common random numbers): evidence rises with it, one root
+    ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
+    if short(ends[1]) <= 0.0:
+        return None
+    return float(np.exp(brentq(short, *ends, xtol=1e-3))) if short(ends[0]) < 0.0 else 0.0
 
 
 def _shown(one: Typical, least: Detectable | None) -> bool:
@@ -268,18 +264,23 @@ def _why(one: Typical, least: Detectable | None) -> str:
     return f"{taken}; it would be found only at {least.times:.1f} times its typical strength"
 
 
-def typical(design: CohortSignatures, number: int, form: CandidateForm) -> Typical:
+def typical_form(design: CohortSignatures, number: int, form: CandidateForm) -> Typical:
     """A form of effect ``number`` under a design."""
     index, start = design.those.indices[number], design.those.starts[number]
     middle = usual_shapes(form.variant)
     places, strengths = index.places(form, middle, tuple(design.of), design.those.tests)
     count = len(strengths)
     signs = sides(form, strengths)
-    sizes = typical_strengths(form.variant)
+    sizes = {}  # default of each strength, in prior SDs from off
+    for column in form.variant.strengths:
+        p = form.variant.create().parameters[column]
+        assert p.off is not None
+        off = np.log(p.default / p.off) if p.logarithmic else p.default - p.off
+        sizes[column] = float(off) / p.prior_scale
     away = np.array([sizes[column] for column in strengths])
     raw, refitted, left = (np.zeros((count, count)) for _ in range(3))
     for specimen, columns, owners in places:
-        part, here, onto = design.of[specimen], np.ix_(columns, columns), summing(owners, count)
+        part, here, onto = design.of[specimen], np.ix_(columns, columns), summation(owners, count)
         among_all = np.ix_(start + columns, start + columns)
         raw += onto @ part.raw[number][here] @ onto.T
         refitted += onto @ part.refitted[number][here] @ onto.T
@@ -289,19 +290,8 @@ def typical(design: CohortSignatures, number: int, form: CandidateForm) -> Typic
     return Typical(form, places, mean, sd, signs, raw, refitted, left)
 
 
-def summing(owners: Indices, count: int) -> Array:
+def summation(owners: Indices, count: int) -> Array:
     """(k, c) sums columns onto the strengths that own them."""
     onto = np.zeros((count, len(owners)))
     onto[owners, np.arange(len(owners))] = 1.0
     return onto
-
-
-def typical_strengths(variant: Variant) -> dict[int, float]:
-    """Default of each strength, in prior SDs from off, by its column."""
-    found = {}
-    for column in variant.strengths:
-        p = variant.create().parameters[column]
-        assert p.off is not None
-        away = np.log(p.default / p.off) if p.logarithmic else p.default - p.off
-        found[column] = float(away) / p.prior_scale
-    return found

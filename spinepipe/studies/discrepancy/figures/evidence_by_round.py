@@ -142,9 +142,12 @@ def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: StudyTa
     every = rounds(tables["candidates"], end)
     if not every:
         return saying("No evidence can be shown: no effect was tried.")
-    shown = chosen(every)
+    shown = rounds_shown(every)
     wide = pd.concat([one.shown.rename(column) for column, one in enumerate(shown)], axis=1)
-    names = _with_a_trace(wide)
+    # effects with evidence for or against them in some round, most evidence first
+    traced = wide[(wide.abs() >= _NO_TRACE).any(axis=1)]
+    most = (traced if len(traced) else wide).max(axis=1)
+    names = list(most.sort_values(ascending=False, kind="stable").index)
     grid = wide.loc[names].to_numpy(float)
     turned = len(shown) > _FULL
     labels = _TURNED_MM if turned else _WRAPPED_MM
@@ -161,7 +164,9 @@ def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: StudyTa
     if not turned:
         heads = [f"round {fill(head, 17)}" for head in heads]
     name_cells(axis, [general(name) for name in names], heads, turned)
-    _bold(axis, names, verdict)
+    for label, name in zip(axis.get_yticklabels(), names, strict=True):
+        if name in end:
+            label.set(fontweight="bold", color=BLUE if name in verdict.named else GREEN)
     if threshold is not None:
         _scale_bar(figure, axis, image, threshold, scale)
     hidden = len(wide) - len(names)
@@ -170,13 +175,6 @@ def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: StudyTa
         told += " In brackets: screened, but no refit of it has a result, so it is no rival."
     explain_marks(figure, _handles(shown, grid), told, 5)
     return figure
-
-
-def _with_a_trace(wide: pd.DataFrame) -> list[str]:
-    """Effects with evidence for or against them in some round, most evidence first."""
-    seen = wide[(wide.abs() >= _NO_TRACE).any(axis=1)]
-    shown = seen if len(seen) else wide
-    return list(shown.max(axis=1).sort_values(ascending=False, kind="stable").index)
 
 
 def _panel(figure: Figure, columns: int) -> Axes:
@@ -190,7 +188,7 @@ def _panel(figure: Figure, columns: int) -> Axes:
     return panel
 
 
-def chosen(every: Sequence[EvidenceRound]) -> list[EvidenceRound]:
+def rounds_shown(every: Sequence[EvidenceRound]) -> list[EvidenceRound]:
     """Of many rounds those that led to something first, in their order."""
     if len(every) <= MOST_ROUNDS:
         return list(every)
@@ -244,14 +242,6 @@ def _mark(axis: Axes, names: Sequence[str], shown: Sequence[EvidenceRound]) -> N
                 at = ([column - 0.39], [names.index(name)])
                 how = {"mec": WHITE, "mew": 0.5, "zorder": 5}
                 axis.plot(*at, marker, color=color, ms=5.0, **how)  # type: ignore[arg-type]
-
-
-def _bold(axis: Axes, names: Sequence[str], verdict: Verdict) -> None:
-    for label, name in zip(axis.get_yticklabels(), names, strict=True):
-        if name in verdict.named:
-            label.set(fontweight="bold", color=BLUE)
-        elif name in verdict.candidates_in_set:
-            label.set(fontweight="bold", color=GREEN)
 
 
 def _scale_bar(figure: Figure, axis: Axes, image: object, threshold: float, to: Normalize) -> None:

@@ -1,8 +1,7 @@
 """Figure: where model and measurement disagree, joint by coordinate, for each test.
 
-Figure: measured less modelled motion along the load steps, where they disagree most.
-
-Grids of numbers as colours, with the number in each cell where there is room.
+Its heat map, numbers as colours with the number in each cell where there is room, serves other
+figures of the kind too.
 """
 
 from collections.abc import Sequence
@@ -14,133 +13,27 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.glyphs import Array, finite
-from spinepipe.report.panels import explain_marks, head, head_line, lines_of, sections
+from spinepipe.report.panels import explain_marks, head_line, lines_of
 from spinepipe.report.style import (
     BLACK,
     EMPTY,
     GREY,
     HATCH,
-    INK,
-    OURS,
-    SMALL_PT,
     TALLEST_MM,
-    THEIRS,
     WHITE,
     WIDTH_MM,
     blank,
     saying,
 )
-from spinepipe.report.words import AXIS, case, count, fixed, number, short, unit
-from spinepipe.studies.discrepancy.figures.load_displacement import CLEARLY, LABELS, models_shown
+from spinepipe.report.words import case, count, fixed, short
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.tables import StudyTables
 from spinepipe.units import COORDINATES
-
-MOST_PLACES, FEWEST_PLACES = 6, 3
-
-PLACE = ["specimen", "test", "joint", "coordinate"]
-
-LINES: dict[str, dict[str, Any]] = {
-    "base": {"color": THEIRS, "ls": "--", "lw": 1.0, "marker": "s", "ms": 3.0, "mew": 0.0},
-    "with_effects": {"color": OURS, "ls": "-", "lw": 1.2, "marker": "o", "ms": 2.6, "mew": 0.0},
-    "with_table": {"color": BLACK, "ls": ":", "lw": 1.2, "marker": "d", "ms": 2.6, "mew": 0.0},
-}
-"""How each model is drawn."""
-
-_PANEL_MM, _STEPS_KEY_MM = 50.0, 17.0
-_BAND_SD = 1.96
-
-
-def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
-    """A panel for each of the places where the base model is farthest off."""
-    gap = tables["gap"]
-    places = worst_places(gap)
-    if not places:
-        return saying("No motion can be shown: the base model has no pose.")
-    lines = models_shown(gap)
-    (panels,), figure = sections([(len(places), _PANEL_MM)], _STEPS_KEY_MM)
-    for index, (axis, place) in enumerate(zip(panels, places, strict=True)):
-        rows = gap[(gap[PLACE] == list(place)).all(axis=1)].sort_values("step")
-        _draw(axis, rows, lines)
-        _label_steps(axis, index, place, len(cohort.specimen_names))
-        _reach(axis, rows["measured"].to_numpy(float), unit(place[-1]))
-    explain_marks(figure, _handles(lines), _words_of_steps(places, gap), 4)
-    return figure
-
-
-def worst_places(gap: pd.DataFrame) -> list[tuple[Any, ...]]:
-    """Places of the largest residual of the base in noise SD, of like places the worst specimen."""
-    rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)]
-    squares = ((rows["measured"] - rows["base"]) / rows["noise_sd"]) ** 2
-    size = squares.groupby([rows[key] for key in PLACE], sort=False).mean().rename("size")
-    ordered = size.sort_values(ascending=False, kind="stable").reset_index()
-    like = ordered.drop_duplicates(PLACE[1:]).head(MOST_PLACES).reset_index()
-    like = like[(like.index < FEWEST_PLACES) | (like["size"] > CLEARLY**2)]
-    return [tuple(row) for row in like[PLACE].itertuples(index=False)]
-
-
-def _draw(axis: Axes, rows: pd.DataFrame, lines: Sequence[str]) -> None:
-    x, measured = rows["step"].to_numpy(float), rows["measured"].to_numpy(float)
-    band = _BAND_SD * rows["noise_sd"].to_numpy(float)
-    axis.fill_between(x, -band, band, color=GREY, alpha=0.25, lw=0, zorder=1)
-    axis.axhline(0.0, color=BLACK, lw=0.5, zorder=2)
-    for name in lines:
-        axis.plot(x, measured - rows[name].to_numpy(float), zorder=3, **LINES[name])
-    axis.set_xlim(float(x.min()) - 0.3, float(x.max()) + 0.3)
-
-
-def _label_steps(axis: Axes, index: int, place: tuple[Any, ...], specimens: int) -> None:
-    specimen, test, joint, coordinate = place
-    whose = f", {short(str(specimen), 14)}" if specimens > 1 else ""
-    head(axis, index, f"{joint}{whose}\n{short(case(str(test)), 34)}")
-    axis.set_ylabel(f"{AXIS[coordinate].lower()} ({unit(coordinate)})")
-    axis.set_xlabel("load step")
-    axis.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-    axis.tick_params(axis="y", length=2.5)
-
-
-def _reach(axis: Axes, measured: np.ndarray, of: str) -> None:
-    """How far the joint moved: the size of the motion that the difference is a part of."""
-    ends = (number(float(end), 2) for end in (measured.min(), measured.max()))
-    words = f"moved {' to '.join(ends)}{of if of == '°' else f' {of}'}"
-    axis.text(
-        0.02,
-        1.0,
-        words,
-        transform=axis.transAxes,
-        va="top",
-        fontsize=SMALL_PT,
-        color=INK[GREY],
-        in_layout=False,
-    )
-    axis.margins(y=0.18)
-
-
-def _handles(lines: Sequence[str]) -> list[Line2D | Patch]:
-    handles: list[Line2D | Patch] = [
-        Patch(facecolor=GREY, alpha=0.25, lw=0, label="noise of the mean of the cycles, 95 %"),
-    ]
-    return handles + [
-        Line2D([], [], label=f"measured less {LABELS[name]}", **LINES[name]) for name in lines
-    ]
-
-
-def _words_of_steps(places: list[tuple[Any, ...]], gap: pd.DataFrame) -> str:
-    rows = gap[(gap[PLACE] == list(places[0])).all(axis=1)]
-    off = ((rows["measured"] - rows["base"]) / rows["noise_sd"]).to_numpy(float)
-    worst = float(np.sqrt(np.nanmean(off**2)))
-    return (
-        "The places where the base model is farthest off, each in the specimen where it is worst; "
-        f"in a the base is off by {number(worst, 2)} noise SD (root mean square)."
-    )
-
 
 COLORS = LinearSegmentedColormap.from_list("gap", (WHITE, "#FEC44F", "#D95F0E", "#662506"))
 """From white to brown: it darkens steadily, for all kinds of eyes and for print."""
@@ -164,18 +57,8 @@ def draw_heat(
     """
     quiet = np.zeros(grid.shape, dtype=bool) if pale is None else pale
     axis.set_facecolor(EMPTY)
-    axis.add_patch(
-        Rectangle(
-            (-0.5, -0.5),
-            grid.shape[1],
-            grid.shape[0],
-            hatch="//////",
-            lw=0,
-            facecolor="none",
-            edgecolor=HATCH,
-            zorder=0,
-        )
-    )
+    hatched: dict[str, Any] = {"hatch": "//////", "facecolor": "none", "edgecolor": HATCH}
+    axis.add_patch(Rectangle((-0.5, -0.5), grid.shape[1], grid.shape[0], lw=0, zorder=0, **hatched))
     image = axis.imshow(
         np.ma.masked_invalid(np.where(quiet, 0.0, grid)),
         cmap=COLORS,
@@ -187,17 +70,8 @@ def draw_heat(
         value = grid[row, column]
         words = fixed(value, decimals or 0) if value else "0"
         color = GREY if quiet[row, column] else WHITE if scale(value) > _DARK else BLACK
-        axis.text(
-            column,
-            row,
-            words,
-            ha="center",
-            va="center",
-            fontsize=5.0,
-            zorder=3,
-            color=color,
-            in_layout=False,
-        )
+        how: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 5.0, "color": color}
+        axis.text(column, row, words, zorder=3, in_layout=False, **how)
     for side in axis.spines.values():
         side.set(visible=True, color=_EDGE, linewidth=0.5)
     axis.tick_params(length=0.0, pad=2.0, labelsize=6.0)
@@ -248,21 +122,29 @@ def gap_map_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> F
     tests = _widest(rows, cohort.tests)
     columns = [name for name in COORDINATES if name in set(rows["coordinate"])]
     models = _models(rows)
+    joints = cohort.joint_names[::-1]  # cranial to caudal
     across = min(len(tests), 3 if len(columns) <= _FEW_COORDINATES else 2)
-    figure, axes = _grid(len(tests), across, len(models), len(cohort.joint_names))
+    figure, axes = _grid(len(tests), across, len(models), len(joints))
     scale = Normalize(0.0, max(_LEAST_SCALE, float(finite(rows["gap"]).max())))
-    numbers = _room(across * len(models), len(columns), len(cohort.joint_names))
+
+    # whether a number can be read in each cell, so many panels side by side
+    panels = across * len(models)
+    cell_mm = (WIDTH_MM - 7.0 * panels) / (panels * len(columns))
+    low_enough = len(joints) * _ROW_WITH_NUMBER_MM <= TALLEST_MM / 2.0
+    decimals = 1 if cell_mm >= _CELL_WITH_NUMBER_MM and low_enough else None
+
     for place, test in enumerate(tests):
         line, first = axes[place // across], len(models) * (place % across)
         for side, model in enumerate(models):
             axis = line[first + side]
             part = rows[(rows["test"] == test) & (rows["model"] == model)]
-            grid, low = (
-                _square(part, name, cohort.joint_names[::-1], columns)
-                for name in ("gap", "gap_low")
-            )
-            image = draw_heat(axis, grid, scale, 1 if numbers else None, low <= 0.0)
-            _label(axis, cohort.joint_names[::-1], columns, MODELS[model], side == 0)
+            grid, low = (_square(part, name, joints, columns) for name in ("gap", "gap_low"))
+            image = draw_heat(axis, grid, scale, decimals, low <= 0.0)
+            shown = [short(name, 10) for name in joints]
+            name_cells(axis, shown, [SHORT[name] for name in columns], True)
+            axis.tick_params(labelleft=side == 0)
+            title = f" \n{MODELS[model]}"
+            axis.set_title(title, fontweight="normal", fontsize=6.5, linespacing=1.7)
         head_line(line[first], place, short(case(test), 96 // across), 13.0)
     bar = figure.colorbar(
         image,
@@ -302,24 +184,10 @@ def _grid(n: int, across: int, models: int, joints: int) -> tuple[Figure, list[l
     return figure, lines_of(figure, models * n, models * across)
 
 
-def _room(panels: int, columns: int, joints: int) -> bool:
-    """Whether a number can be read in each cell, so many panels side by side."""
-    cell_mm = (WIDTH_MM - 7.0 * panels) / (panels * columns)
-    return cell_mm >= _CELL_WITH_NUMBER_MM and joints * _ROW_WITH_NUMBER_MM <= TALLEST_MM / 2.0
-
-
 def _square(rows: pd.DataFrame, value: str, joints: Sequence[str], columns: Sequence[str]) -> Array:
     """(J, C) of one of the table's values, cranial to caudal; NaN where there is none."""
     wide = rows.pivot_table(value, "joint", "coordinate", aggfunc="first")
     return wide.reindex(index=list(joints), columns=list(columns)).to_numpy(float)
-
-
-def _label(
-    axis: Axes, joints: Sequence[str], columns: Sequence[str], model: str, leftmost: bool
-) -> None:
-    name_cells(axis, [short(name, 10) for name in joints], [SHORT[c] for c in columns], True)
-    axis.tick_params(labelleft=leftmost)
-    axis.set_title(f" \n{model}", fontweight="normal", fontsize=6.5, linespacing=1.7)
 
 
 def _words(rows: pd.DataFrame, tests: Sequence[str], models: Sequence[str]) -> str:

@@ -59,7 +59,16 @@ def held_out_by_test_figure(study: Discrepancy, cohort: Cohort, tables: StudyTab
         axis.set_xlim(-0.03 * most, (_ROOM_FOR_WORDS if added else 1.06) * most)
         axis.xaxis.set_major_locator(MaxNLocator(5))
         axis.set_xlabel("held-out gap (noise SD), with 95 % interval")
-    explain_marks(figure, _handles(shown), _words(added), len(shown) + 1)
+    handles = [
+        Line2D([], [], color=color, marker=shape, ms=size, mew=0.0, lw=1.1, label=words)
+        for color, shape, size, _, words in (MODELS[name] for name in shown)
+    ]
+    handles.append(Line2D([], [], color=BLACK, lw=0.8, ls="--", label="only noise"))
+    told = "No effect was added: there is one model."
+    if added:
+        told = "Worse: the effects predict it worse than the base, by more than noise makes."
+    left_off = "Left out and then predicted; what noise and training leave open is taken off."
+    explain_marks(figure, handles, f"{left_off} {told}", len(handles))
     return figure
 
 
@@ -74,10 +83,11 @@ def _draw(axis: Axes, rows: pd.DataFrame, shown: list[str], added: bool) -> None
             words, how = _change(row)
             note(axis, 1.0, y, words, ha="right", **how)
     axis.axvline(0.0, color=BLACK, lw=0.8, ls="--", zorder=1)
-    axis.set_yticks(
-        range(len(rows)),
-        [_name(fold, kind) for fold, kind in zip(rows["fold"], rows["kind"], strict=True)],
+    names = (
+        fold.removeprefix(f"{kind} ").removeprefix(f"{kind}=")
+        for fold, kind in zip(rows["fold"], rows["kind"], strict=True)
     )
+    axis.set_yticks(range(len(rows)), [short(plain(name), 24) for name in names])
     axis.spines["left"].set_visible(False)
 
 
@@ -100,22 +110,3 @@ def _change(row: Mapping[Any, Any]) -> tuple[str, dict[str, Any]]:
     if closed <= 0.0:
         return "no better", {}
     return f"{fixed(100.0 * share_of_gap(closed), 0)} % of gap", {}
-
-
-def _name(fold: str, kind: str) -> str:
-    return short(plain(fold.removeprefix(f"{kind} ").removeprefix(f"{kind}=")), 24)
-
-
-def _handles(shown: list[str]) -> list[Line2D]:
-    handles = [
-        Line2D([], [], color=color, marker=shape, ms=size, mew=0.0, lw=1.1, label=words)
-        for color, shape, size, _, words in (MODELS[name] for name in shown)
-    ]
-    return [*handles, Line2D([], [], color=BLACK, lw=0.8, ls="--", label="only noise")]
-
-
-def _words(added: bool) -> str:
-    told = "Left out and then predicted; what noise and training leave open is taken off."
-    if not added:
-        return f"{told} No effect was added: there is one model."
-    return f"{told} Worse: the effects predict it worse than the base, by more than noise makes."

@@ -19,6 +19,11 @@ from spinepipe.tables import StudyTables
 HEADS = {"base": "Beside the base model", "with_effects": "Beside the model with the effects"}
 EVERY = "*"
 
+WORDS = (
+    "A point: one imperfection of one specimen. Grey band: one prior SD. Pale: readings hardly "
+    "tell it. Shares: of the chi squared that all imperfections take up."
+)
+
 _LANE_MM, _ROW_MM, _AROUND_MM, _KEY_MM = 1.5, 3.0, 16.0, 17.0
 _LEAST_REACH, _ROOM = 2.4, 1.08
 _HARDLY_TOLD = 0.7
@@ -36,7 +41,9 @@ def imperfections_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables
     rows = tables["imperfections"]
     if rows.empty:
         return saying("No imperfection can be shown: none is allowed for, or the base has no fit.")
-    shown = [name for name in MODELS if _differs(rows, name)]
+    # without effects both models are the same, and one panel tells of both
+    sizes = {name: rows.loc[rows["model"] == name, "in_prior_sds"].to_numpy() for name in MODELS}
+    shown = [n for n in MODELS if n == "base" or not np.array_equal(sizes[n], sizes["base"])]
     kinds = list(dict.fromkeys(rows["kind"]))[::-1]
     lanes = (EVERY, *cohort.joint_names)
     here = [joint for joint in lanes if (rows["joint"] == joint).any()]
@@ -44,7 +51,8 @@ def imperfections_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables
     figure = blank(height)
     drawn = rows[(rows["places"] == 1) | rows["common"]]
     reach = _ROOM * max(_LEAST_REACH, float(drawn["in_prior_sds"].abs().max()))
-    colors = _colors(cohort.joint_names)
+    colors = {EVERY: GREY}
+    colors |= {joint: _SHADES[n % len(_SHADES)] for n, joint in enumerate(cohort.joint_names)}
     for index, (axis, name) in enumerate(
         zip(side_by_side(figure, len(shown), len(shown)), shown, strict=True)
     ):
@@ -53,21 +61,16 @@ def imperfections_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables
         axis.set_xlim(-reach, reach)
         axis.set_yticks(range(len(kinds)), [plain(kind) for kind in kinds] if not index else [])
         axis.set_xlabel("most likely size (prior SD)")
-    handles = _handles(here, colors, bool(rows["common"].any()))
-    explain_marks(figure, handles, _words(), min(len(handles), 6))
+    names = {EVERY: "loads, and all joints alike"}
+    handles = [
+        Line2D([], [], color=colors[lane], marker="o", ms=3.5, lw=0, label=names.get(lane, lane))
+        for lane in here
+    ]
+    if rows["common"].any():
+        words = "alike in many places, mean and 95 % interval: no random error"
+        handles.append(Line2D([], [], color=THEIRS, marker="D", ms=4.5, lw=0, label=words))
+    explain_marks(figure, handles, WORDS, min(len(handles), 6))
     return figure
-
-
-def _differs(rows: pd.DataFrame, model: str) -> bool:
-    """Whether a model has rows of its own: without effects both are the same."""
-    own = rows.loc[rows["model"] == model, "in_prior_sds"].to_numpy()
-    base = rows.loc[rows["model"] == "base", "in_prior_sds"].to_numpy()
-    return model == "base" or not np.array_equal(own, base)
-
-
-def _colors(joints: Sequence[str]) -> Mapping[str, str]:
-    shades = {joint: _SHADES[n % len(_SHADES)] for n, joint in enumerate(joints)}
-    return {EVERY: GREY} | shades
 
 
 def _draw(
@@ -107,25 +110,3 @@ def _points(axis: Axes, rows: pd.DataFrame, y: float, color: str) -> None:
     for part, alpha in ((rows[told], 0.9), (rows[~told], 0.3)):
         sizes = part["in_prior_sds"]
         axis.plot(sizes, np.full(len(part), y), "o", color=color, ms=2.8, mew=0.0, alpha=alpha)
-
-
-def _handles(lanes: Sequence[str], colors: Mapping[str, str], common: bool) -> list[Line2D]:
-    found = [
-        Line2D([], [], color=colors[joint], marker="o", ms=3.5, lw=0, label=_called(joint))
-        for joint in lanes
-    ]
-    if common:
-        words = "alike in many places, mean and 95 % interval: no random error"
-        found.append(Line2D([], [], color=THEIRS, marker="D", ms=4.5, lw=0, label=words))
-    return found
-
-
-def _called(joint: str) -> str:
-    return "loads, and all joints alike" if joint == EVERY else joint
-
-
-def _words() -> str:
-    return (
-        "A point: one imperfection of one specimen. Grey band: one prior SD. Pale: readings hardly "
-        "tell it. Shares: of the chi squared that all imperfections take up."
-    )

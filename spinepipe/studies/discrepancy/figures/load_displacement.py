@@ -1,7 +1,9 @@
-"""Figure: applied load over displacement, measured and modelled, joint by joint and test by test.
+"""Figures of single joints along the load of a test, measured and modelled.
 
-Each joint has a panel for the coordinate that a test drives: that in which its load does the most
-work. The curve is the field's own: displacement along, load up, loading and unloading apart.
+Load over displacement has a panel for the coordinate that a test drives: that in which its load
+does the most work. The curve is the field's own: displacement along, load up, loading and unloading
+apart. Measured less modelled motion over load steps has one for each place where they disagree
+most, driven or not.
 """
 
 from collections.abc import Sequence
@@ -22,7 +24,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.glyphs import Array
 from spinepipe.report.panels import explain_marks, head, sections
 from spinepipe.report.style import BLACK, GREY, INK, OURS, SMALL_PT, THEIRS, WHITE, saying
-from spinepipe.report.words import case, count, fixed, short, unit
+from spinepipe.report.words import AXIS, case, count, fixed, number, short, unit
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.words import load_axis, motion_of
 from spinepipe.tables import StudyTables
@@ -31,6 +33,8 @@ from spinepipe.units import COORDINATES, DISPLAY_PER_SI
 MOST_PANELS, FEWEST_PANELS = 12, 6
 CLEARLY = 1.5
 """Beyond the fewest, curves and places are shown where the base is off by so many noise SD."""
+
+MOST_PLACES, FEWEST_PLACES = 6, 3
 
 BAND_SD = 2.0
 """SDs of the measured mean to each side of a point."""
@@ -42,6 +46,13 @@ _LINES: dict[str, dict[str, Any]] = {
     "with_effects": {"color": OURS, "ls": "-", "lw": 1.2},
     "with_table": {"color": BLACK, "ls": (0, (1, 1.2)), "lw": 1.3},
 }
+_STEP_LINES: dict[str, dict[str, Any]] = {
+    "base": {"color": THEIRS, "ls": "--", "lw": 1.0, "marker": "s", "ms": 3.0, "mew": 0.0},
+    "with_effects": {"color": OURS, "ls": "-", "lw": 1.2, "marker": "o", "ms": 2.6, "mew": 0.0},
+    "with_table": {"color": BLACK, "ls": ":", "lw": 1.2, "marker": "d", "ms": 2.6, "mew": 0.0},
+}
+"""How each model is drawn over displacement, and over load steps."""
+
 LABELS = {
     "base": "base model",
     "with_effects": "model with the effects",
@@ -49,6 +60,7 @@ LABELS = {
 }
 _DOT: dict[str, Any] = {"marker": "o", "ms": 3.4, "lw": 0, "mec": BLACK, "mew": 0.6}
 _PANEL_MM, _KEY_MM = 51.0, 18.0
+_STEPS_PANEL_MM, _STEPS_KEY_MM = 50.0, 17.0
 _JUMP = 2.0
 """Times the usual change of load from which a change of side is a jump."""
 
@@ -94,29 +106,29 @@ class JointTestCurve:
     off: float
 
 
-def worst_curves(gap: pd.DataFrame, most: int = MOST_PANELS) -> list[JointTestCurve]:
+def worst_curves(gap: pd.DataFrame) -> list[JointTestCurve]:
     """Of each joint in each test the driven coordinate, the base's farthest first.
 
     Of many each in the specimen where it is worst.
     """
     rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)].sort_values("step", kind="stable")
-    chosen = driven(rows)
+    chosen = driven_coordinates(rows)
     found = [
         JointTestCurve(str(specimen), str(test), str(joint), str(coordinate), part, _off(part))
         for (specimen, test, joint, coordinate), part in rows.groupby(PLACE, sort=False)
         if (test, joint, coordinate) in chosen
     ]
     ordered = sorted(found, key=lambda curve: -curve.off)
-    if len(ordered) <= most:
+    if len(ordered) <= MOST_PANELS:
         return ordered
     of_place: dict[tuple[str, str], JointTestCurve] = {}
     for curve in ordered:
         of_place.setdefault((curve.test, curve.joint), curve)
-    shown = list(of_place.values())[:most]
+    shown = list(of_place.values())[:MOST_PANELS]
     return [curve for n, curve in enumerate(shown) if n < FEWEST_PANELS or curve.off > CLEARLY]
 
 
-def driven(gap: pd.DataFrame) -> set[tuple[str, str, str]]:
+def driven_coordinates(gap: pd.DataFrame) -> set[tuple[str, str, str]]:
     """Test, joint and the coordinate in which the load does the most work there, over specimens."""
     factors = dict(zip(COORDINATES, DISPLAY_PER_SI, strict=True))
     per_si = gap["coordinate"].map(factors).astype(float)
@@ -171,7 +183,7 @@ def _draw(axis: Axes, curve: JointTestCurve, lines: Sequence[str]) -> bool:
             fill_between(drive[steps], low, high, color=GREY, alpha=0.3, lw=0, zorder=1)
         for name in lines:
             modelled = rows[name].to_numpy(float)
-            line = placed(modelled, drawn_once(drive, modelled, way))
+            line = placed(modelled, line_order(drive, modelled, way))
             axis.plot(*line, zorder=3, **_LINES[name])
     for chosen, fill in ((~back, BLACK), (back, WHITE)):
         axis.plot(*placed(measured, chosen), mfc=fill, zorder=5, **_DOT)
@@ -182,6 +194,7 @@ def _draw(axis: Axes, curve: JointTestCurve, lines: Sequence[str]) -> bool:
 
 def ways(load: Array) -> list[Steps]:
     """Steps that a line may join: a jump to the other side starts anew, from where all began."""
+    # a change of side is usual where a test sweeps through zero: there the change is small
     change = np.abs(np.diff(load))
     sides = load[1:] * load[:-1] < 0.0
     usual = float(np.median(change)) if len(change) else 0.0
@@ -191,7 +204,7 @@ def ways(load: Array) -> list[Steps]:
     return [np.r_[0, way] if unloaded and way[0] else way for way in found]
 
 
-def drawn_once(drive: Array, seen: Array, way: Steps) -> Steps:
+def line_order(drive: Array, seen: Array, way: Steps) -> Steps:
     """The steps in the order of what drives them, if that is one line: no dash is drawn twice."""
     order: Steps = way[np.argsort(drive[way], kind="stable")]
     rise = np.diff(seen[order])
@@ -206,8 +219,7 @@ def _branches(way: Steps, back: NDArray[np.bool_]) -> list[Steps]:
 
 
 def _label(axis: Axes, index: int, curve: JointTestCurve, specimens: int) -> None:
-    whose = f", {short(curve.specimen, 14)}" if specimens > 1 else ""
-    head(axis, index, f"{curve.joint}{whose}\n{short(case(curve.test), 34)}")
+    _head_place(axis, index, curve.specimen, curve.test, curve.joint, specimens)
     axis.set_xlabel(f"{motion_of(curve.coordinate)} ({unit(curve.coordinate)})")
     axis.set_ylabel(load_axis(curve.coordinate))
     axis.xaxis.set_major_locator(MaxNLocator(5))
@@ -228,6 +240,13 @@ def _label(axis: Axes, index: int, curve: JointTestCurve, specimens: int) -> Non
     )
 
 
+def _head_place(
+    axis: Axes, index: int, specimen: str, test: str, joint: str, specimens: int
+) -> None:
+    whose = f", {short(specimen, 14)}" if specimens > 1 else ""
+    head(axis, index, f"{joint}{whose}\n{short(case(test), 34)}")
+
+
 def _handles(lines: Sequence[str], unloaded: bool) -> list[Line2D | Patch]:
     word = "measured, loading" if unloaded else "measured"
     handles: list[Line2D | Patch] = [Line2D([], [], mfc=BLACK, label=word, **_DOT)]
@@ -238,7 +257,7 @@ def _handles(lines: Sequence[str], unloaded: bool) -> list[Line2D | Patch]:
 
 
 def _words(gap: pd.DataFrame, curves: Sequence[JointTestCurve], cohort: Cohort) -> str:
-    places = len(driven(gap))
+    places = len(driven_coordinates(gap))
     each = len(curves) == len({(curve.test, curve.joint) for curve in curves})
     whose = ", each in the specimen where it is worst" if len(cohort.specimen_names) > 1 else ""
     some = f"{len(curves)} of {count(places, 'curve')} (joint and test)"
@@ -252,7 +271,7 @@ def _words(gap: pd.DataFrame, curves: Sequence[JointTestCurve], cohort: Cohort) 
 def _aside(gap: pd.DataFrame) -> str:
     """That the base is farther off in a coordinate that no load drives there, if it is."""
     rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)]
-    drives = driven(rows)
+    drives = driven_coordinates(rows)
     off = {place: _off(part) for place, part in rows.groupby(PLACE[1:], sort=False)}
     most = max(off, key=lambda place: off[place])
     if most in drives or off[most] <= CLEARLY:
@@ -262,3 +281,67 @@ def _aside(gap: pd.DataFrame) -> str:
         f" The base is farther off aside of the load: {joint}, {motion_of(coordinate)}, in "
         f"{case(test).lower()} (the gap along the load has it)."
     )
+
+
+def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
+    """A panel for each of the places where the base model is farthest off."""
+    gap = tables["gap"]
+    places = worst_places(gap)
+    if not places:
+        return saying("No motion can be shown: the base model has no pose.")
+    lines = models_shown(gap)
+    (panels,), figure = sections([(len(places), _STEPS_PANEL_MM)], _STEPS_KEY_MM)
+    rows_of = [gap[(gap[PLACE] == list(place)).all(axis=1)] for place in places]
+    for index, (axis, place) in enumerate(zip(panels, places, strict=True)):
+        specimen, test, joint, coordinate = map(str, place)
+        rows = rows_of[index].sort_values("step")
+        _draw_steps(axis, rows, lines)
+        _head_place(axis, index, specimen, test, joint, len(cohort.specimen_names))
+        axis.set_ylabel(f"{AXIS[coordinate].lower()} ({unit(coordinate)})")
+        axis.set_xlabel("load step")
+        axis.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+        axis.tick_params(axis="y", length=2.5)
+        _write_reach(axis, rows["measured"].to_numpy(float), unit(coordinate))
+    words = "noise of the mean of the cycles, 95 %"
+    handles: list[Line2D | Patch] = [Patch(facecolor=GREY, alpha=0.25, lw=0, label=words)]
+    handles += [
+        Line2D([], [], label=f"measured less {LABELS[name]}", **_STEP_LINES[name]) for name in lines
+    ]
+    worst = (rows_of[0]["measured"] - rows_of[0]["base"]) / rows_of[0]["noise_sd"]
+    off = float(np.sqrt(np.nanmean(worst.to_numpy(float) ** 2)))
+    words = (
+        "The places where the base model is farthest off, each in the specimen where it is worst; "
+        f"in a the base is off by {number(off, 2)} noise SD (root mean square)."
+    )
+    explain_marks(figure, handles, words, 4)
+    return figure
+
+
+def worst_places(gap: pd.DataFrame) -> list[tuple[Any, ...]]:
+    """Places of the largest residual of the base in noise SD, of like places the worst specimen."""
+    rows = gap[gap["base"].notna() & (gap["noise_sd"] > 0.0)]
+    squares = ((rows["measured"] - rows["base"]) / rows["noise_sd"]) ** 2
+    size = squares.groupby([rows[key] for key in PLACE], sort=False).mean().rename("size")
+    ordered = size.sort_values(ascending=False, kind="stable").reset_index()
+    like = ordered.drop_duplicates(PLACE[1:]).head(MOST_PLACES).reset_index()
+    like = like[(like.index < FEWEST_PLACES) | (like["size"] > CLEARLY**2)]
+    return [tuple(row) for row in like[PLACE].itertuples(index=False)]
+
+
+def _draw_steps(axis: Axes, rows: pd.DataFrame, lines: Sequence[str]) -> None:
+    x, measured = rows["step"].to_numpy(float), rows["measured"].to_numpy(float)
+    band = 1.96 * rows["noise_sd"].to_numpy(float)
+    axis.fill_between(x, -band, band, color=GREY, alpha=0.25, lw=0, zorder=1)
+    axis.axhline(0.0, color=BLACK, lw=0.5, zorder=2)
+    for name in lines:
+        axis.plot(x, measured - rows[name].to_numpy(float), zorder=3, **_STEP_LINES[name])
+    axis.set_xlim(float(x.min()) - 0.3, float(x.max()) + 0.3)
+
+
+def _write_reach(axis: Axes, measured: Array, of: str) -> None:
+    """How far the joint moved: the size of the motion that the difference is a part of."""
+    ends = (number(float(end), 2) for end in (measured.min(), measured.max()))
+    words = f"moved {' to '.join(ends)}{of if of == '°' else f' {of}'}"
+    style: dict[str, Any] = {"va": "top", "fontsize": SMALL_PT, "color": INK[GREY]}
+    axis.text(0.02, 1.0, words, transform=axis.transAxes, in_layout=False, **style)
+    axis.margins(y=0.18)

@@ -2,11 +2,12 @@
 
 A fit is a linear model around where it stands, readings to first order in its unknowns and in the
 nuisances. All readings enter as normal equations, made once for each test and choice of load steps;
-a fold sums those of its training. The surrogate without physics is the base and a ridge on the
+a fold sums those of its training (Bayesian linear regression with Gaussian priors, nuisances
+eliminated by the Schur complement). The surrogate without physics is the base and a ridge on the
 generic basis.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,6 +50,33 @@ class LinearModel:
     low: Array
     high: Array
 
+    def with_coefficients(
+        self,
+        columns: Mapping[str, Sequence[Array]],
+        numbers: Mapping[str, Indices],
+        count: int,
+    ) -> "LinearModel":
+        """The model with unbounded coefficients more, in prior SDs about zero.
+
+        Parameters
+        ----------
+        columns : by specimen that has some, per test (T, J, 6, k), by one prior SD.
+        numbers : (k,) which of the ``count`` new coefficients these are.
+        """
+        known, members = len(self.mean), dict(self.members)
+        for name, own in columns.items():
+            pairs = zip(members[name].by_x, own, strict=True)
+            by_x = tuple(np.concatenate(pair, axis=-1) for pair in pairs)
+            joined = np.concatenate([members[name].numbers, known + numbers[name]])
+            members[name] = replace(members[name], by_x=by_x, numbers=joined)
+        return LinearModel(
+            members,
+            np.concatenate([self.mean, np.zeros(count)]),
+            np.concatenate([self.sd, np.ones(count)]),
+            np.concatenate([self.low, np.full(count, -np.inf)]),
+            np.concatenate([self.high, np.full(count, np.inf)]),
+        )
+
 
 def tangent(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
     """The grounds' fit to first order; nuisances of that many prior SDs."""
@@ -57,12 +85,11 @@ def tangent(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
     members = {}
     for name, member in fit.hypothesis.members.items():
         plain, full = grounds.plain[name], grounds.setting.whitenings[name]
-        sizes = full.sizes
         members[name] = Tangent(
             fit.predicted[name],
-            in_readings(plain, lengthened(full, fit.jacobians[name])),
+            in_readings(plain, full.lengthened(fit.jacobians[name])),
             np.array(member.numbers, dtype=np.int64),
-            in_readings(plain, full.directions * (nuisance_size * sizes)),
+            in_readings(plain, full.directions * (nuisance_size * full.sizes)),
         )
     return LinearModel(
         members,
@@ -71,13 +98,6 @@ def tangent(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
         np.minimum(np.array([u.low for u in unknowns]) - fit.x, 0.0),
         np.maximum(np.array([u.high for u in unknowns]) - fit.x, 0.0),
     )
-
-
-def lengthened(white: Whitening, rows: Array) -> Array:
-    """Noise-whitened rows (N, m) of those with the nuisances' share taken out."""
-    longer = 1.0 / (1.0 + white.shrink) - 1.0
-    result: Array = rows + white.directions @ (longer[:, None] * (white.directions.T @ rows))
-    return result
 
 
 def in_readings(plain: Whitening, white: Array) -> tuple[Array, ...]:
@@ -89,6 +109,7 @@ def in_readings(plain: Whitening, white: Array) -> tuple[Array, ...]:
         count = int(used.sum())
         rows[used] = white[at : at + count]
         at += count
+        # roots are zero in steps that were not read: ones on their diagonal make them invertible
         empty = ~used.transpose(1, 2, 0)  # (J, 6, T)
         square = root + empty[..., None] * np.eye(used.shape[0])
         raw = np.asarray(np.linalg.solve(square, rows.transpose(1, 2, 0, 3)), dtype=np.float64)
@@ -129,8 +150,7 @@ class _Normal:
 
     def nuisances(self, x: Array) -> Array:
         """(k,) most likely values beside unknowns x (m,)."""
-        found: Array = _solved_alike(self.inner, self.drive - self.outer @ x)
-        return found
+        return _solve_scaled(self.inner, self.drive - self.outer @ x)
 
 
 class LinearFolds:
@@ -140,11 +160,19 @@ class LinearFolds:
         self.model, self.chosen = model, chosen
         self._grams: dict[tuple[str, int, bytes], Array] = {}
 
-    def placed(self, part: FoldFit) -> FoldPrediction:
+    def predict(self, part: FoldFit) -> FoldPrediction:
         """The scored specimens as the training has them."""
         members = self.model.members
         normals = {name: self._normal(name, part) for name in members}
-        x = self._fitted(part, normals)
+
+        # most likely values (M,): of a specimen apart its own are fitted last, to it alone
+        others = {name: one for name, one in normals.items() if name != part.apart}
+        x = np.zeros(len(self.model.mean))
+        x = self._solve(others, np.arange(len(x)), x)
+        if part.apart is not None:
+            own = own_unknowns({n: m.numbers for n, m in members.items()}, part.apart)
+            x[own] = self._solve({part.apart: normals[part.apart]}, own, x)
+
         motion, nuisances = {}, {}
         for name in part.scored:
             one, move = members[name], x[members[name].numbers]
@@ -161,11 +189,14 @@ class LinearFolds:
         precision = np.diag(self.model.sd**-2.0)
         for name, one in members.items():
             np.add.at(precision, np.ix_(one.numbers, one.numbers), self._normal(name, part).held)
-        covariance: Array = _solved_alike(precision, np.eye(count))
+        covariance = _solve_scaled(precision, np.eye(count))
         found = {}
         for name in part.scored:
             own = covariance[np.ix_(members[name].numbers, members[name].numbers)]
-            found[name] = tuple(_se(by_x, own) for by_x in members[name].by_x)
+            found[name] = tuple(
+                np.sqrt(np.maximum(np.sum((by_x @ own) * by_x, axis=-1), 0.0))
+                for by_x in members[name].by_x
+            )
         return found
 
     def left_open(self, part: FoldFit) -> dict[str, Array]:
@@ -173,20 +204,10 @@ class LinearFolds:
         found = {}
         for name in part.scored:
             inner = self._normal(name, part).inner
-            found[name] = _solved_alike(inner, np.eye(len(inner)))
+            found[name] = _solve_scaled(inner, np.eye(len(inner)))
         return found
 
-    def _fitted(self, part: FoldFit, normals: Mapping[str, _Normal]) -> Array:
-        """(M,) most likely values."""
-        others = {name: one for name, one in normals.items() if name != part.apart}
-        x = np.zeros(len(self.model.mean))
-        x = self._solved(others, np.arange(len(x)), x)
-        if part.apart is not None:
-            own = own_unknowns({n: m.numbers for n, m in self.model.members.items()}, part.apart)
-            x[own] = self._solved({part.apart: normals[part.apart]}, own, x)
-        return x
-
-    def _solved(self, normals: Mapping[str, _Normal], free: Indices, x: Array) -> Array:
+    def _solve(self, normals: Mapping[str, _Normal], free: Indices, x: Array) -> Array:
         """Most likely values of the free unknowns, others as in x."""
         model, count = self.model, len(x)
         matrix, moment = np.diag(model.sd**-2.0), model.mean * model.sd**-2.0
@@ -199,6 +220,7 @@ class LinearFolds:
         return _bounded(matrix[np.ix_(free, free)], drive, model.low[free], model.high[free])
 
     def _normal(self, specimen: str, part: FoldFit) -> _Normal:
+        """Sums over the training, nuisances eliminated: A - B' C^-1 B of [[A, B'], [B, C]]."""
         one = self.model.members[specimen]
         m, k = len(one.numbers), one.nuisances[0].shape[-1]
         gram = np.zeros((m + k + 1, m + k + 1))
@@ -208,7 +230,7 @@ class LinearFolds:
         x, z = slice(0, m), slice(m, m + k)
         inner = np.eye(k) + gram[z, z]
         outer, drive = gram[z, x], gram[z, -1]
-        gain = _solved_alike(inner, outer).T
+        gain = _solve_scaled(inner, outer).T
         matrix = gram[x, x] - gain @ outer
         return _Normal(gram[x, x], matrix, gram[x, -1] - gain @ drive, inner, outer, drive)
 
@@ -225,8 +247,11 @@ class LinearFolds:
         return self._grams[key]
 
 
-def _solved_alike(matrix: Array, right: Array) -> Array:
-    """``matrix^-1 right`` of a positive matrix whose unknowns have units and sizes of their own."""
+def _solve_scaled(matrix: Array, right: Array) -> Array:
+    """``matrix^-1 right`` of a positive matrix whose unknowns have units and sizes of their own.
+
+    Jacobi scaling to a unit diagonal, then Cholesky.
+    """
     scale = 1.0 / np.sqrt(np.diagonal(matrix))
     lower = cholesky(matrix * np.outer(scale, scale), lower=True)
     scaled = (scale * right.T).T
@@ -241,8 +266,11 @@ def own_unknowns(numbers: Mapping[str, Indices], specimen: str) -> Indices:
 
 
 def _bounded(matrix: Array, drive: Array, low: Array, high: Array) -> Array:
-    """Minimum of ``x' matrix x / 2 - drive' x`` inside bounds."""
-    scale = 1.0 / np.sqrt(np.diagonal(matrix))  # unknowns of different units become alike
+    """Minimum of ``x' matrix x / 2 - drive' x`` inside bounds.
+
+    With matrix = L L' it is the least squares problem ``|L' x - L^-1 drive|`` inside bounds.
+    """
+    scale = 1.0 / np.sqrt(np.diagonal(matrix))  # Jacobi scaling: units become alike
     lower = cholesky(matrix * np.outer(scale, scale), lower=True)
     target = solve_triangular(lower, scale * drive, lower=True)
     found: Array = scale * solve_triangular(lower.T, target)
@@ -250,12 +278,6 @@ def _bounded(matrix: Array, drive: Array, low: Array, high: Array) -> Array:
         return found
     bounded: Array = scale * bounded_lstsq(lower.T, target, (low / scale, high / scale))
     return bounded
-
-
-def _se(by_x: Array, covariance: Array) -> Array:
-    """(T, J, 6) standard error by the unknowns' covariance (m, m)."""
-    found: Array = np.sqrt(np.maximum(np.sum((by_x @ covariance) * by_x, axis=-1), 0.0))
-    return found
 
 
 def surrogate(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
@@ -270,11 +292,10 @@ def surrogate(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
         When a load step has no stable pose.
     """
     base = tangent(grounds, nuisance_size)
-    known = len(base.mean)
     read = np.any([used.any(axis=(0, 1)) for w in grounds.plain.values() for used in w.used], 0)
     coordinates = [name for name, there in zip(COORDINATES, read, strict=True) if there]
-    members, added = {}, 0
-    for name, one in base.members.items():
+    columns, numbers, added = {}, {}, 0
+    for name in base.members:
         model, cases = grounds.fit.models[name], grounds.readings[name].cases
         found = generic_columns(model, cases, grounds.noise.zeroed, coordinates)
         keys = [(t.family, t.coordinate, t.number) for t in found.terms]
@@ -283,17 +304,6 @@ def surrogate(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
         together[np.arange(len(keys)), [order[key] for key in keys]] = 1.0
         onto = np.hstack([np.eye(len(keys)), together])
         added = onto.shape[1]
-        columns = tuple(
-            np.concatenate([by_x, moved @ onto], axis=-1)
-            for by_x, moved in zip(one.by_x, found.moved, strict=True)
-        )
-        numbers = np.concatenate([one.numbers, known + np.arange(added)])
-        members[name] = replace(one, by_x=columns, numbers=numbers)
-    free = np.full(added, np.inf)
-    return LinearModel(
-        members,
-        np.concatenate([base.mean, np.zeros(added)]),
-        np.concatenate([base.sd, np.ones(added)]),
-        np.concatenate([base.low, -free]),
-        np.concatenate([base.high, free]),
-    )
+        columns[name] = tuple(moved @ onto for moved in found.moved)
+        numbers[name] = np.arange(added)
+    return base.with_coefficients(columns, numbers, added)

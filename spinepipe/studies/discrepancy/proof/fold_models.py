@@ -24,7 +24,6 @@ from spinepipe.studies.discrepancy.proof.fold_linear import (
 from spinepipe.studies.discrepancy.proof.folds import (
     TEST,
     ChosenSteps,
-    Flags,
     Fold,
     FoldFit,
     Masks,
@@ -84,21 +83,20 @@ class FoldModels:
         size = nuisance_size(final)
         self.base = LinearFolds(tangent(base, size), self.chosen)
         self.final = LinearFolds(tangent(final, size), self.chosen) if self.named else self.base
-        self.surrogate, self.why_none = self._surrogate(size)
-
-    def _surrogate(self, size: float) -> tuple[LinearFolds | None, str]:
+        self.surrogate: LinearFolds | None = None
+        self.why_none = ""
         try:
-            return LinearFolds(surrogate(self.grounds[0], size), self.chosen), ""
+            self.surrogate = LinearFolds(surrogate(base, size), self.chosen)
         except NoEquilibrium as trouble:
-            return None, f"no surrogate: {trouble}"
+            self.why_none = f"no surrogate: {trouble}"
 
-    def placed(self, parts: Sequence[FoldFit]) -> list[Both]:
+    def predict(self, parts: Sequence[FoldFit]) -> list[Both]:
         """Each part as base and model with effects have it, before it is said what counts."""
-        base = self._placed(self.grounds[0], self.base, parts)
-        final = self._placed(self.grounds[1], self.final, parts) if self.named else base
+        base = self._predict(self.grounds[0], self.base, parts)
+        final = self._predict(self.grounds[1], self.final, parts) if self.named else base
         return list(zip(base, final, strict=True))
 
-    def predictions(self, fold: Fold, part: FoldFit, placed: Both) -> Predictions:
+    def predictions(self, fold: Fold, part: FoldFit, both: Both) -> Predictions:
         """A part as each model has it.
 
         Raises
@@ -106,33 +104,31 @@ class FoldModels:
         NoFold
             When a fit by the full simulator has no start.
         """
-        base, final = placed
+        base, final = both
         if isinstance(base, str):
             raise NoFold(base)
         if isinstance(final, str):
             raise NoFold(final)
-        by_surrogate = None if self.surrogate is None else self.surrogate.placed(part)
+        by_surrogate = None if self.surrogate is None else self.surrogate.predict(part)
         scored = self._scored(fold, part)
-        return Predictions(scored, base, final, by_surrogate, self._left_open(part, scored))
 
-    def _left_open(self, part: FoldFit, scored: Masks) -> float:
-        """Trace of the nuisances' covariance after training, in noise SDs of scored readings."""
-        covariance, total = self.base.left_open(part), 0.0
+        # trace of the nuisances' covariance after training, in noise SDs of scored readings
+        covariance, left_open = self.base.left_open(part), 0.0
         for name, tests in scored.items():
             nuisances = self.base.model.members[name].nuisances
             for test, there in enumerate(tests):
                 if there.any():
                     white = self.chosen.whitening(name, test, there)
                     columns = white.noise_only([nuisances[test]])
-                    total += float(np.sum((columns @ covariance[name]) * columns))
-        return total
+                    left_open += float(np.sum((columns @ covariance[name]) * columns))
+        return Predictions(scored, base, final, by_surrogate, left_open)
 
-    def _placed(
+    def _predict(
         self, grounds: BaselineFit, linear: LinearFolds, parts: Sequence[FoldFit]
     ) -> Sequence[FoldPrediction | str]:
         if self.refit:
-            return self.run.map(refitted, [(grounds, linear.model, part) for part in parts])
-        return [linear.placed(part) for part in parts]
+            return self.run.map(refit_fold, [(grounds, linear.model, part) for part in parts])
+        return [linear.predict(part) for part in parts]
 
     def _scored(self, fold: Fold, part: FoldFit) -> Masks:
         """Readings left out; of an unseen test those that the training determines in both models.
@@ -143,21 +139,17 @@ class FoldModels:
         if fold.kind != TEST:
             return left_out
         models = (self.base, self.final) if self.named else (self.base,)
-        errors = [model.standard_errors(part) for model in models]
-        return {
-            name: tuple(
-                there & self._told(name, test, [error[name][test] for error in errors])
-                for test, there in enumerate(tests)
-            )
-            for name, tests in left_out.items()
-        }
-
-    def _told(self, specimen: str, test: int, errors: list[Array]) -> Flags:
-        sd = self.chosen.sd(specimen, test)
-        told: Flags = sd > 0.0
-        for error in errors:
-            told = told & (error < sd)
-        return told
+        scored = left_out
+        for model in models:
+            errors = model.standard_errors(part)
+            scored = {
+                name: tuple(
+                    there & (errors[name][test] < self.chosen.sd(name, test))
+                    for test, there in enumerate(tests)
+                )
+                for name, tests in scored.items()
+            }
+        return scored
 
     def left_out(self, part: FoldFit) -> Masks:
         """By specimen, per test (T, J, 6): what was read in the load steps that are left out."""
@@ -170,34 +162,32 @@ class FoldModels:
         }
 
 
-def refitted(grounds: BaselineFit, linear: LinearModel, part: FoldFit) -> FoldPrediction | str:
+def refit_fold(grounds: BaselineFit, linear: LinearModel, part: FoldFit) -> FoldPrediction | str:
     """The scored specimens as fits to the training have them, or why one has no start.
 
     Parameters
     ----------
     linear : the grounds' fit to first order; its nuisances are used.
     """
-    try:
-        return _refitted(grounds, linear, part)
-    except NoFold as trouble:
-        return str(trouble)
-
-
-def _refitted(grounds: BaselineFit, linear: LinearModel, part: FoldFit) -> FoldPrediction:
     hypothesis = grounds.fit.hypothesis
     count = len(hypothesis.unknowns)
     free, x = np.arange(count), np.zeros(count)
-    if part.apart is None:
-        _, fit = _fitted(grounds, linear, part, list(hypothesis.members), free, x)
-    else:
-        numbers = {
-            name: np.array(one.numbers, dtype=np.int64) for name, one in hypothesis.members.items()
-        }
-        own = own_unknowns(numbers, part.apart)
-        others = [name for name in hypothesis.members if name != part.apart]
-        # own values stay at the full fit: no training tells them yet, priors would switch them off
-        x, _ = _fitted(grounds, linear, part, others, np.setdiff1d(free, own), x)
-        _, fit = _fitted(grounds, linear, part, [part.apart], own, x)
+    try:
+        if part.apart is None:
+            _, fit = _fitted(grounds, linear, part, list(hypothesis.members), free, x)
+        else:
+            numbers = {
+                name: np.array(one.numbers, dtype=np.int64)
+                for name, one in hypothesis.members.items()
+            }
+            own = own_unknowns(numbers, part.apart)
+            others = [name for name in hypothesis.members if name != part.apart]
+            # own values stay at the full fit: no training tells them yet, priors would switch
+            # them off
+            x, _ = _fitted(grounds, linear, part, others, np.setdiff1d(free, own), x)
+            _, fit = _fitted(grounds, linear, part, [part.apart], own, x)
+    except NoFold as trouble:
+        return str(trouble)
     nuisances = {name: _nuisances(grounds, linear, part, name, fit) for name in part.scored}
     return FoldPrediction({name: fit.predicted[name] for name in part.scored}, nuisances)
 
@@ -231,6 +221,7 @@ def _again(
     fit: JointFit, linear: LinearModel, specimens: Sequence[str], free: Indices, x: Array
 ) -> Hypothesis:
     """The fit's hypothesis of some specimens, started where it ended, moved by x."""
+    # unknowns are counted anew among the free ones; bounds and priors move with the start
     order = {int(number): place for place, number in enumerate(free)}
     members = {}
     for name in specimens:
@@ -272,7 +263,11 @@ def _nuisances(
 
 
 def nuisance_size(grounds: BaselineFit) -> float:
-    """Most likely size of the nuisances beside the grounds' fit, in prior SDs."""
+    """Most likely size of the nuisances beside the grounds' fit, in prior SDs.
+
+    Along each direction of the nuisances, residuals have the variance 1 of noise and that of the
+    nuisance at its size; the other directions say nothing of it.
+    """
     likelihood = np.zeros(len(SIZES))
     for name, one in grounds.readings.items():
         full, plain = grounds.setting.whitenings[name], grounds.plain[name]

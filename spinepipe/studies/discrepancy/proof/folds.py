@@ -15,8 +15,13 @@ from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening
 
-Steps = Mapping[str, tuple[NDArray[np.bool_], ...]]
+Flags = NDArray[np.bool_]
+
+Steps = Mapping[str, tuple[Flags, ...]]
 """Load steps (T,) of each test, by specimen."""
+
+Masks = Mapping[str, tuple[Flags, ...]]
+"""Readings of each test, (T, J, 6), by specimen."""
 
 TEST, SPECIMEN, STEPS = "test", "specimen", "steps"
 
@@ -51,17 +56,32 @@ def folds_by_test(
     """One test left out in all specimens; none where there is only one."""
     if len(tests) < 2:
         return ()
-    return tuple(Fold(name, TEST, (_without(readings, name),)) for name in tests)
+    folds = []
+    for test in tests:
+        training, scored = {}, {}
+        for name, one in readings.items():
+            shapes = [(case.test == test, len(case.steps)) for case in one.cases]
+            scored[name] = tuple(np.full(steps, left_out) for left_out, steps in shapes)
+            training[name] = tuple(np.full(steps, not left_out) for left_out, steps in shapes)
+        folds.append(Fold(test, TEST, (FoldFit(training, scored),)))
+    return tuple(folds)
 
 
 def folds_by_specimen(readings: Mapping[str, SpecimenReadings]) -> tuple[Fold, ...]:
     """One specimen left out, but for half of its load steps; none where there is only one."""
     if len(readings) < 2:
         return ()
-    return tuple(
-        Fold(name, SPECIMEN, tuple(_half(readings, name, first) for first in (0, 1)))
-        for name in readings
-    )
+    whole = {
+        name: tuple(np.full(len(case.steps), True) for case in one.cases)
+        for name, one in readings.items()
+    }
+    folds = []
+    for name, one in readings.items():
+        even, odd = (_every_second(one, first) for first in (0, 1))
+        halves = ((even, odd), (odd, even))
+        parts = (FoldFit({**whole, name: own}, {name: left}, name) for own, left in halves)
+        folds.append(Fold(name, SPECIMEN, tuple(parts)))
+    return tuple(folds)
 
 
 def step_fold(readings: Mapping[str, SpecimenReadings]) -> Fold:
@@ -74,35 +94,8 @@ def step_fold(readings: Mapping[str, SpecimenReadings]) -> Fold:
     return Fold("every second load step", STEPS, tuple(halves))
 
 
-def _without(readings: Mapping[str, SpecimenReadings], test: str) -> FoldFit:
-    training, scored = {}, {}
-    for name, one in readings.items():
-        shapes = [(case.test == test, len(case.steps)) for case in one.cases]
-        scored[name] = tuple(np.full(steps, left_out) for left_out, steps in shapes)
-        training[name] = tuple(np.full(steps, not left_out) for left_out, steps in shapes)
-    return FoldFit(training, scored)
-
-
-def _half(readings: Mapping[str, SpecimenReadings], specimen: str, first: int) -> FoldFit:
-    training = {
-        name: _every_second(one, first) if name == specimen else _all(one)
-        for name, one in readings.items()
-    }
-    return FoldFit(training, {specimen: _every_second(readings[specimen], 1 - first)}, specimen)
-
-
-def _all(one: SpecimenReadings) -> tuple[NDArray[np.bool_], ...]:
-    return tuple(np.full(len(case.steps), True) for case in one.cases)
-
-
-def _every_second(one: SpecimenReadings, first: int) -> tuple[NDArray[np.bool_], ...]:
+def _every_second(one: SpecimenReadings, first: int) -> tuple[Flags, ...]:
     return tuple(np.arange(len(case.steps)) % 2 == first for case in one.cases)
-
-
-Flags = NDArray[np.bool_]
-
-Masks = Mapping[str, tuple[Flags, ...]]
-"""Readings of each test, (T, J, 6), by specimen."""
 
 
 def only(test: Repeats, chosen: Flags) -> Repeats:

@@ -13,8 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.proof.fold_linear import FoldPrediction
-from spinepipe.studies.discrepancy.proof.fold_models import Both, FoldModels, NoFold, Predictions
+from spinepipe.studies.discrepancy.proof.fold_linear import (
+    FoldPrediction,
+    LinearFolds,
+    LinearModel,
+    tangent,
+)
+from spinepipe.studies.discrepancy.proof.fold_models import (
+    Both,
+    FoldModels,
+    NoFold,
+    Predictions,
+    nuisance_size,
+)
 from spinepipe.studies.discrepancy.proof.folds import (
     STEPS,
     ChosenSteps,
@@ -27,7 +38,6 @@ from spinepipe.studies.discrepancy.proof.folds import (
 )
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
-from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.search_state import SearchResult
 from spinepipe.studies.discrepancy.store import PieceRunner, at_once
 
@@ -38,9 +48,6 @@ SCORED, NOT_DETERMINED, NO_FIT = "scored", "not determined", "no fit"
 
 CLEARLY = 2.5
 """SDs of noise by which an unseen test or specimen must be worse to count as worse: 1 in 160."""
-
-FEWEST_FOLDS = 3
-"""Folds from which a margin has a standard error."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +97,7 @@ class FoldRow:
         """
         if self.base is None or self.with_effects is None:
             return False
+        # n'd has variance d'd times that of a reading, which open nuisances make larger than one
         sd = 2.0 * float(np.sqrt(self.moved * max(self.expected / self.readings, 1.0)))
         return self.base.chi2 - self.with_effects.chi2 < -CLEARLY * sd
 
@@ -97,20 +105,7 @@ class FoldRow:
     def closed(self) -> float | None:
         """Share of the base's excess misfit (chi2) that the effects take away; None where noise
         hides the excess."""
-        return closed(self.base, self.with_effects, self.expected)
-
-
-@dataclass(frozen=True)
-class Margin:
-    """By how much chi2 a model is better than another, over all folds; SE from three folds on."""
-
-    chi2: float
-    se: float | None
-
-    @property
-    def beats(self) -> bool:
-        """Whether the model is the better one."""
-        return self.chi2 > 0.0
+        return closed_share(self.base, self.with_effects, self.expected)
 
 
 @dataclass(frozen=True)
@@ -119,31 +114,29 @@ class HeldOut:
 
     Attributes
     ----------
-    motion : by specimen. base, with_effects, surrogate : over all scored readings; None of none.
+    motion : by specimen. base, with_effects : over all scored readings; None of none.
     expected : chi2 of a model that is right: noise, and nuisances that training left open.
-    over_base, over_surrogate : margins of the model with effects; None where nothing compares.
+    over_base : chi2 by which the model with effects is better; None where nothing was scored.
     """
 
     folds: tuple[FoldRow, ...]
     motion: Mapping[str, HeldOutMotion]
     base: Gap | None
     with_effects: Gap | None
-    surrogate: Gap | None
     expected: float
-    over_base: Margin | None
-    over_surrogate: Margin | None
+    over_base: float | None
 
     @property
     def closed(self) -> float | None:
         """Share of the base's excess misfit (chi2) that the effects take away; None where noise
         hides the excess."""
-        return closed(self.base, self.with_effects, self.expected)
+        return closed_share(self.base, self.with_effects, self.expected)
 
     def by_kind(self) -> Mapping[str, "HeldOut"]:
         """Folds of each kind that were scored, together: their training knows other things."""
         scored = [row for row in self.folds if row.base is not None]
         kinds = dict.fromkeys(row.kind for row in scored)
-        return {kind: together([row for row in scored if row.kind == kind], {}) for kind in kinds}
+        return {kind: pool_folds([row for row in scored if row.kind == kind], {}) for kind in kinds}
 
     def of_base(self) -> "HeldOut":
         """The base in the place of the model with effects."""
@@ -156,12 +149,12 @@ class HeldOut:
         """Whether any scored reading is predicted otherwise with the effects than without."""
         if self.over_base is None:
             return False
-        return abs(self.over_base.chi2) > (SAME * self.base.chi2 if self.base else 0.0)
+        return abs(self.over_base) > (SAME * self.base.chi2 if self.base else 0.0)
 
     @property
     def beats_base(self) -> bool:
         """Whether the effects predict better than the base alone."""
-        return self.over_base is not None and self.over_base.beats
+        return self.over_base is not None and self.over_base > 0.0
 
 
 @dataclass(frozen=True)
@@ -176,45 +169,93 @@ class Asked:
 def held_out(found: SearchResult, asked: Asked, run: PieceRunner) -> HeldOut:
     """Each fold's readings as predicted by fits without them."""
     if asked.refit:  # each fit is kept
-        return _proof(found.base, found.final, asked, run)
+        return _proof(FoldModels(found.base, found.final, True, run), asked)
     return run(to_first_order, found.base, found.final, asked)
 
 
 def to_first_order(base: BaselineFit, final: BaselineFit, asked: Asked) -> HeldOut:
     """The same by models that are straight about the fit to all readings."""
-    return _proof(base, final, asked, at_once)
+    return _proof(FoldModels(base, final, False, at_once), asked)
 
 
-def _proof(base: BaselineFit, final: BaselineFit, asked: Asked, run: PieceRunner) -> HeldOut:
-    models = FoldModels(base, final, asked.refit, run)
-    return proven(models, base.readings, base.tests, asked)
+@dataclass(frozen=True)
+class ChosenTerm:
+    """A term of a formula.
+
+    Attributes
+    ----------
+    moved : per test (T, J, 6) by one unit of its coefficient, of the specimens that have it.
+    sd : prior of the coefficient: as large as makes the term a joint's whole load.
+    """
+
+    moved: Mapping[str, tuple[Array, ...]]
+    sd: float
 
 
-def proven(
-    models: FoldModels,
-    readings: Mapping[str, SpecimenReadings],
-    tests: Sequence[str],
-    asked: Asked,
+def proof_of_terms(
+    before: BaselineFit, after: BaselineFit, terms: Sequence[ChosenTerm] = ()
 ) -> HeldOut:
+    """Two fits, the second one with terms besides, on each test and specimen left out.
+
+    Which terms was found with all readings; their coefficients are fitted without those left out.
+    """
+    return _proof(FormulaFolds(before, after, terms), Asked())
+
+
+class FormulaFolds(FoldModels):
+    """One fit as the base, another and terms besides as the model with effects."""
+
+    def __init__(
+        self, before: BaselineFit, after: BaselineFit, terms: Sequence[ChosenTerm]
+    ) -> None:
+        self.grounds = (before, after)
+        self.refit, self.run, self.named = False, at_once, True
+        self.chosen = ChosenSteps(before.readings, before.noise)
+        size = nuisance_size(after)
+        self.base = LinearFolds(tangent(before, size), self.chosen)
+        self.final = LinearFolds(with_terms(tangent(after, size), terms), self.chosen)
+        self.surrogate, self.why_none = None, ""
+
+
+def with_terms(plain: LinearModel, terms: Sequence[ChosenTerm]) -> LinearModel:
+    """A linear model with a coefficient more for each term, in prior SDs."""
+    columns, numbers = {}, {}
+    for name, one in plain.members.items():
+        own = [number for number, term in enumerate(terms) if name in term.moved]
+        if own:
+            columns[name] = [
+                np.stack([terms[n].sd * terms[n].moved[name][test] for n in own], axis=-1)
+                for test in range(len(one.by_x))
+            ]
+            numbers[name] = np.array(own, dtype=np.int64)
+    return plain.with_coefficients(columns, numbers, len(terms))
+
+
+def _proof(models: FoldModels, asked: Asked) -> HeldOut:
     """Each fold's readings as these models predict them."""
-    motion = nothing_held_out(readings)
+    readings, tests = models.grounds[0].readings, models.grounds[0].tests
+    motion = {}
+    for name, one in readings.items():
+        shapes = [test.count.shape for test in one.tests]
+        base, final = (tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(2))
+        motion[name] = HeldOutMotion(tuple(np.full(shape, -1) for shape in shapes), base, final)
     folds: list[Fold] = []
     if asked.tests:
         folds += folds_by_test(readings, tests)
     if asked.specimens:
         folds += folds_by_specimen(readings)
     rows = _rows(models, folds, 0, motion)
-    if asked.tests and len(readings) == 1 and not together(rows, motion).tells:
+    if asked.tests and len(readings) == 1 and not pool_folds(rows, motion).tells:
         rows += _rows(models, [step_fold(readings)], len(rows), motion)
-    return together(rows, motion)
+    return pool_folds(rows, motion)
 
 
 def _rows(
     models: FoldModels, folds: Sequence[Fold], first: int, motion: Mapping[str, HeldOutMotion]
 ) -> list[FoldRow]:
-    placed = iter(models.placed([part for fold in folds for part in fold.parts]))
+    predicted = iter(models.predict([part for fold in folds for part in fold.parts]))
     return [
-        _row(models, fold, number, list(islice(placed, len(fold.parts))), motion)
+        _row(models, fold, number, list(islice(predicted, len(fold.parts))), motion)
         for number, fold in enumerate(folds, first)
     ]
 
@@ -223,7 +264,7 @@ def _row(
     models: FoldModels,
     fold: Fold,
     number: int,
-    placed: Sequence[Both],
+    predicted: Sequence[Both],
     motion: Mapping[str, HeldOutMotion],
 ) -> FoldRow:
     count = sum(
@@ -233,38 +274,30 @@ def _row(
         for test in tests
     )
     try:
-        pairs = zip(fold.parts, placed, strict=True)
+        pairs = zip(fold.parts, predicted, strict=True)
         parts = [models.predictions(fold, part, both) for part, both in pairs]
     except NoFold as trouble:
         return FoldRow(fold.name, fold.kind, 0, count, None, None, None, 0.0, NO_FIT, str(trouble))
     for part in parts:
         fill(motion, number, part)
-    return _scored_row(models, fold, parts, count)
-
-
-def _scored_row(
-    models: FoldModels, fold: Fold, parts: Sequence[Predictions], left_out: int
-) -> FoldRow:
     chosen = models.chosen
     base = scored_gap(chosen, [(part.scored, part.base) for part in parts])
     if not base.readings:
         why = "the other tests do not determine what these readings would be"
-        return FoldRow(
-            fold.name, fold.kind, 0, left_out, None, None, None, 0.0, NOT_DETERMINED, why
-        )
+        return FoldRow(fold.name, fold.kind, 0, count, None, None, None, 0.0, NOT_DETERMINED, why)
     final = scored_gap(chosen, [(part.scored, part.with_effects) for part in parts])
     by_surrogate = [(p.scored, p.surrogate) for p in parts if p.surrogate is not None]
     surrogate = scored_gap(chosen, by_surrogate) if by_surrogate else None
     said = [models.why_none] if models.why_none else []
-    if base.readings < left_out:
-        said.append(f"the other tests determine {base.readings} of {left_out} readings")
+    if base.readings < count:
+        said.append(f"the other tests determine {base.readings} of {count} readings")
     if fold.kind == STEPS:
         said.append("one specimen and no test that others determine: halves of the load steps")
     return FoldRow(
         fold.name,
         fold.kind,
         base.readings,
-        left_out,
+        count,
         base,
         final,
         surrogate,
@@ -275,38 +308,26 @@ def _scored_row(
     )
 
 
-def together(rows: Sequence[FoldRow], motion: Mapping[str, HeldOutMotion]) -> HeldOut:
+def pool_folds(rows: Sequence[FoldRow], motion: Mapping[str, HeldOutMotion]) -> HeldOut:
     """All folds pooled."""
     base = [row.base for row in rows if row.base is not None]
     final = [row.with_effects for row in rows if row.with_effects is not None]
-    surrogate = [row.surrogate for row in rows if row.surrogate is not None]
+    drops = [a.chi2 - b.chi2 for a, b in zip(base, final, strict=True)]
     return HeldOut(
         tuple(rows),
         motion,
-        pooled(base),
-        pooled(final),
-        pooled(surrogate),
+        pool_gaps(base),
+        pool_gaps(final),
         sum(row.expected for row in rows),
-        _margin(base, final),
-        _margin(surrogate, final) if surrogate else None,
+        float(np.sum(drops)) if drops else None,
     )
-
-
-def _margin(other: Sequence[Gap], ours: Sequence[Gap]) -> Margin | None:
-    """Sum of the folds' differences; its SE by how folds differ."""
-    drops = np.array([a.chi2 - b.chi2 for a, b in zip(other, ours, strict=True)])
-    if not len(drops):
-        return None
-    enough = len(drops) >= FEWEST_FOLDS
-    se = float(np.sqrt(len(drops)) * np.std(drops, ddof=1)) if enough else None
-    return Margin(float(drops.sum()), se)
 
 
 def scored_gap(chosen: ChosenSteps, parts: Sequence[tuple[Masks, FoldPrediction]]) -> Gap:
     """The gap over the scored readings of all parts, noise whitened within each test."""
     white = [
-        _missed(chosen, name, test, there, placed)
-        for scored, placed in parts
+        _missed(chosen, name, test, there, predicted)
+        for scored, predicted in parts
         for name, tests in scored.items()
         for test, there in enumerate(tests)
         if there.any()
@@ -328,15 +349,15 @@ def _moved(chosen: ChosenSteps, part: Predictions) -> float:
 
 
 def _missed(
-    chosen: ChosenSteps, specimen: str, test: int, there: Flags, placed: FoldPrediction
+    chosen: ChosenSteps, specimen: str, test: int, there: Flags, predicted: FoldPrediction
 ) -> Array:
     """(N,) residuals with SD one and independent where only noise is left."""
-    predicted = placed.motion[specimen][test] + placed.nuisances[specimen][test]
-    errors = chosen.mean(specimen, test) - predicted
+    reading = predicted.motion[specimen][test] + predicted.nuisances[specimen][test]
+    errors = chosen.mean(specimen, test) - reading
     return chosen.whitening(specimen, test, there).noise_only([errors])
 
 
-def pooled(gaps: Sequence[Gap]) -> Gap | None:
+def pool_gaps(gaps: Sequence[Gap]) -> Gap | None:
     """All together; None of none."""
     if not gaps:
         return None
@@ -345,17 +366,6 @@ def pooled(gaps: Sequence[Gap]) -> Gap | None:
         sum(gap.dof for gap in gaps),
         sum(gap.readings for gap in gaps),
     )
-
-
-def nothing_held_out(readings: Mapping[str, SpecimenReadings]) -> dict[str, HeldOutMotion]:
-    """Empty sheets, to be filled by `fill`."""
-    return {name: _empty(one) for name, one in readings.items()}
-
-
-def _empty(one: SpecimenReadings) -> HeldOutMotion:
-    shapes = [test.count.shape for test in one.tests]
-    arrays = [tuple(np.full(shape, np.nan) for shape in shapes) for _ in range(2)]
-    return HeldOutMotion(tuple(np.full(shape, -1) for shape in shapes), *arrays)
 
 
 def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -> None:
@@ -373,7 +383,7 @@ def fill(sheets: Mapping[str, HeldOutMotion], number: int, found: Predictions) -
                 column[test][new] = values[test][new]
 
 
-def closed(base: Gap | None, new: Gap | None, expected: float) -> float | None:
+def closed_share(base: Gap | None, new: Gap | None, expected: float) -> float | None:
     """Share of the excess misfit: (chi2 of base - chi2 of new) / (chi2 of base - expected), at most
     1. It is no share of the gap, which is its root.
 

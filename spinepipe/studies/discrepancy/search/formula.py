@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.proof.formula_folds import ChosenTerm, proof_of_terms
+from spinepipe.studies.discrepancy.proof.held_out import ChosenTerm, proof_of_terms
 from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant

@@ -12,7 +12,7 @@ import numpy as np
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.tabulated_law import ITSELF
-from spinepipe.studies.discrepancy.proof.formula_folds import proof_of_terms
+from spinepipe.studies.discrepancy.proof.held_out import proof_of_terms
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.formula import formula
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
