@@ -16,7 +16,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
     NO_SUCH_FITS,
     CohortClaim,
     Row,
-    told,
+    sample_words,
     words,
 )
 from spinepipe.studies.cohort_stiffness.representations import POOLED
@@ -74,14 +74,16 @@ def load_case_findings(
     for representation, claim in SPECIFIC.items():
         found = statistics[statistics["family"] == f"{FAMILY}/{representation}"]
         note = MISFIT if representation == "per_specimen" else ""
-        yield specific(claim, found, significance, note)
+        yield load_case_claim(claim, found, significance, note)
     loaded = errors[errors["loaded"].astype(bool)]
     directions = loaded[["specimen", "test", "coordinate"]].drop_duplicates()
     ratios = loaded_ratios(stiffness[stiffness["representation"] == "per_joint"], directions)
     yield _ratio(ratios, significance)
 
 
-def specific(claim: CohortClaim, tests: pd.DataFrame, significance: float, note: str = "") -> Row:
+def load_case_claim(
+    claim: CohortClaim, tests: pd.DataFrame, significance: float, note: str = ""
+) -> Row:
     """Yes where the F tests together are significant; no where none is and they explain little."""
     known = tests.dropna(subset="p")
     if tests.empty:
@@ -161,7 +163,9 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
         holds = "no"
     interval = None if ends is None else (1.0 + ends[0], 1.0 + ends[1])
     value = 1.0 + mean.value
-    return STIFFER.row(holds, joined(told(mean), many), value, interval, mean.p, mean.n, p_no)
+    return STIFFER.row(
+        holds, joined(sample_words(mean), many), value, interval, mean.p, mean.n, p_no
+    )
 
 
 def _within(values: Array, low: float, high: float) -> float:
@@ -198,21 +202,18 @@ def stiffness_spreads(
     for coordinate in stiffness["coordinate"].unique():
         rows = own[own["coordinate"] == coordinate]
         for what, (factor, block) in FACTORS.items():
-            claim = _spread_claim(what, str(coordinate))
+            other = "levels" if what == "specimens" else "specimens"
+            claim = CohortClaim(
+                f"stiffness_differs_between_{what}_{coordinate}",
+                f"{what.capitalize()} differ in {words(str(coordinate))} stiffness: some are "
+                f"stiffer than others in all {other} alike.",
+                f"share of the variance of its logarithm, means of {other} removed, that lies "
+                f"between {what} (intraclass correlation, exact F interval; each joint its own, "
+                "all load cases)",
+                "",
+            )
             note = _pooled_spread(pooling, label, str(coordinate), what)
             yield share_between(claim, rows, factor, block, significance, note)
-
-
-def _spread_claim(what: str, coordinate: str) -> CohortClaim:
-    other = "levels" if what == "specimens" else "specimens"
-    return CohortClaim(
-        f"stiffness_differs_between_{what}_{coordinate}",
-        f"{what.capitalize()} differ in {words(coordinate)} stiffness: some are stiffer "
-        f"than others in all {other} alike.",
-        f"share of the variance of its logarithm, means of {other} removed, that lies between "
-        f"{what} (intraclass correlation, exact F interval; each joint its own, all load cases)",
-        "",
-    )
 
 
 def _pooled_spread(pooling: pd.DataFrame | None, label: str, coordinate: str, what: str) -> str:
@@ -241,9 +242,14 @@ def share_between(
     note = joined(note, f"{left_out} specimens without all joints left out" if left_out else "")
     if min(values.shape) < 2:
         return claim.unknown(joined("at least 2 specimens with 2 joints are needed", note))
-    if _additive(values):
+    # What specimens and levels together leave may be rounding alone.
+    grid = values.to_numpy(float)
+    rest = grid - grid.mean(axis=0) - grid.mean(axis=1, keepdims=True) + grid.mean()
+    if np.abs(rest).max() <= SAME:
         return claim.unknown(joined("nothing is left beside specimens and levels", note))
-    f, between, within, p = _anova(values, factor, block)
+    long = values.reset_index().melt(id_vars="specimen", var_name="joint", value_name="log")
+    table = AnovaRM(long, "log", block, [factor]).fit().anova_table  # one value per cell
+    f, between, within, p = (float(value) for value in table.iloc[0])
     times = values.shape[1] if block == "joint" else values.shape[0]
     low = _share(f / float(stats.f.isf(0.025, between, within)), times)
     high = _share(f * float(stats.f.isf(0.025, within, between)), times)
@@ -260,21 +266,6 @@ def log_grid(rows: pd.DataFrame) -> pd.DataFrame:
     known = rows[rows["identifiable"].eq(True) & rows["stiffness"].notna()]
     grid = known.pivot(index="specimen", columns="joint", values="stiffness").astype(float)
     return grid.dropna().map(np.log)
-
-
-def _anova(values: pd.DataFrame, factor: str, block: str) -> tuple[float, float, float, float]:
-    """F of a factor, its degrees of freedom, those of the rest, and p; one value per cell."""
-    long = values.reset_index().melt(id_vars="specimen", var_name="joint", value_name="log")
-    table = AnovaRM(long, "log", block, [factor]).fit().anova_table
-    f, between, within, p = (float(value) for value in table.iloc[0])
-    return f, between, within, p
-
-
-def _additive(values: pd.DataFrame) -> bool:
-    """Whether specimens and levels explain values (specimens, joints) but for rounding."""
-    rest = values.to_numpy(float)
-    rest = rest - rest.mean(axis=0) - rest.mean(axis=1, keepdims=True) + rest.mean()
-    return bool(np.abs(rest).max() <= SAME)
 
 
 def _share(f: float, times: int) -> float:

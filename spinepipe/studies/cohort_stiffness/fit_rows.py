@@ -19,6 +19,8 @@ Row = dict[str, Any]
 LEVEL = 0.975
 """Upper end of the intervals: 95 % lie between the ends."""
 
+_OPEN = ("open_below", "open_above")
+
 
 def stiffness_rows(
     joints: Sequence[str],
@@ -48,7 +50,8 @@ def stiffness_rows(
         for name in free:
             at = row, COORDINATES.index(name)
             told = (reaches or {}).get(at)
-            ends = NO_REGION if told is None else asdict(told)
+            # Where no region was looked for the interval stands.
+            ends = dict.fromkeys(_OPEN) if told is None else asdict(told)
             rows.append(
                 {
                     "joint": joint,
@@ -62,10 +65,6 @@ def stiffness_rows(
                 }
             )
     return rows
-
-
-NO_REGION: Row = {"open_below": None, "open_above": None}
-"""Where no region was looked for the interval stands."""
 
 
 def interval(value: float, log_error: float, reach: float) -> Row:

@@ -15,7 +15,7 @@ from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
     origin,
-    seen_note,
+    own_values_note,
     specimen_tests,
     start_stiffness,
 )
@@ -43,7 +43,7 @@ def run(
     tests = specimen_tests(settings, cohort, specimen)
     found = [read_frame(path) for path in others]
     k, growth, used = _median(settings, cohort, representation, found)
-    note = seen_note(root, settings, cohort, specimen)
+    note = own_values_note(root, settings, cohort, specimen)
     rows = _stiffness(settings, cohort, k, growth, used, len(others), note)
     within = {one.case.test for one in tests.fitted_to(fitted_to)}
     effects = (

@@ -16,11 +16,11 @@ from spinepipe.report.page.document import (
     sortable,
 )
 from spinepipe.schema import Column, Table, all_declared
-from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL_BUT,
+    GOULD_2024B,
     NOBODY,
     CohortStiffness,
     representations_of,

@@ -7,7 +7,7 @@ import numpy as np
 from spinepipe.experiment.double_sigmoid import Zone
 from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import count, number
-from spinepipe.studies.cohort_stiffness.curves_compared import both
+from spinepipe.studies.cohort_stiffness.loop_rows import paired_curves
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import (
@@ -39,7 +39,7 @@ def ranges(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     rows = results.table("load_displacement")
     if rows.empty:
         return
-    found = both(rows, "range_of_motion", "deg").dropna(subset=["measured", "simulated"])
+    found = paired_curves(rows, "range_of_motion", "deg").dropna(subset=["measured", "simulated"])
     if found.empty:
         return
     differences = found["simulated"] - found["measured"]
@@ -95,7 +95,7 @@ def hysteresis(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     rows = results.table("load_displacement")
     if rows.empty:
         return
-    found = both(rows, "hysteresis_area", "j").dropna(subset=["measured"])
+    found = paired_curves(rows, "hysteresis_area", "j").dropna(subset=["measured"])
     if found.empty:
         yield "No closed loop was read: whether joints lose work in a cycle is not known."
         return

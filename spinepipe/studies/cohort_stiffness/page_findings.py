@@ -9,10 +9,8 @@ import pandas as pd
 from spinepipe.report.page.document import ResultTables, judged
 from spinepipe.report.words import AXIS, after_number, case, count, number, percent
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.page_covariates import covariates
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
-from spinepipe.studies.cohort_stiffness.page_nuisances import nuisances
-from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
+from spinepipe.studies.cohort_stiffness.page_optional import covariates, nuisances, stiffening
 from spinepipe.studies.cohort_stiffness.representations import (
     IN_WORDS,
     NUISANCE,

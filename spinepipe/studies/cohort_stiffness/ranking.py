@@ -59,11 +59,16 @@ def ranking_rows(
         if criterion in INFORMATION:
             found = _information(fits, criterion, [n for n in names if n not in PUBLISHED])
             counts = {name: estimated_spreads(fits, pooling, name) for name in POOLED}
-            order = ranked(found, True, specimens, _penalty(fits, criterion, counts))
-            order = [_conditional(row, counts) for row in order]
+            order = rank_candidates(found, True, specimens, _penalty(fits, criterion, counts))
+            for row in order:
+                if row["representation"] in POOLED and row["value"] is not None:
+                    # Vaida and Blanchard 2005: random effects count by their effective number
+                    count = counts[row["representation"]]
+                    note = f"conditional criterion; {count} spreads of the cohort counted once "
+                    row["message"] = joined(f"{note}as unknowns", row["message"])
         else:
             found = _errors(errors, criterion, names)
-            order = ranked(found, False, specimens, unit=unit_of(errors))
+            order = rank_candidates(found, False, specimens, unit=unit_of(errors))
         rows += [{"criterion": criterion, **row} for row in order]
     return rows
 
@@ -91,15 +96,6 @@ def _penalty(
     return found
 
 
-def _conditional(row: Row, counts: Mapping[str, int]) -> Row:
-    """The row of a pooled fit told of what its criterion is (Vaida and Blanchard 2005)."""
-    if row["representation"] not in POOLED or row["value"] is None:
-        return row
-    count = counts[row["representation"]]
-    note = f"conditional criterion; {count} spreads of the cohort counted once as unknowns"
-    return row | {"message": joined(note, row["message"])}
-
-
 def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Candidate, pd.Series]:
     """Error by specimen of each representation; the literature's is the same everywhere."""
     found = {}
@@ -107,16 +103,13 @@ def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Cand
         stage = LITERATURE if name in PUBLISHED else criterion
         chosen = of_joint_fits(errors, stage)
         chosen = chosen[chosen["representation"] == name]
-        found[name, _source(name, criterion)] = specimen_rms(chosen, errors)
+        source = "own"
+        if name in PUBLISHED:
+            source = "literature"
+        elif criterion == LEFT_OUT_SPECIMEN:
+            source = "others_pooled" if name in POOLED else "others_median"
+        found[name, source] = specimen_rms(chosen, errors)
     return found
-
-
-def _source(name: str, criterion: str) -> str:
-    if name in PUBLISHED:
-        return "literature"
-    if criterion != LEFT_OUT_SPECIMEN:
-        return "own"
-    return "others_pooled" if name in POOLED else "others_median"
 
 
 def _information(
@@ -131,7 +124,7 @@ def _information(
     return found
 
 
-def ranked(
+def rank_candidates(
     found: dict[Candidate, pd.Series],
     summed: bool,
     specimens: Iterable[str] = (),

@@ -39,19 +39,11 @@ def _labels(table: pd.DataFrame) -> list[str]:
 def _of(errors: pd.DataFrame, stage: str, fits: pd.Series) -> pd.DataFrame:
     if stage == LITERATURE:
         return errors[errors["stage"] == LITERATURE]
-    if stage == LEFT_OUT_CASE:
-        fits = _to_all_others(errors)
+    if stage == LEFT_OUT_CASE:  # of the fits to all tests but that of the row
+        labels = _labels(errors)
+        others = {test: label_of_others(labels, test) for test in errors["test"].unique()}
+        fits = errors["fitted_to"] == errors["test"].map(others)
     return errors[(errors["stage"] == stage) & fits]
-
-
-def _to_all_others(errors: pd.DataFrame) -> pd.Series:
-    """Which were fitted to all tests but that of the row."""
-    labels = _labels(errors)
-    others = {test: label_of_others(labels, test) for test in errors["test"].unique()}
-    return errors["fitted_to"] == errors["test"].map(others)
-
-
-READING = ["test", "joint", "coordinate"]
 
 
 KINDS = {"deg": ROTATIONS, "mm": TRANSLATIONS}
@@ -87,7 +79,9 @@ def specimen_rms(chosen: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
     chosen : errors of one stiffness per specimen. errors : all, for what was measured.
     """
     unit = unit_of(errors)
-    seen = compared_motion(errors, unit).drop_duplicates(["specimen", *READING])
+    seen = compared_motion(errors, unit).drop_duplicates(
+        ["specimen", "test", "joint", "coordinate"]
+    )
     measured = seen["specimen"].value_counts()
     known = compared_motion(chosen, unit).dropna(subset="rmse")
     known = known[known["readings"] > 0]

@@ -19,14 +19,14 @@ from spinepipe.studies.cohort_stiffness.claims_of_errors import (
 )
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     adjusted_share,
+    load_case_claim,
     load_case_findings,
     loaded_ratios,
     mean_excess,
     share_between,
-    specific,
     stiffness_spreads,
 )
-from spinepipe.studies.cohort_stiffness.findings import together
+from spinepipe.studies.cohort_stiffness.findings import decide_together
 from spinepipe.studies.cohort_stiffness.significance import nested_fits
 from spinepipe.studies.cohort_stiffness.stages import without_result
 
@@ -106,7 +106,7 @@ def test_specimens_of_a_friedman_test_are_its_own(
     found = {row["finding"]: row for row in error_spreads(rows, 0.05)}
     row = found[f"errors_differ_between_{what}"]
     assert (row["specimens"], row["holds"]) == (specimens, "yes")
-    (beside,) = together([row], 6, 0.05)
+    (beside,) = decide_together([row], 6, 0.05)
     assert beside["holds"] == ("undecided" if specimens < 3 else "yes")
     assert ("2 specimens, and a verdict needs 3" in beside["message"]) == (specimens < 3)
 
@@ -131,7 +131,7 @@ def test_spreads_need_a_grid_with_something_left() -> None:
 def test_f_tests_of_all_specimens_together(p: float, effect: float, holds: str) -> None:
     test = {"p": p, "p_holm": p, "effect": effect, "statistic": 2.0, "message": ""}
     rows = [test] * 3
-    row = specific(CLAIM, pd.DataFrame(rows), 0.05)
+    row = load_case_claim(CLAIM, pd.DataFrame(rows), 0.05)
     assert row["holds"] == holds
     assert row["value"] == (1.0 if p < 0.05 else 0.0)
     if p == 0.5:
@@ -156,7 +156,7 @@ def test_one_significant_specimen_leaves_load_cases_undecided() -> None:
         {"p": p, "p_holm": min(1.0, 3 * p), "effect": 0.01, "statistic": 2.0, "message": ""}
         for p in (0.01, 1, 1)
     ]
-    row = specific(CLAIM, pd.DataFrame(rows), 0.05)
+    row = load_case_claim(CLAIM, pd.DataFrame(rows), 0.05)
     # Fisher: x = -ln 0.01 = 4.605 of 6 degrees of freedom, 0.01 (1 + x + x^2 / 2).
     assert row["p"] == pytest.approx(0.01 * (1 + 4.60517 + 4.60517**2 / 2), abs=1e-5)
     assert (row["value"], row["holds"]) == (pytest.approx(1 / 3), "undecided")

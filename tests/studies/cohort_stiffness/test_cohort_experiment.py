@@ -14,7 +14,7 @@ from spinepipe.cohort import read
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.experiment.loop import Loop
 from spinepipe.report.page.document import ResultTables
-from spinepipe.studies.cohort_stiffness.loops import cycles_of
+from spinepipe.studies.cohort_stiffness.experiment import loading_loops
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
 from spinepipe.units import COORDINATES
 
@@ -208,7 +208,7 @@ def test_published_discs_have_the_range_and_stiffness_of_their_points() -> None:
     """Heuer et al. 2007, L4-L5 disc: -10.11 and 10.28 deg at 7.5 N m, -8.38 and 7.92 at 5."""
     cohort = read(ROOT / "config/cohorts/l4l5_disc")
     tested = measured_specimen(cohort, "heuer_2007", cohort.tests).tested
-    (cycle,) = (one for one in cycles_of(tested) if one.test == "flexion+extension")
+    (cycle,) = (one for one in loading_loops(tested) if one.test == "flexion+extension")
     assert cycle.coordinate == "extension"
     place = COORDINATES.index("extension")
     loop = Loop(cycle.load, cycle.measured[:, 0, place])
@@ -216,7 +216,7 @@ def test_published_discs_have_the_range_and_stiffness_of_their_points() -> None:
     slopes = [loop.elastic_compliance(side, None) for side in (-1, 1)]
     found = [1.0 / one.value for one in slopes if one is not None]
     assert found == pytest.approx([2.5 / np.deg2rad(10.11 - 8.38), 2.5 / np.deg2rad(10.28 - 7.92)])
-    sides = {one.test for one in cycles_of(tested)}
+    sides = {one.test for one in loading_loops(tested)}
     assert {"right_bending", "left_rotation"} < sides, "one side of each was tested"
 
 

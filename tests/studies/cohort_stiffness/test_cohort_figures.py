@@ -21,7 +21,7 @@ from spinepipe.report.words import short
 from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure, stages
 from spinepipe.studies.cohort_stiffness.figures.held_out_error import motion_errors
 from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios
-from spinepipe.studies.cohort_stiffness.figures.range_of_motion import compared
+from spinepipe.studies.cohort_stiffness.figures.range_of_motion import comparison_panels
 from spinepipe.studies.cohort_stiffness.kind import KIND, OF_JOBS
 from spinepipe.tables import StudyTables
 
@@ -333,9 +333,9 @@ def test_long_names_keep_both_ends() -> None:
 def test_curves_stand_beside_the_model_where_they_were_read() -> None:
     size = Size(("a", "b"), tests=("flexion", "left_lateral_bending"))
     rows = tables_of(size)["load_displacement"]
-    titles = [panel.title for panel in compared(rows)]
+    titles = [panel.title for panel in comparison_panels(rows)]
     assert titles == ["Flexion", "Left lateral bending", "Neutral zone", "Work lost in a cycle"]
-    ranges, _, zones, work = compared(rows)
+    ranges, _, zones, work = comparison_panels(rows)
     here = ranges.points
     np.testing.assert_allclose(here["measured_way"], 0.3)
     np.testing.assert_allclose((here["simulated"] - here["measured"]).abs() % 1.0, 0.5)
@@ -344,4 +344,4 @@ def test_curves_stand_beside_the_model_where_they_were_read() -> None:
     figure = draw("range_of_motion", size)
     drawn = [axis for axis in figure.axes if axis.get_visible()]
     assert [axis.get_title(loc="left")[4:] for axis in drawn] == titles
-    assert compared(rows[rows["source"] == "measured"]) == []
+    assert comparison_panels(rows[rows["source"] == "measured"]) == []

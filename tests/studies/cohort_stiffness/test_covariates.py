@@ -17,7 +17,7 @@ from spinepipe.studies.cohort_stiffness.covariates import (
     covariate_rows,
     specimen_effects,
 )
-from spinepipe.studies.cohort_stiffness.page_covariates import covariates
+from spinepipe.studies.cohort_stiffness.page_optional import covariates
 from spinepipe.studies.cohort_stiffness.settings import COVARIATES, CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import COVARIATES_TABLE
 from spinepipe.studies.read import check

@@ -26,7 +26,7 @@ from scipy import stats
 
 from spinepipe.problems import InputError
 from spinepipe.report.page.document import ResultTables
-from spinepipe.studies.cohort_stiffness.page_nuisances import nuisances, orders
+from spinepipe.studies.cohort_stiffness.page_optional import nuisances, orders
 from spinepipe.studies.cohort_stiffness.representations import FITTED, NUISANCE, finest
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import RANKING

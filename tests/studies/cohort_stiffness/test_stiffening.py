@@ -14,7 +14,7 @@ from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.problems import InputError
 from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.cohort_stiffness.findings import finding_rows
-from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
+from spinepipe.studies.cohort_stiffness.page_optional import stiffening
 from spinepipe.studies.cohort_stiffness.ranking import ranking_rows
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.significance import all_tests
