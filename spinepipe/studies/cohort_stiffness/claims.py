@@ -103,6 +103,3 @@ def listed(names: Sequence[str]) -> str:
 
 
 NO_SUCH_FITS = "no such fits in this study"
-
-FACTORS = {"specimens": ("specimen", "joint"), "levels": ("joint", "specimen")}
-"""What differs, and what it is seen in again and again."""

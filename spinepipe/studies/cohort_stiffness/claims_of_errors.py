@@ -14,7 +14,6 @@ from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.claims import (
     BY_CONSTRUCTION,
     CIRCULAR,
-    FACTORS,
     NO_SUCH_FITS,
     CohortClaim,
     Row,
@@ -24,6 +23,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
 )
 from spinepipe.studies.cohort_stiffness.representations import ASKED_FOR, EVERY, named
 from spinepipe.studies.cohort_stiffness.stages import (
+    FACTORS,
     FITTED,
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,

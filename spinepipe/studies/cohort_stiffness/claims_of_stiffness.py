@@ -12,7 +12,6 @@ from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.claims import (
-    FACTORS,
     NO_SUCH_FITS,
     CohortClaim,
     Row,
@@ -22,7 +21,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, label_of_others
 from spinepipe.studies.cohort_stiffness.significance import FAMILY
-from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import FACTORS, joint_label_of, own_fits
 
 LITTLE_DEG = 0.05
 """Adjusted share of the squared error below which what is not significant is called absent."""
@@ -197,7 +196,7 @@ def stiffness_spreads(
 ) -> Iterator[Row]:
     """Do specimens, and do levels, differ in stiffness? One finding per coordinate."""
     label = joint_label_of(stiffness)
-    own = stiffness[(stiffness["fitted_to"] == label) & (stiffness["source"] == "own")]
+    own = own_fits(stiffness)
     own = own[own["representation"] == "per_joint"]
     for coordinate in stiffness["coordinate"].unique():
         rows = own[own["coordinate"] == coordinate]

@@ -25,7 +25,7 @@ from spinepipe.studies.cohort_stiffness.representations import (
     SHARED,
 )
 from spinepipe.studies.cohort_stiffness.settings import SEXES, CohortStiffness
-from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import own_fits
 from spinepipe.studies.cohort_stiffness.tables import COVARIATES_TABLE
 from spinepipe.tables import from_rows, read_frames, write
 
@@ -86,8 +86,7 @@ def covariate_rows(
     names : covariates, taken together. significance : p below which a test decides.
     """
     known = numbers_of(specimens, names)
-    own = stiffness[stiffness["fitted_to"] == joint_label_of(stiffness)]
-    own = own[own["source"] == "own"]
+    own = own_fits(stiffness)
     here = next((name for name in _PLAIN if (own["representation"] == name).any()), "")
     rows: list[Row] = []
     for coordinate in stiffness["coordinate"].unique():

@@ -12,7 +12,6 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import AXIS, after_number, count, number, percent
 from spinepipe.studies.cohort_stiffness.claims import FEWEST
 from spinepipe.studies.cohort_stiffness.claims_of_errors import CONTESTS
@@ -28,6 +27,7 @@ from spinepipe.studies.cohort_stiffness.stages import (
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,
     joint_label_of,
+    own_fits,
 )
 
 Row = dict[Any, Any]
@@ -41,14 +41,14 @@ _VERDICTS = {
 }
 
 
-def stiffening(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
-    """Laws that stiffen beside their linear counterparts, and whether the data hold them."""
-    rows = results.table("findings")
+def stiffening_verdicts(
+    study: CohortStiffness, rows: pd.DataFrame, ranking: pd.DataFrame
+) -> Iterator[str]:
+    """Laws that stiffen beside their linear counterparts, from `findings` and `ranking`."""
     for better, worse in CONTESTS:
-        if len(rows) and better in STIFFENING and worse not in STIFFENING:
-            criterion = _akaike(better, worse, results.table("ranking"))
+        if better in STIFFENING and worse not in STIFFENING:
+            criterion = _akaike(better, worse, ranking)
             yield from _worth(better, worse, rows.set_index("finding"), criterion)
-    yield from _held(results.table("stiffness"))
 
 
 def _akaike(better: str, worse: str, ranking: pd.DataFrame) -> str:
@@ -99,12 +99,10 @@ def _told(row: Row) -> str:
     return f"{words} ({less}{ends}{p})"
 
 
-def _held(stiffness: pd.DataFrame) -> Iterator[str]:
+def excluded_linear_laws(study: CohortStiffness, stiffness: pd.DataFrame) -> Iterator[str]:
     """In how many joints a linear law is excluded, and what stiffness then means."""
-    if stiffness.empty:
-        return
-    own = stiffness[stiffness["fitted_to"] == joint_label_of(stiffness)]
-    own = own[(own["source"] == "own") & own["growth"].notna()]
+    own = own_fits(stiffness)
+    own = own[own["growth"].notna()]
     parts, left = [], 0
     for name, part in own.groupby("representation", sort=False):
         if name in SHARED:  # one law of all joints
@@ -125,13 +123,10 @@ FAR = 3
 """A pull beyond this, either way, is seldom of its prior: one in 370."""
 
 
-def nuisances(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
-    """What fitting them beside does to the order on held-out motion, and how large they are."""
-    ranking = results.table("ranking")
+def order_with_nuisances(study: CohortStiffness, ranking: pd.DataFrame) -> Iterator[str]:
+    """What fitting them beside does to the order on held-out motion."""
     for criterion in (LEFT_OUT_SPECIMEN, LEFT_OUT_CASE):
-        if len(ranking):
-            yield from _order(ranking[ranking["criterion"] == criterion], _HELD_OUT[criterion])
-    yield from _sizes(results.table("nuisances"))
+        yield from _order(ranking[ranking["criterion"] == criterion], _HELD_OUT[criterion])
 
 
 def orders(values: pd.Series) -> tuple[list[str], list[str]]:
@@ -174,10 +169,8 @@ def _order(rows: pd.DataFrame, words: str) -> Iterator[str]:
     yield f"{about} The order of representations changes. {changed}"
 
 
-def _sizes(rows: pd.DataFrame) -> Iterator[str]:
+def nuisance_sizes(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """How many are told by readings, and how many are larger than their prior lets expect."""
-    if rows.empty:
-        return
     whole = rows[rows["fitted_to"] == joint_label_of(rows)]
     for name, part in whole.groupby("representation", sort=False):
         error, prior = part["standard_error"].astype(float), part["prior_sd"].astype(float)
@@ -197,11 +190,8 @@ _WORDS = {
 }
 
 
-def covariates(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def covariates(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """What goes with stiffness, what cannot be told, and what was not to be asked."""
-    rows = results.table("covariates")
-    if rows.empty:
-        return
     for row in rows[rows["holds"] == "yes"].to_dict("records"):
         yield (
             f"{AXIS[row['coordinate']]} stiffness goes with {_name(row)}: {_factor(row)}, over "
@@ -231,5 +221,5 @@ def _name(row: Row) -> str:
 
 def _factor(row: Row) -> str:
     ends = f"{number(row['low'], 2)} to {number(row['high'], 2)}"
-    p = "" if pd.isna(row["p_holm"]) else f", p {number(row['p_holm'], 2)} beside the others"
+    p: str = "" if pd.isna(row["p_holm"]) else f", p {number(row['p_holm'], 2)} beside the others"
     return f"times {number(row['factor'], 2)} for {row['step']} (95 % interval {ends}{p})"

@@ -15,6 +15,9 @@ SHARED_ERROR = (
 LITERATURE, FITTED = "literature", "fitted"
 LEFT_OUT_SPECIMEN, LEFT_OUT_CASE = "left_out_specimen", "left_out_case"
 
+FACTORS = {"specimens": ("specimen", "joint"), "levels": ("joint", "specimen")}
+"""What differs, and what it is seen in again and again: blocks of a test."""
+
 
 def of_single_cases(errors: pd.DataFrame, stage: str) -> pd.DataFrame:
     """Errors of a stage under each test, of the fits to that test alone, as published."""
@@ -29,6 +32,12 @@ def of_joint_fits(errors: pd.DataFrame, stage: str) -> pd.DataFrame:
 def joint_label_of(table: pd.DataFrame) -> str:
     """What fits to all load cases are called in a table."""
     return joint_label(_labels(table))
+
+
+def own_fits(stiffness: pd.DataFrame) -> pd.DataFrame:
+    """Stiffness of each specimen's own fit to all load cases."""
+    whole = stiffness["fitted_to"] == joint_label_of(stiffness)
+    return stiffness[whole & (stiffness["source"] == "own")]
 
 
 def _labels(table: pd.DataFrame) -> list[str]:

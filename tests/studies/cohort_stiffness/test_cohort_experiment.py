@@ -6,14 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from chain_cases import JOINTS, MILLIMETRES, MOMENT_OF, Chains, Tables
-from cohort_study_cases import Size, cohort_of, frame, study_of, tables_of
+from cohort_study_cases import Size, frame, study_of, tables_of
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from spinepipe.cohort import read
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.experiment.loop import Loop
-from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.cohort_stiffness.experiment import loading_loops
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
 from spinepipe.units import COORDINATES
@@ -223,10 +222,10 @@ def test_published_discs_have_the_range_and_stiffness_of_their_points() -> None:
 def told(**changed: pd.DataFrame) -> list[str]:
     """Sentences of made-up results."""
     size = Size(("a", "b"))
-    study, results = study_of(size), ResultTables(tables_of(size, **changed), {}, {})
-    assert cohort_of(size).name == study.cohort
-    makers = (ranges, zones, hysteresis, axes)
-    return [sentence for make in makers for sentence in make(study, results)]
+    tables = tables_of(size, **changed)
+    curves, motions = tables["load_displacement"], tables["helical_axes"]
+    makers = ((ranges, curves), (zones, curves), (hysteresis, curves), (axes, motions))
+    return [one for make, rows in makers if len(rows) for one in make(study_of(size), rows)]
 
 
 def test_sentences_follow_from_the_rows() -> None:
@@ -282,8 +281,6 @@ def test_of_springs_fitted_to_their_readings_95_in_100_are_within_the_limit() ->
             )
         ]
     )
-    (sentence,) = ranges(
-        study_of(Size(("a", "b"))), ResultTables({"load_displacement": rows}, {}, {})
-    )
+    (sentence,) = ranges(study_of(Size(("a", "b"))), rows)
     agree = int(sentence.split(" of 2000 are within")[0].split()[-1])
     assert agree / 2000 == pytest.approx(0.95, abs=4.0 * np.sqrt(0.05 * 0.95 / 2000))

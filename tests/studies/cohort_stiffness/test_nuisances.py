@@ -25,8 +25,7 @@ from displaced_cases import (
 from scipy import stats
 
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import ResultTables
-from spinepipe.studies.cohort_stiffness.page_optional import nuisances, orders
+from spinepipe.studies.cohort_stiffness.page_optional import order_with_nuisances, orders
 from spinepipe.studies.cohort_stiffness.representations import FITTED, NUISANCE, finest
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import RANKING
@@ -245,8 +244,7 @@ def ranked(values: dict[str, float], specimens: int = 5) -> pd.DataFrame:
 
 def sentence(values: dict[str, float], specimens: int = 5) -> str:
     settings = CohortStiffness(study="s", kind="cohort_stiffness", cohort="c")
-    results = ResultTables({"ranking": ranked(values, specimens)}, {}, {})
-    return " ".join(nuisances(settings, results))
+    return " ".join(order_with_nuisances(settings, ranked(values, specimens)))
 
 
 def test_the_order_changes_where_values_with_nuisances_stand_otherwise() -> None:

@@ -12,15 +12,17 @@ from chain_cases import STUDY, Chains, Written, by_joint
 
 from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.cohort_stiffness.findings import finding_rows
-from spinepipe.studies.cohort_stiffness.page_optional import stiffening
+from spinepipe.studies.cohort_stiffness.page_optional import (
+    excluded_linear_laws,
+    stiffening_verdicts,
+)
 from spinepipe.studies.cohort_stiffness.ranking import ranking_rows
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.significance import all_tests
 from spinepipe.studies.cohort_stiffness.tables import FINDINGS, RANKING
 from spinepipe.studies.read import check, read
-from spinepipe.tables import StudyTables, from_rows
+from spinepipe.tables import from_rows
 
 K = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 B = np.array([[8.0, 6.0, 20.0], [10.0, 5.0, 15.0], [6.0, 9.0, 30.0]])
@@ -170,7 +172,8 @@ def test_stiffening_wins_where_joints_stiffen_and_only_there(
     best = frames["ranking"]
     best = best[(best["criterion"] == "aicc") & (best["rank"] == 1)]["representation"].item()
     assert best == ("stiffening" if wins else "per_specimen")
-    first, held = stiffening(study, ResultTables(StudyTables(frames), {}, {}))
+    (first,) = stiffening_verdicts(study, frames["findings"], frames["ranking"])
+    (held,) = excluded_linear_laws(study, frames["stiffness"])
     assert first.startswith("Do joints that stiffen predict better what was not fitted?")
     assert ("? Yes." in first) is wins
     assert ("? Not shown." in first) is not wins

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -71,12 +72,11 @@ def stages(loaded: pd.DataFrame, specimens: int) -> list[PanelLine]:
         there = set(chosen.loc[chosen["stage"] == stage, "representation"])
         if not any(name in there and at == stage for name, at in wanted):
             wanted += [(name, stage) for name in _INSTEAD if name in there][:1]
-    found = [
+    return [
         PanelLine(_title(name, stage), rows)
         for name, stage in wanted
         if len(rows := chosen[(chosen["representation"] == name) & (chosen["stage"] == stage)])
     ]
-    return found
 
 
 def _title(representation: str, stage: str) -> str:
@@ -87,6 +87,9 @@ def _title(representation: str, stage: str) -> str:
 
 COLORS = "PuOr_r"
 """Purple to orange over white: colour-blind readers tell its ends apart."""
+
+_MISSING: dict[str, Any] = {"hatch": "//////", "lw": 0, "edgecolor": HATCH}
+"""What stands behind cells without a number."""
 
 MOST_CASES = 6
 _ROW_MM, _LEAST_ROW_MM, _HEAD_MM, _KEY_MM, _NAMES_MM = 4.6, 1.0, 8.0, 34.0, 14.0
@@ -109,14 +112,20 @@ def error_map_figure(
     if not found or not len(values):
         total = count(len(errors), "row")
         return saying(f"No error in a loaded direction can be shown: none of {total} has one.")
-    figure, axes = _grid(cohort, len(found), min(len(cases), MOST_CASES))
+    lines, across = len(found), min(len(cases), MOST_CASES)
+    rows_mm = len(cohort.specimen_names) * _line_mm(cohort, lines)
+    figure = blank(lines * (rows_mm + _HEAD_MM) + _NAMES_MM + _KEY_MM)
+    axes = lines_of(figure, lines * across, across)
+    # A number is written in each cell where it can be read.
+    wide = _cell_mm(cohort, across) >= _CELL_WITH_NUMBER_MM
+    numbers = wide and _line_mm(cohort, lines) >= _LINE_MM
     image = None
     scale = _scale(found)
     for line, stage in enumerate(found):
         for column, test in enumerate(cases[:MOST_CASES]):
             axis = axes[line][column]
             grid = _square(stage.rows[stage.rows["test"] == test], cohort)
-            image = _draw(axis, grid, scale, _room(cohort, len(axes[0]), len(found)))
+            image = _draw(axis, grid, scale, numbers)
             _frame(axis, signs, test, cohort)
             _label(axis, cohort, line == len(found) - 1, column == 0)
             words = _over(test, loaded, len(axes[0])) if line == 0 else ""
@@ -140,18 +149,6 @@ def _cell_mm(cohort: Cohort, across: int) -> float:
     return (WIDTH_MM - 6.0 - 1.3 * names - 5.0 * across) / (across * len(cohort.joint_names))
 
 
-def _room(cohort: Cohort, across: int, lines: int) -> bool:
-    """Whether a number can be read in each cell."""
-    wide = _cell_mm(cohort, across) >= _CELL_WITH_NUMBER_MM
-    return wide and _line_mm(cohort, lines) >= _LINE_MM
-
-
-def _grid(cohort: Cohort, lines: int, across: int) -> tuple[Figure, list[list[Axes]]]:
-    rows = len(cohort.specimen_names) * _line_mm(cohort, lines)
-    figure = blank(lines * (rows + _HEAD_MM) + _NAMES_MM + _KEY_MM)
-    return figure, lines_of(figure, lines * across, across)
-
-
 def _scale(found: Sequence[PanelLine]) -> Normalize:
     """Symmetric around zero; an end that few errors reach is drawn in."""
     sizes = [np.abs(finite(stage.rows["peak_error"])) for stage in found]
@@ -172,16 +169,7 @@ def _square(rows: pd.DataFrame, cohort: Cohort) -> Array:
 def _draw(axis: Axes, grid: Array, scale: Normalize, numbers: bool) -> AxesImage:
     axis.set_facecolor(EMPTY)
     axis.add_patch(
-        Rectangle(
-            (-0.5, -0.5),
-            grid.shape[1],
-            grid.shape[0],
-            hatch="//////",
-            lw=0,
-            facecolor="none",
-            edgecolor=HATCH,
-            zorder=0,
-        )
+        Rectangle((-0.5, -0.5), *grid.shape[::-1], **_MISSING, facecolor="none", zorder=0)
     )
     shown = np.ma.masked_invalid(grid)
     image = axis.imshow(shown, cmap=COLORS, norm=scale, aspect="auto", zorder=1)
@@ -209,18 +197,8 @@ def _frame(axis: Axes, signs: pd.DataFrame, test: str, cohort: Cohort) -> None:
     levels = list(cohort.joint_names[::-1])
     for _, row in _flipped(signs)[_flipped(signs)["test"] == test].iterrows():
         x, y = levels.index(row["joint"]), cohort.specimen_names.index(row["specimen"])
-        axis.add_patch(
-            Rectangle(
-                (x - 0.5, y - 0.5),
-                1.0,
-                1.0,
-                fill=False,
-                edgecolor=BLACK,
-                lw=1.3,
-                zorder=4,
-                clip_on=False,
-            )
-        )
+        line: dict[str, Any] = {"fill": False, "edgecolor": BLACK, "lw": 1.3}
+        axis.add_patch(Rectangle((x - 0.5, y - 0.5), 1.0, 1.0, **line, zorder=4, clip_on=False))
 
 
 def _flipped(signs: pd.DataFrame) -> pd.DataFrame:
@@ -274,15 +252,7 @@ def _explain(
     told = "predicted less measured motion at the largest load, loaded direction"
     bar.set_label(f"{told} ({SIGNS[unit]})")
     bar.outline.set_linewidth(0.4)
-    handles = [
-        Patch(
-            facecolor=EMPTY,
-            edgecolor=HATCH,
-            hatch="//////",
-            lw=0,
-            label="not measured, or no result",
-        )
-    ]
+    handles = [Patch(facecolor=EMPTY, **_MISSING, label="not measured, or no result")]
     if len(_flipped(signs)):
         label = "measured motion goes against the load: sign flipped?"
         handles.append(Patch(facecolor=WHITE, edgecolor=BLACK, lw=1.3, label=label))

@@ -112,10 +112,8 @@ def _explain(figure: Figure, panels: list[ComparisonPanel]) -> None:
     ]
     loose = any(p.points[["measured_way", "simulated_way"]].isna().any().any() for p in panels)
     if loose:
-        label = "an interval is missing"
-        handles.insert(
-            1, Line2D([], [], color=OURS, marker="o", mfc=WHITE, ms=3.0, lw=0, label=label)
-        )
+        hollow = {"color": OURS, "marker": "o", "mfc": WHITE, "ms": 3.0, "lw": 0}
+        handles.insert(1, Line2D([], [], **hollow, label="an interval is missing"))  # type: ignore[arg-type]
     more = len(panels) - _MOST_PANELS
     rest = f" {count(more, 'further panel')} not shown." if more > 0 else ""
     words = (
