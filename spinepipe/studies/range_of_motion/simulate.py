@@ -16,10 +16,10 @@ from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import KEPT_SPECIMENS, study_of_kind
-from spinepipe.model import RefusedModel, SpineModel
+from spinepipe.model import RefusedModel
 from spinepipe.statics.batched import Stack
 from spinepipe.status import Status
-from spinepipe.studies.range_of_motion.load_steps import asked_tests, virtual_tensions
+from spinepipe.studies.range_of_motion.grid import asked_tests, virtual_tensions
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.studies.selected_tests import AskedTest
@@ -63,25 +63,19 @@ def _solved(
     values: Array,
     tests: Sequence[AskedTest],
 ) -> list[Ends]:
-    """Ends of all tests of one spine; refused where it is none."""
+    """Ends of the stored steps of one spine, test by test; refused where it is none."""
     damping = np.array(settings.damping.in_order())
     try:
         tension_n = virtual_tensions(settings)
         model = on_bushings(cohort, specimen, placed, values, damping, tension_n=tension_n)
-        return _ends(model, tests)
     except RefusedModel as error:
         nowhere = np.full(values.shape, np.nan)
         return [
             [(nowhere, Status.REFUSED, str(error))] * len(test.case.steps[test.stored])
             for test in tests
         ]
-
-
-def _ends(model: SpineModel, tests: Sequence[AskedTest]) -> list[Ends]:
-    """Ends of the steps that are stored, test by test; all are solved in one stack.
-
-    Without an equilibrium in step 0 there is none in later steps, as they are followed from it.
-    """
+    # All tests are solved in one stack. Without an equilibrium in step 0 there is none in later
+    # steps, as they are followed from it.
     stack = Stack.of([model], [(0, test.case) for test in tests])
     found = stack.solve()
     ends = []

@@ -20,8 +20,8 @@ from spinepipe.problems import InputError
 from spinepipe.studies import read as studies
 from spinepipe.studies.range_of_motion import draw as draw_stiffness
 from spinepipe.studies.range_of_motion import draw as sample_frames
-from spinepipe.studies.range_of_motion import load_steps, simulate, summary, variance
-from spinepipe.studies.range_of_motion.grid import read_grid
+from spinepipe.studies.range_of_motion import simulate, summary, variance
+from spinepipe.studies.range_of_motion.grid import asked_tests, read_grid
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion, VirtualTest
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.tables import from_rows, read_frame, write
@@ -128,7 +128,7 @@ def test_levels_and_factors_make_the_stiffness_sets(tmp_path: Path) -> None:
 def moved(root: Path, pose: int = 0, stiffness: int = 0, specimen: str = "a") -> pd.DataFrame:
     """Rows of one job."""
     frames, sets, output = (str(root / f"{name}.parquet") for name in ("frames", "sets", "out"))
-    load_steps.asked_tests.cache_clear()  # a test changes its study in no time
+    asked_tests.cache_clear()  # a test changes its study in no time
     sample_frames.sample_frames(str(root), STUDY, specimen, frames)
     draw_stiffness.draw_stiffness(str(root), STUDY, sets)
     place = {"pose": f"{pose:04d}", "stiffness": f"{stiffness:02d}"}

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.glyphs import BAR_PT, KEY, THIN_BAR_PT, draw_bar
-from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
+from spinepipe.report.panels import across_of, explain, explain_marks, head, side_by_side
 from spinepipe.report.style import BEST, BLACK, BLUE, GREEN, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, case, count
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
@@ -54,8 +54,10 @@ def levels_figure(
     axes, figure = panels(tests, joints, height)
     for axis, test in zip(axes, tests, strict=True):
         _draw_levels(axis, loaded[loaded["test"] == test], joints, several)
-    handles = _handles(several)
-    explain_marks(figure, handles, _words_of_levels(summary, several), len(handles))
+    meaning = {OURS: "all joint frames and stiffness sets" + " of all specimens" * several}
+    if several:
+        meaning[BEST] = "medians of the specimens"
+    explain(figure, meaning, _words_of_levels(summary, several))
     return figure
 
 
@@ -81,16 +83,6 @@ def _quantile_bar(axis: Axes, row: dict[Any, Any], y: float, thick_pt: float) ->
     quartiles = [row["low_quartile"], row["high_quartile"]]
     axis.plot(quartiles, [y, y], color=OURS, lw=thick_pt, solid_capstyle="butt", zorder=4)
     axis.plot([row["median"]], [y], "|", color=BLACK, ms=1.6 * thick_pt + 0.6, mew=1.0, zorder=5)
-
-
-def _handles(several: bool) -> list[Line2D]:
-    meaning = {OURS: "all joint frames and stiffness sets" + " of all specimens" * several}
-    if several:
-        meaning[BEST] = "medians of the specimens"
-    return [
-        Line2D([], [], color=color, lw=BAR_PT, solid_capstyle="butt", label=words)
-        for color, words in meaning.items()
-    ]
 
 
 def _words_of_levels(summary: pd.DataFrame, several: bool) -> str:
@@ -131,16 +123,8 @@ def variance_figure(
     for axis, test in zip(axes, tests, strict=True):
         _draw_shares(axis, shown[shown["test"] == test], cohort.joint_names, factors)
     handles = [
-        Line2D(
-            [],
-            [],
-            color=_MARKS[name][0],
-            marker=_MARKS[name][1],
-            ms=3.5,
-            lw=0.8,
-            label=_MARKS[name][2],
-        )
-        for name in factors
+        Line2D([], [], color=color, marker=shape, ms=3.5, lw=0.8, label=words)
+        for color, shape, words in (_MARKS[name] for name in factors)
     ]
     explain_marks(figure, handles, _words_of_shares(shown), len(handles))
     return figure
@@ -158,27 +142,16 @@ def _draw_shares(
                 at = y + 0.3 - 0.6 * number / (len(factors) - 1)
                 ends = [100.0 * row[f"{name}_low"], 100.0 * row[f"{name}_high"]]
                 axis.plot(ends, [at, at], color=color, lw=0.8, solid_capstyle="butt", zorder=3)
-                axis.plot(
-                    [100.0 * row[f"{name}_share"]],
-                    [at],
-                    shape,
-                    color=color,
-                    ms=2.6,
-                    mew=0.0,
-                    clip_on=False,
-                    zorder=4,
-                )
+                symbol: dict[str, Any] = {"ms": 2.6, "mew": 0.0, "clip_on": False, "zorder": 4}
+                axis.plot([100.0 * row[f"{name}_share"]], [at], shape, color=color, **symbol)
     axis.set_xlim(0.0, 100.0)
     axis.set_xlabel("share of variance (%)")
 
 
 def _words_of_shares(shown: pd.DataFrame) -> str:
     first = shown.iloc[0]
-    poses = (
-        f"{count(int(first['n_poses']), 'drawn pose')} each"
-        if first["specimen"] == EVERY
-        else (f"{count(int(first['n_poses']), 'drawn pose')} of {first['specimen']}")
-    )
+    whose = "each" if first["specimen"] == EVERY else f"of {first['specimen']}"
+    poses = f"{count(int(first['n_poses']), 'drawn pose')} {whose}"
     sets = count(int(first["n_stiffness"]), "drawn stiffness set")
     specimens = count(int(first["n_specimens"]), "specimen")
     return f"symbol: estimate, line: 95 % interval; {specimens}, {poses}, {sets}"
