@@ -250,6 +250,7 @@ def share_between(
     table = AnovaRM(long, "log", block, [factor]).fit().anova_table  # one value per cell
     f, between, within, p = (float(value) for value in table.iloc[0])
     times = values.shape[1] if block == "joint" else values.shape[0]
+    # F of a share rho scales F by 1 + times rho / (1 - rho): quantiles of F make its interval.
     low = _share(f / float(stats.f.isf(0.025, between, within)), times)
     high = _share(f * float(stats.f.isf(0.025, within, between)), times)
     # Twice the chance of so small an F where the share is LITTLE: below 0.05 if high < LITTLE.

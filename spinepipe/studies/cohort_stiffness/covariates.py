@@ -167,6 +167,7 @@ def _why_not(x: pd.DataFrame, needed: int) -> str:
 
 def _alone(x: Array) -> Array:
     """(k,) share of each covariate's variance (n, k) that the others do not make."""
+    # 1 - R2 of each on the others: the inverse of its variance inflation factor.
     centred = x - x.mean(axis=0)
     shares = []
     for column in range(x.shape[1]):
@@ -189,6 +190,8 @@ def specimen_effects(values: pd.DataFrame) -> pd.Series:
         return pd.Series(dtype=float)
     by_specimen = values["specimen"].astype(str).to_numpy()[:, None] == np.array(specimens)
     by_level = values["joint"].to_numpy()[:, None] == np.array(levels)
+    # Two-way fixed effects; the first level has none of its own, so that each specimen's effect is
+    # its mean there.
     design = np.hstack([by_specimen, by_level[:, 1:]]).astype(float)
     logarithms = np.log(values["stiffness"].to_numpy(float))
     solution, _ = lstsq(design, logarithms)
@@ -197,6 +200,8 @@ def specimen_effects(values: pd.DataFrame) -> pd.Series:
 
 def _connected(values: pd.DataFrame) -> set[str]:
     """The largest group of specimens that levels hold together."""
+    # Connected components of the graph of specimens and the levels they were read at: effects of
+    # specimens in different ones cannot be compared.
     groups: list[tuple[set[str], set[str]]] = []
     for specimen, part in values.groupby("specimen", sort=False):
         names, levels = {str(specimen)}, set(part["joint"])

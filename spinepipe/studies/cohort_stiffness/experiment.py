@@ -262,6 +262,7 @@ def _covariance(
         evaluator.problem, evaluator.at(x), at_bound, settings.identifiable_below, None
     )
     held = found.identifiable
+    # root @ root.T is the covariance; rounding may leave eigenvalues below 0
     values, vectors = eigh(found.covariance[np.ix_(held, held)]) if held.any() else (None, None)
     if values is None or vectors is None:
         return np.zeros((0, 0)), held, 0.0
@@ -388,6 +389,7 @@ def _simulated(
         row, axis = read.curve(motion, None), read.axis(motion, None, None, SIMULATED, name)
     else:
         by = cycle.of(model.slopes)[:, joint]
+        # What the data hold of the stiffness spreads; what they do not leaves ends open.
         held, loose = by[..., model.held] @ model.root, by[..., ~model.held]
         spread = RotationErrors(held[:, read.place], loose[:, read.place], model.reach).at(
             read.known

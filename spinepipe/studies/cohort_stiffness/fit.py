@@ -154,6 +154,7 @@ def _stiffness(
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
     fitted = [COORDINATES.index(name) for name in settings.free]
+    # Open until a region was found; where the fit looked for none, the interval stands.
     reaches = {(row, at): OPEN for row in range(len(k)) for at in fitted}
     for index, unknown in enumerate(problem.free):
         if unknown.effect != BUSHING:

@@ -193,5 +193,6 @@ def _sign(measured: Array, expected: Array) -> int:
     slope, error = _slope(measured, expected)
     if slope is None or error is None:
         return 0
+    # t test of a slope through zero, of one unknown
     reach = float(stats.t.isf(FALSE_ALARM, len(measured) - 1)) * error
     return int(np.sign(slope)) if abs(slope) > reach else 0

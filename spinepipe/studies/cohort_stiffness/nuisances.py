@@ -92,12 +92,13 @@ def start_from_plain(problem: Problem, plain: Fit) -> tuple[Problem, str]:
         return problem, ""
     known = plain.uncertainty.identifiable | (plain.at_bound != 0)
     stiffness = [index for index in range(len(problem.free)) if not problem.has_prior(index)]
-    x = np.zeros(len(problem.free))
+    x = np.zeros(len(problem.free))  # nuisances start at none
     x[stiffness] = plain.x
     held = [index for index, told in zip(stiffness, known, strict=True) if not told]
     kept = np.setdiff1d(np.arange(len(x)), held)
     assert problem.prior_sd is not None
     note = f"held as without nuisances: {len(held)} of {len(stiffness)} stiffnesses"
+    # Unknowns count from where the model stands now, and so do their bounds.
     return replace(
         problem,
         model=with_parameters(problem.model, problem.free, x),

@@ -45,6 +45,7 @@ def predicted(
     seen = readings(stack, poses.q)
     found: list[tuple[Array | None, Status, str]] = []
     for first, end in pairwise(stack.first.tolist()):
+        # A case has motion where all of its steps have a stable pose.
         lost = next((at for at in range(first, end) if not Status(poses.status[at]).usable), None)
         if lost is not None:
             found.append((None, Status(poses.status[lost]), poses.messages[lost]))

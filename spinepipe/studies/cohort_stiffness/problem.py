@@ -130,7 +130,9 @@ def calibration_problem(
     growths = free_growth(study, model, representation)
     errors, sds = free_nuisances(study, model, representation, BUSHING + 1 + len(stiffening))
     free = stiffness + growths + errors
-    reach = np.full(len(free), np.inf)  # of growth and nuisances their declared bounds
+    # Stiffness moves as a logarithm: bounds are start / factor and start x factor. Of growth and
+    # nuisances those that their effects declare stand.
+    reach = np.full(len(free), np.inf)
     reach[: len(stiffness)] = np.log(study.bound_factor)
     prior_sd = np.append(np.full(len(stiffness + growths), np.inf), sds) if errors else None
     cases = tuple(

@@ -151,6 +151,7 @@ def rank_candidates(
     by_name = {candidate[0]: found[candidate] for candidate in compared}
     lost = without_result(by_name, {*table.index, *specimens})
     told = f"left out, without a result: {lost}" if lost else ""
+    # What counts once is shared out evenly, so that sums have it and paired differences too.
     share = {one: once.get(one, 0.0) / len(complete) for one in compared}
     values = {one: complete[one].to_numpy(float) + share[one] for one in compared}
     best = min(compared, key=lambda one: values[one].mean())
