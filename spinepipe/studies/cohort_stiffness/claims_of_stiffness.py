@@ -7,7 +7,6 @@ import pandas as pd
 from scipy import stats
 from statsmodels.stats.anova import AnovaRM
 
-from spinepipe.effects.contract import Array
 from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status, joined
@@ -154,7 +153,14 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     spread = float(np.sqrt(np.mean((ratios["ratio"] / ratios["error"]) ** 2)))
     many = f"{len(ratios)} ratios, {spread:.2g} of their standard errors from 1 (root mean square)"
     ends = mean.interval
-    p_no = None if ends is None else _within(1.0 + excess, 1.0 / MARGIN, MARGIN)
+    p_no = None
+    if ends is not None:
+        # p that the mean is not between the margins: the larger of two t tests, doubled. So it is
+        # below 0.05 where the 95 % interval of the mean lies between them.
+        ratio = 1.0 + excess
+        above = float(stats.ttest_1samp(ratio, 1.0 / MARGIN, alternative="greater").pvalue)
+        below = float(stats.ttest_1samp(ratio, MARGIN, alternative="less").pvalue)
+        p_no = min(1.0, 2.0 * max(above, below))
     holds = "undecided"
     if mean.p is not None and mean.p < significance:
         holds = "yes"
@@ -165,16 +171,6 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     return STIFFER.row(
         holds, joined(sample_words(mean), many), value, interval, mean.p, mean.n, p_no
     )
-
-
-def _within(values: Array, low: float, high: float) -> float:
-    """p that the mean of values (n,) is not between two ends: the larger of two t tests, doubled.
-
-    Doubled, it is below 0.05 where the 95 % interval of the mean lies between them.
-    """
-    above = float(stats.ttest_1samp(values, low, alternative="greater").pvalue)
-    below = float(stats.ttest_1samp(values, high, alternative="less").pvalue)
-    return min(1.0, 2.0 * max(above, below))
 
 
 def mean_excess(ratios: pd.DataFrame) -> pd.Series:
@@ -236,14 +232,17 @@ def share_between(
 
     The share is ICC(C,1) of McGraw and Wong 1996, doi:10.1037/1082-989X.1.1.30, Table 7.
     """
-    values = log_grid(rows)
+    # Logarithms (specimens, joints) of the specimens with all joints identifiable.
+    known = rows[rows["identifiable"].eq(True) & rows["stiffness"].notna()]
+    grid = known.pivot(index="specimen", columns="joint", values="stiffness").astype(float)
+    values = grid.dropna().map(np.log)
     left_out = rows["specimen"].nunique() - len(values)
     note = joined(note, f"{left_out} specimens without all joints left out" if left_out else "")
     if min(values.shape) < 2:
         return claim.unknown(joined("at least 2 specimens with 2 joints are needed", note))
     # What specimens and levels together leave may be rounding alone.
-    grid = values.to_numpy(float)
-    rest = grid - grid.mean(axis=0) - grid.mean(axis=1, keepdims=True) + grid.mean()
+    logs = values.to_numpy(float)
+    rest = logs - logs.mean(axis=0) - logs.mean(axis=1, keepdims=True) + logs.mean()
     if np.abs(rest).max() <= SAME:
         return claim.unknown(joined("nothing is left beside specimens and levels", note))
     long = values.reset_index().melt(id_vars="specimen", var_name="joint", value_name="log")
@@ -259,13 +258,6 @@ def share_between(
     holds = "yes" if p < significance else "no" if p_no < significance else "undecided"
     message = joined(f"F({between:.0f}, {within:.0f}) {f:.3g}", note)
     return claim.row(holds, message, _share(f, times), (low, high), p, len(values), p_no)
-
-
-def log_grid(rows: pd.DataFrame) -> pd.DataFrame:
-    """Logarithm of stiffness (specimens, joints) of the specimens with all joints identifiable."""
-    known = rows[rows["identifiable"].eq(True) & rows["stiffness"].notna()]
-    grid = known.pivot(index="specimen", columns="joint", values="stiffness").astype(float)
-    return grid.dropna().map(np.log)
 
 
 def _share(f: float, times: int) -> float:

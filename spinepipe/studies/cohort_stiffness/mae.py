@@ -39,7 +39,10 @@ def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
     for key, part in loaded.groupby(GROUP, sort=False):
         named = dict(zip(GROUP, map(str, key), strict=True))
         for steps, (error, motion) in STEPS.items():
-            found = specimen_mae(part, error, motion)
+            # over the joints with a motion, by specimen; all of these must be known
+            measured = part[part[motion].notna()]
+            by_joint = measured[error].astype(float).abs().groupby(measured["specimen"])
+            found = by_joint.mean()[by_joint.count() == by_joint.size()]
             largest_of_all = largest[named["test"], named["coordinate"], motion]
             row = {
                 **named,
@@ -57,11 +60,3 @@ def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
             in_deg = row["unit"] == "deg"
             rows.append(row | {f"{name}_deg": row[name] if in_deg else None for name in MAE_IN_DEG})
     return rows
-
-
-def specimen_mae(part: pd.DataFrame, error: str, motion: str) -> pd.Series:
-    """Mean absolute error over the joints with a motion, by specimen; all of them must be known."""
-    measured = part[part[motion].notna()]
-    by_joint = measured[error].astype(float).abs().groupby(measured["specimen"])
-    known: pd.Series = by_joint.mean()[by_joint.count() == by_joint.size()]
-    return known

@@ -58,7 +58,14 @@ def ranking_rows(
     for criterion in CRITERIA:
         if criterion in INFORMATION:
             found = _information(fits, criterion, [n for n in names if n not in PUBLISHED])
-            counts = {name: estimated_spreads(fits, pooling, name) for name in POOLED}
+            counts = dict.fromkeys(POOLED, 0)
+            if pooling is not None:  # the spreads that a fit to all load cases has estimated
+                here = (pooling["fitted_to"] == joint_label_of(fits)) & (
+                    pooling["without"] == NOBODY
+                )
+                for name in POOLED:
+                    of_name = pooling.loc[here & (pooling["representation"] == name), list(SPREADS)]
+                    counts[name] = int(of_name.notna().sum().sum())
             order = rank_candidates(found, True, specimens, _penalty(fits, criterion, counts))
             for row in order:
                 if row["representation"] in POOLED and row["value"] is not None:
@@ -71,15 +78,6 @@ def ranking_rows(
             order = rank_candidates(found, False, specimens, unit=unit_of(errors))
         rows += [{"criterion": criterion, **row} for row in order]
     return rows
-
-
-def estimated_spreads(fits: pd.DataFrame, pooling: pd.DataFrame | None, name: str) -> int:
-    """How many spreads a pooled fit to all load cases and specimens has estimated."""
-    if pooling is None:
-        return 0
-    here = (pooling["fitted_to"] == joint_label_of(fits)) & (pooling["without"] == NOBODY)
-    here &= pooling["representation"] == name
-    return int(pooling.loc[here, list(SPREADS)].notna().sum().sum())
 
 
 def _penalty(

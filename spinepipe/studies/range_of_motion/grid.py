@@ -3,7 +3,6 @@
 Motion is by specimen, pose, stiffness set, test and joint.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import mode
@@ -96,7 +95,12 @@ def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> MotionGrid:
     with opened(path) as file:
         for rows in file.iter_batches(ROWS_AT_A_TIME, columns=[*_KEYS, *_MOTION]):
             rows = rows.filter(rows["largest_load"])
-            at = {name: _positions(rows[name], values) for name, values in names.items()}
+            at = {  # places among the names
+                name: pc.index_in(rows[name], value_set=pa.array(values)).to_numpy(
+                    zero_copy_only=False
+                )
+                for name, values in names.items()
+            }
             at |= {name: rows[name].to_numpy() for name in ("pose", "stiffness")}
             place = tuple(at[name] for name in ("specimen", "pose", "stiffness", "test", "joint"))
             values = [rows[name].to_numpy(zero_copy_only=False) for name in _MOTION]
@@ -107,14 +111,6 @@ def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> MotionGrid:
         driven.get(test) or _moves_most(motion[:, :, :, i]) for i, test in enumerate(tests)
     )
     return MotionGrid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, tested)
-
-
-def _positions(values: pa.Array, names: Sequence[str]) -> NDArray[np.int32]:
-    """Place of each value among the names."""
-    found: NDArray[np.int32] = pc.index_in(values, value_set=pa.array(names)).to_numpy(
-        zero_copy_only=False
-    )
-    return found
 
 
 def _driven(study: RangeOfMotion, cohort: Cohort) -> dict[str, str]:

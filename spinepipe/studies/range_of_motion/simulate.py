@@ -47,8 +47,8 @@ def run(
     drawn = [mark_of(frames), mark_of(stiffness_sets)]
     made_by = provenance("simulate", settings, cohort, [specimen], drawn)
     for path, place in parts.items():
-        placed = drawn_frames(frames).of(specimen, int(place["pose"]))
-        values = drawn_stiffness(stiffness_sets)[int(place["stiffness"])]
+        placed = drawn_frames(stamp(frames)).of(specimen, int(place["pose"]))
+        values = drawn_stiffness(stamp(stiffness_sets))[int(place["stiffness"])]
         ends = _solved(settings, cohort, specimen, placed, values, tests)
         columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
         columns["stiffness"] = [int(place["stiffness"])] * len(columns["test"])
@@ -137,13 +137,9 @@ class DrawnFrames:
         return tuple(Pose(self.rotations[row], self.origins[row]) for row in at)
 
 
-def drawn_frames(path: str) -> DrawnFrames:
-    """Frames of a specimen, from the file that `sample_frames` wrote."""
-    return _frames(stamp(path))
-
-
 @lru_cache(maxsize=KEPT_SPECIMENS)
-def _frames(where: Stamp) -> DrawnFrames:
+def drawn_frames(where: Stamp) -> DrawnFrames:
+    """Frames of a specimen, from the file that `sample_frames` wrote."""
     table = read_frame(where[0])
     n = table["joint"].nunique()
     keys = zip(table["specimen"][::n], table["pose"][::n].astype(int), strict=True)
@@ -156,13 +152,9 @@ def _frames(where: Stamp) -> DrawnFrames:
     )
 
 
-def drawn_stiffness(path: str) -> Array:
-    """(sets, J, 6) stiffness of ``stiffness_sets.parquet``, SI."""
-    return _stiffness(stamp(path))
-
-
 @lru_cache(maxsize=2)
-def _stiffness(where: Stamp) -> Array:
+def drawn_stiffness(where: Stamp) -> Array:
+    """(sets, J, 6) stiffness of ``stiffness_sets.parquet``, SI."""
     table = read_frame(where[0])
     values: Array = table[list(STIFFNESS_COLUMNS)].to_numpy(float)
     return values.reshape(table["stiffness"].nunique(), -1, 6)

@@ -45,6 +45,11 @@ def load_case_stiffness_figure(
     names = [name for name in COORDINATES if name in set(found["coordinate"])]
     height = _ROW_MM * len(cases) + _AROUND_MM
     lines, figure = sections([(len(names), height)] * len(shown), _KEY_MM)
+    names_of_cases = []
+    for test in cases[::-1]:  # on two lines
+        words = short(case(test), 32).split(" ")
+        halves = words[: -(-len(words) // 2)], words[-(-len(words) // 2) :]
+        names_of_cases.append("\n".join(" ".join(half) for half in halves if half))
     number_of = 0
     for representation, axes in zip(shown, lines, strict=True):
         for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
@@ -54,7 +59,7 @@ def load_case_stiffness_figure(
                 (found["representation"] == representation) & (found["coordinate"] == name)
             ]
             _draw(axis, here, cases)
-            axis.set_yticks(range(len(cases)), [_two_lines(one) for one in cases[::-1]])
+            axis.set_yticks(range(len(cases)), names_of_cases)
             place = axis.get_subplotspec()
             axis.tick_params(labelleft=place is None or place.is_first_col())
             if index == 0:
@@ -89,12 +94,6 @@ def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     pairs = set(zip(driven["test"], driven["coordinate"], strict=True)) if len(errors) else set()
     loads = [key in pairs for key in zip(both["fitted_to"], both["coordinate"], strict=True)]
     return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
-
-
-def _two_lines(test: str) -> str:
-    words = short(case(test), 32).split(" ")
-    middle = -(-len(words) // 2)
-    return "\n".join(" ".join(part) for part in (words[:middle], words[middle:]) if part)
 
 
 def _draw(axis: Axes, rows: pd.DataFrame, cases: Sequence[str]) -> None:

@@ -68,21 +68,19 @@ def _draw_levels(axis: Axes, rows: pd.DataFrame, joints: tuple[str, ...], severa
     whole = rows[rows["specimen"] == EVERY] if several else rows
     for y, joint in enumerate(joints):
         for row in whole[whole["joint"] == joint].to_dict("records"):
-            _quantile_bar(axis, row, y + 0.17 * several, thick)
+            # the bar of `draw_bar` from quantiles
+            at = [y + 0.17 * several] * 2
+            ends = [row["percentile_5"], row["percentile_95"]]
+            axis.plot(ends, at, color=OURS, lw=0.8, solid_capstyle="butt", zorder=3)
+            quartiles = [row["low_quartile"], row["high_quartile"]]
+            axis.plot(quartiles, at, color=OURS, lw=thick, solid_capstyle="butt", zorder=4)
+            tick: dict[str, Any] = {"color": BLACK, "ms": 1.6 * thick + 0.6, "mew": 1.0}
+            axis.plot([row["median"]], at[:1], "|", **tick, zorder=5)
         own = rows[(rows["joint"] == joint) & (rows["specimen"] != EVERY)]
         if several and len(own):
             draw_bar(axis, own["median"].to_numpy(float), y - 0.2, BEST, thick)
     coordinate = rows["coordinate"].iloc[0]
     axis.set_xlabel(f"{AXIS[coordinate].lower()} (°), + is {POSITIVE[coordinate]}")
-
-
-def _quantile_bar(axis: Axes, row: dict[Any, Any], y: float, thick_pt: float) -> None:
-    """The bar of `draw_bar` from quantiles."""
-    ends = [row["percentile_5"], row["percentile_95"]]
-    axis.plot(ends, [y, y], color=OURS, lw=0.8, solid_capstyle="butt", zorder=3)
-    quartiles = [row["low_quartile"], row["high_quartile"]]
-    axis.plot(quartiles, [y, y], color=OURS, lw=thick_pt, solid_capstyle="butt", zorder=4)
-    axis.plot([row["median"]], [y], "|", color=BLACK, ms=1.6 * thick_pt + 0.6, mew=1.0, zorder=5)
 
 
 def _words_of_levels(summary: pd.DataFrame, several: bool) -> str:
