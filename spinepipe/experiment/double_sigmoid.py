@@ -127,7 +127,7 @@ def neutral_zone(
         return None, Zone.TOO_FEW, why
     if not np.ptp(rotation) or load @ (rotation - rotation.mean()) <= 0.0:
         return None, Zone.NOT_MEANINGFUL, "the joint does not move with the load"
-    curve = fitted(load, rotation, sd)
+    curve = fit_sigmoids(load, rotation, sd)
     if curve is None:
         why = "no neutral zone: an S-shaped curve fits no better than a straight line"
         return None, Zone.NOT_MEANINGFUL, why
@@ -154,7 +154,7 @@ def _distinct(load: Array) -> int:
     return 1 + int(np.count_nonzero(steps > 0.01 * np.ptp(load)))
 
 
-def fitted(load: Array, rotation: Array, sd: float | None) -> SigmoidCurve | None:
+def fit_sigmoids(load: Array, rotation: Array, sd: float | None) -> SigmoidCurve | None:
     """The sum of as few sigmoids as the points ask for; None where a straight line does as well.
 
     Parameters

@@ -35,7 +35,7 @@ from spinepipe.studies.cohort_stiffness.loop_rows import (
     empty,
     noise_of_poses,
 )
-from spinepipe.studies.cohort_stiffness.predict import predicted
+from spinepipe.studies.cohort_stiffness.predict import predict_motion
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
     base_effects,
@@ -223,7 +223,7 @@ def _simulation(
         return None, joined("the fit has no stiffness", str(frame["message"].iloc[0]))
     start = start_stiffness(settings, cohort, representation)
     k, bound = _fitted(cohort, start, frame)
-    motion = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
+    motion = predict_motion(cohort, specimen, tests.frames, tests.tested, k, others)
     try:
         problem = calibration_problem(
             settings, cohort, specimen, representation, tests.frames, tests.tested, others

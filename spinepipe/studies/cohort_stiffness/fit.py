@@ -150,7 +150,7 @@ def _stiffness(
     """Fitted stiffness (J, 6), NaN where the fit has none, and its rows."""
     usable = found.status.usable
     model = with_parameters(problem.model, problem.free, found.x)
-    k = model.effects[0].values
+    k = model.effects[BUSHING].values
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
     fitted = [COORDINATES.index(name) for name in settings.free]

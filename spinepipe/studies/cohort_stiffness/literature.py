@@ -15,7 +15,7 @@ from spinepipe.model import ScopedEffect
 from spinepipe.plausibility.motion_size import implausible, unit_of
 from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
-from spinepipe.studies.cohort_stiffness.predict import error_rows, predicted
+from spinepipe.studies.cohort_stiffness.predict import error_rows, predict_motion
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
     base_effects,
@@ -95,7 +95,7 @@ def sign_rows(
     ----------
     k : (J, 6) published stiffness, SI, for the expected motion; ``others`` act besides it.
     """
-    ended = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
+    ended = predict_motion(cohort, specimen, tests.frames, tests.tested, k, others)
     rows: list[Row] = []
     for test in tests.tests:
         loaded = driven([one for one in tests.tested if one.case.test == test])

@@ -20,7 +20,7 @@ from spinepipe.units import COORDINATE_UNITS, COORDINATES, from_si, subtract_bas
 Row = dict[str, Any]
 
 
-def predicted(
+def predict_motion(
     cohort: Cohort,
     specimen: str,
     frames: tuple[Pose, ...],
@@ -63,7 +63,7 @@ def error_rows(
     others: tuple[ScopedEffect, ...] = (),
 ) -> list[Row]:
     """Errors by test, joint and measured coordinate, all cycles together; see table ``errors``."""
-    ended = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
+    ended = predict_motion(cohort, specimen, tests.frames, tests.tested, k, others)
     rows = []
     for test in tests.tests:
         here = [

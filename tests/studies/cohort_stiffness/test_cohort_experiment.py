@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from chain_cases import JOINTS, MILLIMETRES, MOMENT_OF, Chains, Tables
+from cohort_edge_cases import A
 from cohort_study_cases import Size, frame, study_of, tables_of
 from scipy import stats
 from scipy.spatial.transform import Rotation
@@ -17,7 +18,6 @@ from spinepipe.studies.cohort_stiffness.experiment import loading_loops
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
 from spinepipe.units import COORDINATES
 
-A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 KEY = ["joint", "test", "cycle", "source"]
 SD_DEG = 0.1
 ROOT = Path(__file__).parents[3]

@@ -14,7 +14,7 @@ from spinepipe.report.glyphs import BAR_PT, finite, quartiles, spread_out
 from spinepipe.report.panels import explain_marks, head, log_ticks, sections
 from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
 from spinepipe.report.words import AXIS, case, count, short
-from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import doubted, ends_shown
+from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import ends_shown, unconstrained
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, OF_JOINTS, SHARED
 from spinepipe.studies.cohort_stiffness.settings import ALL, CohortStiffness, load_cases
 from spinepipe.units import COORDINATES
@@ -93,7 +93,7 @@ def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     driven = errors[errors["loaded"].astype(bool)] if len(errors) else errors
     pairs = set(zip(driven["test"], driven["coordinate"], strict=True)) if len(errors) else set()
     loads = [key in pairs for key in zip(both["fitted_to"], both["coordinate"], strict=True)]
-    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
+    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=unconstrained(both), loaded=loads)
 
 
 def _draw(axis: Axes, rows: pd.DataFrame, cases: Sequence[str]) -> None:

@@ -99,7 +99,7 @@ def _representations(own: pd.DataFrame, cohort: Cohort) -> list[str]:
     return free[:2] if one * len(free[:2]) <= MOST_INTERVALS else free[:1]
 
 
-def doubted(rows: pd.DataFrame) -> pd.Series:
+def unconstrained(rows: pd.DataFrame) -> pd.Series:
     """Whether each stiffness is not held by the data: not identifiable, or at a bound."""
     known = rows["identifiable"].map(lambda flag: flag is None or bool(flag)).astype(bool)
     return ~known | (rows["at_bound"] != "no")
@@ -139,7 +139,7 @@ def _draw(
     for level, joint in enumerate(levels):
         here = rows[rows["joint"] == joint]
         if _crowded(cohort):
-            values = finite(here.loc[~doubted(here), "stiffness"])
+            values = finite(here.loc[~unconstrained(here), "stiffness"])
             if len(values):
                 draw_upright(axis, values, level, OURS, 0.5)
             continue
@@ -160,7 +160,7 @@ def _reach(rows: pd.DataFrame, more: object = ()) -> tuple[float, float]:
     rows : with stiffness and interval; those the data do not hold count only where all are such.
     more : further values that are on the axis if they are near.
     """
-    held = rows[~doubted(rows)]
+    held = rows[~unconstrained(rows)]
     chosen = held if len(held) else rows
     values = finite(chosen["stiffness"])
     middle = quartiles(values)
@@ -196,7 +196,7 @@ def _look(published: str) -> dict[str, Any]:
 def _draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None:
     """Stiffness of each row at its place (n,); the axis has its limits already."""
     low, high = axis.get_ylim()
-    doubt = doubted(rows)
+    doubt = unconstrained(rows)
     for at, row, doubtful in zip(x, rows.to_dict("records"), doubt, strict=True):
         value = row["stiffness"]
         if value is None or not np.isfinite(value):
@@ -254,7 +254,7 @@ def _explain(
     published = set(stiffness.loc[stiffness["source"] == "literature", "representation"])
     for name in (name for name in PUBLISHED if name in published):
         handles.append(Line2D([], [], **_look(name), label=IN_WORDS[name]))
-    doubt = bool(doubted(rows[rows["stiffness"].notna()]).any())
+    doubt = bool(unconstrained(rows[rows["stiffness"].notna()]).any())
     if doubt and not _crowded(cohort):
         handles.append(_handle(_MARKS[0], "not identifiable or at a bound", filled=False))
     if rows["stiffness"].isna().any() and not _crowded(cohort):
@@ -269,12 +269,12 @@ def _words(stiffness: pd.DataFrame, rows: pd.DataFrame, cohort: Cohort) -> str:
     fitted = "all load cases" if label == "all" else label.replace("_", " ")
     words = [f"Fitted to {fitted}"]
     if _crowded(cohort):
-        held = rows[~doubted(rows) & rows["high"].notna()]
+        held = rows[~unconstrained(rows) & rows["high"].notna()]
         half = (held["high"] / held["low"]).pow(0.5)
         if len(half):
             words.append(f"median 95 % interval: times and divided by {number(half.median())}")
         words.append("bar: middle half of the specimens, tick: median")
-        lost = int(doubted(rows[rows["stiffness"].notna()]).sum())
+        lost = int(unconstrained(rows[rows["stiffness"].notna()]).sum())
         if lost:
             words.append(f"left out: {count(lost, 'value')} not identifiable or at a bound")
     else:
