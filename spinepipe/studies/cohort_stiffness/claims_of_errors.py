@@ -314,6 +314,7 @@ def _against(
     row = above_zero(claim, pair["larger"] - pair["smaller"], significance, note)
     if row["holds"] == "undecided":
         return row
+    # Where the side that wins has no result of some specimens, these may be the hard ones.
     better = results["smaller" if row["holds"] == "yes" else "larger"]
     return row if set(asked) <= set(better.index) else row | {"holds": "undecided"}
 

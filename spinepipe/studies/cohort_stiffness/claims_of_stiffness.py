@@ -134,6 +134,7 @@ def loaded_ratios(stiffness: pd.DataFrame, directions: pd.DataFrame) -> pd.DataF
     own = own.assign(log=logs[0], error=logs[1])
     own = own[own["error"] > 0.0]
     keys = ["specimen", "test", "joint", "coordinate"]
+    # Each loaded coordinate twice: fitted to the load case alone, and to all the others.
     loaded = own.merge(directions.assign(fitted_to=directions["test"]))
     labels = stiffness["fitted_to"].unique()
     to_others = {test: label_of_others(labels, test) for test in directions["test"].unique()}
@@ -181,6 +182,7 @@ def mean_excess(ratios: pd.DataFrame) -> pd.Series:
     neither the ratio nor its weight lean to one side. A logarithm does: its error, and so its
     weight, hangs on the value itself.
     """
+    # Weights by the variance of the ratio itself, to first order (ratio x SD of its logarithm)2.
     ratio = np.exp(ratios["ratio"])
     weight = (ratio * ratios["error"]) ** -2.0
     sums = ((ratio - 1.0) * weight).groupby(ratios["specimen"]).sum()

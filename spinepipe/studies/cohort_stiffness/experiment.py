@@ -194,6 +194,7 @@ def run(
     frame = read_frame(fitted[0]) if fitted else None
     model, why = _simulation(settings, cohort, specimen, tests, others, name, frame)
     sd = settings.measurement_sd or cohort.measurement_sd
+    # Rows of each curve and, where the joint turns, of its axis: measured first, then simulated.
     curves: list[Row] = []
     axes: list[Row] = []
     for cycle in loading_loops(tests.tested):
@@ -229,6 +230,7 @@ def _simulation(
             settings, cohort, specimen, representation, tests.frames, tests.tested, others
         )
         at = [(unknown.rows[0], unknown.column) for unknown in problem.free]
+        # Unknowns are logarithms, so the fit is found again from its table: log of fitted / start.
         x = np.array([np.log(k[one] / start[one]) for one in at])
         at_bound = np.array([bound[one] for one in at])
         cases = [one.case for one in tests.tested]

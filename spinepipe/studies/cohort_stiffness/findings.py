@@ -99,6 +99,7 @@ def _corrected(rows: Sequence[Row]) -> list[float | None]:
         for name in _TESTS
         if row[name] is not None and not row.get(BY_CONSTRUCTION)
     ]
+    # Step down from the smallest p. A claim is open as long as one of its tests is.
     open_tests = Counter(place for _, place, _ in tests)
     reached, found = 0.0, {}
     for p, place, name in sorted(tests):

@@ -72,6 +72,7 @@ def interval(value: float, log_error: float, reach: float) -> Row:
     empty: Row = {"standard_error": None, "low": None, "high": None}
     if not np.isfinite(value):
         return {"stiffness": None, **empty}
+    # Student's t on the logarithm, so that both ends are positive.
     with np.errstate(over="ignore"):  # an end beyond all numbers is none
         low, high = value * np.exp([-reach * log_error, reach * log_error])
     if not np.isfinite(log_error) or not np.isfinite(high):
@@ -114,6 +115,7 @@ def criteria(
     unknowns = effective_unknowns + 1.0
     if not independent or cost <= 0.0 or readings - unknowns - 1.0 <= 0.0:
         return empty
+    # Normal errors whose variance is at its own maximum of likelihood, cost / readings.
     log_likelihood = -0.5 * readings * (np.log(2.0 * np.pi * cost / readings) + 1.0)
     correction = 2.0 * unknowns * (unknowns + 1.0) / (readings - unknowns - 1.0)
     return empty | {

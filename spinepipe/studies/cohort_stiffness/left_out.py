@@ -74,6 +74,7 @@ def _median(
     fitted = [frame for frame in others if frame["stiffness"].notna().all()]
     if not fitted:
         return k, None, 0
+    # Coordinates that are not fitted keep the published value.
     keys, values = ["joint", "coordinate"], ["stiffness", "growth"]
     rows = pd.concat(fitted).astype(dict.fromkeys(values, float))
     median = rows.groupby(keys, as_index=False)[values].median()

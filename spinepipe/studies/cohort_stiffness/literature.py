@@ -180,6 +180,7 @@ def _judged(cycles: Sequence[Reading]) -> Row:
 
 def _slope(measured: Array, expected: Array) -> tuple[float | None, float | None]:
     """Slope through zero and its standard error, None where there is none."""
+    # Least squares through zero: a joint without load has not moved.
     n, size = len(measured), float(expected @ expected)
     if not np.isfinite(size) or size <= 0.0:
         return None, None

@@ -234,6 +234,7 @@ def _sds(before: Array, after: Array, root: Array | None, free: Array | None) ->
     """SD of each number of the screw, deg and mm; None where it is not known."""
     if root is None or free is None:
         return [None] * len(_UNITS)
+    # First order: numbers of the screw by the coordinates, and these by their independent errors.
     by = derivatives(before, after) * _UNITS[:, None]
     sds = np.linalg.norm(by @ root, axis=1)
     loose = np.abs(by @ free).max(axis=1, initial=0.0) > _TRACES

@@ -297,9 +297,12 @@ class PooledRows:
             return None
         own, newcomer = self._own(specimen), np.diagonal(self.found.newcomer_covariance)
         free = next(iter(self.problems.values())).free
-        if own is None:
+        if (
+            own is None
+        ):  # the prior predictive of the cohort: its mean, and what specimens differ by
             nothing = np.zeros(len(free), dtype=int)
             return PooledUnknowns(free, self.found.newcomer, newcomer, nothing, None)
+        # Own readings decide where they make the specimen much surer than the cohort alone would.
         variance = np.diagonal(own.covariance)
         decided = variance < DECIDED * newcomer
         return PooledUnknowns(free, own.x, variance, own.at_bound, decided)

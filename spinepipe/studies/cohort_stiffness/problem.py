@@ -120,6 +120,7 @@ def calibration_problem(
     """
     start, one = start_stiffness(study, cohort, representation), named(representation)
     growth = np.zeros(start.shape) if one.stiffens else None
+    # Effects in the order that `BUSHING` tells of; all but the bushing start without effect.
     stiffening = laws(study, growth)
     nuisances = nuisance_effects(study, representation, len(start))
     beside = (*stiffening, *nuisances, *others)

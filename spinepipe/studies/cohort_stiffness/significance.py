@@ -220,6 +220,7 @@ def nested_fits(rows: pd.DataFrame) -> StatisticalTest:
     small, large = (int(part["degrees_of_freedom"].sum()) for part in (joint, single))
     if small <= large:
         return _without("the separate fits have no more unknowns inside their bounds")
+    # Extra sum of squares: what separate unknowns of each load case gain over shared ones.
     costs = float(joint["cost"].sum()), float(single["cost"].sum())
     outcome = f_test_nested(costs[0], small, costs[1], large)
     return replace(outcome, n=readings) if outcome.status is ComputationStatus.DONE else outcome

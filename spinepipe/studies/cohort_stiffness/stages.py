@@ -91,6 +91,7 @@ def specimen_rms(chosen: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
     seen = compared_motion(errors, unit).drop_duplicates(
         ["specimen", "test", "joint", "coordinate"]
     )
+    # How many readings' places each specimen has, to be compared with how many have an error.
     measured = seen["specimen"].value_counts()
     known = compared_motion(chosen, unit).dropna(subset="rmse")
     known = known[known["readings"] > 0]

@@ -167,6 +167,7 @@ def status_with_growth(
     none = [unknown.effect >= FIRST and side < 0 for unknown, side in sides]
     if status is not Status.CONVERGED_AT_BOUND or not any(none):
         return status, message
+    # The message begins with the names of all that is at a bound: told anew without these.
     left = np.where(none, 0, at_bound)
     rest = message.removeprefix(names_at_bound(problem, at_bound)).removeprefix("; ")
     ending = Status.CONVERGED_AT_BOUND if left.any() else Status.CONVERGED
@@ -220,7 +221,7 @@ def pooled_growth(
         if at is None:
             continue
         value, error = told.x[index], np.sqrt(told.variance[index])
-        growth.values[at] = max(value, 0.0)
+        growth.values[at] = max(value, 0.0)  # a pool may draw it below: the linear joint
         growth.at_bound[at] = told.at_bound[index]
         growth.standard_error[at] = error
         growth.low[at], growth.high[at] = np.maximum(value + error * np.array([-reach, reach]), 0.0)

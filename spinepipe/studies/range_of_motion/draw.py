@@ -25,6 +25,7 @@ def draw_stiffness(root: str, study: str, output: str) -> None:
     joints = cohort.joint_names
     factors = sample_factors(settings.stiffness_spread, 6, settings.stiffness_sets, settings.seed)
     own = stiffness_of_joints(cohort, settings.stiffness, settings.level_stiffness)
+    # (sets, 1, 6) by (J, 6): one factor for all joints, its own for each coordinate
     values = (factors[:, None, :] * own).reshape(-1, 6)
     columns: dict[str, list[Any]] = {
         "stiffness": np.repeat(np.arange(len(factors)), len(joints)).tolist(),

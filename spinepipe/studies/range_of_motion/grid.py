@@ -92,6 +92,7 @@ def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> MotionGrid:
     motion = np.full((*sizes, len(cohort.joint_names), 6), np.nan)
     tested = np.zeros(sizes, dtype=bool)
     names = {"specimen": cohort.specimen_names, "test": tests, "joint": cohort.joint_names}
+    # Row groups are streamed: a large study has more rows than memory, and a grid of peaks fits.
     with opened(path) as file:
         for rows in file.iter_batches(ROWS_AT_A_TIME, columns=[*_KEYS, *_MOTION]):
             rows = rows.filter(rows["largest_load"])
@@ -129,6 +130,7 @@ def _driven(study: RangeOfMotion, cohort: Cohort) -> dict[str, str]:
 
 def _moves_most(motion: Array) -> str:
     """The rotation that moves most; motion (..., 6)."""
+    # By the median over runs and joints; where nothing has an equilibrium the first rotation.
     flat = np.abs(motion[..., 3:]).reshape(-1, 3)
     solved = flat[np.isfinite(flat).all(axis=1)]
     return ROTATIONS[int(np.median(solved, axis=0).argmax())] if len(solved) else ROTATIONS[0]

@@ -110,6 +110,7 @@ def _motion(rows: pd.DataFrame) -> Iterator[str]:
 
 def _ends(row: pd.Series) -> str:
     low, high = sorted((abs(row["percentile_5"]), abs(row["percentile_95"])))
+    # Sizes where all motion is to one side; across zero the signs are kept.
     same_side = row["percentile_5"] * row["percentile_95"] > 0.0
     ends = (low, high) if same_side else (row["percentile_5"], row["percentile_95"])
     return f"{fixed(ends[0], 1)} to {fixed(ends[1], 1)}°"

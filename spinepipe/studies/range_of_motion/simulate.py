@@ -107,6 +107,7 @@ def _columns(
             columns["status"] += [status.value] * len(joints)
             columns["message"] += [message] * len(joints)
             motions.append(motion)
+    # Steps follow one another with all their joints, as the columns above do.
     predicted = np.concatenate(motions).T
     return {
         **columns,

@@ -70,6 +70,7 @@ def _all(grid: MotionGrid, motions: list[Array]) -> Iterator[dict[str, Any]]:
         ended = (ComputationStatus.TOO_FEW, "no pose has an equilibrium with every stiffness set")
         yield from ({"joint": joint, **_row(empty[..., 0], ended, {})} for joint in grid.joints)
         return
+    # A balanced design: shares of nested draws take equally many of each specimen.
     poses = min(len(motion) for motion in kept)
     values = np.stack([motion[:poses] for motion in kept])
     specimens = len(motions) - len(kept)

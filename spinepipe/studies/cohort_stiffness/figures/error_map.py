@@ -201,6 +201,7 @@ def _label(axis: Axes, cohort: Cohort, lowest: bool, leftmost: bool) -> None:
     grid = axis.get_gridspec()
     assert grid is not None
     row_mm = (height - _KEY_MM - _NAMES_MM - grid.nrows * _HEAD_MM) / (grid.nrows * len(names))
+    # Of many specimens only every so many have a name.
     every = max(1, int(np.ceil(_LABEL_MM / row_mm)))
     axis.set_yticks(range(0, len(names), every), [short(name, _NAME) for name in names[::every]])
     turned = max(len(name) for name in levels) * 1.25 + 1.0 > _cell_mm(cohort, grid.ncols)

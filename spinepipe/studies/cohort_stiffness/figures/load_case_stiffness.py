@@ -118,6 +118,7 @@ def _draw(axis: Axes, rows: pd.DataFrame, cases: Sequence[str]) -> None:
 def _reach(rows: pd.DataFrame) -> tuple[float, float]:
     """Both ways equally far, as far as stiffness that the data hold goes."""
     held = rows[~rows["doubted"]] if (~rows["doubted"]).any() else rows
+    # The axis is logarithmic and symmetric about 1: half and twice are equally far.
     sizes = np.abs(np.log(finite(held[["ratio", "low", "high"]])))
     far = float(np.exp(sizes.max())) if len(sizes) else _LEAST_REACH
     end = min(_FARTHEST, max(_LEAST_REACH, far * 1.05))

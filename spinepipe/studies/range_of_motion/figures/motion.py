@@ -48,7 +48,7 @@ def levels_figure(
     if loaded.empty:
         return saying("No motion can be shown: no run has an equilibrium.")
     tests = list(dict.fromkeys(loaded["test"]))
-    several = len(cohort.specimen_names) > 1
+    several = len(cohort.specimen_names) > 1  # then their medians stand beneath all runs
     joints = cohort.joint_names
     height = _LEVEL_MM if len(joints) <= _FEW_ROWS else _ROW_MM_OF_MANY
     axes, figure = panels(tests, joints, height)
