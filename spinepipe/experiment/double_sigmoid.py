@@ -41,6 +41,7 @@ _FAR, _LARGEST = 60.0, 60.0
 """Bounds of |a| and |d|, and of c, with the largest load and the range of rotation as units."""
 
 _SHALLOWEST = 0.05
+"""Least b, in the same units: a sigmoid that is flatter is a straight line within the loads."""
 
 _STEPS_PER_RISE = 3.0
 """A sigmoid takes at least so many steps of load from 12 to 88 % of its rise, which is 4 / b."""
@@ -50,8 +51,14 @@ _TWO = ((-0.4, 4.0, 0.4, 4.0), (0.0, 6.0, 0.0, 1.5), (-0.3, 8.0, 0.3, 2.0), (-0.
 """Middle and steepness of each sigmoid where fits start."""
 
 _GRID = 801
+"""Places where extremes of the second derivative are looked for before they are refined."""
+
 _RANK = 1e-7
+"""Singular values below this share of the largest are of unknowns that no point tells of."""
+
 _STEP = 1e-5
+"""Of central differences; also where derivatives of an order that has no formula are taken."""
+
 _ROUNDING = 1e-9
 """A line that leaves less than this share of the range of rotation leaves nothing."""
 
@@ -120,7 +127,7 @@ def neutral_zone(
         return None, Zone.TOO_FEW, why
     if not np.ptp(rotation) or load @ (rotation - rotation.mean()) <= 0.0:
         return None, Zone.NOT_MEANINGFUL, "the joint does not move with the load"
-    curve = fitted(load, rotation, sd)
+    curve = fit_sigmoids(load, rotation, sd)
     if curve is None:
         why = "no neutral zone: an S-shaped curve fits no better than a straight line"
         return None, Zone.NOT_MEANINGFUL, why
@@ -128,7 +135,10 @@ def neutral_zone(
     if places is None:
         why = "no neutral zone: compliance does not rise and fall between the largest loads"
         return None, Zone.NOT_MEANINGFUL, why
-    if sd is not None and not _describes(curve, len(load), sd):
+    # Where noise does not explain what the curve leaves, its bends are not the joint's: a zone
+    # narrower than the steps of load bends faster than any sigmoid that they allow.
+    freedom = len(load) - len(curve.theta)
+    if sd is not None and curve.squares / sd**2 > float(stats.chi2.isf(_HARDLY, freedom)):
         left = float(np.sqrt(curve.squares / len(load)))
         why = (
             f"softer in the middle, but sigmoids leave {np.rad2deg(left):.2g} deg where readings "
@@ -138,22 +148,13 @@ def neutral_zone(
     return _measured(curve, places), Zone.FOUND, ""
 
 
-def _describes(curve: SigmoidCurve, points: int, sd: float) -> bool:
-    """Whether noise explains what a curve leaves: where it does not, its bends are not the joint's.
-
-    A zone narrower than the steps of load bends faster than any sigmoid that they allow.
-    """
-    freedom = points - len(curve.theta)
-    return curve.squares / sd**2 <= float(stats.chi2.isf(_HARDLY, freedom))
-
-
 def _distinct(load: Array) -> int:
     """How many loads there are that differ by a hundredth of their range."""
     steps = np.diff(np.sort(load))
     return 1 + int(np.count_nonzero(steps > 0.01 * np.ptp(load)))
 
 
-def fitted(load: Array, rotation: Array, sd: float | None) -> SigmoidCurve | None:
+def fit_sigmoids(load: Array, rotation: Array, sd: float | None) -> SigmoidCurve | None:
     """The sum of as few sigmoids as the points ask for; None where a straight line does as well.
 
     Parameters
@@ -168,6 +169,7 @@ def fitted(load: Array, rotation: Array, sd: float | None) -> SigmoidCurve | Non
     theta, squares = None, float(left @ left)
     if squares <= len(x) * _ROUNDING**2:
         return None
+    # Forward selection of nested models: a line, one sigmoid, two, as long as each is better.
     for starts in (_ONE, _TWO):
         fewer, more = 2 if theta is None else len(theta), 3 * len(starts[0]) // 2 + 1
         if not _better(squares, 0.0, fewer, more, len(x), noise):
@@ -205,6 +207,8 @@ def _bounds(count: int, x: Array) -> tuple[Array, Array]:
 
 def _descend(x: Array, y: Array, start: Sequence[float]) -> tuple[Array, float]:
     """Unknowns and sum of squares where a start leads to."""
+    # A start names the middle and the steepness b of each sigmoid, so that a = -middle b; together
+    # they rise by 1.2 times the range of rotation, of which the loads show a part.
     pairs = [start[at : at + 2] for at in range(0, len(start), 2)]
     low, high = _bounds(len(pairs), x)
     theta = [one for middle, steep in pairs for one in (-middle * steep, steep, 1.2 / len(pairs))]
@@ -232,6 +236,7 @@ def _value(theta: Array, x: Array, order: int = 0) -> Array:
     for a, b, c in _sigmoids(theta):
         s = expit(a + b * x)
         slope = s * (1.0 - s)
+        # derivatives of the logistic function by its argument, the chain rule makes b ** order
         by_order = (s, slope, slope * (1.0 - 2.0 * s), slope * (1.0 - 6.0 * slope))
         total = total + c * b**order * by_order[order]
     return total
@@ -251,6 +256,7 @@ def _gain(theta: Array, x: Array) -> Array:
     """(m, N) derivative of the unknowns by the points, to first order; those at a bound stay."""
     low, high = _bounds(len(_sigmoids(theta)), x)
     inside = (theta > low + 1e-9) & (theta < high - 1e-9)
+    # Least squares to first order: the pseudoinverse of the Jacobian.
     left, sizes, right = svd(_jacobian(theta, x)[:, inside])
     seen = sizes > _RANK * sizes.max(initial=0.0)
     gain = np.zeros((len(theta), len(x)))
@@ -269,6 +275,8 @@ def _zone(curve: SigmoidCurve) -> Array | None:
     at = int(np.argmax(second)), int(np.argmin(second))
     if at[0] >= at[1] or at[0] == 0 or at[1] == len(x) - 1:
         return None
+    # The third derivative changes its sign there, from + to - at the largest, back at the least:
+    # only then is there a root to refine between the neighbours on the grid.
     third = _value(curve.theta, x, 3)
     if third[at[0] - 1] <= 0.0 or third[at[1] - 1] >= 0.0:
         return None
@@ -292,6 +300,7 @@ def _measured(curve: SigmoidCurve, places: Array) -> FittedNeutralZone:
         size = curve.rotation_unit * (high - low)
         return np.array([size, size / (curve.load_unit * (there[1] - there[0]))])
 
+    # Chain rule: size and compliance by the unknowns, and these by the points.
     steps = _STEP * np.maximum(np.abs(curve.theta), 0.1)
     slopes = [
         (both(curve.theta + move) - both(curve.theta - move)) / (2.0 * step)

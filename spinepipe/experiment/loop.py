@@ -177,11 +177,13 @@ class Loop:
 
         Where the last rotation is not the first, a straight line closes the loop.
         """
+        # Integral of load over rotation by the shoelace formula, as weights of the rotations.
         before, after = np.roll(self.load, 1), np.roll(self.load, -1)
         return self._measure(0.5 * (before - after))
 
     def branch(self, side: int) -> Places:
         """Places from the peak of the other side to that of this one, in the order applied."""
+        # A closed loop may go round its end between the peaks; an open one has no such branch.
         first, last = self.peak(-side), self.peak(side)
         if first <= last:
             return np.arange(first, last + 1)
@@ -199,6 +201,7 @@ class Loop:
 
     def loading(self, side: int) -> Places:
         """Places of a side while its load grows, from nothing to the peak."""
+        # Back from the peak, round the end of a closed loop, until the load leaves that side.
         places, at = [], self.peak(side)
         for _ in range(len(self.load)):
             if side * self.load[at] <= 0.0:
@@ -233,12 +236,14 @@ class Loop:
         weights = np.zeros(len(self.load))
         around = x - x.mean()
         factor = _MEDIAN_SLOPE if len(x) >= _FEWEST_FOR_MEDIAN else 1.0
+        # Noise moves the median slope as it moves the slope of least squares, but for a factor.
         weights[places] = factor * around / (around @ around)
         return Measure(_median_slope(x, y), weights)
 
 
 def _median_slope(x: Array, y: Array) -> float:
     """Weighted median of the slopes between all points (n,), two at least of different x."""
+    # The slope at which the loads of pairs below it reach half of those of all pairs.
     first, second = np.triu_indices(len(x), 1)
     run = x[second] - x[first]
     pairs = np.abs(run) > 1e-9 * np.ptp(x)

@@ -62,6 +62,7 @@ def screw_between(before: Array, after: Array) -> Screw:
         raise ValueError("the poses have one orientation: no axis of rotation")
     direction = turn / angle
     shift = float(direction @ motion.origin)
+    # What is left of the shift lies across the axis: a turn by the angle about a line makes it.
     across = motion.origin - shift * direction
     centre = 0.5 * (across + np.cross(direction, across) / np.tan(0.5 * angle))
     return Screw(angle, direction, centre, shift)

@@ -90,6 +90,11 @@ class Chains:
             for step in range(self.steps)
         ]
 
+    def where(self, **values: object) -> pd.Series:
+        """Which rows of motion have these values in all of these columns."""
+        same = [self.motion[column] == value for column, value in values.items()]
+        return pd.concat(same, axis=1).all(axis=1)
+
     def write(self, root: Path) -> "Written":
         """A project folder with this cohort and one study of it."""
         folder = root / "config" / "cohorts" / "chains"

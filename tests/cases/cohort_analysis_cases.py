@@ -1,6 +1,6 @@
 """Rows of errors, fits and stiffness of cohort studies, made up for their analyses."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -8,8 +8,11 @@ import pandas as pd
 
 from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.studies.cohort_stiffness.claims import CohortClaim
+from spinepipe.studies.cohort_stiffness.findings import finding_rows
+from spinepipe.studies.cohort_stiffness.mae import mae_rows
+from spinepipe.studies.cohort_stiffness.ranking import ranking_rows
 from spinepipe.studies.cohort_stiffness.significance import all_tests
-from spinepipe.studies.cohort_stiffness.tables import STATISTICS
+from spinepipe.studies.cohort_stiffness.tables import FINDINGS, MAE, RANKING, STATISTICS
 from spinepipe.tables import from_rows
 from spinepipe.units import ROTATIONS
 
@@ -90,6 +93,21 @@ def rated() -> list[Row]:
         for name, ratings in zip("abcdef", RATINGS, strict=True)
         for joint, rating in zip(("L2L3", "L3L4", "L4L5", "L5S1"), ratings, strict=True)
     ]
+
+
+def analysed(frames: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
+    """All analyses of the tables of a study, through their schemas."""
+    errors, fits = frames["errors"], frames["fits"]
+    tested = list(corrected_rows(all_tests(errors, fits)))
+    statistics = from_rows(STATISTICS, tested).to_pandas()
+    said = list(finding_rows({**frames, "statistics": statistics}, 0.05))
+    order = ranking_rows(errors, fits, frames.get("pooling"))
+    return {
+        "mae": from_rows(MAE, mae_rows(errors)).to_pandas(),
+        "ranking": from_rows(RANKING, order).to_pandas(),
+        "statistics": statistics,
+        "findings": from_rows(FINDINGS, said).to_pandas(),
+    }
 
 
 CLAIM = CohortClaim("name", "It is so.", "a number", "deg")

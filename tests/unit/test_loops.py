@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import integrate
 from sweeps import sweep
 
-from spinepipe.experiment.double_sigmoid import FEWEST_POINTS, Zone, fitted, neutral_zone
+from spinepipe.experiment.double_sigmoid import FEWEST_POINTS, Zone, fit_sigmoids, neutral_zone
 from spinepipe.experiment.loop import (
     Loop,
     Measure,
@@ -231,7 +231,7 @@ def test_what_has_no_neutral_zone_says_why() -> None:
     assert "no better than a straight line" in neutral_zone(load, inside_out, SD)[2]
     one_bend = np.log1p(np.exp(0.5 * load)) / 50.0  # stiff on one side, soft on the other
     assert "does not rise and fall" in neutral_zone(load, one_bend, SD)[2]
-    curve = fitted(load, sigmoid(load), SD)
+    curve = fit_sigmoids(load, sigmoid(load), SD)
     assert curve is not None
     np.testing.assert_allclose(curve.rotation(load), sigmoid(load), atol=1e-6)
 

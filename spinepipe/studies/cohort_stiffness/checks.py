@@ -1,6 +1,6 @@
 """What a cohort study demands of its cohort."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,10 @@ def check_cohort_stiffness(
     document : the study file, for the lines of its keys.
     """
     yield from _tests(document, study, cohort)
-    yield from _specimens(cohort)
+    if NOBODY in cohort.specimen_names:  # folders of results call something else so
+        place = (f"{cohort.folder.name}/specimens.csv", None, "specimen")
+        allowed = f"any other name: '{NOBODY}' stands for fits that leave no specimen out"
+        yield InputProblem(*place, f"'{NOBODY}'", allowed, "rename the specimen in every file")
     yield from _levels(document, study, cohort)
     yield from _cost(document, study, cohort)
     yield from _covariates(document, study, cohort)
@@ -62,14 +65,6 @@ def _tests(
             place = (f"{cohort.folder.name}/loads.csv", None, "test")
             yield InputProblem(*place, f"test {name!r}", allowed, "rename it in loads and motion")
     yield from _measured(document, study, cohort)
-
-
-def _specimens(cohort: Cohort) -> Iterator[InputProblem]:
-    """A name that folders of results use for something else."""
-    if NOBODY in cohort.specimen_names:
-        place = (f"{cohort.folder.name}/specimens.csv", None, "specimen")
-        allowed = f"any other name: '{NOBODY}' stands for fits that leave no specimen out"
-        yield InputProblem(*place, f"'{NOBODY}'", allowed, "rename the specimen in every file")
 
 
 def _measured(
@@ -187,17 +182,12 @@ def check_one_stiffening(
         effects = read_model(path).effects
     except InputError:
         return  # told by the check of the file itself
-    if any(
-        one.effect == STIFFENING_EFFECT and _coordinate(one.options) in study.free
-        for one in effects
-    ):
+    # Of an effect that stiffens, the coordinate is one of its options.
+    laws: list[Any] = [
+        create(one.effect, one.options) for one in effects if one.effect == STIFFENING_EFFECT
+    ]
+    if any(law.coordinate in study.free for law in laws):
         found = f"{one_of(asked)}, and {STIFFENING_EFFECT} in the base model too"
         allowed = "one of them: two laws that scale one bushing cannot be told apart"
         remedy = "leave these representations out, or take the effect out of the model file"
         yield InputProblem(*at(document, "representations"), found, allowed, remedy)
-
-
-def _coordinate(options: Mapping[str, Any] | None) -> str:
-    effect: Any = create(STIFFENING_EFFECT, options)
-    name: str = effect.coordinate
-    return name

@@ -76,10 +76,12 @@ def above_zero(claim: CohortClaim, values: pd.Series, significance: float, note:
     holds = UNDECIDED
     if mean.p is not None and mean.value is not None and mean.p < significance:
         holds = "yes" if mean.value > 0.0 else "no"
-    return claim.row(holds, joined(told(mean), note), mean.value, mean.interval, mean.p, mean.n)
+    return claim.row(
+        holds, joined(sample_words(mean), note), mean.value, mean.interval, mean.p, mean.n
+    )
 
 
-def told(mean: Mean) -> str:
+def sample_words(mean: Mean) -> str:
     """Of how many specimens a mean is, or why it has no interval."""
     if mean.n == 0:
         return "no specimen has all results"
@@ -101,6 +103,3 @@ def listed(names: Sequence[str]) -> str:
 
 
 NO_SUCH_FITS = "no such fits in this study"
-
-FACTORS = {"specimens": ("specimen", "joint"), "levels": ("joint", "specimen")}
-"""What differs, and what it is seen in again and again."""

@@ -3,7 +3,7 @@
 The errors that are compared stand first, then the claims, then how they are decided.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.claims import (
     BY_CONSTRUCTION,
     CIRCULAR,
-    FACTORS,
     NO_SUCH_FITS,
     CohortClaim,
     Row,
@@ -24,6 +23,7 @@ from spinepipe.studies.cohort_stiffness.claims import (
 )
 from spinepipe.studies.cohort_stiffness.representations import ASKED_FOR, EVERY, named
 from spinepipe.studies.cohort_stiffness.stages import (
+    FACTORS,
     FITTED,
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,
@@ -209,13 +209,13 @@ def error_findings(errors: pd.DataFrame, significance: float) -> Iterator[Row]:
         better = comparison.smaller.representation
         if better in ASKED_FOR and better not in asked:
             continue  # fitted only where a study asks for it: of nobody else is it claimed
-        yield compared(comparison, seen, significance)
+        yield compare_errors(comparison, seen, significance)
     yield every_level(_of(seen, RATIO), _of(seen, UNIFORM), seen, significance)
     yield loaded_direction(_of(seen, UNIFORM), seen, significance)
     yield from overpredictions(seen, significance)
 
 
-def compared(comparison: Comparison, errors: pd.DataFrame, significance: float) -> Row:
+def compare_errors(comparison: Comparison, errors: pd.DataFrame, significance: float) -> Row:
     """The row of a comparison; specimens that a side cannot predict are named."""
     larger, smaller = (_of(errors, one) for one in (comparison.larger, comparison.smaller))
     claim, unit = comparison.claim(unit_of(errors)), unit_of(errors)
@@ -223,10 +223,17 @@ def compared(comparison: Comparison, errors: pd.DataFrame, significance: float) 
     pair = pd.DataFrame(results).dropna()
     if pair.empty:
         return _nothing(claim, larger, smaller)
-    asked = _asked(comparison, errors)
+    # Both sides should have a result of a specimen, but that one load case leaves none out.
+    held_out = LEFT_OUT_CASE in (comparison.larger.stage, comparison.smaller.stage)
+    cases = errors.groupby("specimen")["test"].nunique()
+    asked = list(cases.index[cases >= (2 if held_out else 1)])
     sides = (comparison.larger.words, comparison.smaller.words)
     lost = _lost(dict(zip(sides, results.values(), strict=True)), asked)
-    note = joined(_note(pair, unit), OWN_READINGS if comparison.own_readings else "", lost)
+    compared = [pair[side] for side in ("larger", "smaller")]
+    p = wilcoxon_signed_rank(*(values.to_numpy(float) for values in compared)).p
+    numbers = f"{compared[0].mean():.3g} less {compared[1].mean():.3g} {unit}"
+    numbers = joined(numbers, "" if p is None else f"Wilcoxon p {p:.2g}")
+    note = joined(numbers, OWN_READINGS if comparison.own_readings else "", lost)
     row = _against(claim, results, asked, significance, note)
     if not comparison.own_readings:
         return row
@@ -254,16 +261,13 @@ def every_level(
     lost = _lost(sides, measured_specimens(errors))
     message = joined(f"of {len(rows)} joints; {told}", lost)
     holds = "undecided" if of["undecided"] else "no" if of["no"] else "yes"
-    p, specimens = _of_all_levels(rows, holds)
-    return EVERY_LEVEL.row(holds, message, float(len(of["yes"])), p=p, specimens=specimens)
-
-
-def _of_all_levels(rows: Sequence[Row], holds: str) -> tuple[float | None, int]:
-    """p that all joints are worse, or that one is better (Bonferroni); the fewest specimens."""
+    # p that all joints are worse, or that one is better (Bonferroni); the fewest specimens
     decided = [row for row in rows if row["p"] is not None and row["holds"] == holds]
     ps = [row["p"] for row in decided]
     p = None if not ps else max(ps) if holds == "yes" else min(1.0, len(rows) * min(ps))
-    return (p if holds != "undecided" else None), min(row["specimens"] for row in decided or rows)
+    p = None if holds == "undecided" else p
+    specimens = min(row["specimens"] for row in decided or rows)
+    return EVERY_LEVEL.row(holds, message, float(len(of["yes"])), p=p, specimens=specimens)
 
 
 def loaded_direction(fitted: pd.DataFrame, errors: pd.DataFrame, significance: float) -> Row:
@@ -292,13 +296,6 @@ def _results(
     return {"larger": specimen_rms(larger, errors), "smaller": specimen_rms(smaller, errors)}
 
 
-def _asked(comparison: Comparison, errors: pd.DataFrame) -> list[str]:
-    """Specimens of which both sides should have a result: one load case leaves none out."""
-    cases = errors.groupby("specimen")["test"].nunique()
-    held_out = LEFT_OUT_CASE in (comparison.larger.stage, comparison.smaller.stage)
-    return list(cases.index[cases >= (2 if held_out else 1)])
-
-
 def _lost(found: Mapping[str, pd.Series], asked: Iterable[str]) -> str:
     """Specimens left out, for a message."""
     lost = without_result(found, asked)
@@ -317,6 +314,7 @@ def _against(
     row = above_zero(claim, pair["larger"] - pair["smaller"], significance, note)
     if row["holds"] == "undecided":
         return row
+    # Where the side that wins has no result of some specimens, these may be the hard ones.
     better = results["smaller" if row["holds"] == "yes" else "larger"]
     return row if set(asked) <= set(better.index) else row | {"holds": "undecided"}
 
@@ -329,13 +327,6 @@ def _nothing(claim: CohortClaim, larger: pd.DataFrame, smaller: pd.DataFrame) ->
         missing = "first" if larger.empty else "second"
         return claim.not_asked(f"the {missing} was not computed in this study")
     return claim.unknown("no specimen has all results of both")
-
-
-def _note(pair: pd.DataFrame, unit: str) -> str:
-    larger, smaller = pair["larger"], pair["smaller"]
-    tested = wilcoxon_signed_rank(larger.to_numpy(float), smaller.to_numpy(float))
-    means = f"{larger.mean():.3g} less {smaller.mean():.3g} {unit}"
-    return joined(means, "" if tested.p is None else f"Wilcoxon p {tested.p:.2g}")
 
 
 def overpredictions(errors: pd.DataFrame, significance: float) -> Iterator[Row]:

@@ -7,22 +7,20 @@ import pandas as pd
 from scipy import stats
 from statsmodels.stats.anova import AnovaRM
 
-from spinepipe.effects.contract import Array
 from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.claims import (
-    FACTORS,
     NO_SUCH_FITS,
     CohortClaim,
     Row,
-    told,
+    sample_words,
     words,
 )
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, label_of_others
 from spinepipe.studies.cohort_stiffness.significance import FAMILY
-from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import FACTORS, joint_label_of, own_fits
 
 LITTLE_DEG = 0.05
 """Adjusted share of the squared error below which what is not significant is called absent."""
@@ -74,14 +72,16 @@ def load_case_findings(
     for representation, claim in SPECIFIC.items():
         found = statistics[statistics["family"] == f"{FAMILY}/{representation}"]
         note = MISFIT if representation == "per_specimen" else ""
-        yield specific(claim, found, significance, note)
+        yield load_case_claim(claim, found, significance, note)
     loaded = errors[errors["loaded"].astype(bool)]
     directions = loaded[["specimen", "test", "coordinate"]].drop_duplicates()
     ratios = loaded_ratios(stiffness[stiffness["representation"] == "per_joint"], directions)
     yield _ratio(ratios, significance)
 
 
-def specific(claim: CohortClaim, tests: pd.DataFrame, significance: float, note: str = "") -> Row:
+def load_case_claim(
+    claim: CohortClaim, tests: pd.DataFrame, significance: float, note: str = ""
+) -> Row:
     """Yes where the F tests together are significant; no where none is and they explain little."""
     known = tests.dropna(subset="p")
     if tests.empty:
@@ -134,6 +134,7 @@ def loaded_ratios(stiffness: pd.DataFrame, directions: pd.DataFrame) -> pd.DataF
     own = own.assign(log=logs[0], error=logs[1])
     own = own[own["error"] > 0.0]
     keys = ["specimen", "test", "joint", "coordinate"]
+    # Each loaded coordinate twice: fitted to the load case alone, and to all the others.
     loaded = own.merge(directions.assign(fitted_to=directions["test"]))
     labels = stiffness["fitted_to"].unique()
     to_others = {test: label_of_others(labels, test) for test in directions["test"].unique()}
@@ -153,7 +154,14 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
     spread = float(np.sqrt(np.mean((ratios["ratio"] / ratios["error"]) ** 2)))
     many = f"{len(ratios)} ratios, {spread:.2g} of their standard errors from 1 (root mean square)"
     ends = mean.interval
-    p_no = None if ends is None else _within(1.0 + excess, 1.0 / MARGIN, MARGIN)
+    p_no = None
+    if ends is not None:
+        # p that the mean is not between the margins: the larger of two t tests, doubled. So it is
+        # below 0.05 where the 95 % interval of the mean lies between them.
+        ratio = 1.0 + excess
+        above = float(stats.ttest_1samp(ratio, 1.0 / MARGIN, alternative="greater").pvalue)
+        below = float(stats.ttest_1samp(ratio, MARGIN, alternative="less").pvalue)
+        p_no = min(1.0, 2.0 * max(above, below))
     holds = "undecided"
     if mean.p is not None and mean.p < significance:
         holds = "yes"
@@ -161,17 +169,9 @@ def _ratio(ratios: pd.DataFrame, significance: float) -> Row:
         holds = "no"
     interval = None if ends is None else (1.0 + ends[0], 1.0 + ends[1])
     value = 1.0 + mean.value
-    return STIFFER.row(holds, joined(told(mean), many), value, interval, mean.p, mean.n, p_no)
-
-
-def _within(values: Array, low: float, high: float) -> float:
-    """p that the mean of values (n,) is not between two ends: the larger of two t tests, doubled.
-
-    Doubled, it is below 0.05 where the 95 % interval of the mean lies between them.
-    """
-    above = float(stats.ttest_1samp(values, low, alternative="greater").pvalue)
-    below = float(stats.ttest_1samp(values, high, alternative="less").pvalue)
-    return min(1.0, 2.0 * max(above, below))
+    return STIFFER.row(
+        holds, joined(sample_words(mean), many), value, interval, mean.p, mean.n, p_no
+    )
 
 
 def mean_excess(ratios: pd.DataFrame) -> pd.Series:
@@ -182,6 +182,7 @@ def mean_excess(ratios: pd.DataFrame) -> pd.Series:
     neither the ratio nor its weight lean to one side. A logarithm does: its error, and so its
     weight, hangs on the value itself.
     """
+    # Weights by the variance of the ratio itself, to first order (ratio x SD of its logarithm)2.
     ratio = np.exp(ratios["ratio"])
     weight = (ratio * ratios["error"]) ** -2.0
     sums = ((ratio - 1.0) * weight).groupby(ratios["specimen"]).sum()
@@ -193,26 +194,23 @@ def stiffness_spreads(
 ) -> Iterator[Row]:
     """Do specimens, and do levels, differ in stiffness? One finding per coordinate."""
     label = joint_label_of(stiffness)
-    own = stiffness[(stiffness["fitted_to"] == label) & (stiffness["source"] == "own")]
+    own = own_fits(stiffness)
     own = own[own["representation"] == "per_joint"]
     for coordinate in stiffness["coordinate"].unique():
         rows = own[own["coordinate"] == coordinate]
         for what, (factor, block) in FACTORS.items():
-            claim = _spread_claim(what, str(coordinate))
+            other = "levels" if what == "specimens" else "specimens"
+            claim = CohortClaim(
+                f"stiffness_differs_between_{what}_{coordinate}",
+                f"{what.capitalize()} differ in {words(str(coordinate))} stiffness: some are "
+                f"stiffer than others in all {other} alike.",
+                f"share of the variance of its logarithm, means of {other} removed, that lies "
+                f"between {what} (intraclass correlation, exact F interval; each joint its own, "
+                "all load cases)",
+                "",
+            )
             note = _pooled_spread(pooling, label, str(coordinate), what)
             yield share_between(claim, rows, factor, block, significance, note)
-
-
-def _spread_claim(what: str, coordinate: str) -> CohortClaim:
-    other = "levels" if what == "specimens" else "specimens"
-    return CohortClaim(
-        f"stiffness_differs_between_{what}_{coordinate}",
-        f"{what.capitalize()} differ in {words(coordinate)} stiffness: some are stiffer "
-        f"than others in all {other} alike.",
-        f"share of the variance of its logarithm, means of {other} removed, that lies between "
-        f"{what} (intraclass correlation, exact F interval; each joint its own, all load cases)",
-        "",
-    )
 
 
 def _pooled_spread(pooling: pd.DataFrame | None, label: str, coordinate: str, what: str) -> str:
@@ -236,15 +234,24 @@ def share_between(
 
     The share is ICC(C,1) of McGraw and Wong 1996, doi:10.1037/1082-989X.1.1.30, Table 7.
     """
-    values = log_grid(rows)
+    # Logarithms (specimens, joints) of the specimens with all joints identifiable.
+    known = rows[rows["identifiable"].eq(True) & rows["stiffness"].notna()]
+    grid = known.pivot(index="specimen", columns="joint", values="stiffness").astype(float)
+    values = grid.dropna().map(np.log)
     left_out = rows["specimen"].nunique() - len(values)
     note = joined(note, f"{left_out} specimens without all joints left out" if left_out else "")
     if min(values.shape) < 2:
         return claim.unknown(joined("at least 2 specimens with 2 joints are needed", note))
-    if _additive(values):
+    # What specimens and levels together leave may be rounding alone.
+    logs = values.to_numpy(float)
+    rest = logs - logs.mean(axis=0) - logs.mean(axis=1, keepdims=True) + logs.mean()
+    if np.abs(rest).max() <= SAME:
         return claim.unknown(joined("nothing is left beside specimens and levels", note))
-    f, between, within, p = _anova(values, factor, block)
+    long = values.reset_index().melt(id_vars="specimen", var_name="joint", value_name="log")
+    table = AnovaRM(long, "log", block, [factor]).fit().anova_table  # one value per cell
+    f, between, within, p = (float(value) for value in table.iloc[0])
     times = values.shape[1] if block == "joint" else values.shape[0]
+    # F of a share rho scales F by 1 + times rho / (1 - rho): quantiles of F make its interval.
     low = _share(f / float(stats.f.isf(0.025, between, within)), times)
     high = _share(f * float(stats.f.isf(0.025, within, between)), times)
     # Twice the chance of so small an F where the share is LITTLE: below 0.05 if high < LITTLE.
@@ -253,28 +260,6 @@ def share_between(
     holds = "yes" if p < significance else "no" if p_no < significance else "undecided"
     message = joined(f"F({between:.0f}, {within:.0f}) {f:.3g}", note)
     return claim.row(holds, message, _share(f, times), (low, high), p, len(values), p_no)
-
-
-def log_grid(rows: pd.DataFrame) -> pd.DataFrame:
-    """Logarithm of stiffness (specimens, joints) of the specimens with all joints identifiable."""
-    known = rows[rows["identifiable"].eq(True) & rows["stiffness"].notna()]
-    grid = known.pivot(index="specimen", columns="joint", values="stiffness").astype(float)
-    return grid.dropna().map(np.log)
-
-
-def _anova(values: pd.DataFrame, factor: str, block: str) -> tuple[float, float, float, float]:
-    """F of a factor, its degrees of freedom, those of the rest, and p; one value per cell."""
-    long = values.reset_index().melt(id_vars="specimen", var_name="joint", value_name="log")
-    table = AnovaRM(long, "log", block, [factor]).fit().anova_table
-    f, between, within, p = (float(value) for value in table.iloc[0])
-    return f, between, within, p
-
-
-def _additive(values: pd.DataFrame) -> bool:
-    """Whether specimens and levels explain values (specimens, joints) but for rounding."""
-    rest = values.to_numpy(float)
-    rest = rest - rest.mean(axis=0) - rest.mean(axis=1, keepdims=True) + rest.mean()
-    return bool(np.abs(rest).max() <= SAME)
 
 
 def _share(f: float, times: int) -> float:

@@ -6,7 +6,6 @@ a mixed model with a random specimen, and Student's t is exact.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from spinepipe.studies.cohort_stiffness.representations import (
     SHARED,
 )
 from spinepipe.studies.cohort_stiffness.settings import SEXES, CohortStiffness
-from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import own_fits
 from spinepipe.studies.cohort_stiffness.tables import COVARIATES_TABLE
 from spinepipe.tables import from_rows, read_frames, write
 
@@ -87,8 +86,7 @@ def covariate_rows(
     names : covariates, taken together. significance : p below which a test decides.
     """
     known = numbers_of(specimens, names)
-    own = stiffness[stiffness["fitted_to"] == joint_label_of(stiffness)]
-    own = own[own["source"] == "own"]
+    own = own_fits(stiffness)
     here = next((name for name in _PLAIN if (own["representation"] == name).any()), "")
     rows: list[Row] = []
     for coordinate in stiffness["coordinate"].unique():
@@ -96,7 +94,10 @@ def covariate_rows(
         told = {"coordinate": str(coordinate), "representation": here}
         rows += [{**row, **told} for row in _regression(chosen, known, here in SHARED)]
     holm = corrected([row["p"] for row in rows], "holm")
-    return [_decided(row, p, significance) for row, p in zip(rows, holm, strict=True)]
+    for row, p in zip(rows, holm, strict=True):
+        decided = "refused" if p is None else "yes" if p < significance else "undecided"
+        row |= {"p_holm": p, "holds": decided}
+    return rows
 
 
 def numbers_of(specimens: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
@@ -108,12 +109,6 @@ def numbers_of(specimens: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
             values = values.map(lambda sex: SEXES.get(str(sex).strip().lower()))
         found[name] = values.astype(float) / STEPS[name][0]
     return pd.DataFrame(found).set_axis(specimens["specimen"].astype(str))
-
-
-def _decided(row: Row, p_holm: float | None, significance: float) -> Row:
-    if p_holm is None:
-        return row | {"holds": "refused"}
-    return row | {"p_holm": p_holm, "holds": "yes" if p_holm < significance else "undecided"}
 
 
 def _regression(chosen: pd.DataFrame, known: pd.DataFrame, shared: bool) -> list[Row]:
@@ -134,7 +129,7 @@ def _regression(chosen: pd.DataFrame, known: pd.DataFrame, shared: bool) -> list
     needed = len(rest) + BESIDE
     row: Row = {"specimens": len(names), "needed": needed, **dict.fromkeys(_NUMBERS)}
     why = NO_FITS if chosen.empty else _why_not(x[rest], needed)
-    found = {} if why or not rest else regressed(effects.loc[names].to_numpy(float), x[rest])
+    found = {} if why or not rest else regress(effects.loc[names].to_numpy(float), x[rest])
     return [
         {
             **row,
@@ -172,6 +167,7 @@ def _why_not(x: pd.DataFrame, needed: int) -> str:
 
 def _alone(x: Array) -> Array:
     """(k,) share of each covariate's variance (n, k) that the others do not make."""
+    # 1 - R2 of each on the others: the inverse of its variance inflation factor.
     centred = x - x.mean(axis=0)
     shares = []
     for column in range(x.shape[1]):
@@ -194,6 +190,8 @@ def specimen_effects(values: pd.DataFrame) -> pd.Series:
         return pd.Series(dtype=float)
     by_specimen = values["specimen"].astype(str).to_numpy()[:, None] == np.array(specimens)
     by_level = values["joint"].to_numpy()[:, None] == np.array(levels)
+    # Two-way fixed effects; the first level has none of its own, so that each specimen's effect is
+    # its mean there.
     design = np.hstack([by_specimen, by_level[:, 1:]]).astype(float)
     logarithms = np.log(values["stiffness"].to_numpy(float))
     solution, _ = lstsq(design, logarithms)
@@ -202,6 +200,8 @@ def specimen_effects(values: pd.DataFrame) -> pd.Series:
 
 def _connected(values: pd.DataFrame) -> set[str]:
     """The largest group of specimens that levels hold together."""
+    # Connected components of the graph of specimens and the levels they were read at: effects of
+    # specimens in different ones cannot be compared.
     groups: list[tuple[set[str], set[str]]] = []
     for specimen, part in values.groupby("specimen", sort=False):
         names, levels = {str(specimen)}, set(part["joint"])
@@ -216,35 +216,24 @@ def _connected(values: pd.DataFrame) -> set[str]:
     return max((names for names, _ in groups), key=len, default=set())
 
 
-@dataclass(frozen=True)
-class _Line:
-    """A least squares fit: coefficients (k + 1,) with the mean first, their variances, the rest."""
+def regress(y: Array, x: pd.DataFrame) -> dict[str, Row]:
+    """Numbers of each covariate from one line through all specimens; y: (specimens,).
 
-    coefficients: Array
-    variances: Array
-    left: float
-    freedom: int
-
-
-def _line(y: Array, x: Array) -> _Line:
-    design = np.column_stack([np.ones(len(y)), x - x.mean(axis=0)])
+    Ordinary least squares by the singular values of the centred design, the mean first.
+    """
+    covariates = x.to_numpy(float)
+    design = np.column_stack([np.ones(len(y)), covariates - covariates.mean(axis=0)])
     left, sizes, right = svd(design)
     coefficients = (right.T / sizes) @ (left.T @ y)
     residual = y - design @ coefficients
     freedom = len(y) - design.shape[1]
     scatter = float(residual @ residual) / freedom
     variances = scatter * np.sum((right.T / sizes) ** 2, axis=1)
-    return _Line(coefficients, variances, float(np.sqrt(scatter)), freedom)
-
-
-def regressed(y: Array, x: pd.DataFrame) -> dict[str, Row]:
-    """Numbers of each covariate from one line through all specimens; y: (specimens,)."""
-    line = _line(y, x.to_numpy(float))
-    reach = float(stats.t.ppf(0.975, line.freedom))
-    alone = _alone(x.to_numpy(float))
+    reach = float(stats.t.ppf(0.975, freedom))
+    alone = _alone(covariates)
     found = {}
     for number, name in enumerate(x.columns):
-        effect, error = line.coefficients[1 + number], float(np.sqrt(line.variances[1 + number]))
+        effect, error = coefficients[1 + number], float(np.sqrt(variances[1 + number]))
         low, high = np.exp([effect - reach * error, effect + reach * error])
         found[str(name)] = {
             "factor": float(np.exp(effect)),
@@ -252,9 +241,9 @@ def regressed(y: Array, x: pd.DataFrame) -> dict[str, Row]:
             "high": float(high),
             "log_effect": float(effect),
             "standard_error": error,
-            "degrees_of_freedom": float(line.freedom),
+            "degrees_of_freedom": float(freedom),
             "inflation": max(1.0 / float(alone[number]), 1.0),
-            "unexplained": line.left,
-            "p": float(2.0 * stats.t.sf(abs(effect) / error, line.freedom)) if error else None,
+            "unexplained": float(np.sqrt(scatter)),
+            "p": float(2.0 * stats.t.sf(abs(effect) / error, freedom)) if error else None,
         }
     return found

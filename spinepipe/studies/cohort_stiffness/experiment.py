@@ -1,7 +1,11 @@
-"""Job: what laboratories report of the tests of a specimen, measured and simulated."""
+"""Job: what laboratories report of the tests of a specimen, measured and simulated.
+
+Each curve is a loop of moment and motion; tests to opposite sides are joined to one.
+"""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,6 +18,8 @@ from spinepipe.calibrate.solvers import AtRest
 from spinepipe.calibrate.uncertainty import uncertainty
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
+from spinepipe.cohort.load_tests import DRIVEN, moments
+from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.experiment.loop import Loop, RotationErrors, reading_noise
@@ -29,8 +35,7 @@ from spinepipe.studies.cohort_stiffness.loop_rows import (
     empty,
     noise_of_poses,
 )
-from spinepipe.studies.cohort_stiffness.loops import LoadingLoop, cycles_of
-from spinepipe.studies.cohort_stiffness.predict import predicted
+from spinepipe.studies.cohort_stiffness.predict import predict_motion
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
     base_effects,
@@ -55,10 +60,102 @@ from spinepipe.units import COORDINATES, DEG_PER_RAD, subtract_baseline
 
 Row = dict[str, Any]
 
+AND = "+"
+"""Between the names of two tests that are one loop."""
+
 NO_MOMENT = "no moment drives a rotation that was read: there is no curve of moment and rotation"
 ONE_READING = "fewer than two load steps were read"
 NO_FIT = "no stiffness was fitted specimen by specimen: nothing to simulate with"
 NO_SD = "no measurement_sd is declared: no interval"
+
+
+@dataclass(frozen=True)
+class LoadingLoop:
+    """One cycle of a test, or of two tests to opposite sides one behind the other.
+
+    Attributes
+    ----------
+    coordinate : rotation that the moment drives; None where no moment drives what was read.
+    places : of its recordings among the cycles of the specimen. recordings : these.
+    """
+
+    test: str
+    number: int
+    coordinate: str | None
+    places: tuple[int, ...]
+    recordings: tuple[MeasuredCycle, ...]
+
+    @cached_property
+    def load(self) -> Array:
+        """(T,) N m, the moment that drives the coordinate."""
+        axis = DRIVEN.index(self.coordinate or DRIVEN[0])
+        return np.concatenate([moments(one.case)[:, axis] for one in self.recordings])
+
+    @cached_property
+    def measured(self) -> Array:
+        """(T, J, 6) m and rad, NaN where not read; where zeroed step 0 is zero as it is told."""
+        parts = []
+        for one in self.recordings:
+            motion = one.measured.copy()
+            if one.zeroed and len(motion):
+                read = np.isfinite(one.readings).any(axis=0)
+                motion[0] = np.where(read, 0.0, motion[0])
+            parts.append(motion)
+        return np.concatenate(parts)
+
+    @property
+    def parts(self) -> tuple[int, ...]:
+        """Load steps of each recording."""
+        return tuple(len(one.measured) for one in self.recordings)
+
+    def of(self, each: Sequence[Array]) -> Array:
+        """(T, ...) what is known step by step of all cycles of the specimen, of this loop."""
+        return np.concatenate([each[place] for place in self.places])
+
+
+def loading_loops(tested: Sequence[MeasuredCycle]) -> list[LoadingLoop]:
+    """The cycles of a specimen in their order, two tests to opposite sides joined to one.
+
+    Joined are tests that drive one rotation, each to its own side alone and the only one to it;
+    their cycles of one number make a loop, others stay by themselves.
+    """
+    alone = []
+    for place, one in enumerate(tested):
+        # A moment that drives no rotation that was read makes no curve.
+        driven = one.loaded if one.loaded in DRIVEN else None
+        alone.append(LoadingLoop(one.case.test, one.case.cycle, driven, (place,), (one,)))
+    partner = dict(_opposite(alone))
+    found = {(loop.test, loop.number): loop for loop in alone}
+    loops: list[LoadingLoop] = []
+    for loop in alone:
+        other = found.get((partner.get(loop.test, ""), loop.number))
+        if other is None:
+            loops.append(loop)
+        elif loop.places < other.places:
+            both = replace(
+                loop,
+                test=f"{loop.test}{AND}{other.test}",
+                places=loop.places + other.places,
+                recordings=loop.recordings + other.recordings,
+            )
+            loops.append(both)
+    return loops
+
+
+def _opposite(cycles: Sequence[LoadingLoop]) -> Iterator[tuple[str, str]]:
+    """Each test with the one to the other side, where there is exactly one for each side."""
+    sides: dict[tuple[str | None, int], set[str]] = {}
+    for one in cycles:
+        # 1 or -1 where only that side is loaded, else 0
+        curve = Loop(one.load, one.load)
+        reached = [side for side in (1, -1) if one.coordinate and curve.reached(side)]
+        side = reached[0] if len(reached) == 1 else 0
+        sides.setdefault((one.coordinate, side), set()).add(one.test)
+    for coordinate in DRIVEN:
+        here, there = (sides.get((coordinate, side), set()) for side in (1, -1))
+        if len(here) == len(there) == 1 and not here & there:
+            positive, negative = min(here), min(there)
+            yield from ((positive, negative), (negative, positive))
 
 
 @dataclass(frozen=True)
@@ -97,9 +194,10 @@ def run(
     frame = read_frame(fitted[0]) if fitted else None
     model, why = _simulation(settings, cohort, specimen, tests, others, name, frame)
     sd = settings.measurement_sd or cohort.measurement_sd
+    # Rows of each curve and, where the joint turns, of its axis: measured first, then simulated.
     curves: list[Row] = []
     axes: list[Row] = []
-    for cycle in cycles_of(tests.tested):
+    for cycle in loading_loops(tests.tested):
         for joint, label in enumerate(cohort.joint_names):
             key = {"joint": label, "test": cycle.test, "cycle": cycle.number}
             for curve, axis in _of_joint(cycle, joint, sd, cohort.zeroed_at_step_0, model, why):
@@ -126,15 +224,21 @@ def _simulation(
         return None, joined("the fit has no stiffness", str(frame["message"].iloc[0]))
     start = start_stiffness(settings, cohort, representation)
     k, bound = _fitted(cohort, start, frame)
-    motion = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
+    motion = predict_motion(cohort, specimen, tests.frames, tests.tested, k, others)
     try:
         problem = calibration_problem(
             settings, cohort, specimen, representation, tests.frames, tests.tested, others
         )
         at = [(unknown.rows[0], unknown.column) for unknown in problem.free]
+        # Unknowns are logarithms, so the fit is found again from its table: log of fitted / start.
         x = np.array([np.log(k[one] / start[one]) for one in at])
         at_bound = np.array([bound[one] for one in at])
-        slopes = _slopes(problem, tests, x, cohort.zeroed_at_step_0)
+        cases = [one.case for one in tests.tested]
+        (seen,) = AtRest(problem.model, cases, problem.free, problem.scale).solve([(0, x)])
+        # by the logarithms of the unknowns; without a pose there are words in their place
+        slopes = None
+        if not isinstance(seen, str):
+            slopes = [subtract_baseline(one, cohort.zeroed_at_step_0) for one in seen.by_x]
         root, held, reach = _covariance(settings, problem, x, at_bound)
     except RefusedModel as error:
         return None, str(error)
@@ -151,13 +255,6 @@ def _fitted(cohort: Cohort, start: Array, frame: pd.DataFrame) -> tuple[Array, N
     return k, bound
 
 
-def _slopes(problem: Problem, tests: SpecimenTests, x: Array, zeroed: bool) -> list[Array] | None:
-    """(T, J, 6, m) derivatives of the motion of each cycle by the unknowns; None without a pose."""
-    cases = [one.case for one in tests.tested]
-    (seen,) = AtRest(problem.model, cases, problem.free, problem.scale).solve([(0, x)])
-    return None if isinstance(seen, str) else [subtract_baseline(one, zeroed) for one in seen.by_x]
-
-
 def _covariance(
     settings: CohortStiffness, problem: Problem, x: Array, at_bound: Array
 ) -> tuple[Array, NDArray[np.bool_], float]:
@@ -167,6 +264,7 @@ def _covariance(
         evaluator.problem, evaluator.at(x), at_bound, settings.identifiable_below, None
     )
     held = found.identifiable
+    # root @ root.T is the covariance; rounding may leave eigenvalues below 0
     values, vectors = eigh(found.covariance[np.ix_(held, held)]) if held.any() else (None, None)
     if values is None or vectors is None:
         return np.zeros((0, 0)), held, 0.0
@@ -199,7 +297,9 @@ def _of_joint(
         return
     noise = None if sd is None else reading_noise(cycle.parts, 1.0, zeroed)
     read = _Read(cycle, place, known, None if sd is None else sd.rotation_deg / DEG_PER_RAD)
-    spread = None if noise is None or read.sd is None else _scaled(noise, read.sd).at(known)
+    spread = None
+    if noise is not None and read.sd is not None:
+        spread = replace(noise, root=read.sd * noise.root).at(known)
     row = read.curve(measured, spread) | {"source": MEASURED, "representation": ""}
     row["message"] = joined(row["message"], told, NO_SD if sd is None else "")
     first, last = read.ends
@@ -208,10 +308,6 @@ def _of_joint(
         root = noise_of_poses(sd.translation_mm, sd.rotation_deg, noise.root[[first, last]])
     yield row, read.axis(measured, root, np.zeros((12, 0)), MEASURED, "")
     yield _simulated(read, joint, model, why)
-
-
-def _scaled(noise: RotationErrors, sd: float) -> RotationErrors:
-    return RotationErrors(sd * noise.root, noise.free, noise.reach)
 
 
 def _refused(
@@ -295,6 +391,7 @@ def _simulated(
         row, axis = read.curve(motion, None), read.axis(motion, None, None, SIMULATED, name)
     else:
         by = cycle.of(model.slopes)[:, joint]
+        # What the data hold of the stiffness spreads; what they do not leaves ends open.
         held, loose = by[..., model.held] @ model.root, by[..., ~model.held]
         spread = RotationErrors(held[:, read.place], loose[:, read.place], model.reach).at(
             read.known

@@ -1,7 +1,5 @@
 """The model of a specimen with its fitted stiffness, as `spinepipe export` writes it."""
 
-import pandas as pd
-
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
@@ -89,7 +87,9 @@ def _fitted(
     ]
     fitted = own[own["status"].isin(USABLE) & own["stiffness"].notna()]
     if fitted.empty or len(fitted) < len(own):
-        found = f"no fit of {wanted.specimen} by {name}{_because(own)}"
+        messages = [str(text) for text in own["message"].unique() if text]
+        why = f": {'; '.join(messages)}" if messages else ""
+        found = f"no fit of {wanted.specimen} by {name}{why}"
         remedy = "choose another --representation, or add --start"
         raise InputError([problem("SPECIMEN", found, "a specimen that was fitted", remedy)])
     k = start.copy()
@@ -98,8 +98,3 @@ def _fitted(
     ):
         k[cohort.joint_names.index(joint), COORDINATES.index(coordinate)] = value
     return k
-
-
-def _because(rows: pd.DataFrame) -> str:
-    messages = [str(text) for text in rows["message"].unique() if text]
-    return f": {'; '.join(messages)}" if messages else ""

@@ -41,7 +41,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     rows = list(finding_rows(read_frames(tables), settings.significance))
     if cohort.made_up:
-        rows = [put_in(row) for row in rows]
+        rows = [mark_circular(row) for row in rows]
     origin = provenance("findings", settings, cohort)
     write(from_rows(FINDINGS, rows), output, origin)
 
@@ -61,17 +61,17 @@ def finding_rows(frames: Mapping[str, pd.DataFrame], significance: float) -> Ite
         *stiffness_spreads(stiffness, frames.get("pooling"), significance),
         *error_spreads(statistics, significance),
     )
-    yield from together(by_themselves, stiffness["specimen"].nunique(), significance)
+    yield from decide_together(by_themselves, stiffness["specimen"].nunique(), significance)
 
 
-def put_in(row: Row) -> Row:
+def mark_circular(row: Row) -> Row:
     """The row in a made-up cohort: that specimens and levels differ as drawn is no finding."""
     if row["holds"] != "yes" or not str(row["finding"]).startswith(PUT_IN):
         return row
     return row | {"holds": CIRCULAR, "message": joined(MADE_UP, row["message"])}
 
 
-def together(rows: Sequence[Row], specimens: int, significance: float) -> Iterator[Row]:
+def decide_together(rows: Sequence[Row], specimens: int, significance: float) -> Iterator[Row]:
     """The rows with ``p_holm``, and undecided where few specimens or all claims together say so.
 
     Parameters
@@ -99,6 +99,7 @@ def _corrected(rows: Sequence[Row]) -> list[float | None]:
         for name in _TESTS
         if row[name] is not None and not row.get(BY_CONSTRUCTION)
     ]
+    # Step down from the smallest p. A claim is open as long as one of its tests is.
     open_tests = Counter(place for _, place, _ in tests)
     reached, found = 0.0, {}
     for p, place, name in sorted(tests):

@@ -9,6 +9,7 @@ from spinepipe.calibrate import Fit, Problem, fit
 from spinepipe.calibrate.profile import RegionEnds
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
+from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
 from spinepipe.statics import with_parameters
@@ -21,9 +22,9 @@ from spinepipe.studies.cohort_stiffness.fit_rows import (
 )
 from spinepipe.studies.cohort_stiffness.nuisances import (
     fitted_nuisances,
-    from_plain,
     nuisance_rows,
-    without,
+    start_from_plain,
+    without_nuisances,
 )
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
@@ -37,14 +38,19 @@ from spinepipe.studies.cohort_stiffness.problem import (
 from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import SHARED_ERROR
-from spinepipe.studies.cohort_stiffness.stiffening import Growth, ended, fitted_growth, laws
+from spinepipe.studies.cohort_stiffness.stiffening import (
+    Growth,
+    fitted_growth,
+    laws,
+    status_with_growth,
+)
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, NUISANCES, STIFFNESS
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
 
-UNTOLD = RegionEnds(None, None, open_below=True, open_above=True)
+OPEN = RegionEnds(None, None, open_below=True, open_above=True)
 """Of a stiffness that was held as no reading tells of it."""
 
 
@@ -87,29 +93,33 @@ def fitted(
     fitted_to : a test, ``all``, or ``all_but_<test>``. others : effects besides the bushings.
     """
     tests = specimen_tests(settings, cohort, specimen)
-    beside: tuple[ScopedEffect, ...] = ()
-    told: list[Row] = []
     where = specimen, representation, fitted_to
     problem, found, refusal = _fit(settings, cohort, *where, tests, others)
+    predicted: list[Row] = []
     if problem is None or found is None:
-        k, growth, rows = None, None, _no_stiffness(settings, cohort, refusal)
-        record = no_fit(Status.REFUSED.value, refusal)
+        nowhere = np.full((len(cohort.joint_names), len(COORDINATES)), np.nan)
+        none = np.zeros(nowhere.shape, dtype=int)
+        values = stiffness_rows(
+            cohort.joint_names, settings.free, nowhere, nowhere, 0.0, none.astype(bool), none
+        )
+        status, told = Status.REFUSED, []
+        record = no_fit(status.value, refusal)
     else:
-        growth = _growth(settings, representation, problem, found)
-        k, rows = _stiffness(settings, cohort, problem, found, growth)
-        record, beside = _record(problem, found), fitted_nuisances(problem, found)
+        # A law that stiffens has growth beside its stiffness, and others none.
+        stiffens = named(representation).stiffens
+        growth = fitted_growth(settings, problem, found) if stiffens else None
+        k, values = _stiffness(settings, cohort, problem, found, growth)
+        status, record = found.status, _record(problem, found)
         told = nuisance_rows(problem, found, cohort.joint_names)
-    others = (*laws(settings, None if growth is None else growth.values), *beside, *others)
-    seen = [] if k is None else error_rows(cohort, specimen, tests, k, others)
-    labelled = [
-        {**row, "source": "own", "stage": tests.stage(row["test"], fitted_to)} for row in seen
-    ]
-    return {
-        STIFFNESS.name: rows,
-        FITS.name: [record],
-        ERRORS.name: labelled,
-        NUISANCES.name: told,
-    }
+        if status.usable:
+            effects = laws(settings, None if growth is None else growth.values)
+            acting = (*effects, *fitted_nuisances(problem, found), *others)
+            predicted = error_rows(cohort, specimen, tests, k, acting)
+    ended = {"status": status.value, "message": refusal if found is None else found.message}
+    by = {"source": "own"}
+    rows = [{**row, **by, **ended} for row in values]
+    seen = [{**row, **by, "stage": tests.stage(row["test"], fitted_to)} for row in predicted]
+    return {STIFFNESS.name: rows, FITS.name: [record], ERRORS.name: seen, NUISANCES.name: told}
 
 
 def _fit(
@@ -133,24 +143,18 @@ def _fit(
         below = settings.identifiable_below
         held = ""
         if named(representation).without_nuisances:
-            plain = fit(without(problem), settings.starts, seed, below)
-            problem, held = from_plain(problem, plain)
+            plain = fit(without_nuisances(problem), settings.starts, seed, below)
+            problem, held = start_from_plain(problem, plain)
         found = fit(problem, settings.starts, seed, below, profiled=True)
         found = replace(found, message=joined(found.message, held))
         if named(representation).stiffens:
-            status, message = ended(problem, found.at_bound, found.status, found.message)
+            status, message = status_with_growth(
+                problem, found.at_bound, found.status, found.message
+            )
             found = replace(found, status=status, message=message)
         return problem, found, ""
     except RefusedModel as error:
         return None, None, str(error)
-
-
-def _growth(
-    settings: CohortStiffness, representation: str, problem: Problem, found: Fit
-) -> Growth | None:
-    """Of laws that stiffen; None where they are linear."""
-    stiffens = named(representation).stiffens
-    return fitted_growth(settings, problem, found) if stiffens else None
 
 
 def _stiffness(
@@ -159,15 +163,16 @@ def _stiffness(
     problem: Problem,
     found: Fit,
     growth: Growth | None,
-) -> tuple[Any, list[Row]]:
-    """Fitted stiffness (J, 6), None where the fit has none, and its rows."""
+) -> tuple[Array, list[Row]]:
+    """Fitted stiffness (J, 6), NaN where the fit has none, and its rows."""
     usable = found.status.usable
     model = with_parameters(problem.model, problem.free, found.x)
-    k = model.effects[0].values
+    k = model.effects[BUSHING].values
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
     fitted = [COORDINATES.index(name) for name in settings.free]
-    reaches = {(row, at): UNTOLD for row in range(len(k)) for at in fitted}
+    # Open until a region was found; where the fit looked for none, the interval stands.
+    reaches = {(row, at): OPEN for row in range(len(k)) for at in fitted}
     for index, unknown in enumerate(problem.free):
         if unknown.effect != BUSHING:
             continue  # of a law that stiffens, or a nuisance
@@ -184,12 +189,10 @@ def _stiffness(
                 reaches[one] = reach
     values = k if usable else np.full(k.shape, np.nan)
     freedom = found.uncertainty.degrees_of_freedom
-    rows = stiffness_rows(
+    return values, stiffness_rows(
         *(cohort.joint_names, settings.free, values, error, freedom, known, bound, reaches),
         growth if usable else None,
     )
-    ended = {"source": "own", "status": found.status.value, "message": found.message}
-    return (k if usable else None), [{**row, **ended} for row in rows]
 
 
 def _record(problem: Problem, found: Fit) -> Row:
@@ -203,10 +206,12 @@ def _record(problem: Problem, found: Fit) -> Row:
     )
     cost = found.cost - found.cost_of_priors if found.status.usable else None
     effective = None if cost is None else unknowns - found.uncertainty.held_by_priors
-    several = f"{found.n_optima} optima: the answer depends on the start"
     alone = independent(problem)
-    shared = "" if alone or cost is None else SHARED_ERROR
-    notes = found.message, several if found.n_optima > 1 else "", shared
+    notes = [found.message]
+    if found.n_optima > 1:
+        notes.append(f"{found.n_optima} optima: the answer depends on the start")
+    if not alone and cost is not None:
+        notes.append(SHARED_ERROR)
     return {
         "readings": readings,
         "unknowns": unknowns,
@@ -223,13 +228,3 @@ def _record(problem: Problem, found: Fit) -> Row:
         "message": joined(*notes),
         "degrees_of_freedom": None if cost is None else found.uncertainty.degrees_of_freedom,
     }
-
-
-def _no_stiffness(settings: CohortStiffness, cohort: Cohort, refusal: str) -> list[Row]:
-    nothing = np.full((len(cohort.joint_names), len(COORDINATES)), np.nan)
-    none = np.zeros(nothing.shape, dtype=int)
-    rows = stiffness_rows(
-        cohort.joint_names, settings.free, nothing, nothing, 0.0, none.astype(bool), none
-    )
-    ended = {"source": "own", "status": Status.REFUSED.value, "message": refusal}
-    return [{**row, **ended} for row in rows]

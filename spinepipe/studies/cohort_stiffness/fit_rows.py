@@ -19,6 +19,8 @@ Row = dict[str, Any]
 LEVEL = 0.975
 """Upper end of the intervals: 95 % lie between the ends."""
 
+_OPEN = ("open_below", "open_above")
+
 
 def stiffness_rows(
     joints: Sequence[str],
@@ -48,7 +50,8 @@ def stiffness_rows(
         for name in free:
             at = row, COORDINATES.index(name)
             told = (reaches or {}).get(at)
-            ends = NO_REGION if told is None else asdict(told)
+            # Where no region was looked for the interval stands.
+            ends = dict.fromkeys(_OPEN) if told is None else asdict(told)
             rows.append(
                 {
                     "joint": joint,
@@ -64,15 +67,12 @@ def stiffness_rows(
     return rows
 
 
-NO_REGION: Row = {"open_below": None, "open_above": None}
-"""Where no region was looked for the interval stands."""
-
-
 def interval(value: float, log_error: float, reach: float) -> Row:
     """Value, standard error and ends of the interval, normal in the logarithm."""
     empty: Row = {"standard_error": None, "low": None, "high": None}
     if not np.isfinite(value):
         return {"stiffness": None, **empty}
+    # Student's t on the logarithm, so that both ends are positive.
     with np.errstate(over="ignore"):  # an end beyond all numbers is none
         low, high = value * np.exp([-reach * log_error, reach * log_error])
     if not np.isfinite(log_error) or not np.isfinite(high):
@@ -115,6 +115,7 @@ def criteria(
     unknowns = effective_unknowns + 1.0
     if not independent or cost <= 0.0 or readings - unknowns - 1.0 <= 0.0:
         return empty
+    # Normal errors whose variance is at its own maximum of likelihood, cost / readings.
     log_likelihood = -0.5 * readings * (np.log(2.0 * np.pi * cost / readings) + 1.0)
     correction = 2.0 * unknowns * (unknowns + 1.0) / (readings - unknowns - 1.0)
     return empty | {

@@ -1,8 +1,9 @@
 """The kind cohort_stiffness: how stiffness differs between specimens, levels and load cases."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 from spinepipe.cohort import Cohort
@@ -10,10 +11,10 @@ from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.schema import all_declared
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.cohort_stiffness.checks import check_cohort_stiffness, check_one_stiffening
-from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.cohort_stiffness.representations import NUISANCE, POOLED, finest
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
+    GOULD_2024B,
     NOBODY,
     CohortStiffness,
     joint_label,
@@ -121,16 +122,12 @@ class CohortLayout(StudyFiles):
     @property
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
-        pooled = ("pooling",) if self._pooled_ones else ()
-        beside = ("nuisances",) if self._with_nuisances else ()
-        own = ("stiffness", "fits", "errors", *beside, "sign_checks", *pooled, *OF_EXPERIMENTS)
-        return (*own, *(job.name for job in _ANALYSES if self._asked(job.name)))
-
-    def _asked(self, analysis: str) -> bool:
-        """Whether this study has a table that is computed from tables."""
-        if analysis == "covariates":
-            return bool(self.study.covariates)
-        return self.rebuilt or not analysis.startswith("against")
+        pooled = ("pooling",) if self._pooled else ()
+        nuisances = ("nuisances",) if self._with_nuisances else ()
+        own = ("stiffness", "fits", "errors", *nuisances, "sign_checks", *pooled, *OF_EXPERIMENTS)
+        lacking = set() if self.rebuilt else {"against_gould_2024b"}
+        lacking |= set() if self.study.covariates else {"covariates"}
+        return (*own, *(job.name for job in _ANALYSES if job.name not in lacking))
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -144,40 +141,40 @@ class CohortLayout(StudyFiles):
 
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
-        folder = path.removeprefix(f"{self.folder}/").split("/")[0]
-        return _MADE_BY[folder]
+        return _MADE_BY[path.removeprefix(f"{self.folder}/").split("/")[0]]
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per specimen, and one of the pooled fits."""
         nobody = table == "pooling" or (table == "fits" and not self._single)
         own = [] if nobody else [(name, _SINGLE_BLOCK) for name in self.specimens]
         alone = table in ("nuisances", "sign_checks", *OF_EXPERIMENTS)
-        whole = not alone and self._pooled_ones
-        return [*own, *([(EVERYONE, POOLED_BLOCK)] if whole else [])]
+        pooled = [] if alone or not self._pooled else [(EVERYONE, POOLED_BLOCK)]
+        return [*own, *pooled]
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
+        own = f"specimen={specimen}"
         if block == POOLED_BLOCK:
-            return [f"{self.folder}/pooled/{place}/{table}.parquet" for place in self._pooled()]
-        if table in OF_EXPERIMENTS:
-            return [f"{self.folder}/experiment/specimen={specimen}/{table}.parquet"]
-        if table == "nuisances":
-            places = [f"fits/specimen={specimen}/{place}" for place in self._fits(beside=True)]
-            return [f"{self.folder}/{place}/{table}.parquet" for place in places]
-        places = [f"literature/specimen={specimen}"] if table != "fits" else []
-        if table in ("stiffness", "errors", "fits"):
-            places += [f"fits/specimen={specimen}/{place}" for place in self._fits()]
-        if table in ("stiffness", "errors"):
-            places += [f"left_out/specimen={specimen}/{place}" for place in self._left_out()]
+            places = self._pooled_places()
+        elif table in OF_EXPERIMENTS:
+            places = [f"experiment/{own}"]
+        elif table == "nuisances":
+            places = _fitted(f"fits/{own}", self._with_nuisances, self.load_sets)
+        else:
+            places = [f"literature/{own}"] if table != "fits" else []
+            if table != "sign_checks":
+                places += _fitted(f"fits/{own}", self._single, self.load_sets)
+            if table in ("stiffness", "errors") and self._held_out:
+                places += _fitted(f"left_out/{own}", self._single, self._without_case_folds)
         return [f"{self.folder}/{place}/{table}.parquet" for place in places]
 
     def fits_of_others(self, specimen: str, representation: str, fitted_to: str) -> list[str]:
         """Stiffness files of the other specimens' own fits."""
-        place = f"representation={representation}/fitted_to={fitted_to}/stiffness.parquet"
         return [
-            f"{self.folder}/fits/specimen={name}/{place}"
+            f"{self.folder}/{place}/stiffness.parquet"
             for name in self.specimens
             if name != specimen
+            for place in _fitted(f"fits/specimen={name}", [representation], [fitted_to])
         ]
 
     def simulated_fit(self, specimen: str) -> list[str]:
@@ -185,8 +182,8 @@ class CohortLayout(StudyFiles):
         name = finest(self.representations)
         if name is None:
             return []
-        place = f"representation={name}/fitted_to={joint_label(self.tests)}"
-        return [f"{self.folder}/fits/specimen={specimen}/{place}/stiffness.parquet"]
+        (place,) = _fitted(f"fits/specimen={specimen}", [name], [joint_label(self.tests)])
+        return [f"{self.folder}/{place}/stiffness.parquet"]
 
     @property
     def _single(self) -> tuple[str, ...]:
@@ -194,7 +191,7 @@ class CohortLayout(StudyFiles):
         return tuple(name for name in self.representations if name not in POOLED)
 
     @property
-    def _pooled_ones(self) -> tuple[str, ...]:
+    def _pooled(self) -> tuple[str, ...]:
         """Representations fitted to all specimens at once."""
         return tuple(name for name in self.representations if name in POOLED)
 
@@ -203,42 +200,33 @@ class CohortLayout(StudyFiles):
         """Representations with errors of joint centres and axes fitted beside."""
         return tuple(name for name in self.representations if name in NUISANCE)
 
-    def _fits(self, beside: bool = False) -> list[str]:
-        """Places of the fits of a specimen; ``beside`` : of those with nuisances alone."""
-        return [
-            f"representation={representation}/fitted_to={label}"
-            for representation in (self._with_nuisances if beside else self._single)
-            for label in self.load_sets
-        ]
-
     @property
     def _held_out(self) -> bool:
         """Whether specimens are predicted from the others."""
         return self.study.cross_validation.specimens and len(self.specimens) > 1
 
-    def _left_out(self) -> list[str]:
-        if not self._held_out:
-            return []
-        return [
-            f"representation={representation}/fitted_to={label}"
-            for representation in self._single
-            for label in self._without_case_folds()
-        ]
-
+    @property
     def _without_case_folds(self) -> tuple[str, ...]:
         """The load sets that leave no load case out."""
         return tuple(label for label in self.load_sets if label == ALL or label in self.tests)
 
-    def _pooled(self) -> list[str]:
+    def _pooled_places(self) -> list[str]:
         folds = [(label, NOBODY) for label in self.load_sets]
         if self._held_out:
-            labels = self._without_case_folds()
-            folds += [(label, name) for label in labels for name in self.specimens]
+            folds += [(label, one) for label in self._without_case_folds for one in self.specimens]
         return [
-            f"representation={representation}/fitted_to={label}/without={without}"
-            for representation in self._pooled_ones
+            f"pooled/representation={representation}/fitted_to={label}/without={without}"
+            for representation in self._pooled
             for label, without in folds
         ]
+
+
+def _fitted(folder: str, representations: Iterable[str], labels: Iterable[str]) -> list[str]:
+    """Places of what is fitted of a specimen: each representation to each load set."""
+    return [
+        f"{folder}/representation={representation}/fitted_to={label}"
+        for representation, label in product(representations, labels)
+    ]
 
 
 def _fits_of_others(expected: Any, place: Mapping[str, str]) -> list[str]:

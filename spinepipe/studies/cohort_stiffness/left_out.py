@@ -16,7 +16,7 @@ from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
     origin,
-    seen_note,
+    own_values_note,
     specimen_tests,
     start_stiffness,
 )
@@ -45,7 +45,7 @@ def run(
         *(settings, cohort, specimen, representation, fitted_to),
         [read_frame(path) for path in others],
         base_effects(root, settings, cohort, specimen, left_out=True),
-        seen_note(root, settings, cohort, specimen),
+        own_values_note(root, settings, cohort, specimen),
     )
     read = [mark_of(path) for path in others]
     made = origin("left_out", root, settings, cohort, [specimen], read)
@@ -95,6 +95,7 @@ def _median(
     fitted = [frame for frame in others if frame["stiffness"].notna().all()]
     if not fitted:
         return k, None, 0
+    # Coordinates that are not fitted keep the published value.
     keys, values = ["joint", "coordinate"], ["stiffness", "growth"]
     rows = pd.concat(fitted).astype(dict.fromkeys(values, float))
     median = rows.groupby(keys, as_index=False)[values].median()

@@ -1,10 +1,14 @@
-"""Rows of the tables ``load_displacement`` and ``helical_axes``, from one joint in one cycle."""
+"""The tables ``load_displacement`` and ``helical_axes``: a row of one joint in one cycle.
+
+Rows are made here, and the two of one curve, measured and simulated, are read side by side.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from spinepipe.effects.contract import Array
 from spinepipe.experiment.double_sigmoid import FittedNeutralZone, Zone, neutral_zone
@@ -17,8 +21,10 @@ from spinepipe.studies.cohort_stiffness.tables import (
     DIRECTION,
     HELICAL_AXES,
     LOAD_DISPLACEMENT,
+    MEASURED,
     NOT_READ,
     NOWHERE,
+    SIMULATED,
     SMALL,
     UPPER_HALF,
     WHOLE,
@@ -26,6 +32,9 @@ from spinepipe.studies.cohort_stiffness.tables import (
 from spinepipe.units import COORDINATES, DEG_PER_RAD, DISPLAY_PER_SI, MM_PER_M
 
 Row = dict[str, Any]
+
+CURVE_KEY = ["specimen", "joint", "test", "cycle"]
+"""Columns that name a curve, measured or simulated."""
 
 SIDES = {1: "positive", -1: "negative"}
 
@@ -71,7 +80,7 @@ def displacement_row(seen: LoopReading) -> Row:
     }
     if not loop.goes_round_once:
         return row | {"status": Status.REFUSED.value, "message": MANY}
-    row |= _in_deg(seen, "range_of_motion", loop.range_of_motion())
+    row |= _cells(seen, "range_of_motion", "deg", loop.range_of_motion(), DEG_PER_RAD)
     zones, found, why = _zones(seen)
     row["neutral_zone"] = found.value
     row |= _zone_cells(seen, zones)
@@ -96,10 +105,6 @@ def _cells(seen: LoopReading, name: str, suffix: str, measure: Measure, unit: fl
     low, high = (None if end is None else unit * end for end in ends)
     names = (f"{name}_{suffix}", f"{name}_low_{suffix}", f"{name}_high_{suffix}")
     return dict(zip(names, (unit * measure.value, low, high), strict=True))
-
-
-def _in_deg(seen: LoopReading, name: str, measure: Measure) -> Row:
-    return _cells(seen, name, "deg", measure, DEG_PER_RAD)
 
 
 def _stiffness_cells(seen: LoopReading, name: str, compliance: Measure) -> Row:
@@ -145,7 +150,7 @@ def _mean(measures: Sequence[Measure]) -> Measure:
 def _zone_cells(seen: LoopReading, zones: Sequence[FittedNeutralZone]) -> Row:
     if not zones:
         return {}
-    size = _in_deg(seen, "neutral_zone", _mean([one.size for one in zones]))
+    size = _cells(seen, "neutral_zone", "deg", _mean([one.size for one in zones]), DEG_PER_RAD)
     low = size["neutral_zone_low_deg"]
     begins, ends = np.mean([one.ends for one in zones], axis=0)
     stiffness = _stiffness_cells(
@@ -229,6 +234,7 @@ def _sds(before: Array, after: Array, root: Array | None, free: Array | None) ->
     """SD of each number of the screw, deg and mm; None where it is not known."""
     if root is None or free is None:
         return [None] * len(_UNITS)
+    # First order: numbers of the screw by the coordinates, and these by their independent errors.
     by = derivatives(before, after) * _UNITS[:, None]
     sds = np.linalg.norm(by @ root, axis=1)
     loose = np.abs(by @ free).max(axis=1, initial=0.0) > _TRACES
@@ -240,3 +246,27 @@ def noise_of_poses(sd_mm: float, sd_deg: float, root: Array) -> Array:
     sd: Array = np.array([sd_mm] * 3 + [sd_deg] * 3) / DISPLAY_PER_SI
     noise: Array = np.asarray(np.kron(root, np.diag(sd)), dtype=np.float64)
     return noise
+
+
+def paired_curves(rows: pd.DataFrame, name: str, unit: str) -> pd.DataFrame:
+    """One row per curve: a number measured and simulated, and the way to the ends of each.
+
+    Parameters
+    ----------
+    rows : of ``load_displacement``. name : of the number, whose column ends in ``unit``.
+
+    Returns
+    -------
+    Columns `CURVE_KEY`, ``measured``, ``simulated``, ``measured_way`` and ``simulated_way``; NaN
+    where not known.
+    """
+    value = f"{name}_{unit}"
+    told = rows[[*CURVE_KEY, "source"]].assign(
+        number=rows[value].astype(float),
+        way=0.5 * (rows[f"{name}_high_{unit}"].astype(float) - rows[f"{name}_low_{unit}"]),
+    )
+    sides = []
+    for source in (MEASURED, SIMULATED):
+        here = told[told["source"] == source].drop(columns="source")
+        sides.append(here.rename(columns={"number": source, "way": f"{source}_way"}))
+    return sides[0].merge(sides[1], on=CURVE_KEY, how="left")

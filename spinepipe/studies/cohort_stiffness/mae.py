@@ -39,32 +39,24 @@ def mae_rows(errors: pd.DataFrame) -> list[dict[str, Any]]:
     for key, part in loaded.groupby(GROUP, sort=False):
         named = dict(zip(GROUP, map(str, key), strict=True))
         for steps, (error, motion) in STEPS.items():
-            found = specimen_mae(part, error, motion)
-            of_all = largest[named["test"], named["coordinate"], motion]
-            unit = COORDINATE_UNITS[named["coordinate"]]
-            row = {**named, "unit": unit, "steps": steps, **_spread(found, of_all)}
-            rows.append(row | _in_deg(row))
+            # over the joints with a motion, by specimen; all of these must be known
+            measured = part[part[motion].notna()]
+            by_joint = measured[error].astype(float).abs().groupby(measured["specimen"])
+            found = by_joint.mean()[by_joint.count() == by_joint.size()]
+            largest_of_all = largest[named["test"], named["coordinate"], motion]
+            row = {
+                **named,
+                "unit": COORDINATE_UNITS[named["coordinate"]],
+                "steps": steps,
+                "specimens": len(found),
+                "largest_motion": largest_of_all,
+                **dict.fromkeys(("mae", "low_quartile", "high_quartile", "mae_percent")),
+            }
+            if len(found):
+                low, median, high = found.quantile([0.25, 0.5, 0.75])
+                share = 100.0 * median / largest_of_all if largest_of_all else None
+                row |= {"mae": median, "low_quartile": low, "high_quartile": high}
+                row |= {"mae_percent": share}
+            in_deg = row["unit"] == "deg"
+            rows.append(row | {f"{name}_deg": row[name] if in_deg else None for name in MAE_IN_DEG})
     return rows
-
-
-def _in_deg(row: dict[str, Any]) -> dict[str, Any]:
-    """The columns that hold rotations alone."""
-    return {f"{name}_deg": row[name] if row["unit"] == "deg" else None for name in MAE_IN_DEG}
-
-
-def specimen_mae(part: pd.DataFrame, error: str, motion: str) -> pd.Series:
-    """Mean absolute error over the joints with a motion, by specimen; all of them must be known."""
-    measured = part[part[motion].notna()]
-    by_joint = measured[error].astype(float).abs().groupby(measured["specimen"])
-    known: pd.Series = by_joint.mean()[by_joint.count() == by_joint.size()]
-    return known
-
-
-def _spread(values: pd.Series, largest: float | None) -> dict[str, Any]:
-    empty = dict.fromkeys(("mae", "low_quartile", "high_quartile", "mae_percent"))
-    row: dict[str, Any] = {"specimens": len(values), "largest_motion": largest, **empty}
-    if values.empty:
-        return row
-    low, median, high = values.quantile([0.25, 0.5, 0.75])
-    row |= {"mae": median, "low_quartile": low, "high_quartile": high}
-    return row | {"mae_percent": 100.0 * median / largest if largest else None}

@@ -40,7 +40,9 @@ def prior_sds(study: CohortStiffness, representation: str) -> dict[str, float]:
     return {effect: sd for effect, sd in sds.items() if sd > 0.0}
 
 
-def none_yet(study: CohortStiffness, representation: str, joints: int) -> tuple[ScopedEffect, ...]:
+def nuisance_effects(
+    study: CohortStiffness, representation: str, joints: int
+) -> tuple[ScopedEffect, ...]:
     """The nuisance effects of a representation's model, where fits start: all of them off."""
     everywhere = tuple(range(joints))
     made = [create(name, None) for name in prior_sds(study, representation)]
@@ -69,7 +71,7 @@ def free_nuisances(
     return found, np.array(sds)
 
 
-def without(problem: Problem) -> Problem:
+def without_nuisances(problem: Problem) -> Problem:
     """The problem with joint centres and axes as stated."""
     kept = [index for index in range(len(problem.free)) if not problem.has_prior(index)]
     free = tuple(problem.free[index] for index in kept)
@@ -77,25 +79,26 @@ def without(problem: Problem) -> Problem:
     return replace(problem, free=free, lower=lower, upper=upper, prior_sd=None)
 
 
-def from_plain(problem: Problem, plain: Fit) -> tuple[Problem, str]:
+def start_from_plain(problem: Problem, plain: Fit) -> tuple[Problem, str]:
     """The problem from where the fit without nuisances ended, and what is held there, in words.
 
     Held is stiffness whose standard error without nuisances is too large, see ``identifiable``.
 
     Parameters
     ----------
-    plain : of `without` the problem; where it has no pose, all is fitted from the start.
+    plain : of the problem `without_nuisances`; where it has no pose, all is fitted from the start.
     """
     if not plain.status.usable:
         return problem, ""
     known = plain.uncertainty.identifiable | (plain.at_bound != 0)
     stiffness = [index for index in range(len(problem.free)) if not problem.has_prior(index)]
-    x = np.zeros(len(problem.free))
+    x = np.zeros(len(problem.free))  # nuisances start at none
     x[stiffness] = plain.x
     held = [index for index, told in zip(stiffness, known, strict=True) if not told]
     kept = np.setdiff1d(np.arange(len(x)), held)
     assert problem.prior_sd is not None
     note = f"held as without nuisances: {len(held)} of {len(stiffness)} stiffnesses"
+    # Unknowns count from where the model stands now, and so do their bounds.
     return replace(
         problem,
         model=with_parameters(problem.model, problem.free, x),
@@ -120,6 +123,7 @@ def nuisance_rows(problem: Problem, found: Fit, joints: Sequence[str]) -> list[R
     rows = []
     for index, unknown in _unknowns(problem).items():
         parameter = declared(problem.model, unknown)
+        of_centre = problem.model.effects[unknown.effect].effect.name == CENTRE
         unit, many = SHOWN[parameter.unit]
         assert problem.prior_sd is not None
         value, sd = float(found.values[index]), float(problem.prior_sd[index])
@@ -127,7 +131,7 @@ def nuisance_rows(problem: Problem, found: Fit, joints: Sequence[str]) -> list[R
         rows.append(
             {
                 "joint": joints[unknown.rows[0]],
-                "parameter": _name(problem.model, unknown),
+                "parameter": f"centre_{parameter.name}" if of_centre else parameter.name,
                 "unit": unit,
                 "value": value * many,
                 "prior_sd": sd * many,
@@ -143,9 +147,3 @@ def _unknowns(problem: Problem) -> dict[int, FreeParameter]:
     return {
         index: unknown for index, unknown in enumerate(problem.free) if problem.has_prior(index)
     }
-
-
-def _name(model: SpineModel, unknown: FreeParameter) -> str:
-    """Of a parameter in the table: that of a centre is told as such."""
-    name = declared(model, unknown).name
-    return f"centre_{name}" if model.effects[unknown.effect].effect.name == CENTRE else name

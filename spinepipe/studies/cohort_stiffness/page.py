@@ -9,23 +9,22 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.page.document import (
     Document,
-    Picture,
     ResultTables,
     Sortable,
     beside_paper,
     sortable,
 )
 from spinepipe.schema import Column, Table, all_declared
-from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
 from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL_BUT,
+    GOULD_2024B,
     NOBODY,
     CohortStiffness,
     representations_of,
 )
-from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import own_fits
 from spinepipe.studies.cohort_stiffness.tables import (
     AGAINST_GOULD_2024B,
     FINDINGS,
@@ -102,10 +101,17 @@ NOT_HELD_OUT = (
 
 def document(study: CohortStiffness, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
+    pictures = list(results.pictures.values())
+    if study.base is not None:  # beneath held-out errors, what of its model was not held out
+        note = NOT_HELD_OUT.format(file=study.base.model)
+        pictures = [
+            replace(one, caption=f"{one.caption} {note}") if one.name == HELD_OUT_ERROR else one
+            for one in pictures
+        ]
     return Document(
         question=QUESTION,
         findings=findings(study, results),
-        pictures=[_with_base(study, picture) for picture in results.pictures.values()],
+        pictures=pictures,
         tables=shown_tables(results),
         metadata=results.metadata,
         left_out=(
@@ -114,14 +120,6 @@ def document(study: CohortStiffness, cohort: Cohort, results: ResultTables) -> D
         ),
         poses=results.table("poses"),
     )
-
-
-def _with_base(study: CohortStiffness, picture: Picture) -> Picture:
-    """Beneath held-out errors, what of a base model was not held out."""
-    if study.base is None or picture.name != HELD_OUT_ERROR:
-        return picture
-    told = f"{picture.caption} {NOT_HELD_OUT.format(file=study.base.model)}"
-    return replace(picture, caption=told)
 
 
 def left_out(study: CohortStiffness, specimens: int, joints: Sequence[str] = ()) -> tuple[str, ...]:
@@ -167,8 +165,7 @@ def _rows(name: str, frame: pd.DataFrame) -> tuple[pd.DataFrame, str]:
     """Rows that the page shows, and what is said of those that it does not."""
     chosen, told = frame, ""
     if name == "stiffness":
-        whole = frame["fitted_to"] == joint_label_of(frame)
-        chosen, told = frame[whole & (frame["source"] == "own")], "own fits to all load cases"
+        chosen, told = own_fits(frame), "own fits to all load cases"
     elif name == "pooling":
         chosen, told = frame[frame["without"] == NOBODY], "fits of all specimens"
     elif name in ("fits", "mae", "nuisances"):

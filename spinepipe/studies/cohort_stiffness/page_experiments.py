@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 
 from spinepipe.experiment.double_sigmoid import Zone
-from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import count, number
-from spinepipe.studies.cohort_stiffness.curves_compared import both
+from spinepipe.studies.cohort_stiffness.loop_rows import paired_curves
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import (
@@ -28,7 +28,7 @@ _WHY = {
 }
 
 
-def ranges(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def ranges(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """How far joints move, and how far the fitted model does.
 
     A curve agrees where the difference is within its 95 % limit. The model was fitted to these
@@ -36,10 +36,7 @@ def ranges(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     the variance of the readings less that of the model, not the sum (Cook and Weisberg, Residuals
     and influence in regression, 1982, section 2.1).
     """
-    rows = results.table("load_displacement")
-    if rows.empty:
-        return
-    found = both(rows, "range_of_motion", "deg").dropna(subset=["measured", "simulated"])
+    found = paired_curves(rows, "range_of_motion", "deg").dropna(subset=["measured", "simulated"])
     if found.empty:
         return
     differences = found["simulated"] - found["measured"]
@@ -60,14 +57,11 @@ def ranges(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     yield f"{told}. The stiffness was fitted to these readings, so this is no prediction."
 
 
-def zones(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def zones(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """How many curves are softer in the middle, by how much, and whether the model's are.
 
     Softer: a sigmoid fits better than a straight line, by more than noise (5 %).
     """
-    rows = results.table("load_displacement")
-    if rows.empty:
-        return
     measured, model = (rows[rows["source"] == source] for source in (MEASURED, SIMULATED))
     asked = measured[measured["neutral_zone"].isin([*_SOFT, Zone.NOT_MEANINGFUL])]
     if asked.empty:
@@ -90,36 +84,27 @@ def zones(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     yield f"{told}."
 
 
-def hysteresis(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def hysteresis(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """How much work a cycle loses, measured and in the model."""
-    rows = results.table("load_displacement")
-    if rows.empty:
-        return
-    found = both(rows, "hysteresis_area", "j").dropna(subset=["measured"])
+    found = paired_curves(rows, "hysteresis_area", "j").dropna(subset=["measured"])
     if found.empty:
         yield "No closed loop was read: whether joints lose work in a cycle is not known."
         return
     sure = found["measured_way"].notna()
     lost = int((found["measured"] - found["measured_way"] > 0.0).sum())
     share = f"; {lost} of {int(sure.sum())} lose work for sure (95 %)" if sure.any() else ""
-    model = found["simulated"].dropna()
-    beside = f", in the model {number(_rounded(model.median()), 2)} J" if len(model) else ""
+    model, beside = found["simulated"].dropna(), ""
+    if len(model):  # what solving leaves of a loop without area is none
+        work = float(model.median())
+        beside = f", in the model {number(work if abs(work) >= 1e-9 else 0.0, 2)} J"
     yield (
         f"Work lost in a closed cycle: median {number(found['measured'].median(), 2)} J over "
         f"{count(len(found), 'loop')}{share}{beside}."
     )
 
 
-def _rounded(joules: float) -> float:
-    """What solving leaves of a loop without area is none."""
-    return 0.0 if abs(joules) < 1e-9 else float(joules)
-
-
-def axes(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def axes(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """How many motions have an axis, and how sure its place is."""
-    rows = results.table("helical_axes")
-    if rows.empty:
-        return
     measured = rows[rows["source"] == MEASURED]
     many = measured["status"].value_counts()
     placed = measured[measured["status"] == WHOLE]

@@ -9,10 +9,14 @@ import pandas as pd
 from spinepipe.report.page.document import ResultTables, judged
 from spinepipe.report.words import AXIS, after_number, case, count, number, percent
 from spinepipe.status import Status
-from spinepipe.studies.cohort_stiffness.page_covariates import covariates
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
-from spinepipe.studies.cohort_stiffness.page_nuisances import nuisances
-from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
+from spinepipe.studies.cohort_stiffness.page_optional import (
+    covariates,
+    excluded_linear_laws,
+    nuisance_sizes,
+    order_with_nuisances,
+    stiffening_verdicts,
+)
 from spinepipe.studies.cohort_stiffness.representations import (
     IN_WORDS,
     NUISANCE,
@@ -21,7 +25,7 @@ from spinepipe.studies.cohort_stiffness.representations import (
     STIFFENING,
 )
 from spinepipe.studies.cohort_stiffness.settings import NOBODY, NOTHING, CohortStiffness
-from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import joint_label_of, own_fits
 
 _MOST_PLACES = 6
 
@@ -47,20 +51,22 @@ _PARTS = {
     "between_joints": "of joints beyond that",
 }
 
-Finding = Callable[[CohortStiffness, ResultTables], Iterator[str]]
+Finding = Callable[..., Iterator[str]]
+"""Sentences from a study and tables of its results."""
 
 
 def findings(study: CohortStiffness, results: ResultTables) -> list[str]:
     """The sentences, without those that the study has no table for."""
-    told = [sentence for make in MAKERS for sentence in make(study, results)]
+    told: list[str] = []
+    for make, names in MAKERS:
+        first, *others = (results.table(name) for name in names)
+        if len(first):
+            told += make(study, first, *others)
     return [sentence.replace(" %", "\u00a0%") for sentence in told]
 
 
-def signs(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def signs(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """Where the measured motion goes against the load."""
-    rows = results.table("sign_checks")
-    if rows.empty:
-        return
     flipped = rows[rows["verdict"] == "flipped"]
     if len(flipped):
         places = [
@@ -97,11 +103,8 @@ def _sizes(implausible: pd.DataFrame) -> Iterator[str]:
     )
 
 
-def failed(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def failed(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """Fits without a stiffness, and why."""
-    rows = results.table("fits")
-    if rows.empty:
-        return
     usable = [status.value for status in Status if status.usable]
     lost = rows[~rows["status"].isin(usable)]
     if lost.empty:
@@ -111,11 +114,8 @@ def failed(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     yield f"{len(lost)} of {count(len(rows), 'fit')} have no stiffness: {_some(places)}."
 
 
-def bounds(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def bounds(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """Fits with a stiffness at a bound."""
-    rows = results.table("fits")
-    if rows.empty:
-        return
     at = rows[rows["status"] == Status.CONVERGED_AT_BOUND.value]
     if at.empty:
         return
@@ -136,36 +136,29 @@ def bounds(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
     )
 
 
-def optima(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def optima(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """Fits whose answer hangs on the start."""
-    rows = results.table("fits")
-    several = rows[rows["n_optima"] > 1] if len(rows) else rows
+    several = rows[rows["n_optima"] > 1]
     if len(several):
         places = [_fit(row) for row in several.to_dict("records")]
         found = count(len(several), "fit has", "fits have")
         yield f"{found} several optima, so that the answer depends on the start: {_some(places)}."
 
 
-def identifiable(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def identifiable(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """How many fitted values the data do not constrain, and how well errors are explained."""
-    rows = results.table("stiffness")
-    if rows.empty:
-        return
-    own = rows[(rows["fitted_to"] == joint_label_of(rows)) & (rows["source"] == "own")]
-    parts = [_lost(str(name), part) for name, part in own.groupby("representation", sort=False)]
-    told = "; ".join(part for part in parts if part)
-    if told:
-        yield f"Not identifiable from all load cases together: {told}."
+    own = own_fits(rows)
+    parts = []
+    for name, part in own.groupby("representation", sort=False):
+        flags = part["identifiable"].dropna().astype(bool)
+        lost, total = int((~flags).sum()), len(flags)
+        if lost:
+            share = f"{lost} of {total} values ({percent(lost, total)})"
+            parts.append(f"{IN_WORDS[str(name)]} {share}")
+    if parts:
+        yield f"Not identifiable from all load cases together: {'; '.join(parts)}."
     elif len(own):
         yield "From all load cases together every fitted stiffness is identifiable."
-
-
-def _lost(name: str, part: pd.DataFrame) -> str:
-    flags = part["identifiable"].dropna().astype(bool)
-    lost = int((~flags).sum())
-    if not lost:
-        return ""
-    return f"{IN_WORDS[name]} {lost} of {len(flags)} values ({percent(lost, len(flags))})"
 
 
 def _fit(row: dict[Any, Any]) -> str:
@@ -184,11 +177,8 @@ CHOSEN_AFTER = (
 )
 
 
-def ranking(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def ranking(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """The order of representations by each criterion."""
-    rows = results.table("ranking")
-    if rows.empty:
-        return
     for criterion, words in _CRITERIA.items():
         ranked = rows[(rows["criterion"] == criterion) & rows["rank"].notna()].sort_values("rank")
         if (~ranked["representation"].isin(PUBLISHED)).any():
@@ -196,7 +186,7 @@ def ranking(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
             after = CHOSEN_AFTER if ranked["p"].notna().any() else ""
             yield f"{words}, from least to largest error (mean ± SE): {'; '.join(told)}.{after}"
     best = [
-        f"{words} prefers {_best(part)}"
+        f"{words} prefers {' and '.join(IN_WORDS[first] for first in part['representation'])}"
         for name, words in (("aicc", "Akaike's criterion"), ("bic", "Schwarz's criterion"))
         if len(part := rows[(rows["criterion"] == name) & (rows["rank"] == 1)])
     ]
@@ -217,15 +207,8 @@ def _place(row: dict[Any, Any], significance: float) -> str:
     return f"{IN_WORDS[row['representation']]} {error_of}{same}"
 
 
-def _best(part: pd.DataFrame) -> str:
-    return " and ".join(IN_WORDS[name] for name in part["representation"])
-
-
-def claims(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def claims(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """How many claims hold, and the first of each verdict with their numbers."""
-    rows = results.table("findings")
-    if rows.empty:
-        return
     parts = {name: rows[rows["holds"] == name] for name in _VERDICTS}
     told = [f"{_VERDICTS[name][0]} {len(part)}" for name, part in parts.items() if len(part)]
     yield (
@@ -256,11 +239,8 @@ def _claim(row: dict[Any, Any]) -> str:
     return f"{words} ({', '.join(numbers)})"
 
 
-def loaded_errors(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def loaded_errors(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """Errors in the loaded direction at the largest load, load case by load case."""
-    rows = results.table("mae")
-    if rows.empty:
-        return
     labels = [joint_label_of(rows), NOTHING]
     chosen = rows[
         (rows["steps"] == "peak")
@@ -271,7 +251,8 @@ def loaded_errors(study: CohortStiffness, results: ResultTables) -> Iterator[str
     for (test, _), part in chosen.groupby(["test", "coordinate"], sort=False):
         told = [
             f"{IN_WORDS[row['representation']]} {number(row['mae'], 2)}"
-            f"{after_number(row['unit'])}{_share(row)}"
+            f"{after_number(row['unit'])}"
+            + ("" if pd.isna(row["mae_percent"]) else f" ({number(row['mae_percent'], 2)} %)")
             for row in part.to_dict("records")
         ]
         yield (
@@ -280,16 +261,8 @@ def loaded_errors(study: CohortStiffness, results: ResultTables) -> Iterator[str
         )
 
 
-def _share(row: dict[Any, Any]) -> str:
-    share = row["mae_percent"]
-    return "" if pd.isna(share) else f" ({number(share, 2)} %)"
-
-
-def spreads(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def spreads(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """Spreads that the hierarchical fit found, as factors: one SD up or down."""
-    rows = results.table("pooling")
-    if rows.empty:
-        return
     rows = rows[rows["representation"] == POOLED[0]]
     whole = rows[(rows["without"] == NOBODY) & (rows["fitted_to"] == joint_label_of(rows))]
     settled = whole[whole["status"].map(lambda name: Status(name).usable).astype(bool)]
@@ -311,15 +284,32 @@ def _spread(row: dict[Any, Any]) -> str:
     return f"{centre} ({', '.join(factors)})" if factors else centre
 
 
-def beside_the_paper(study: CohortStiffness, results: ResultTables) -> Iterator[str]:
+def beside_the_paper(study: CohortStiffness, rows: pd.DataFrame) -> Iterator[str]:
     """How the published quantities were judged."""
-    told = judged(results.table("against_gould_2024b"))
+    told = judged(rows)
     if told:
         yield told
 
 
-MAKERS: tuple[Finding, ...] = (
-    *(signs, failed, bounds, optima, identifiable),
-    *(ranking, nuisances, stiffening, claims, loaded_errors, spreads, covariates),
-    *(ranges, zones, hysteresis, axes, beside_the_paper),
+MAKERS: tuple[tuple[Finding, tuple[str, ...]], ...] = (
+    (signs, ("sign_checks",)),
+    (failed, ("fits",)),
+    (bounds, ("fits",)),
+    (optima, ("fits",)),
+    (identifiable, ("stiffness",)),
+    (ranking, ("ranking",)),
+    (order_with_nuisances, ("ranking",)),
+    (nuisance_sizes, ("nuisances",)),
+    (stiffening_verdicts, ("findings", "ranking")),
+    (excluded_linear_laws, ("stiffness",)),
+    (claims, ("findings",)),
+    (loaded_errors, ("mae",)),
+    (spreads, ("pooling",)),
+    (covariates, ("covariates",)),
+    (ranges, ("load_displacement",)),
+    (zones, ("load_displacement",)),
+    (hysteresis, ("load_displacement",)),
+    (axes, ("helical_axes",)),
+    (beside_the_paper, ("against_gould_2024b",)),
 )
+"""Each with the tables that it reads; without rows of the first there is nothing to say."""

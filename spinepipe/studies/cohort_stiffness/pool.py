@@ -1,13 +1,13 @@
 """Job: the stiffness of all specimens at once, each drawn towards its cohort; or all but one."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from spinepipe.calibrate import CohortSpread, Pooled, PooledSpecimen, Problem, pool
+from spinepipe.calibrate import Pooled, PooledSpecimen, Problem, pool
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.inputs import study_of_kind
@@ -25,7 +25,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
     calibration_problem,
     origin,
-    seen_note,
+    own_values_note,
     specimen_tests,
     start_stiffness,
 )
@@ -36,8 +36,8 @@ from spinepipe.studies.cohort_stiffness.stiffening import (
     PooledUnknowns,
     growth_spread,
     laws,
-    pooled_ended,
     pooled_growth,
+    pooled_status,
 )
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, POOLING, SPREAD_CELLS, STIFFNESS
 from spinepipe.tables import from_rows, write
@@ -51,6 +51,12 @@ DECIDED = 0.5
 
 IN_POOLED = ("representation", "fitted_to")
 """Columns that the folders of a file of one pooled fit carry."""
+
+_OF_SPREADS = (
+    *("centre", "between_levels", "between_specimens", "between_joints", "scatter"),
+    *("effective_unknowns", "log_likelihood", *SPREAD_CELLS),
+)
+"""Cells of table ``pooling`` that stay empty where nothing was fitted."""
 
 NOT_DECIDED = "the specimen's readings do not decide: value and interval are the cohort's"
 
@@ -72,7 +78,7 @@ def run(
         name: base_effects(root, settings, cohort, name, left_out=name == without)
         for name in cohort.specimen_names
     }
-    note = "" if without == NOBODY else seen_note(root, settings, cohort, without)
+    note = "" if without == NOBODY else own_values_note(root, settings, cohort, without)
     rows = pooled(settings, cohort, representation, fitted_to, without, others, note)
     made = origin("pool", root, settings, cohort)
     paths = {STIFFNESS: stiffness, ERRORS: errors, FITS: fits, POOLING: pooling}
@@ -100,21 +106,17 @@ def pooled(
     fitted = [name for name in cohort.specimen_names if name != without]
     problems, refusals = _problems(settings, cohort, representation, fitted, fitted_to, others)
     asked = list(problems.values())
-    found = pooled_ended(asked, pool(asked)) if asked else None
+    found = pooled_status(asked, pool(asked)) if asked else None
     everyone = without == NOBODY
     rows = PooledRows(
         *(settings, cohort, representation, fitted_to, problems, refusals, found, others, note)
     )
-    told = fitted if everyone else [without]
-    values = [row for name in told for row in rows.stiffness(name)]
-    seen = [row for name in told for row in rows.errors(name)]
-    records = [rows.record(name) for name in told] if everyone else []
-    source = "own" if everyone else "others_pooled"
-    by = {"source": source}
+    names = fitted if everyone else [without]
+    by = {"source": "own" if everyone else "others_pooled"}
     return {
-        STIFFNESS.name: [{**row, **by} for row in values],
-        ERRORS.name: [{**row, **by} for row in seen],
-        FITS.name: records,
+        STIFFNESS.name: [{**row, **by} for name in names for row in rows.stiffness(name)],
+        ERRORS.name: [{**row, **by} for name in names for row in rows.errors(name)],
+        FITS.name: [rows.record(name) for name in names] if everyone else [],
         POOLING.name: rows.pooling(),
     }
 
@@ -163,16 +165,29 @@ class PooledRows:
     problems: Mapping[str, Problem]
     refusals: Mapping[str, str]
     found: Pooled | None
-    others: Mapping[str, tuple[ScopedEffect, ...]] = field(default_factory=dict)
-    note: str = ""
+    others: Mapping[str, tuple[ScopedEffect, ...]]
+    note: str
 
     def stiffness(self, specimen: str) -> list[Row]:
         """Rows of table ``stiffness`` for a fitted specimen or a newcomer."""
+        joints, newcomer = self.cohort.joint_names, self._newcomer(specimen)
         values = self._values(specimen)
-        none = np.zeros((len(self.cohort.joint_names), 6), dtype=int)
         if values is None:
-            return self._rows(np.full(none.shape, np.nan), none + np.nan, none, none, specimen)
-        return self._rows(*values, specimen)
+            none = np.zeros((len(joints), len(COORDINATES)), dtype=int)
+            values = np.full(none.shape, np.nan), none + np.nan, none, none
+        k, error, bound, decided = values
+        known = None if newcomer else (error < self.study.identifiable_below) & (decided > 0)
+        rows = stiffness_rows(
+            *(joints, self.study.free, k, error, self._freedom(specimen), known, bound),
+            growth=self._growth(specimen),
+        )
+        status, message = self._ended(specimen)
+        for row in rows:
+            at = joints.index(row["joint"]), COORDINATES.index(row["coordinate"])
+            of_cohort = not newcomer and np.isfinite(error[at]) and not decided[at]
+            note = joined(message, NOT_DECIDED if of_cohort else "")
+            row |= {"specimen": specimen, "status": status.value, "message": note}
+        return rows
 
     def errors(self, specimen: str) -> list[Row]:
         """Rows of table ``errors``: all tests of a fitted specimen, those fitted of a newcomer."""
@@ -183,12 +198,14 @@ class PooledRows:
         growth = self._growth(specimen)
         effects = laws(self.study, None if growth is None else growth.values)
         others = (*effects, *self.others.get(specimen, ()))
-        found = error_rows(self.cohort, specimen, tests, values[0], others)
-        rows = [{**row, "specimen": specimen} for row in found]
-        if specimen not in self.problems:
-            within = [r for r in rows if tests.stage(r["test"], self.fitted_to) == "fitted"]
-            return [{**r, "stage": "left_out_specimen"} for r in within]
-        return [{**r, "stage": tests.stage(r["test"], self.fitted_to)} for r in rows]
+        rows = []
+        for row in error_rows(self.cohort, specimen, tests, values[0], others):
+            stage = tests.stage(row["test"], self.fitted_to)
+            if specimen in self.problems:
+                rows.append({**row, "specimen": specimen, "stage": stage})
+            elif stage == "fitted":
+                rows.append({**row, "specimen": specimen, "stage": "left_out_specimen"})
+        return rows
 
     def record(self, specimen: str) -> Row:
         """The row of table ``fits`` of a fitted specimen."""
@@ -218,50 +235,37 @@ class PooledRows:
     def pooling(self) -> list[Row]:
         """Rows of table ``pooling``, one per free coordinate."""
         spreads = {s.name: s for s in self.found.spreads if not s.effect} if self.found else {}
-        return [self._spread(name, spreads) for name in self.study.free]
-
-    def _spread(self, name: str, spreads: Mapping[str, CohortSpread]) -> Row:
-        place = COORDINATES.index(name)
-        spread = spreads.get(STIFFNESS_COLUMNS[place])
-        found = self.found
-        empty: Row = dict.fromkeys(
-            (
-                "centre",
-                "between_levels",
-                "between_specimens",
-                "between_joints",
-                "scatter",
-                "effective_unknowns",
-                "log_likelihood",
-                *SPREAD_CELLS,
-            )
-        )
-        row: Row = {
-            "coordinate": name,
-            "unit": STIFFNESS_UNITS[name],
-            "specimens": self._specimens(),
-            "iterations": 0,
-            "status": Status.REFUSED.value,
-            "message": NOBODY_FITTED,
-            **empty,
-        }
-        if found is None or spread is None:
-            return row
-        start = float(start_stiffness(self.study, self.cohort, self.representation)[0, place])
+        start = start_stiffness(self.study, self.cohort, self.representation)[0]
         alone = all(independent(problem) for problem in self.problems.values())
-        return row | {
-            "centre": start * float(np.exp(spread.mean)),
-            "between_levels": spread.level or None,  # zero: not told from the rest
-            "between_specimens": spread.specimen or None,
-            "between_joints": spread.rest,
-            **growth_spread(self.study, found, name),
-            "scatter": found.scatter,
-            "effective_unknowns": found.effective_parameters,
-            "log_likelihood": found.log_likelihood if alone else None,
-            "iterations": found.iterations,
-            "status": found.status.value,
-            "message": joined(found.message, "" if alone else SHARED_ERROR),
-        }
+        rows = []
+        for name in self.study.free:
+            place = COORDINATES.index(name)
+            row: Row = {
+                "coordinate": name,
+                "unit": STIFFNESS_UNITS[name],
+                "specimens": self._specimens(),
+                "iterations": 0,
+                "status": Status.REFUSED.value,
+                "message": NOBODY_FITTED,
+                **dict.fromkeys(_OF_SPREADS),
+            }
+            spread = spreads.get(STIFFNESS_COLUMNS[place])
+            if self.found is not None and spread is not None:
+                row |= {
+                    "centre": float(start[place]) * float(np.exp(spread.mean)),
+                    "between_levels": spread.level or None,  # zero: not told from the rest
+                    "between_specimens": spread.specimen or None,
+                    "between_joints": spread.rest,
+                    **growth_spread(self.study, self.found, name),
+                    "scatter": self.found.scatter,
+                    "effective_unknowns": self.found.effective_parameters,
+                    "log_likelihood": self.found.log_likelihood if alone else None,
+                    "iterations": self.found.iterations,
+                    "status": self.found.status.value,
+                    "message": joined(self.found.message, "" if alone else SHARED_ERROR),
+                }
+            rows.append(row)
+        return rows
 
     def _own(self, specimen: str) -> PooledSpecimen | None:
         if self.found is None or specimen not in self.problems:
@@ -287,25 +291,25 @@ class PooledRows:
 
         None without a fit.
         """
-        told = self._told(specimen)
-        if told is None:
+        unknowns = self._unknowns(specimen)
+        if unknowns is None:
             return None
         k = start_stiffness(self.study, self.cohort, self.representation)
         error = np.full(k.shape, np.inf)
         bound = np.zeros(k.shape, dtype=int)
         decided = np.zeros(k.shape, dtype=int)
-        for index, unknown in enumerate(told.free):
+        for index, unknown in enumerate(unknowns.free):
             if unknown.effect:
                 continue  # of a law that stiffens
             at = unknown.rows[0], unknown.column
-            k[at] *= np.exp(told.x[index])
-            bound[at] = told.at_bound[index]
-            decided[at] = told.decided is not None and told.decided[index]
+            k[at] *= np.exp(unknowns.x[index])
+            bound[at] = unknowns.at_bound[index]
+            decided[at] = unknowns.decided is not None and unknowns.decided[index]
             if not bound[at]:  # the covariance is not told of bounds
-                error[at] = np.sqrt(told.variance[index])
+                error[at] = np.sqrt(unknowns.variance[index])
         return k, error, bound, decided
 
-    def _told(self, specimen: str) -> PooledUnknowns | None:
+    def _unknowns(self, specimen: str) -> PooledUnknowns | None:
         """What the pool says of the unknowns of a fitted specimen or a newcomer.
 
         A newcomer has them where the pool has ended: it can be expected to be like the others.
@@ -314,42 +318,31 @@ class PooledRows:
             return None
         own, newcomer = self._own(specimen), np.diagonal(self.found.newcomer_covariance)
         free = next(iter(self.problems.values())).free
-        if own is None:
+        if (
+            own is None
+        ):  # the prior predictive of the cohort: its mean, and what specimens differ by
             nothing = np.zeros(len(free), dtype=int)
             return PooledUnknowns(free, self.found.newcomer, newcomer, nothing, None)
+        # Own readings decide where they make the specimen much surer than the cohort alone would.
         variance = np.diagonal(own.covariance)
         decided = variance < DECIDED * newcomer
         return PooledUnknowns(free, own.x, variance, own.at_bound, decided)
 
     def _growth(self, specimen: str) -> Growth | None:
         """What is known of growth; None for a linear fit or without one."""
-        told, joints = self._told(specimen), len(self.cohort.joint_names)
-        freedom = self._freedom(specimen)
+        unknowns, freedom = self._unknowns(specimen), self._freedom(specimen)
+        if unknowns is None:
+            return None
         reach = float(stats.t.ppf(LEVEL, freedom)) if freedom > 0.0 else np.inf
-        return None if told is None else pooled_growth(self.study, told, joints, reach)
+        return pooled_growth(self.study, unknowns, len(self.cohort.joint_names), reach)
 
     def _freedom(self, specimen: str) -> float:
         """Degrees of freedom of intervals: a newcomer's hang on spreads that are estimated."""
-        fitted = specimen in {*self.problems, *self.refusals}
-        return np.inf if fitted else self._specimens() - 1.0
+        return self._specimens() - 1.0 if self._newcomer(specimen) else np.inf
 
-    def _rows(
-        self, k: Array, error: Array, bound: Indices, decided: Indices, specimen: str
-    ) -> list[Row]:
-        status, message = self._ended(specimen)
-        joints, fitted = self.cohort.joint_names, specimen in {*self.problems, *self.refusals}
-        known = (error < self.study.identifiable_below) & (decided > 0) if fitted else None
-        freedom = self._freedom(specimen)
-        rows = stiffness_rows(
-            *(joints, self.study.free, k, error, freedom, known, bound),
-            growth=self._growth(specimen),
-        )
-        for row in rows:
-            at = joints.index(row["joint"]), COORDINATES.index(row["coordinate"])
-            of_cohort = fitted and np.isfinite(error[at]) and not decided[at]
-            note = joined(message, NOT_DECIDED if of_cohort else "")
-            row |= {"specimen": specimen, "status": status.value, "message": note}
-        return rows
+    def _newcomer(self, specimen: str) -> bool:
+        """Whether it took no part in the pool, be it fitted or refused."""
+        return specimen not in self.problems and specimen not in self.refusals
 
     def _specimens(self) -> int:
         """How many specimens the spreads were estimated from."""

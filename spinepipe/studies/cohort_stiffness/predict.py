@@ -20,7 +20,7 @@ from spinepipe.units import COORDINATE_UNITS, COORDINATES, from_si, subtract_bas
 Row = dict[str, Any]
 
 
-def predicted(
+def predict_motion(
     cohort: Cohort,
     specimen: str,
     frames: tuple[Pose, ...],
@@ -57,6 +57,7 @@ def motions(
     seen = readings(stack, poses.q)
     found: list[tuple[Array | None, Status, str]] = []
     for first, end in pairwise(stack.first.tolist()):
+        # A case has motion where all of its steps have a stable pose.
         lost = next((at for at in range(first, end) if not Status(poses.status[at]).usable), None)
         if lost is not None:
             found.append((None, Status(poses.status[lost]), poses.messages[lost]))
@@ -74,7 +75,7 @@ def error_rows(
     others: tuple[ScopedEffect, ...] = (),
 ) -> list[Row]:
     """Errors by test, joint and measured coordinate, all cycles together; see table ``errors``."""
-    ended = predicted(cohort, specimen, tests.frames, tests.tested, k, others)
+    ended = predict_motion(cohort, specimen, tests.frames, tests.tested, k, others)
     rows = []
     for test in tests.tests:
         here = [

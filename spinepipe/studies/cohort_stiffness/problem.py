@@ -27,7 +27,7 @@ from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.statics import free_parameters
 from spinepipe.studies.base_model import beside_bushings, own_values
-from spinepipe.studies.cohort_stiffness.nuisances import free_nuisances, none_yet
+from spinepipe.studies.cohort_stiffness.nuisances import free_nuisances, nuisance_effects
 from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
 from spinepipe.studies.cohort_stiffness.stiffening import free_growth, laws
@@ -120,8 +120,9 @@ def calibration_problem(
     """
     start, one = start_stiffness(study, cohort, representation), named(representation)
     growth = np.zeros(start.shape) if one.stiffens else None
+    # Effects in the order that `BUSHING` tells of; all but the bushing start without effect.
     stiffening = laws(study, growth)
-    nuisances = none_yet(study, representation, len(start))
+    nuisances = nuisance_effects(study, representation, len(start))
     beside = (*stiffening, *nuisances, *others)
     model = stiff_model(cohort, specimen, frames, start, beside)
     names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in study.free]
@@ -130,7 +131,9 @@ def calibration_problem(
     growths = free_growth(study, model, representation)
     errors, sds = free_nuisances(study, model, representation, BUSHING + 1 + len(stiffening))
     free = stiffness + growths + errors
-    reach = np.full(len(free), np.inf)  # of growth and nuisances their declared bounds
+    # Stiffness moves as a logarithm: bounds are start / factor and start x factor. Of growth and
+    # nuisances those that their effects declare stand.
+    reach = np.full(len(free), np.inf)
     reach[: len(stiffness)] = np.log(study.bound_factor)
     prior_sd = np.append(np.full(len(stiffness + growths), np.inf), sds) if errors else None
     cases = tuple(
@@ -196,7 +199,7 @@ def base_effects(
     return () if model is None else beside_bushings(model, specimen, cohort.joint_names, left_out)
 
 
-def seen_note(root: str, study: CohortStiffness, cohort: Cohort, specimen: str) -> str:
+def own_values_note(root: str, study: CohortStiffness, cohort: Cohort, specimen: str) -> str:
     """What must be told of a left-out specimen whose effects have values found on itself."""
     model = _of_study(root, study)
     return SEEN if model and own_values(model, specimen, cohort.joint_names) else ""
@@ -222,9 +225,7 @@ def origin(
     """Metadata of a file, see `provenance`, with the digest of the model file."""
     base = base_marks(root, study.base.model if study.base else None)
     whole = provenance(job, study, cohort, specimens, [*base, *others])
-    return {**whole, "base_model_digest": _digest(root, study)} if base else whole
-
-
-def _digest(root: str, study: CohortStiffness) -> str:
-    assert study.base is not None
-    return hashlib.sha256(study.base.path(Path(root)).read_bytes()).hexdigest()
+    if study.base is None:
+        return whole
+    content = study.base.path(Path(root)).read_bytes()
+    return {**whole, "base_model_digest": hashlib.sha256(content).hexdigest()}

@@ -58,23 +58,26 @@ def ranking_rows(
     for criterion in CRITERIA:
         if criterion in INFORMATION:
             found = _information(fits, criterion, [n for n in names if n not in PUBLISHED])
-            counts = {name: estimated_spreads(fits, pooling, name) for name in POOLED}
-            order = ranked(found, True, specimens, _penalty(fits, criterion, counts))
-            order = [_conditional(row, counts) for row in order]
+            counts = dict.fromkeys(POOLED, 0)
+            if pooling is not None:  # the spreads that a fit to all load cases has estimated
+                here = (pooling["fitted_to"] == joint_label_of(fits)) & (
+                    pooling["without"] == NOBODY
+                )
+                for name in POOLED:
+                    of_name = pooling.loc[here & (pooling["representation"] == name), list(SPREADS)]
+                    counts[name] = int(of_name.notna().sum().sum())
+            order = rank_candidates(found, True, specimens, _penalty(fits, criterion, counts))
+            for row in order:
+                if row["representation"] in POOLED and row["value"] is not None:
+                    # Vaida and Blanchard 2005: random effects count by their effective number
+                    count = counts[row["representation"]]
+                    note = f"conditional criterion; {count} spreads of the cohort counted once "
+                    row["message"] = joined(f"{note}as unknowns", row["message"])
         else:
             found = _errors(errors, criterion, names)
-            order = ranked(found, False, specimens, unit=unit_of(errors))
+            order = rank_candidates(found, False, specimens, unit=unit_of(errors))
         rows += [{"criterion": criterion, **row} for row in order]
     return rows
-
-
-def estimated_spreads(fits: pd.DataFrame, pooling: pd.DataFrame | None, name: str) -> int:
-    """How many spreads a pooled fit to all load cases and specimens has estimated."""
-    if pooling is None:
-        return 0
-    here = (pooling["fitted_to"] == joint_label_of(fits)) & (pooling["without"] == NOBODY)
-    here &= pooling["representation"] == name
-    return int(pooling.loc[here, list(SPREADS)].notna().sum().sum())
 
 
 def _penalty(
@@ -91,15 +94,6 @@ def _penalty(
     return found
 
 
-def _conditional(row: Row, counts: Mapping[str, int]) -> Row:
-    """The row of a pooled fit told of what its criterion is (Vaida and Blanchard 2005)."""
-    if row["representation"] not in POOLED or row["value"] is None:
-        return row
-    count = counts[row["representation"]]
-    note = f"conditional criterion; {count} spreads of the cohort counted once as unknowns"
-    return row | {"message": joined(note, row["message"])}
-
-
 def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Candidate, pd.Series]:
     """Error by specimen of each representation; the literature's is the same everywhere."""
     found = {}
@@ -107,16 +101,13 @@ def _errors(errors: pd.DataFrame, criterion: str, names: list[str]) -> dict[Cand
         stage = LITERATURE if name in PUBLISHED else criterion
         chosen = of_joint_fits(errors, stage)
         chosen = chosen[chosen["representation"] == name]
-        found[name, _source(name, criterion)] = specimen_rms(chosen, errors)
+        source = "own"
+        if name in PUBLISHED:
+            source = "literature"
+        elif criterion == LEFT_OUT_SPECIMEN:
+            source = "others_pooled" if name in POOLED else "others_median"
+        found[name, source] = specimen_rms(chosen, errors)
     return found
-
-
-def _source(name: str, criterion: str) -> str:
-    if name in PUBLISHED:
-        return "literature"
-    if criterion != LEFT_OUT_SPECIMEN:
-        return "own"
-    return "others_pooled" if name in POOLED else "others_median"
 
 
 def _information(
@@ -131,7 +122,7 @@ def _information(
     return found
 
 
-def ranked(
+def rank_candidates(
     found: dict[Candidate, pd.Series],
     summed: bool,
     specimens: Iterable[str] = (),
@@ -158,6 +149,7 @@ def ranked(
     by_name = {candidate[0]: found[candidate] for candidate in compared}
     lost = without_result(by_name, {*table.index, *specimens})
     told = f"left out, without a result: {lost}" if lost else ""
+    # What counts once is shared out evenly, so that sums have it and paired differences too.
     share = {one: once.get(one, 0.0) / len(complete) for one in compared}
     values = {one: complete[one].to_numpy(float) + share[one] for one in compared}
     best = min(compared, key=lambda one: values[one].mean())

@@ -9,6 +9,7 @@ from spinepipe.anatomy import published
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.cohort.memoize import kept_with_cohort
+from spinepipe.report.published import Reproduction
 from spinepipe.studies.base_model import Base
 from spinepipe.studies.cohort_stiffness.representations import FITTED, UNLESS_ASKED, named
 from spinepipe.studies.parts import (
@@ -22,7 +23,8 @@ from spinepipe.studies.parts import (
 from spinepipe.studies.study import Study
 from spinepipe.units import COORDINATE_COLUMNS, ROTATIONS
 
-_PAPER = published("gould_2024b")
+GOULD_2024B = Reproduction("gould_2024b", "t12s1_phantom", "Gould et al. 2024b")
+"""The paper that asked what cohort studies ask, and the cohort rebuilt from it."""
 
 COVARIATES = ("age_years", "sex", "height_m", "mass_kg", "degeneration_grade")
 """Columns of specimens.csv that stiffness may go with."""
@@ -42,7 +44,7 @@ def _published_levels() -> dict[str, LevelStiffness]:
     """Gould 2024b, Table 2, level by level."""
     return {
         joint: LevelStiffness(**{name: float(value) for name, value in values.items()})
-        for joint, values in _PAPER["level_stiffness"].items()
+        for joint, values in published(GOULD_2024B.paper)["level_stiffness"].items()
         if joint != "where"
     }
 

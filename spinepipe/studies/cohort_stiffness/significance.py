@@ -31,6 +31,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     load_cases,
 )
 from spinepipe.studies.cohort_stiffness.stages import (
+    FACTORS,
     FITTED,
     LEFT_OUT_CASE,
     LEFT_OUT_SPECIMEN,
@@ -45,10 +46,6 @@ from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATES
 
 STAGES = (LITERATURE, FITTED, LEFT_OUT_SPECIMEN, LEFT_OUT_CASE)
-GROUPS = {"specimens": "specimen", "levels": "joint"}
-
-BLOCKS = {"specimen": "joint", "joint": "specimen"}
-"""In what each factor is seen again and again."""
 
 VALUES_AS_PUBLISHED = "takes values of the same specimen and joint as independent, as published"
 FITS_AS_PUBLISHED = "takes the two fits of a specimen as independent, as published"
@@ -81,16 +78,13 @@ def between_groups(errors: pd.DataFrame) -> Iterator[Tested]:
     for stage in STAGES:
         chosen = of_single_cases(errors, stage)
         for (representation, test), rows in chosen.groupby(["representation", "test"], sort=False):
-            for what, factor in GROUPS.items():
+            for what, (factor, block) in FACTORS.items():
                 family = f"between_{what}/{representation}/{stage}"
-                for response, part in responses(rows):
-                    for outcome in _both(part, factor):
+                # the loaded coordinate alone, and all motion that is compared
+                loaded = rows[rows["loaded"].astype(bool)]
+                for response, part in (("loaded_error", loaded), (response_of(rows), rows)):
+                    for outcome in _both(part, factor, block):
                         yield Tested(family, "*", response, factor, str(test), outcome)
-
-
-def responses(rows: pd.DataFrame) -> tuple[tuple[str, pd.DataFrame], ...]:
-    """The loaded coordinate alone, and all motion that is compared."""
-    return ("loaded_error", rows[rows["loaded"].astype(bool)]), (response_of(rows), rows)
 
 
 def response_of(rows: pd.DataFrame) -> str:
@@ -98,12 +92,12 @@ def response_of(rows: pd.DataFrame) -> str:
     return "rotation_error" if unit_of(rows) == "deg" else "translation_error"
 
 
-def _both(rows: pd.DataFrame, factor: str) -> Iterator[StatisticalTest]:
+def _both(rows: pd.DataFrame, factor: str, block: str) -> Iterator[StatisticalTest]:
     known = rows.dropna(subset="peak_error")
     errors = known["peak_error"].astype(float).abs()
     groups = [part.to_numpy(float) for _, part in errors.groupby(known[factor], sort=False)]
-    yield _noted(kruskal_wallis(groups), VALUES_AS_PUBLISHED)
-    block = BLOCKS[factor]
+    published = kruskal_wallis(groups)
+    yield replace(published, message=joined(published.message, VALUES_AS_PUBLISHED))
     grid = known.assign(error=errors).pivot(
         index=[block, "coordinate"], columns=factor, values="error"
     )
@@ -111,15 +105,9 @@ def _both(rows: pd.DataFrame, factor: str) -> Iterator[StatisticalTest]:
     lost = len(grid) - len(complete)
     # The coordinates of one block hang together: they count as one, by the mean of their ranks.
     ranks = complete.rank(axis=1).groupby(block, sort=False).mean()
-    note = f"{lost} incomplete blocks of a coordinate left out"
-    yield _noted(friedman(ranks.to_numpy(float)), note, lost > 0)
-
-
-def _noted(outcome: StatisticalTest, note: str, when: bool = True) -> StatisticalTest:
-    """The outcome with a note in its message."""
-    if not when:
-        return outcome
-    return replace(outcome, message=joined(outcome.message, note))
+    note = f"{lost} incomplete blocks of a coordinate left out" if lost else ""
+    paired = friedman(ranks.to_numpy(float))
+    yield replace(paired, message=joined(paired.message, note))
 
 
 def signed_ranks(errors: pd.DataFrame) -> Iterator[Tested]:
@@ -207,7 +195,10 @@ def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
         ["representation", "specimen"], sort=False
     ):
         family = f"{FAMILY}/{representation}"
-        outcome = _without(SHARED_ERROR) if _correlated(rows) else nested_fits(rows)
+        # A fit says where its sum of squares is not one of independent errors.
+        notes = rows["message"] if "message" in rows else pd.Series(dtype=str)
+        correlated = notes.str.contains(SHARED_ERROR, regex=False).any()
+        outcome = _without(SHARED_ERROR) if correlated else nested_fits(rows)
         yield Tested(family, "*", "stiffness", "load case", "", outcome, str(specimen))
 
 
@@ -229,15 +220,10 @@ def nested_fits(rows: pd.DataFrame) -> StatisticalTest:
     small, large = (int(part["degrees_of_freedom"].sum()) for part in (joint, single))
     if small <= large:
         return _without("the separate fits have no more unknowns inside their bounds")
+    # Extra sum of squares: what separate unknowns of each load case gain over shared ones.
     costs = float(joint["cost"].sum()), float(single["cost"].sum())
     outcome = f_test_nested(costs[0], small, costs[1], large)
     return replace(outcome, n=readings) if outcome.status is ComputationStatus.DONE else outcome
-
-
-def _correlated(rows: pd.DataFrame) -> bool:
-    """Whether a fit says that its sum of squares is not one of independent errors."""
-    notes = rows["message"] if "message" in rows else pd.Series(dtype=str)
-    return bool(notes.str.contains(SHARED_ERROR, regex=False).any())
 
 
 def _without(message: str) -> StatisticalTest:

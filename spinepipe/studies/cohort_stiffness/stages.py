@@ -15,6 +15,9 @@ SHARED_ERROR = (
 LITERATURE, FITTED = "literature", "fitted"
 LEFT_OUT_SPECIMEN, LEFT_OUT_CASE = "left_out_specimen", "left_out_case"
 
+FACTORS = {"specimens": ("specimen", "joint"), "levels": ("joint", "specimen")}
+"""What differs, and what it is seen in again and again: blocks of a test."""
+
 
 def of_single_cases(errors: pd.DataFrame, stage: str) -> pd.DataFrame:
     """Errors of a stage under each test, of the fits to that test alone, as published."""
@@ -31,6 +34,12 @@ def joint_label_of(table: pd.DataFrame) -> str:
     return joint_label(_labels(table))
 
 
+def own_fits(stiffness: pd.DataFrame) -> pd.DataFrame:
+    """Stiffness of each specimen's own fit to all load cases."""
+    whole = stiffness["fitted_to"] == joint_label_of(stiffness)
+    return stiffness[whole & (stiffness["source"] == "own")]
+
+
 def _labels(table: pd.DataFrame) -> list[str]:
     """Labels of a table, with tests whose own fits may have left no row."""
     return [*table["fitted_to"].unique(), *(table["test"].unique() if "test" in table else ())]
@@ -39,19 +48,11 @@ def _labels(table: pd.DataFrame) -> list[str]:
 def _of(errors: pd.DataFrame, stage: str, fits: pd.Series) -> pd.DataFrame:
     if stage == LITERATURE:
         return errors[errors["stage"] == LITERATURE]
-    if stage == LEFT_OUT_CASE:
-        fits = _to_all_others(errors)
+    if stage == LEFT_OUT_CASE:  # of the fits to all tests but that of the row
+        labels = _labels(errors)
+        others = {test: label_of_others(labels, test) for test in errors["test"].unique()}
+        fits = errors["fitted_to"] == errors["test"].map(others)
     return errors[(errors["stage"] == stage) & fits]
-
-
-def _to_all_others(errors: pd.DataFrame) -> pd.Series:
-    """Which were fitted to all tests but that of the row."""
-    labels = _labels(errors)
-    others = {test: label_of_others(labels, test) for test in errors["test"].unique()}
-    return errors["fitted_to"] == errors["test"].map(others)
-
-
-READING = ["test", "joint", "coordinate"]
 
 
 KINDS = {"deg": ROTATIONS, "mm": TRANSLATIONS}
@@ -87,7 +88,10 @@ def specimen_rms(chosen: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
     chosen : errors of one stiffness per specimen. errors : all, for what was measured.
     """
     unit = unit_of(errors)
-    seen = compared_motion(errors, unit).drop_duplicates(["specimen", *READING])
+    seen = compared_motion(errors, unit).drop_duplicates(
+        ["specimen", "test", "joint", "coordinate"]
+    )
+    # How many readings' places each specimen has, to be compared with how many have an error.
     measured = seen["specimen"].value_counts()
     known = compared_motion(chosen, unit).dropna(subset="rmse")
     known = known[known["readings"] > 0]

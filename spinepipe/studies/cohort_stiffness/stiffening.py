@@ -60,21 +60,14 @@ class Growth:
         error, low, high = (np.full(values.shape, np.nan) for _ in range(3))
         return cls(values, error, low, high, None, None, None, np.zeros(values.shape, dtype=int))
 
-    @classmethod
-    def nowhere(cls, shape: tuple[int, int]) -> "Growth":
-        """No values, and regions open everywhere, to be filled in."""
-        flags = [np.full(shape, fill) for fill in (True, True, False)]
-        below, above, known = flags
-        empty = cls.of(np.full(shape, np.nan))
-        return replace(empty, open_below=below, open_above=above, identifiable=known)
-
     def row(self, at: tuple[int, int]) -> Row:
         """Cells of table ``stiffness``."""
         flags = (self.open_below, self.open_above, self.identifiable)
         below, above, known = (None if one is None else bool(one[at]) for one in flags)
+        (parameter,) = create(STIFFENING_EFFECT, {"coordinate": COORDINATES[at[1]]}).parameters
         return {
             "growth": _number(self.values[at]),
-            "growth_unit": _declared(COORDINATES[at[1]]).unit,
+            "growth_unit": parameter.unit,
             "growth_standard_error": _number(self.standard_error[at]),
             "growth_low": _number(self.low[at]),
             "growth_high": _number(self.high[at]),
@@ -91,11 +84,6 @@ LINEAR: Row = dict.fromkeys(GROWTH_CELLS)
 
 def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _declared(coordinate: str) -> Any:
-    (parameter,) = create(STIFFENING_EFFECT, {"coordinate": coordinate}).parameters
-    return parameter
 
 
 def laws(study: CohortStiffness, growth: Array | None) -> tuple[ScopedEffect, ...]:
@@ -125,15 +113,10 @@ def free_growth(
     for number, name in enumerate(study.free):
         (parameter,) = model.effects[FIRST + number].effect.parameters
         unknowns = free_parameters(model, FIRST + number, [parameter.name], one.grouping)
-        found += tuple(_labelled(unknown, name) for unknown in unknowns)
+        for unknown in unknowns:  # with the coordinate: the effect is there once for each
+            _, at, joint = unknown.label.partition("@")
+            found += (replace(unknown, label=f"growth in {name}{at}{joint}"),)
     return found
-
-
-def _labelled(unknown: FreeParameter, coordinate: str) -> FreeParameter:
-    """With the coordinate in its name: the effect is there once for each."""
-    _, at, joint = unknown.label.partition("@")
-    label = f"growth in {coordinate}{at}{joint}"
-    return FreeParameter(label, unknown.effect, unknown.column, unknown.rows, unknown.logarithmic)
 
 
 def place_of(study: CohortStiffness, unknown: FreeParameter) -> tuple[list[int], int] | None:
@@ -149,37 +132,29 @@ def fitted_growth(study: CohortStiffness, problem: Problem, found: Fit) -> Growt
     if not any(places):
         return None
     shape = len(problem.model.joints), len(COORDINATES)
+    values, error, low, high = (np.full(shape, np.nan) for _ in range(4))
+    open_below, open_above, known = (np.full(shape, fill) for fill in (True, True, False))
+    at_bound = np.zeros(shape, dtype=int)
     model = with_parameters(problem.model, problem.free, found.x)
-    growth = Growth.nowhere(shape)
+    region = found.profile
     for index, (unknown, at) in enumerate(zip(problem.free, places, strict=True)):
         if at is None:
             continue
-        values = model.effects[unknown.effect].values[list(unknown.rows), unknown.column]
-        growth.values[at] = np.maximum(values, 0.0)
-        _tell(growth, at, found, index)
-    return growth
+        fitted = model.effects[unknown.effect].values[list(unknown.rows), unknown.column]
+        values[at] = np.maximum(fitted, 0.0)
+        standard_error = found.uncertainty.standard_error[index]
+        error[at] = standard_error if np.isfinite(standard_error) else np.nan
+        at_bound[at] = found.at_bound[index]
+        if region is not None:
+            open_below[at], open_above[at] = region.open_below[index], region.open_above[index]
+            # A region that is open below reaches down to the linear joint.
+            low[at] = 0.0 if region.open_below[index] else region.low[index]
+            high[at] = np.nan if region.open_above[index] else region.high[index]
+            known[at] = found.uncertainty.identifiable[index] and region.closed[index]
+    return Growth(values, error, low, high, open_below, open_above, known, at_bound)
 
 
-def _tell(growth: Growth, at: Any, found: Fit, index: int) -> None:
-    """Fill in what is known of one unknown beside its value."""
-    error = found.uncertainty.standard_error[index]
-    growth.standard_error[at] = error if np.isfinite(error) else np.nan
-    growth.at_bound[at] = found.at_bound[index]
-    region = found.profile
-    if region is None:
-        return
-    assert growth.open_below is not None
-    assert growth.open_above is not None
-    assert growth.identifiable is not None
-    below, above = bool(region.open_below[index]), bool(region.open_above[index])
-    growth.low[at] = 0.0 if below else region.low[index]
-    growth.high[at] = np.nan if above else region.high[index]
-    growth.open_below[at], growth.open_above[at] = below, above
-    known = bool(found.uncertainty.identifiable[index] and region.closed[index])
-    growth.identifiable[at] = known
-
-
-def ended(
+def status_with_growth(
     problem: Problem, at_bound: NDArray[Any], status: Status, message: str
 ) -> tuple[Status, str]:
     """Status and message of a fit: growth that ended at zero is linear, and at no bound.
@@ -192,6 +167,7 @@ def ended(
     none = [unknown.effect >= FIRST and side < 0 for unknown, side in sides]
     if status is not Status.CONVERGED_AT_BOUND or not any(none):
         return status, message
+    # The message begins with the names of all that is at a bound: told anew without these.
     left = np.where(none, 0, at_bound)
     rest = message.removeprefix(names_at_bound(problem, at_bound)).removeprefix("; ")
     ending = Status.CONVERGED_AT_BOUND if left.any() else Status.CONVERGED
@@ -199,11 +175,11 @@ def ended(
     return ending, joined(names_at_bound(problem, left), linear, rest)
 
 
-def pooled_ended(problems: Sequence[Problem], found: Pooled) -> Pooled:
-    """A pooled fit with the status that `ended` gives its specimens, and so the whole."""
+def pooled_status(problems: Sequence[Problem], found: Pooled) -> Pooled:
+    """A pooled fit with each specimen's `status_with_growth`, and so that of the whole."""
     specimens = []
     for problem, one in zip(problems, found.specimens, strict=True):
-        status, message = ended(problem, one.at_bound, one.status, one.message)
+        status, message = status_with_growth(problem, one.at_bound, one.status, one.message)
         specimens.append(replace(one, status=status, message=message))
     status = found.status
     standing = {one.status for one in specimens if one.poses}
@@ -245,7 +221,7 @@ def pooled_growth(
         if at is None:
             continue
         value, error = told.x[index], np.sqrt(told.variance[index])
-        growth.values[at] = max(value, 0.0)
+        growth.values[at] = max(value, 0.0)  # a pool may draw it below: the linear joint
         growth.at_bound[at] = told.at_bound[index]
         growth.standard_error[at] = error
         growth.low[at], growth.high[at] = np.maximum(value + error * np.array([-reach, reach]), 0.0)

@@ -25,6 +25,7 @@ def draw_stiffness(root: str, study: str, output: str) -> None:
     joints = cohort.joint_names
     factors = sample_factors(settings.stiffness_spread, 6, settings.stiffness_sets, settings.seed)
     own = stiffness_of_joints(cohort, settings.stiffness, settings.level_stiffness)
+    # (sets, 1, 6) by (J, 6): one factor for all joints, its own for each coordinate
     values = (factors[:, None, :] * own).reshape(-1, 6)
     columns: dict[str, list[Any]] = {
         "stiffness": np.repeat(np.arange(len(factors)), len(joints)).tolist(),
@@ -38,27 +39,18 @@ def draw_stiffness(root: str, study: str, output: str) -> None:
 def sample_frames(root: str, study: str, specimen: str, output: str) -> None:
     """Write the rows of one specimen."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
-    frame = _sampled(settings, cohort, specimen)
-    columns = {column.name: frame[column.name].to_list() for column in FRAMES.columns}
-    made_by = provenance("sample_frames", settings, cohort, [specimen])
-    write(to_arrow(FRAMES, columns), output, made_by)
-
-
-def _sampled(settings: RangeOfMotion, cohort: Cohort, specimen: str) -> pd.DataFrame:
+    # SDs of a frame per axis; nothing is drawn with them when there is one pose.
+    sd = settings.pose_sd or cohort.measurement_sd
+    translation_m = 0.0 if sd is None else sd.translation_mm / MM_PER_M
+    rotation_rad = 0.0 if sd is None else float(np.deg2rad(sd.rotation_deg))
     own = joint_frames(cohort, specimen)
-    translation_m, rotation_rad = _sds(settings, cohort)
     poses = sample_joint_frames(
         own, translation_m, rotation_rad, settings.n_poses, settings.seed, specimen
     )
-    return _rows(cohort, specimen, poses)
-
-
-def _sds(settings: RangeOfMotion, cohort: Cohort) -> tuple[float, float]:
-    """SDs of a frame per axis, m and rad; nothing is drawn with them when there is one pose."""
-    sd = settings.pose_sd or cohort.measurement_sd
-    if sd is None:
-        return 0.0, 0.0
-    return sd.translation_mm / MM_PER_M, float(np.deg2rad(sd.rotation_deg))
+    frame = _rows(cohort, specimen, poses)
+    columns = {column.name: frame[column.name].to_list() for column in FRAMES.columns}
+    made_by = provenance("sample_frames", settings, cohort, [specimen])
+    write(to_arrow(FRAMES, columns), output, made_by)
 
 
 def _rows(cohort: Cohort, specimen: str, poses: list[tuple[Pose, ...]]) -> pd.DataFrame:

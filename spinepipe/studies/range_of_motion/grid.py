@@ -1,7 +1,10 @@
-"""The grid of a study: motion at the largest load by specimen, pose, stiffness set, test, joint."""
+"""The grid of a study: the load steps that are computed, and motion at the largest load.
 
-from collections.abc import Sequence
+Motion is by specimen, pose, stiffness set, test and joint.
+"""
+
 from dataclasses import dataclass
+from functools import lru_cache
 from statistics import mode
 
 import numpy as np
@@ -10,16 +13,50 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.load_tests import loaded_coordinate
+from spinepipe.cohort.load_tests import loaded_coordinate, virtual_load_cases
+from spinepipe.cohort.specimen import followers, load_cases
 from spinepipe.effects.contract import Array
-from spinepipe.studies.range_of_motion.load_steps import all_cases
+from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.model import LoadCase
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
+from spinepipe.studies.selected_tests import AskedTest, asked, first_cycles
 from spinepipe.tables import opened
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
 ROWS_AT_A_TIME = 50_000
 _KEYS = ("specimen", "pose", "stiffness", "test", "joint", "largest_load")
 _MOTION = tuple(f"predicted_{name}" for name in COORDINATE_COLUMNS)
+
+
+@lru_cache(maxsize=256)
+def asked_tests(root: str, study: str, specimen: str, _digest: str) -> tuple[AskedTest, ...]:
+    """Tests of a specimen; ``_digest`` is that of its cohort."""
+    settings, cohort = study_of_kind(RangeOfMotion, root, study)
+    virtual = virtual_tensions(settings)
+    tension_n = followers(cohort, specimen) if virtual is None else virtual
+    return tuple(
+        asked(
+            case,
+            cohort.gravity or tension_n.get(case.test, 0.0) > 0.0,
+            settings.rows == "all_steps",
+        )
+        for case in all_cases(settings, cohort, specimen)
+    )
+
+
+def all_cases(settings: RangeOfMotion, cohort: Cohort, specimen: str) -> tuple[LoadCase, ...]:
+    """All steps of the tests that the study asks for."""
+    tests = settings.virtual_tests
+    if tests is not None:
+        top = len(cohort.joint_names) - 1
+        return virtual_load_cases(tests.tests, tests.moment_nm, tests.steps, top)
+    return first_cycles(load_cases(cohort, specimen, settings.tests or cohort.tests, np.zeros(3)))
+
+
+def virtual_tensions(settings: RangeOfMotion) -> dict[str, float] | None:
+    """Follower load in N of each virtual test; None: the tests are the cohort's, as it says."""
+    asked_for = settings.virtual_tests
+    return None if asked_for is None else dict.fromkeys(asked_for.tests, asked_for.follower_n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,39 +86,32 @@ class MotionGrid:
 
 def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> MotionGrid:
     """Rows of the largest loads of ``range_of_motion.parquet``, read some at a time."""
-    tests = _tests(study, cohort)
+    virtual = study.virtual_tests
+    tests = (study.tests or cohort.tests) if virtual is None else virtual.tests
     sizes = (len(cohort.specimen_names), study.n_poses, study.stiffness_sets, len(tests))
     motion = np.full((*sizes, len(cohort.joint_names), 6), np.nan)
-    asked = np.zeros(sizes, dtype=bool)
+    tested = np.zeros(sizes, dtype=bool)
     names = {"specimen": cohort.specimen_names, "test": tests, "joint": cohort.joint_names}
+    # Row groups are streamed: a large study has more rows than memory, and a grid of peaks fits.
     with opened(path) as file:
         for rows in file.iter_batches(ROWS_AT_A_TIME, columns=[*_KEYS, *_MOTION]):
             rows = rows.filter(rows["largest_load"])
-            at = {name: _positions(rows[name], values) for name, values in names.items()}
+            at = {  # places among the names
+                name: pc.index_in(rows[name], value_set=pa.array(values)).to_numpy(
+                    zero_copy_only=False
+                )
+                for name, values in names.items()
+            }
             at |= {name: rows[name].to_numpy() for name in ("pose", "stiffness")}
             place = tuple(at[name] for name in ("specimen", "pose", "stiffness", "test", "joint"))
             values = [rows[name].to_numpy(zero_copy_only=False) for name in _MOTION]
             motion[place] = np.column_stack(values)
-            asked[place[:4]] = True
+            tested[place[:4]] = True
     driven = _driven(study, cohort)
     loaded = tuple(
         driven.get(test) or _moves_most(motion[:, :, :, i]) for i, test in enumerate(tests)
     )
-    return MotionGrid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, asked)
-
-
-def _positions(values: pa.Array, names: Sequence[str]) -> NDArray[np.int32]:
-    """Place of each value among the names."""
-    found: NDArray[np.int32] = pc.index_in(values, value_set=pa.array(names)).to_numpy(
-        zero_copy_only=False
-    )
-    return found
-
-
-def _tests(study: RangeOfMotion, cohort: Cohort) -> tuple[str, ...]:
-    if study.virtual_tests is not None:
-        return study.virtual_tests.tests
-    return study.tests or cohort.tests
+    return MotionGrid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, tested)
 
 
 def _driven(study: RangeOfMotion, cohort: Cohort) -> dict[str, str]:
@@ -100,6 +130,7 @@ def _driven(study: RangeOfMotion, cohort: Cohort) -> dict[str, str]:
 
 def _moves_most(motion: Array) -> str:
     """The rotation that moves most; motion (..., 6)."""
+    # By the median over runs and joints; where nothing has an equilibrium the first rotation.
     flat = np.abs(motion[..., 3:]).reshape(-1, 3)
     solved = flat[np.isfinite(flat).all(axis=1)]
     return ROTATIONS[int(np.median(solved, axis=0).argmax())] if len(solved) else ROTATIONS[0]

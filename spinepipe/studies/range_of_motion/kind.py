@@ -10,23 +10,20 @@ from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion, check_range_of_motion
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 
-_JOBS = ("range_of_motion",)
-"""Tables joined from job files, one for each specimen, pose and stiffness set."""
-
 BY_SPECIMEN = ("frames",)
 """Tables joined from one file per specimen."""
 
-OF_JOBS = (*_JOBS, *BY_SPECIMEN)
-"""Tables joined from job files."""
+OF_JOBS = ("range_of_motion",)
+"""Tables joined from job files, one for each specimen, pose and stiffness set."""
 
-TABLES = ("frames", "stiffness_sets", *_JOBS, "rom_summary", "rom_variance")
+TABLES = (*BY_SPECIMEN, "stiffness_sets", *OF_JOBS, "rom_summary", "rom_variance")
 
 
 @dataclass(frozen=True)
 class RangeOfMotionFiles(StudyFiles):
     """The result files of one range-of-motion study."""
 
-    joined = OF_JOBS
+    joined = (*OF_JOBS, *BY_SPECIMEN)
     drawings = (
         Figure(
             "range_of_motion", "Range of motion", "figures.motion:levels_figure", ("rom_summary",)
@@ -54,7 +51,7 @@ class RangeOfMotionFiles(StudyFiles):
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
         """The table that is made of job files."""
-        return _JOBS
+        return OF_JOBS
 
     @property
     def by_specimen(self) -> tuple[str, ...]:
@@ -71,18 +68,17 @@ class RangeOfMotionFiles(StudyFiles):
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        numbers = files_of_block(block, len(self.specimens), self._per_specimen)
-        return [self._job_file(specimen, number) for number in numbers]
+        files = []
+        for number in files_of_block(block, len(self.specimens), self._per_specimen):
+            pose, stiffness = divmod(number, self.study.stiffness_sets)
+            place = f"specimen={specimen}/pose={pose:04d}/stiffness={stiffness:02d}"
+            files.append(f"{self.folder}/jobs/{place}.parquet")
+        return files
 
     @property
     def _per_specimen(self) -> int:
         """Number of job files of a specimen."""
         return self.study.n_poses * self.study.stiffness_sets
-
-    def _job_file(self, specimen: str, number: int) -> str:
-        pose, stiffness = divmod(number, self.study.stiffness_sets)
-        place = f"specimen={specimen}/pose={pose:04d}/stiffness={stiffness:02d}"
-        return f"{self.folder}/jobs/{place}.parquet"
 
 
 def _drawn(expected: Any, place: Mapping[str, str]) -> list[str]:

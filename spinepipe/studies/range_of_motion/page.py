@@ -7,7 +7,6 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, ResultTables, Sortable, sortable
 from spinepipe.report.words import count, fixed, percent
-from spinepipe.schema import Table
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import (
     EVERY,
@@ -62,15 +61,13 @@ def left_out(study: RangeOfMotion) -> tuple[str, ...]:
 def _tables(cohort: Cohort, results: ResultTables) -> Iterator[Sortable]:
     """Rows of the whole cohort, or of its only specimen; those of each specimen are in the file."""
     chosen = EVERY if len(cohort.specimen_names) > 1 else cohort.specimen_names[0]
-    summary, variance = results.table("rom_summary"), results.table("rom_variance")
-    shown: tuple[tuple[Table, str, bool], ...] = (
+    shown = (
         (ROM_SUMMARY, "Range of motion", True),
         (ROM_VARIANCE, "Shares of variance", True),
         (STIFFNESS_SETS, "Stiffness sets", False),
     )
-    rows = {ROM_SUMMARY.name: summary, ROM_VARIANCE.name: variance}
     for table, title, by_specimen in shown:
-        frame = rows.get(table.name, results.table(table.name))
+        frame = results.table(table.name)
         if by_specimen:
             frame = frame[frame["specimen"] == chosen]
         yield sortable(table.name, title, table.about, frame, table.columns)
@@ -113,6 +110,7 @@ def _motion(rows: pd.DataFrame) -> Iterator[str]:
 
 def _ends(row: pd.Series) -> str:
     low, high = sorted((abs(row["percentile_5"]), abs(row["percentile_95"])))
+    # Sizes where all motion is to one side; across zero the signs are kept.
     same_side = row["percentile_5"] * row["percentile_95"] > 0.0
     ends = (low, high) if same_side else (row["percentile_5"], row["percentile_95"])
     return f"{fixed(ends[0], 1)} to {fixed(ends[1], 1)}°"

@@ -16,10 +16,10 @@ from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import KEPT_SPECIMENS, study_of_kind
-from spinepipe.model import RefusedModel, SpineModel
+from spinepipe.model import RefusedModel
 from spinepipe.statics.batched import Stack
 from spinepipe.status import Status
-from spinepipe.studies.range_of_motion.load_steps import asked_tests, virtual_tensions
+from spinepipe.studies.range_of_motion.grid import asked_tests, virtual_tensions
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.studies.selected_tests import AskedTest
@@ -47,8 +47,8 @@ def run(
     drawn = [mark_of(frames), mark_of(stiffness_sets)]
     made_by = provenance("simulate", settings, cohort, [specimen], drawn)
     for path, place in parts.items():
-        placed = drawn_frames(frames).of(specimen, int(place["pose"]))
-        values = drawn_stiffness(stiffness_sets)[int(place["stiffness"])]
+        placed = drawn_frames(stamp(frames)).of(specimen, int(place["pose"]))
+        values = drawn_stiffness(stamp(stiffness_sets))[int(place["stiffness"])]
         ends = _solved(settings, cohort, specimen, placed, values, tests)
         columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
         columns["stiffness"] = [int(place["stiffness"])] * len(columns["test"])
@@ -63,25 +63,19 @@ def _solved(
     values: Array,
     tests: Sequence[AskedTest],
 ) -> list[Ends]:
-    """Ends of all tests of one spine; refused where it is none."""
+    """Ends of the stored steps of one spine, test by test; refused where it is none."""
     damping = np.array(settings.damping.in_order())
     try:
         tension_n = virtual_tensions(settings)
         model = on_bushings(cohort, specimen, placed, values, damping, tension_n=tension_n)
-        return _ends(model, tests)
     except RefusedModel as error:
         nowhere = np.full(values.shape, np.nan)
         return [
             [(nowhere, Status.REFUSED, str(error))] * len(test.case.steps[test.stored])
             for test in tests
         ]
-
-
-def _ends(model: SpineModel, tests: Sequence[AskedTest]) -> list[Ends]:
-    """Ends of the steps that are stored, test by test; all are solved in one stack.
-
-    Without an equilibrium in step 0 there is none in later steps, as they are followed from it.
-    """
+    # All tests are solved in one stack. Without an equilibrium in step 0 there is none in later
+    # steps, as they are followed from it.
     stack = Stack.of([model], [(0, test.case) for test in tests])
     found = stack.solve()
     ends = []
@@ -113,6 +107,7 @@ def _columns(
             columns["status"] += [status.value] * len(joints)
             columns["message"] += [message] * len(joints)
             motions.append(motion)
+    # Steps follow one another with all their joints, as the columns above do.
     predicted = np.concatenate(motions).T
     return {
         **columns,
@@ -143,13 +138,9 @@ class DrawnFrames:
         return tuple(Pose(self.rotations[row], self.origins[row]) for row in at)
 
 
-def drawn_frames(path: str) -> DrawnFrames:
-    """Frames of a specimen, from the file that `sample_frames` wrote."""
-    return _frames(stamp(path))
-
-
 @lru_cache(maxsize=KEPT_SPECIMENS)
-def _frames(where: Stamp) -> DrawnFrames:
+def drawn_frames(where: Stamp) -> DrawnFrames:
+    """Frames of a specimen, from the file that `sample_frames` wrote."""
     table = read_frame(where[0])
     n = table["joint"].nunique()
     keys = zip(table["specimen"][::n], table["pose"][::n].astype(int), strict=True)
@@ -162,13 +153,9 @@ def _frames(where: Stamp) -> DrawnFrames:
     )
 
 
-def drawn_stiffness(path: str) -> Array:
-    """(sets, J, 6) stiffness of ``stiffness_sets.parquet``, SI."""
-    return _stiffness(stamp(path))
-
-
 @lru_cache(maxsize=2)
-def _stiffness(where: Stamp) -> Array:
+def drawn_stiffness(where: Stamp) -> Array:
+    """(sets, J, 6) stiffness of ``stiffness_sets.parquet``, SI."""
     table = read_frame(where[0])
     values: Array = table[list(STIFFNESS_COLUMNS)].to_numpy(float)
     return values.reshape(table["stiffness"].nunique(), -1, 6)

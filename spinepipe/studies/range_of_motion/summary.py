@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
@@ -51,12 +50,11 @@ def _test_rows(grid: MotionGrid, motion: Array, loaded: str) -> Iterator[dict[st
     """Rows of one test; motion (runs, J, 6). A run has an equilibrium of all joints or of none."""
     solved = motion[np.isfinite(motion).all(axis=(1, 2))]
     numbers = {"n": len(solved), "n_without": len(motion) - len(solved)}
-    found = _quantiles(solved)
-    ended = (
-        (ComputationStatus.DONE, "")
-        if len(solved)
-        else (ComputationStatus.TOO_FEW, "no run has an equilibrium")
-    )
+    status, message = ComputationStatus.TOO_FEW, "no run has an equilibrium"
+    found = np.full((len(_QUANTILES), *solved.shape[1:]), np.nan)
+    if len(solved):
+        status, message = ComputationStatus.DONE, ""
+        found = np.percentile(solved, list(_QUANTILES.values()), axis=0)
     for joint, name in enumerate(grid.joints):
         for at, coordinate in enumerate(COORDINATES):
             yield {
@@ -66,13 +64,6 @@ def _test_rows(grid: MotionGrid, motion: Array, loaded: str) -> Iterator[dict[st
                 "unit": COORDINATE_UNITS[coordinate],
                 **numbers,
                 **dict(zip(_QUANTILES, found[:, joint, at].tolist(), strict=True)),
-                "status": ended[0].value,
-                "message": ended[1],
+                "status": status.value,
+                "message": message,
             }
-
-
-def _quantiles(solved: Array) -> NDArray[np.float64]:
-    """(quantiles, J, 6), NaN where there is nothing."""
-    if not len(solved):
-        return np.full((len(_QUANTILES), *solved.shape[1:]), np.nan)
-    return np.percentile(solved, list(_QUANTILES.values()), axis=0)

@@ -12,6 +12,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.words import count
 from spinepipe.sensitivity.shares import VarianceShare, nested_shares, variance_shares
 from spinepipe.statistics import ComputationStatus
+from spinepipe.status import joined
 from spinepipe.studies.range_of_motion.grid import MotionGrid, read_grid
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import EVERY, FACTORS, ROM_VARIANCE
@@ -40,18 +41,15 @@ def variance_rows(grid: MotionGrid) -> Iterator[dict[str, Any]]:
         drawn = grid.loaded_motion(number)[:, 1:, 1:]  # the first pose and set are no draws
         same = {"test": test, "coordinate": grid.loaded[number]}
         tested = np.flatnonzero(grid.asked[:, :, :, number].any(axis=(1, 2)))
-        complete = [_complete(drawn[at]) for at in tested]
+        # of each specimen (poses, K, J), the poses with an equilibrium with every stiffness set
+        complete = [
+            motion[np.isfinite(motion).all(axis=(1, 2))] for motion in (drawn[at] for at in tested)
+        ]
         names = [grid.specimens[at] for at in tested]
         for specimen, motion in zip(names, complete, strict=True):
             yield from ({**same, "specimen": specimen, **row} for row in _own(grid, motion))
         if len(names) > 1:
             yield from ({**same, "specimen": EVERY, **row} for row in _all(grid, complete))
-
-
-def _complete(motion: Array) -> Array:
-    """Motion (poses, K, J) of the poses that have an equilibrium with every stiffness set."""
-    whole: Array = motion[np.isfinite(motion).all(axis=(1, 2))]
-    return whole
 
 
 def _own(grid: MotionGrid, motion: Array) -> Iterator[dict[str, Any]]:
@@ -72,9 +70,13 @@ def _all(grid: MotionGrid, motions: list[Array]) -> Iterator[dict[str, Any]]:
         ended = (ComputationStatus.TOO_FEW, "no pose has an equilibrium with every stiffness set")
         yield from ({"joint": joint, **_row(empty[..., 0], ended, {})} for joint in grid.joints)
         return
+    # A balanced design: shares of nested draws take equally many of each specimen.
     poses = min(len(motion) for motion in kept)
     values = np.stack([motion[:poses] for motion in kept])
-    left_out = _left_out(len(motions) - len(kept), most - poses)
+    specimens = len(motions) - len(kept)
+    missing = [count(specimens, "specimen")] * (specimens > 0)
+    missing += [f"up to {count(most - poses, 'pose')} of a specimen"] * (most > poses)
+    left_out = f"left out for lack of equilibria: {', '.join(missing)}" if missing else ""
     for at, joint in enumerate(grid.joints):
         found = nested_shares(values[..., at])
         parts = {
@@ -83,15 +85,8 @@ def _all(grid: MotionGrid, motions: list[Array]) -> Iterator[dict[str, Any]]:
             "stiffness": found.treatment,
             "rest": found.rest,
         }
-        message = "; ".join(part for part in (found.message, left_out) if part)
+        message = joined(found.message, left_out)
         yield {"joint": joint, **_row(values[..., at], (found.status, message), parts)}
-
-
-def _left_out(specimens: int, poses: int) -> str:
-    """What is missing for lack of equilibria."""
-    parts = [count(specimens, "specimen")] * (specimens > 0)
-    parts += [f"up to {count(poses, 'pose')} of a specimen"] * (poses > 0)
-    return f"left out for lack of equilibria: {', '.join(parts)}" if parts else ""
 
 
 def _row(

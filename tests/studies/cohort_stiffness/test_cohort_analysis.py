@@ -4,21 +4,18 @@ Seen here: an analysis that stops at a study of few data, a value without what i
 of one specimen, a fold that is compared over other readings than the rest.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 import pandas as pd
 import pytest
-from cohort_analysis_cases import JOINTS, only, seen, study, without_rotations_in
+from cohort_analysis_cases import JOINTS, analysed, only, seen, study, without_rotations_in
 
-from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.studies.cohort_stiffness.claims_of_errors import error_findings
-from spinepipe.studies.cohort_stiffness.findings import finding_rows
 from spinepipe.studies.cohort_stiffness.mae import mae_rows
 from spinepipe.studies.cohort_stiffness.ranking import ranking_rows
-from spinepipe.studies.cohort_stiffness.significance import all_tests
-from spinepipe.studies.cohort_stiffness.tables import FINDINGS, MAE, RANKING, STATISTICS
+from spinepipe.studies.cohort_stiffness.tables import MAE
 from spinepipe.tables import from_rows
 
 NUMBERS = ("bias", "mae", "rmse", "peak_error")
@@ -30,20 +27,6 @@ def test_one_load_case_leaves_none_out_and_is_no_failure() -> None:
         for row in error_findings(without_one_test()["errors"], significance=0.05)
     }
     assert "without a result" not in found["optimised_beats_literature_left_out_case"]["message"]
-
-
-def analysed(frames: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
-    """All analyses, through their schemas."""
-    errors, fits = frames["errors"], frames["fits"]
-    rows = list(corrected_rows(all_tests(errors, fits)))
-    statistics = from_rows(STATISTICS, rows).to_pandas()
-    said = list(finding_rows({**frames, "statistics": statistics}, 0.05))
-    return {
-        "mae": from_rows(MAE, mae_rows(errors)).to_pandas(),
-        "ranking": from_rows(RANKING, ranking_rows(errors, fits)).to_pandas(),
-        "statistics": statistics,
-        "findings": from_rows(FINDINGS, said).to_pandas(),
-    }
 
 
 def test_a_whole_study() -> None:
@@ -168,8 +151,7 @@ def test_a_left_out_case_beside_one_read_in_translations_only() -> None:
     frames = without_rotations_in(
         "pull", tests=("flexion", "bend", "pull"), representations=("per_joint",), levels=False
     )
-    tested = corrected_rows(all_tests(frames["errors"], frames["fits"]))
-    found = from_rows(STATISTICS, list(tested)).to_pandas()
+    found = analysed(frames)["statistics"]
     family = "between_specimens/per_joint/left_out_case"
     rows = found[(found["family"] == family) & (found["test"] == "Friedman")]
     assert set(rows["stratum"]) == {"flexion", "bend"}

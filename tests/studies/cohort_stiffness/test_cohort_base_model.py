@@ -16,6 +16,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from chain_cases import JOINTS, MOMENT_OF, STUDY, Chains, Written, by_joint
+from cohort_edge_cases import TRUTH, A
 from example_effects import CubicStiffening, MarkerError
 from scipy.optimize import brentq
 
@@ -30,8 +31,6 @@ from spinepipe.studies.cohort_stiffness.problem import SEEN
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.tables import StudyTables
 
-A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
-TRUTH = {"a": A, "b": 0.8 * A, "c": 1.5 * A}
 RISE = 2000.0
 TESTS = ("flexion", "gentle_flexion")
 FREE = "free: [extension]\nstarts: 1\n"
@@ -231,6 +230,8 @@ def test_a_file_that_does_not_fit_is_refused(tmp_path: Path) -> None:
         assert told.startswith("model.yaml")
         assert place in told
         assert says in told
+    two = FOR_ALL.replace("  values", "  scope: {tests: [flexon], specimens: [x]}\n  values")
+    assert len(complaints(tmp_path / "two", two)) == 2
 
 
 def test_paths_count_from_the_project_wherever_one_stands(
@@ -242,11 +243,6 @@ def test_paths_count_from_the_project_wherever_one_stands(
     assert isinstance(study, CohortStiffness)
     assert study.base is not None
     assert study.base.model == "model.yaml"
-
-
-def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
-    model = FOR_ALL.replace("  values", "  scope: {tests: [flexon], specimens: [x]}\n  values")
-    assert len(complaints(tmp_path, model)) == 2
 
 
 def test_a_missing_file_is_told_with_its_line(tmp_path: Path) -> None:

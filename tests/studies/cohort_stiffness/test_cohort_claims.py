@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 from cohort_analysis_cases import CLAIM, Row, fit, rated, seen, series, stiff
 
-from spinepipe.statistics import mean_of
 from spinepipe.studies.cohort_stiffness.claims import above_zero
 from spinepipe.studies.cohort_stiffness.claims_of_errors import (
     OWN_READINGS,
@@ -19,14 +18,14 @@ from spinepipe.studies.cohort_stiffness.claims_of_errors import (
 )
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import (
     adjusted_share,
+    load_case_claim,
     load_case_findings,
     loaded_ratios,
     mean_excess,
     share_between,
-    specific,
     stiffness_spreads,
 )
-from spinepipe.studies.cohort_stiffness.findings import together
+from spinepipe.studies.cohort_stiffness.findings import decide_together
 from spinepipe.studies.cohort_stiffness.significance import nested_fits
 from spinepipe.studies.cohort_stiffness.stages import without_result
 
@@ -80,6 +79,13 @@ def test_a_share_is_surely_little_where_its_whole_interval_is(spread: float) -> 
     assert (row["p_no"] < 1e-9) == (row["holds"] == "no")
 
 
+def friedman(what: str, n: int, p: float, **more: object) -> Row:
+    """A row of ``statistics`` of fitted errors between specimens or levels."""
+    row = {"family": f"between_{what}/per_specimen/fitted", "test": "Friedman", "message": ""}
+    row |= {"response": "loaded_error", "stratum": "flexion", "statistic": 4.0, "effect": 0.5}
+    return {**row, "n": n, "p": p, **more}
+
+
 @pytest.mark.parametrize(
     ("what", "blocks", "groups", "specimens"), [("levels", 2, 5, 2), ("specimens", 5, 4, 4)]
 )
@@ -88,25 +94,12 @@ def test_specimens_of_a_friedman_test_are_its_own(
 ) -> None:
     """Of six specimens two have a complete block of levels, or four are compared."""
     w = 0.6  # Kendall's W is the statistic over blocks (groups - 1)
-    rows = pd.DataFrame(
-        [
-            {
-                "family": f"between_{what}/per_specimen/fitted",
-                "test": "Friedman",
-                "response": "loaded_error",
-                "stratum": "flexion",
-                "n": blocks,
-                "statistic": w * blocks * (groups - 1),
-                "effect": w,
-                "p": 1e-6,
-                "message": "",
-            }
-        ]
-    )
+    statistic = w * blocks * (groups - 1)
+    rows = pd.DataFrame([friedman(what, blocks, 1e-6, statistic=statistic, effect=w)])
     found = {row["finding"]: row for row in error_spreads(rows, 0.05)}
     row = found[f"errors_differ_between_{what}"]
     assert (row["specimens"], row["holds"]) == (specimens, "yes")
-    (beside,) = together([row], 6, 0.05)
+    (beside,) = decide_together([row], 6, 0.05)
     assert beside["holds"] == ("undecided" if specimens < 3 else "yes")
     assert ("2 specimens, and a verdict needs 3" in beside["message"]) == (specimens < 3)
 
@@ -125,19 +118,31 @@ def test_spreads_need_a_grid_with_something_left() -> None:
 
 
 @pytest.mark.parametrize(
-    ("p", "effect", "holds"),
-    [(0.5, 0.09, "no"), (0.5, 0.11, "undecided"), (0.001, 0.01, "yes"), (0.0, 0.9, "yes")],
+    ("ps", "effect", "holds"),
+    [
+        ((0.5, 0.5, 0.5), 0.09, "no"),
+        ((0.5, 0.5, 0.5), 0.11, "undecided"),
+        ((0.01, 1.0, 1.0), 0.01, "undecided"),
+        ((0.001, 0.001, 0.001), 0.01, "yes"),
+        ((0.0, 0.0, 0.0), 0.9, "yes"),
+    ],
 )
-def test_f_tests_of_all_specimens_together(p: float, effect: float, holds: str) -> None:
-    test = {"p": p, "p_holm": p, "effect": effect, "statistic": 2.0, "message": ""}
-    rows = [test] * 3
-    row = specific(CLAIM, pd.DataFrame(rows), 0.05)
-    assert row["holds"] == holds
-    assert row["value"] == (1.0 if p < 0.05 else 0.0)
-    if p == 0.5:
-        # Fisher: -2 x 3 ln 0.5 = 4.1589; the tail of chi-squared with 6 degrees of freedom is
-        # exp(-x) (1 + x + x^2 / 2) at x = 2.0794.
-        assert row["p"] == pytest.approx(0.125 * (1 + 2.0794 + 2.0794**2 / 2), abs=1e-4)
+def test_f_tests_of_all_specimens_together(
+    ps: tuple[float, ...], effect: float, holds: str
+) -> None:
+    rows = [
+        {"p": p, "p_holm": min(1.0, 3 * p), "effect": effect, "statistic": 2.0, "message": ""}
+        for p in ps
+    ]
+    row = load_case_claim(CLAIM, pd.DataFrame(rows), 0.05)
+    below = sum(3 * p < 0.05 for p in ps)
+    assert (row["value"], row["holds"]) == (pytest.approx(below / 3), holds)
+    if max(ps) >= 0.5:
+        # Fisher: x = -sum of ln p; the tail of chi-squared with 6 degrees of freedom is
+        # exp(-x) (1 + x + x^2 / 2).
+        x = -np.log(ps).sum()
+        assert row["p"] == pytest.approx(np.exp(-x) * (1 + x + x**2 / 2))
+    if not below:
         assert row["high"] == pytest.approx(1 - 0.025 ** (1 / 3))  # none of three
 
 
@@ -149,17 +154,6 @@ def test_the_share_of_squares_is_adjusted_for_the_unknowns() -> None:
     assert adjusted_share(pd.DataFrame([row])) == pytest.approx(0.25)
     gained_nothing = {"effect": 0.0, "statistic": 0.0}
     assert adjusted_share(pd.DataFrame([row, gained_nothing])) == pytest.approx(0.125)
-
-
-def test_one_significant_specimen_leaves_load_cases_undecided() -> None:
-    rows = [
-        {"p": p, "p_holm": min(1.0, 3 * p), "effect": 0.01, "statistic": 2.0, "message": ""}
-        for p in (0.01, 1, 1)
-    ]
-    row = specific(CLAIM, pd.DataFrame(rows), 0.05)
-    # Fisher: x = -ln 0.01 = 4.605 of 6 degrees of freedom, 0.01 (1 + x + x^2 / 2).
-    assert row["p"] == pytest.approx(0.01 * (1 + 4.60517 + 4.60517**2 / 2), abs=1e-5)
-    assert (row["value"], row["holds"]) == (pytest.approx(1 / 3), "undecided")
 
 
 def test_loaded_stiffness_against_that_of_the_other_load_cases() -> None:
@@ -290,14 +284,6 @@ def test_worse_at_every_level_is_decided_level_by_level(
     assert every_level(ratio, uniform, table, 0.05)["value"] is None
 
 
-def test_interval_of_a_mean_is_students() -> None:
-    """0.4, 0.5, 0.9: mean 0.6, SD sqrt(0.07), Student's t of 2 degrees of freedom 4.302653."""
-    found = mean_of(np.array([0.4, 0.5, 0.9]))
-    reach = 4.302653 * (0.07 / 3) ** 0.5
-    assert found.interval == pytest.approx((0.6 - reach, 0.6 + reach))
-    assert mean_of(np.array([0.4])).interval is None
-
-
 def test_loaded_stiffness_beside_a_load_case_without_main_moment() -> None:
     """Of two loaded tests and a pull, the others of flexion are in all_but_flexion."""
     rows = [
@@ -355,18 +341,7 @@ def test_pooled_spreads_are_told_beside() -> None:
 def test_a_claim_of_errors_is_corrected_for_its_own_tests() -> None:
     """Of three load cases, not also for those of all rotations: 0.015 times 3, not times 6."""
     rows = [
-        {
-            "family": "between_levels/per_specimen/fitted",
-            "test": "Friedman",
-            "response": response,
-            "stratum": stratum,
-            "n": 4,
-            "statistic": 4.0,
-            "effect": 0.5,
-            "p": p,
-            "p_holm": 1.0,
-            "message": "",
-        }
+        friedman("levels", 4, p, response=response, stratum=stratum)
         for response in ("loaded_error", "rotation_error")
         for stratum, p in (("flexion", 0.3), ("bend", 0.015), ("twist", 0.2))
     ]

@@ -6,19 +6,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from chain_cases import JOINTS, MILLIMETRES, MOMENT_OF, Chains, Tables
-from cohort_study_cases import Size, cohort_of, frame, study_of, tables_of
+from cohort_edge_cases import A
+from cohort_study_cases import Size, frame, study_of, tables_of
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from spinepipe.cohort import read
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.experiment.loop import Loop
-from spinepipe.report.page.document import ResultTables
-from spinepipe.studies.cohort_stiffness.loops import cycles_of
+from spinepipe.studies.cohort_stiffness.experiment import loading_loops
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
 from spinepipe.units import COORDINATES
 
-A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 KEY = ["joint", "test", "cycle", "source"]
 SD_DEG = 0.1
 ROOT = Path(__file__).parents[3]
@@ -208,7 +207,7 @@ def test_published_discs_have_the_range_and_stiffness_of_their_points() -> None:
     """Heuer et al. 2007, L4-L5 disc: -10.11 and 10.28 deg at 7.5 N m, -8.38 and 7.92 at 5."""
     cohort = read(ROOT / "config/cohorts/l4l5_disc")
     tested = measured_specimen(cohort, "heuer_2007", cohort.tests).tested
-    (cycle,) = (one for one in cycles_of(tested) if one.test == "flexion+extension")
+    (cycle,) = (one for one in loading_loops(tested) if one.test == "flexion+extension")
     assert cycle.coordinate == "extension"
     place = COORDINATES.index("extension")
     loop = Loop(cycle.load, cycle.measured[:, 0, place])
@@ -216,17 +215,17 @@ def test_published_discs_have_the_range_and_stiffness_of_their_points() -> None:
     slopes = [loop.elastic_compliance(side, None) for side in (-1, 1)]
     found = [1.0 / one.value for one in slopes if one is not None]
     assert found == pytest.approx([2.5 / np.deg2rad(10.11 - 8.38), 2.5 / np.deg2rad(10.28 - 7.92)])
-    sides = {one.test for one in cycles_of(tested)}
+    sides = {one.test for one in loading_loops(tested)}
     assert {"right_bending", "left_rotation"} < sides, "one side of each was tested"
 
 
 def told(**changed: pd.DataFrame) -> list[str]:
     """Sentences of made-up results."""
     size = Size(("a", "b"))
-    study, results = study_of(size), ResultTables(tables_of(size, **changed), {}, {})
-    assert cohort_of(size).name == study.cohort
-    makers = (ranges, zones, hysteresis, axes)
-    return [sentence for make in makers for sentence in make(study, results)]
+    tables = tables_of(size, **changed)
+    curves, motions = tables["load_displacement"], tables["helical_axes"]
+    makers = ((ranges, curves), (zones, curves), (hysteresis, curves), (axes, motions))
+    return [one for make, rows in makers if len(rows) for one in make(study_of(size), rows)]
 
 
 def test_sentences_follow_from_the_rows() -> None:
@@ -282,8 +281,6 @@ def test_of_springs_fitted_to_their_readings_95_in_100_are_within_the_limit() ->
             )
         ]
     )
-    (sentence,) = ranges(
-        study_of(Size(("a", "b"))), ResultTables({"load_displacement": rows}, {}, {})
-    )
+    (sentence,) = ranges(study_of(Size(("a", "b"))), rows)
     agree = int(sentence.split(" of 2000 are within")[0].split()[-1])
     assert agree / 2000 == pytest.approx(0.95, abs=4.0 * np.sqrt(0.05 * 0.95 / 2000))

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import pytest
+from cohort_analysis_cases import Row, seen
 from cohort_study_cases import PUBLISHED, Size, cohort_of, frame, study_of, tables_of
 from drawn import caption, drawings
 from matplotlib.axis import Axis
@@ -21,7 +22,7 @@ from spinepipe.report.words import short
 from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure, stages
 from spinepipe.studies.cohort_stiffness.figures.held_out_error import motion_errors
 from spinepipe.studies.cohort_stiffness.figures.load_case_stiffness import ratios
-from spinepipe.studies.cohort_stiffness.figures.range_of_motion import compared
+from spinepipe.studies.cohort_stiffness.figures.range_of_motion import comparison_panels
 from spinepipe.studies.cohort_stiffness.kind import KIND, OF_JOBS
 from spinepipe.tables import StudyTables
 
@@ -215,41 +216,19 @@ def test_lines_of_the_map_hang_on_what_was_fitted() -> None:
     assert len(titles(Size(("a",)))) == 3, "nobody else to predict from"
 
 
-def error_rows(*rows: tuple[str, str, str, int, float | None]) -> pd.DataFrame:
-    """Rows of errors: specimen, test, coordinate, readings and error, of fits to all."""
-    empty = {"representation": "per_joint", "fitted_to": "all", "source": "own", "joint": "L4L5"}
-    return frame(
-        "errors",
-        [
-            {
-                **empty,
-                "specimen": specimen,
-                "stage": "fitted",
-                "test": test,
-                "coordinate": name,
-                "loaded": False,
-                "unit": "deg",
-                "readings": n,
-                "rmse": error,
-                "measured": 1.0,
-                "status": "converged",
-                "message": "",
-            }
-            for specimen, test, name, n, error in rows
-        ],
-    )
-
-
 def test_error_of_a_specimen_by_hand() -> None:
-    found = motion_errors(
-        error_rows(
-            ("a", "flexion", "extension", 10, 0.3),
-            ("a", "flexion", "right_bending", 30, 0.1),
-            ("a", "flexion", "anterior", 10, 99.0),
-            ("b", "flexion", "extension", 10, 0.2),
-            ("b", "flexion", "right_bending", 10, None),
-        )
-    )
+    def row(specimen: str, coordinate: str, readings: int, error: float | None) -> Row:
+        of = {"coordinate": coordinate, "readings": readings, "loaded": False}
+        return seen(specimen, "L4L5", error, "per_joint", fitted_to="all", **of)
+
+    rows = [
+        row("a", "extension", 10, 0.3),
+        row("a", "right_bending", 30, 0.1),
+        row("a", "anterior", 10, 99.0),
+        row("b", "extension", 10, 0.2),
+        row("b", "right_bending", 10, None),
+    ]
+    found = motion_errors(pd.DataFrame(rows))
     # (10 * 0.09 + 30 * 0.01) / 40 = 0.03; translations do not count; b is not complete
     assert found["specimen"].tolist() == ["a"]
     assert found["error"].iloc[0] == pytest.approx(0.03**0.5)
@@ -333,9 +312,9 @@ def test_long_names_keep_both_ends() -> None:
 def test_curves_stand_beside_the_model_where_they_were_read() -> None:
     size = Size(("a", "b"), tests=("flexion", "left_lateral_bending"))
     rows = tables_of(size)["load_displacement"]
-    titles = [panel.title for panel in compared(rows)]
+    titles = [panel.title for panel in comparison_panels(rows)]
     assert titles == ["Flexion", "Left lateral bending", "Neutral zone", "Work lost in a cycle"]
-    ranges, _, zones, work = compared(rows)
+    ranges, _, zones, work = comparison_panels(rows)
     here = ranges.points
     np.testing.assert_allclose(here["measured_way"], 0.3)
     np.testing.assert_allclose((here["simulated"] - here["measured"]).abs() % 1.0, 0.5)
@@ -344,4 +323,4 @@ def test_curves_stand_beside_the_model_where_they_were_read() -> None:
     figure = draw("range_of_motion", size)
     drawn = [axis for axis in figure.axes if axis.get_visible()]
     assert [axis.get_title(loc="left")[4:] for axis in drawn] == titles
-    assert compared(rows[rows["source"] == "measured"]) == []
+    assert comparison_panels(rows[rows["source"] == "measured"]) == []

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import statsmodels.api as sm
-from chain_cases import JOINTS, ROTATIONS, STUDY, Chains, Written, by_joint
+from chain_cases import JOINTS, MOMENT_OF, ROTATIONS, STUDY, Chains, Written, by_joint
+from cohort_edge_cases import TRUTH, A
 from scipy import stats
 from statsmodels.tools import eval_measures
 
@@ -25,9 +26,6 @@ from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.cohort_stiffness.fit_rows import criteria, interval
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-
-A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
-TRUTH = {"a": A, "b": 0.8 * A, "c": 1.5 * A}
 
 # Gould et al. 2024b (doi 10.3389/fbioe.2024.1372088), Table 2: extension, bending, rotation.
 UNIFORM = (51.0, 68.8, 291.0)
@@ -172,7 +170,8 @@ def read_by_hand(zeroed: bool, tmp_path: Path) -> pd.DataFrame:
 
 def test_errors_by_hand(tmp_path: Path) -> None:
     """Predicted 0, -1, -2: errors -0.2, -0.5, 1 in cycle 2 and 0, 0.1, -0.4 in cycle 3."""
-    row = read_by_hand(False, tmp_path).loc["L5S1"]
+    rows = read_by_hand(False, tmp_path)
+    row = rows.loc["L5S1"]
     assert row["readings"] == 6
     assert row["loaded"]
     assert row["bias"] == pytest.approx(0.0, abs=1e-9)
@@ -181,6 +180,9 @@ def test_errors_by_hand(tmp_path: Path) -> None:
     assert row["peak_error"] == pytest.approx((1.0 - 0.4) / 2)
     assert row["measured"] == pytest.approx(6.4 / 6)
     assert row["measured_peak"] == pytest.approx(-2.3)
+    lost = rows.loc["L4L5"]  # not read at the peak
+    assert lost["readings"] == 4
+    assert lost[["peak_error", "measured_peak"]].isna().all()
 
 
 def test_zeros_that_zeroing_makes_are_no_readings(tmp_path: Path) -> None:
@@ -190,24 +192,13 @@ def test_zeros_that_zeroing_makes_are_no_readings(tmp_path: Path) -> None:
     assert row["mae"] == pytest.approx(2.0 / 4)
 
 
-def test_a_joint_not_read_at_the_peak_has_no_error_there(tmp_path: Path) -> None:
-    row = read_by_hand(False, tmp_path).loc["L4L5"]
-    assert row["readings"] == 4
-    assert np.isnan(row["peak_error"])
-    assert np.isnan(row["measured_peak"])
-
-
 def test_stages_of_one_load_case(tmp_path: Path) -> None:
     errors = Chains(TRUTH).write(tmp_path).fit("a", "per_joint", "flexion")["errors"]
     stages = errors.groupby("test")["stage"].unique().explode().to_dict()
     others = dict.fromkeys(("left_lateral_bending", "left_axial_rotation"), "left_out_case")
     assert stages == {"flexion": "fitted", **others}
     loaded = errors[errors["loaded"]].groupby("test")["coordinate"].unique().explode().to_dict()
-    assert loaded == {
-        "flexion": "extension",
-        "left_lateral_bending": "right_bending",
-        "left_axial_rotation": "left_rotation",
-    }
+    assert loaded == {test: driven for test, (_, _, driven) in MOMENT_OF.items()}
 
 
 @pytest.mark.parametrize(
@@ -289,13 +280,10 @@ def readings_in_cost(study: str, tmp_path: Path) -> dict[str, np.ndarray]:
 
 def test_published_cost_has_axial_rotation_in_axial_rotation_tests_only(tmp_path: Path) -> None:
     counted = readings_in_cost("cost: published\n", tmp_path)
-    shares = {test: used.mean(axis=(0, 1)).tolist() for test, used in counted.items()}
-    two, three = [0, 0, 0, 1, 1, 0], [0, 0, 0, 1, 1, 1]
-    assert shares == {
-        "flexion": two,
-        "left_lateral_bending": two,
-        "left_axial_rotation": three,
-    }
+    for test, used in counted.items():
+        axial = int(test == "left_axial_rotation")
+        assert used.mean(axis=(0, 1)).tolist() == [0, 0, 0, 1, 1, axial]
+    assert set(counted) == set(MOMENT_OF)
 
 
 def test_peak_steps_are_those_of_the_largest_moment(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import pytest
 from cohort_analysis_cases import fit, only, seen, series
 
 from spinepipe.studies.cohort_stiffness.mae import mae_rows
-from spinepipe.studies.cohort_stiffness.ranking import SPREADS, ranked, ranking_rows
+from spinepipe.studies.cohort_stiffness.ranking import SPREADS, rank_candidates, ranking_rows
 from spinepipe.studies.cohort_stiffness.stages import of_joint_fits, of_single_cases, specimen_rms
 from spinepipe.studies.cohort_stiffness.tables import MAE
 from spinepipe.tables import from_rows
@@ -91,7 +91,7 @@ def test_means_are_ranked_and_told_from_the_best() -> None:
         ("level_ratio", "own"): series(3.0, 4.0, 5.0, 6.0, 7.0, 8.0),
         ("per_joint", "own"): series(1.0, 1.0, 3.0, 3.0, 5.0, 5.0),
     }
-    best, worse = ranked(found, summed=False)
+    best, worse = rank_candidates(found, summed=False)
     assert (best["representation"], best["rank"], best["value"]) == ("per_joint", 1, 3.0)
     assert (best["worse_than_best"], best["p"]) == (0.0, None)
     # Differences 2 3 2 3 2 3: mean 2.5, SD sqrt(0.3), all of one sign among 2^6.
@@ -102,7 +102,7 @@ def test_means_are_ranked_and_told_from_the_best() -> None:
 
 def test_sums_are_ranked() -> None:
     found = {("a", "own"): series(10.0, 20.0), ("b", "own"): series(12.0, 24.0)}
-    best, worse = ranked(found, summed=True)
+    best, worse = rank_candidates(found, summed=True)
     assert (best["value"], best["unit"], worse["value"]) == (30.0, "", 36.0)
     # Differences 2 and 4, SD sqrt(2): the sum of two has SE 2.
     assert (worse["worse_than_best"], worse["p"]) == (6.0, None)
@@ -112,8 +112,8 @@ def test_sums_are_ranked() -> None:
 
 def test_no_p_for_a_sum_however_clear_it_is() -> None:
     found = {("a", "own"): series(*range(6)), ("b", "own"): series(*range(10, 16))}
-    assert [row["p"] for row in ranked(found, summed=True)] == [None, None]
-    assert ranked(found, summed=False)[1]["p"] == pytest.approx(2 / 64)
+    assert [row["p"] for row in rank_candidates(found, summed=True)] == [None, None]
+    assert rank_candidates(found, summed=False)[1]["p"] == pytest.approx(2 / 64)
 
 
 def test_spreads_of_the_cohort_count_once_in_its_criteria() -> None:
@@ -157,7 +157,7 @@ def test_only_specimens_with_all_results_are_compared() -> None:
         ("b", "own"): series(3.0, 3.0),
         ("c", "own"): series(),
     }
-    first, second, none = ranked(found, summed=False)
+    first, second, none = rank_candidates(found, summed=False)
     assert (first["value"], first["specimens"]) == (1.5, 2)
     assert "left out, without a result: c (b)" in first["message"]
     assert (second["value"], second["rank"]) == (3.0, 2)
@@ -167,4 +167,4 @@ def test_only_specimens_with_all_results_are_compared() -> None:
 
 def test_nobody_has_all_results() -> None:
     found = {("a", "own"): series(1.0), ("b", "own"): series(2.0, names="z")}
-    assert [row["rank"] for row in ranked(found, summed=False)] == [None, None]
+    assert [row["rank"] for row in rank_candidates(found, summed=False)] == [None, None]

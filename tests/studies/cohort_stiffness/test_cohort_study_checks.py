@@ -3,19 +3,20 @@
 Seen here: a fault that passes, is told of another line or key, or without what to do.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 from chain_cases import DEGREES, MOMENT_OF, STUDY, Chains
+from cohort_edge_cases import A
 
 from spinepipe.documents.names import ALLOWED
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
-A = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 FILE = f"config/studies/{STUDY}.yaml"
 LEVEL = "{extension_nm_per_rad: 50, right_bending_nm_per_rad: 50, left_rotation_nm_per_rad: 50}"
 
@@ -115,38 +116,42 @@ def test_stiffness_is_fitted_to_motion(tmp_path: Path) -> None:
         studies.check(tmp_path, STUDY)
 
 
-def test_a_specimen_without_any_reading_is_named(tmp_path: Path) -> None:
-    made = chains()
-    made.motion = made.motion[made.motion["specimen"] == "a"]
+@pytest.mark.parametrize(
+    ("study", "zeroed", "columns", "where", "key", "found"),
+    [
+        ("", False, DEGREES, {"specimen": "b"}, "tests", "no motion of specimen 'b' in any"),
+        ("free: [extension]\n", False, DEGREES[:1], {"specimen": "b"}, "tests", "specimen 'b'"),
+        ("", True, DEGREES, {"specimen": "b"}, "tests", "specimen 'b'"),
+        (
+            "tests: [left_axial_rotation, flexion]\n",
+            False,
+            DEGREES,
+            {"test": "flexion"},
+            "tests.1",
+            "test 'flexion', which has no motion",
+        ),
+    ],
+)
+def test_who_was_not_read_in_what_is_fitted_is_named(
+    study: str,
+    zeroed: bool,
+    columns: Sequence[str],
+    where: dict[str, str],
+    key: str,
+    found: str,
+    tmp_path: Path,
+) -> None:
+    """Zeros that zeroing makes are no motion."""
+    made = chains(study, zeroed=zeroed)
+    here = made.where(**where) & (made.motion["step"] >= int(zeroed))
+    made.motion.loc[here, list(columns)] = np.nan
     (problem,) = complaints(made, tmp_path)
-    assert problem.found == "no motion of specimen 'b' in any chosen test"
+    assert problem.column == key
+    assert found in problem.found
 
 
-def test_a_specimen_read_in_what_is_not_free_only_is_named(tmp_path: Path) -> None:
-    made = chains("free: [extension]\n")
-    made.motion.loc[made.motion["specimen"] == "b", "extension_deg"] = np.nan
-    (problem,) = complaints(made, tmp_path)
-    assert "specimen 'b'" in problem.found
-
-
-def test_zeros_of_zeroing_are_no_motion(tmp_path: Path) -> None:
-    made = chains(zeroed=True)
-    later = (made.motion["specimen"] == "b") & (made.motion["step"] > 0)
-    made.motion.loc[later, list(DEGREES)] = np.nan
-    (problem,) = complaints(made, tmp_path)
-    assert "specimen 'b'" in problem.found
-
-
-def test_a_test_that_is_asked_for_must_have_been_measured(tmp_path: Path) -> None:
-    made = chains("tests: [left_axial_rotation, flexion]\n")
-    made.motion.loc[made.motion["test"] == "flexion", list(DEGREES)] = np.nan
-    (problem,) = complaints(made, tmp_path)
-    assert (problem.row, problem.column) == (4, "tests.1")
-    assert problem.found == "test 'flexion', which has no motion"
-
-
-def with_a_test_called(name: str) -> Chains:
-    made = chains()
+def with_a_test_called(name: str, study: str = "") -> Chains:
+    made = chains(study)
     for table in (made.loads, made.motion):
         table["test"] = table["test"].replace("left_lateral_bending", name)
     return made
@@ -174,10 +179,7 @@ def test_names_that_no_table_may_have(tmp_path: Path) -> None:
 
 
 def test_a_test_that_is_not_chosen_may_be_called_anything(tmp_path: Path) -> None:
-    made = chains("tests: [flexion]\n")
-    for table in (made.loads, made.motion):
-        table["test"] = table["test"].replace("left_lateral_bending", "all")
-    made.write(tmp_path)
+    with_a_test_called("all", "tests: [flexion]\n").write(tmp_path)
     assert studies.check(tmp_path, STUDY)
 
 

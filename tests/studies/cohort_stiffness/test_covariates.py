@@ -11,17 +11,16 @@ from scipy import stats
 from statsmodels.regression.mixed_linear_model import MixedLM
 
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.cohort_stiffness.covariates import (
     BESIDE,
     covariate_rows,
     specimen_effects,
 )
-from spinepipe.studies.cohort_stiffness.page_covariates import covariates
+from spinepipe.studies.cohort_stiffness.page_optional import covariates
 from spinepipe.studies.cohort_stiffness.settings import COVARIATES, CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import COVARIATES_TABLE
 from spinepipe.studies.read import check
-from spinepipe.tables import StudyTables, from_rows
+from spinepipe.tables import from_rows
 
 LEVELS = ("L5S1", "L4L5", "L3L4", "L2L3")
 ASKED = ("age_years", "sex")
@@ -107,8 +106,7 @@ def test_an_effect_is_found_and_told() -> None:
     assert found["holds"].to_dict() == {"age_years": "yes", "sex": "undecided"}
     assert found.loc["age_years", "low"] < np.exp(-0.25) < found.loc["age_years", "high"]
     study = CohortStiffness(study="probe", kind="cohort_stiffness", cohort="c", covariates=ASKED)
-    results = ResultTables(StudyTables({"covariates": found.reset_index()}), {}, {})
-    first, second = covariates(study, results)
+    first, second = covariates(study, found.reset_index())
     assert first.startswith("Flexion–extension stiffness goes with age: times 0.")
     assert "12 specimens" in first
     assert "not told apart from no effect" in second.lower()
@@ -124,9 +122,8 @@ def test_two_covariates_need_six_specimens(n: int, refused: bool) -> None:
     assert found["p"].isna().all() == refused
     if refused:
         assert set(found["message"]) == {"5 specimens, and 2 covariates together need 6"}
-        results = ResultTables(StudyTables({"covariates": found.reset_index()}), {}, {})
         study = CohortStiffness(study="probe", kind="cohort_stiffness", cohort="c")
-        (sentence,) = covariates(study, results)
+        (sentence,) = covariates(study, found.reset_index())
         assert "was not asked" in sentence
 
 

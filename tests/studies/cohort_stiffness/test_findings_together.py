@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, CohortClaim, Row
-from spinepipe.studies.cohort_stiffness.findings import put_in, together
+from spinepipe.studies.cohort_stiffness.findings import decide_together, mark_circular
 
 SIGNIFICANCE = 0.05
 
@@ -23,7 +23,7 @@ def row(
 
 
 def judged(*rows: Row, specimens: int = 6) -> list[Row]:
-    return list(together(rows, specimens, SIGNIFICANCE))
+    return list(decide_together(rows, specimens, SIGNIFICANCE))
 
 
 @pytest.mark.parametrize(("p", "holds"), [(0.016, "yes"), (0.017, "undecided")])
@@ -115,6 +115,8 @@ def test_what_was_put_into_a_made_up_cohort_is_no_finding(
     finding: str, holds: str, told: str
 ) -> None:
     """What the method makes of it may be one: load cases must not differ where truth is linear."""
-    found = put_in(CohortClaim(finding, "Statement.", "quantity", "").row(holds, "told", 1.0))
+    found = mark_circular(
+        CohortClaim(finding, "Statement.", "quantity", "").row(holds, "told", 1.0)
+    )
     assert found["holds"] == told
     assert ("made up" in found["message"]) == (told == "circular")

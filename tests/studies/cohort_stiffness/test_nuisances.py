@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from chain_cases import JOINTS, ROTATIONS, Tables, Written, by_joint
+from cohort_edge_cases import A as K
+from cohort_study_cases import frame
 from displaced_cases import (
     CENTRES,
     MOMENTS,
@@ -25,19 +27,15 @@ from displaced_cases import (
 from scipy import stats
 
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import ResultTables
-from spinepipe.studies.cohort_stiffness.page_nuisances import nuisances, orders
+from spinepipe.studies.cohort_stiffness.page_optional import order_with_nuisances, orders
 from spinepipe.studies.cohort_stiffness.representations import FITTED, NUISANCE, finest
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.tables import RANKING
 from spinepipe.studies.read import check
-from spinepipe.tables import from_rows
 from tests.validation.displaced_joints import coverage
 
 PLAIN, BESIDE = "per_joint", "per_joint_nuisance"
 REPRESENTATIONS = f"representations: [{PLAIN}, {BESIDE}]\nstarts: 1\n"
 STUDY = REPRESENTATIONS + "nuisance: {centre_mm: 3, axes_deg: 3}\n"
-K = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 OFF = Displaced(
     K,
     [[6.0, 1.0, -2.0], [-4.0, 0.0, 3.0], [3.0, -2.0, 1.0]],
@@ -229,24 +227,18 @@ def test_regions_cover_the_truth_as_often_as_they_say() -> None:
 
 def ranked(values: dict[str, float], specimens: int = 5) -> pd.DataFrame:
     """Table ``ranking`` of one criterion."""
+    same = {"criterion": "left_out_specimen", "source": "own", "unit": "deg", "message": ""}
     order = sorted(values, key=values.__getitem__)
-    empty = ("standard_error", "worse_than_best", "worse_standard_error", "p")
     rows = [
-        {
-            **dict.fromkeys(empty),
-            **{"criterion": "left_out_specimen", "representation": name, "source": "own"},
-            **{"rank": order.index(name) + 1, "unit": "deg", "value": values[name]},
-            **{"specimens": specimens, "message": ""},
-        }
-        for name in order
+        {**same, "representation": name, "rank": rank, "value": values[name]}
+        for rank, name in enumerate(order, start=1)
     ]
-    return from_rows(RANKING, rows).to_pandas()
+    return frame("ranking", [{**row, "specimens": specimens} for row in rows])
 
 
 def sentence(values: dict[str, float], specimens: int = 5) -> str:
     settings = CohortStiffness(study="s", kind="cohort_stiffness", cohort="c")
-    results = ResultTables({"ranking": ranked(values, specimens)}, {}, {})
-    return " ".join(nuisances(settings, results))
+    return " ".join(order_with_nuisances(settings, ranked(values, specimens)))
 
 
 def test_the_order_changes_where_values_with_nuisances_stand_otherwise() -> None:

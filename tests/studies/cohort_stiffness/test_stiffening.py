@@ -6,31 +6,26 @@ Truth in closed form: a joint that holds ``k (exp(b |q|) - 1) / b`` turns by ``l
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from chain_cases import STUDY, Chains, Written, by_joint
+from cohort_analysis_cases import analysed
+from cohort_edge_cases import A as K
+from cohort_edge_cases import joined_jobs
 
-from spinepipe.jobs.tested_rows import corrected_rows
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import ResultTables
-from spinepipe.studies.cohort_stiffness.findings import finding_rows
-from spinepipe.studies.cohort_stiffness.page_stiffening import stiffening
-from spinepipe.studies.cohort_stiffness.ranking import ranking_rows
+from spinepipe.studies.cohort_stiffness.page_optional import (
+    excluded_linear_laws,
+    stiffening_verdicts,
+)
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.significance import all_tests
-from spinepipe.studies.cohort_stiffness.tables import FINDINGS, RANKING
 from spinepipe.studies.read import check, read
-from spinepipe.tables import StudyTables, from_rows
 
-K = np.array([[50.0, 60.0, 200.0], [55.0, 66.0, 220.0], [60.0, 70.0, 240.0]])
 B = np.array([[8.0, 6.0, 20.0], [10.0, 5.0, 15.0], [6.0, 9.0, 30.0]])
 SPECIMENS = {"a": 1.0, "b": 0.8, "c": 1.5, "d": 1.2, "e": 0.9}
 PER_JOINT = "per_joint_stiffening"
 TESTS = ("flexion", "left_lateral_bending", "left_axial_rotation")
 ASKED = ("per_specimen", "stiffening", "per_joint_stiffening", "pooled_stiffening")
 STIFFENS = f"representations: [{', '.join(ASKED)}]\nstarts: 1\n"
-
-Frames = dict[str, pd.DataFrame]
 
 
 def cohort(growth: float, noise_deg: float, specimens: int = 5, steps: int = 6) -> Chains:
@@ -123,30 +118,6 @@ def test_a_growth_of_zero_is_a_linear_joint_and_no_bound_of_stiffness(tmp_path: 
         assert found["fits"]["message"].str.contains("linear: ").all()
 
 
-def linear_and_stiffening(project: Written) -> Frames:
-    """Tables of a study of one linear and one stiffening law and one test, job by job."""
-    parts: dict[str, list[pd.DataFrame]] = {}
-
-    def keep(found: Frames, **where: str) -> None:
-        for table, rows in found.items():
-            parts.setdefault(table, []).append(rows.assign(**where))
-
-    for name in ("per_specimen", "stiffening"):
-        where = {"representation": name, "fitted_to": "flexion"}
-        for specimen, tables in project.fit_all(list(SPECIMENS), name, "flexion").items():
-            for found in tables:
-                keep(found, specimen=specimen, **where)
-    for specimen in SPECIMENS:
-        keep(project.literature(specimen), specimen=specimen)
-    frames = {name: pd.concat(found, ignore_index=True) for name, found in parts.items()}
-    rows = ranking_rows(frames["errors"], frames["fits"])
-    frames["ranking"] = from_rows(RANKING, rows).to_pandas()
-    tested = list(all_tests(frames["errors"], frames["fits"]))
-    frames["statistics"] = pd.DataFrame(list(corrected_rows(tested)))
-    frames["findings"] = from_rows(FINDINGS, list(finding_rows(frames, 0.05))).to_pandas()
-    return frames
-
-
 def alike(growth: float) -> Chains:
     """A cohort in which joints of a specimen are alike, so that only stiffening is at stake."""
     flat = {name: np.tile(K.mean(axis=0), (3, 1)) * SPECIMENS[name] ** 0.1 for name in SPECIMENS}
@@ -163,14 +134,17 @@ def test_stiffening_wins_where_joints_stiffen_and_only_there(
 ) -> None:
     study = read(alike(growth).write(tmp_path).root / "config/studies" / f"{STUDY}.yaml", tmp_path)
     assert isinstance(study, CohortStiffness)
-    frames = linear_and_stiffening(Written(tmp_path))
+    laws = ("per_specimen", "stiffening")
+    frames = joined_jobs(Written(tmp_path), list(SPECIMENS), laws, ["flexion"])
+    frames |= analysed(frames)
     findings = frames["findings"].set_index("finding")
     claim = findings.loc["stiffening_beats_per_specimen_left_out_specimen"]
     assert (claim["holds"] == "yes") is wins
     best = frames["ranking"]
     best = best[(best["criterion"] == "aicc") & (best["rank"] == 1)]["representation"].item()
     assert best == ("stiffening" if wins else "per_specimen")
-    first, held = stiffening(study, ResultTables(StudyTables(frames), {}, {}))
+    (first,) = stiffening_verdicts(study, frames["findings"], frames["ranking"])
+    (held,) = excluded_linear_laws(study, frames["stiffness"])
     assert first.startswith("Do joints that stiffen predict better what was not fitted?")
     assert ("? Yes." in first) is wins
     assert ("? Not shown." in first) is not wins

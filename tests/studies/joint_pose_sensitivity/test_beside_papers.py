@@ -15,7 +15,7 @@ from sweeps import sweep
 from spinepipe import cohort as cohorts
 from spinepipe.comparison import papers
 from spinepipe.report.style import picture, style
-from spinepipe.studies.cohort_stiffness.gould_2024b import GOULD_2024B
+from spinepipe.studies.cohort_stiffness.settings import GOULD_2024B
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.registry import kind_names, kind_of

@@ -5,7 +5,7 @@ another pose or stiffness set, shares of variance over what is no draw, a fault 
 """
 
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
@@ -13,46 +13,36 @@ import pytest
 from grid_cases import JOINTS, STIFFNESS, STUDY, made_up, project, table_of
 from scipy.spatial.transform import Rotation
 
-from spinepipe.cohort.load_tests import VIRTUAL_TESTS, virtual_load_cases
+from spinepipe.cohort.load_tests import VIRTUAL_TESTS, loaded_coordinate, virtual_load_cases
 from spinepipe.designs import sample_factors, sample_joint_frames
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.problems import InputError
 from spinepipe.studies import read as studies
-from spinepipe.studies.range_of_motion import draw as draw_stiffness
-from spinepipe.studies.range_of_motion import draw as sample_frames
-from spinepipe.studies.range_of_motion import load_steps, simulate, summary, variance
-from spinepipe.studies.range_of_motion.grid import read_grid
+from spinepipe.studies.range_of_motion import draw, simulate, summary, variance
+from spinepipe.studies.range_of_motion.grid import asked_tests, read_grid
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion, VirtualTest
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
 from spinepipe.tables import from_rows, read_frame, write
+from spinepipe.units import ROTATIONS
 
 FILE = f"config/studies/{STUDY}.yaml"
+ROTATION_COLUMNS = [f"predicted_{name}_deg" for name in ROTATIONS]
 SIX = "[flexion, extension, right_bending, left_bending, left_rotation, right_rotation]"
 
 
-# Ground axes: x anterior, y superior, z right. To the right about +x: y turns to z.
-@pytest.mark.parametrize(
-    ("test", "moment", "coordinate"),
-    [
-        ("flexion", (0, 0, -1), "extension"),
-        ("extension", (0, 0, 1), "extension"),
-        ("right_bending", (1, 0, 0), "right_bending"),
-        ("left_bending", (-1, 0, 0), "right_bending"),
-        ("left_rotation", (0, 1, 0), "left_rotation"),
-        ("right_rotation", (0, -1, 0), "left_rotation"),
-    ],
-)
-def test_signs_of_virtual_tests(
-    test: str, moment: tuple[float, float, float], coordinate: str
-) -> None:
-    (case,) = virtual_load_cases((test,), 7.5, 5, 3)
-    assert [step.step for step in case.steps] == [0, 1, 2, 3, 4, 5]
-    for step, share in zip(case.steps, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0), strict=True):
-        (wrench,) = step.wrenches
-        np.testing.assert_allclose(wrench.moment, 7.5 * share * np.array(moment), atol=1e-15)
-        assert not wrench.force.any()
-        assert wrench.body == 3
-    assert VIRTUAL_TESTS[test].coordinate == coordinate
+def test_virtual_tests_are_moments_in_equal_steps() -> None:
+    """On the vertebra that is named, without a force; signs are seen in the motion below."""
+    cases = virtual_load_cases(tuple(VIRTUAL_TESTS), 7.5, 5, 3)
+    for test, case in zip(VIRTUAL_TESTS, cases, strict=True):
+        assert [step.step for step in case.steps] == [0, 1, 2, 3, 4, 5]
+        wrenches = [wrench for step in case.steps for wrench in step.wrenches]
+        assert {wrench.body for wrench in wrenches} == {3}
+        assert not any(wrench.force.any() for wrench in wrenches)
+        moments = np.array([wrench.moment for wrench in wrenches])
+        assert np.linalg.norm(moments[-1]) == pytest.approx(7.5)
+        shares = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+        np.testing.assert_allclose(moments, np.outer(shares, moments[-1]), atol=1e-15)
+        assert VIRTUAL_TESTS[test].coordinate == loaded_coordinate(case)
 
 
 def test_a_study_may_name_every_virtual_test_and_no_other() -> None:
@@ -94,7 +84,7 @@ def test_factors_fill_the_spread_evenly_on_a_logarithmic_scale() -> None:
 
 def test_specimens_have_draws_of_their_own_that_others_do_not_change(tmp_path: Path) -> None:
     def frames(root: Path, specimen: str) -> pd.DataFrame:
-        sample_frames.sample_frames(str(root), STUDY, specimen, str(root / "frames.parquet"))
+        draw.sample_frames(str(root), STUDY, specimen, str(root / "frames.parquet"))
         return read_frame(root / "frames.parquet").set_index(["specimen", "pose", "joint"])
 
     two = project(tmp_path / "two", "poses: 5\n", specimens=("a", "b"))
@@ -111,7 +101,7 @@ def test_levels_and_factors_make_the_stiffness_sets(tmp_path: Path) -> None:
     level = "extension_nm_per_rad: 7, right_bending_nm_per_rad: 8, left_rotation_nm_per_rad: 9"
     root = project(tmp_path, f"stiffness_sets: 6\nlevel_stiffness:\n  L2L3: {{{level}}}\n")
     path = root / "sets.parquet"
-    draw_stiffness.draw_stiffness(str(root), STUDY, str(path))
+    draw.draw_stiffness(str(root), STUDY, str(path))
     sets = read_frame(path).set_index(["stiffness", "joint"])
     own = dict(STIFFNESS)
     assert sets.loc[0, "L1L2"].to_dict() == pytest.approx(own)
@@ -128,9 +118,9 @@ def test_levels_and_factors_make_the_stiffness_sets(tmp_path: Path) -> None:
 def moved(root: Path, pose: int = 0, stiffness: int = 0, specimen: str = "a") -> pd.DataFrame:
     """Rows of one job."""
     frames, sets, output = (str(root / f"{name}.parquet") for name in ("frames", "sets", "out"))
-    load_steps.asked_tests.cache_clear()  # a test changes its study in no time
-    sample_frames.sample_frames(str(root), STUDY, specimen, frames)
-    draw_stiffness.draw_stiffness(str(root), STUDY, sets)
+    asked_tests.cache_clear()  # a test changes its study in no time
+    draw.sample_frames(str(root), STUDY, specimen, frames)
+    draw.draw_stiffness(str(root), STUDY, sets)
     place = {"pose": f"{pose:04d}", "stiffness": f"{stiffness:02d}"}
     simulate.run(str(root), STUDY, frames, sets, specimen, {output: place})
     return read_frame(output)
@@ -151,10 +141,9 @@ def test_joints_of_a_straight_chain_turn_by_moment_over_stiffness(tmp_path: Path
     assert len(rows) == 6 * len(JOINTS)
     assert set(rows["status"]) == {"converged"}
     for test, (loaded, angle) in expected.items():
-        for coordinate in ("extension", "right_bending", "left_rotation"):
-            found = rows.loc[rows["test"] == test, f"predicted_{coordinate}_deg"]
-            wanted = np.rad2deg(angle) if coordinate == loaded else 0.0
-            np.testing.assert_allclose(found, wanted, atol=1e-9)
+        found = rows.loc[rows["test"] == test, ROTATION_COLUMNS]
+        wanted = [np.rad2deg(angle) * (name == f"predicted_{loaded}_deg") for name in found]
+        np.testing.assert_allclose(found, np.tile(wanted, (len(JOINTS), 1)), atol=1e-9)
     np.testing.assert_allclose(rows.filter(like="_mm"), 0.0, atol=1e-9)
 
 
@@ -183,9 +172,7 @@ def test_tilted_frames_split_a_small_moment_among_their_axes(tmp_path: Path) -> 
     axes = Rotation.from_euler("ZXY", (25.0, -10.0, 15.0), degrees=True).as_matrix()
     about_x, about_y, about_z = axes.T @ np.array([0.0, 1.0e-5, 0.0])
     wanted = np.rad2deg([about_z / 50.0, about_x / 80.0, about_y / 250.0])
-    found = moved(root)[
-        [f"predicted_{n}_deg" for n in ("extension", "right_bending", "left_rotation")]
-    ]
+    found = moved(root)[ROTATION_COLUMNS]
     np.testing.assert_allclose(found, np.tile(wanted, (3, 1)), rtol=1e-5)
 
 
@@ -292,12 +279,18 @@ def test_the_load_tells_the_loaded_coordinate_and_motion_where_no_moment_acts(
     }
 
 
+def analysed(
+    job: Any, root: Path, size: tuple[int, int, int], lost: tuple[tuple[int, int, int], ...] = ()
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """What a job makes of a made-up grid, and the rows of the grid."""
+    path, rows = table_of(made_up(root, size), size, lost)
+    job.run(str(root), STUDY, [str(path)], str(root / "out.parquet"))
+    return read_frame(root / "out.parquet"), rows
+
+
 def test_summary_has_the_quantiles_of_pandas(tmp_path: Path) -> None:
-    size = (3, 6, 4)
-    root = made_up(tmp_path, size)
-    path, rows = table_of(root, size, lost=((1, 2, 0), (1, 3, 3)))
-    summary.run(str(root), STUDY, [str(path)], str(root / "out.parquet"))
-    found = read_frame(root / "out.parquet").set_index(["specimen", "test", "joint", "coordinate"])
+    found, rows = analysed(summary, tmp_path, (3, 6, 4), ((1, 2, 0), (1, 3, 3)))
+    found = found.set_index(["specimen", "test", "joint", "coordinate"])
     assert len(found) == 4 * 2 * 3 * 6
     column = rows["predicted_extension_deg"]
     pooled = rows.assign(specimen="*")
@@ -314,11 +307,8 @@ def test_summary_has_the_quantiles_of_pandas(tmp_path: Path) -> None:
 
 
 def test_variance_leaves_out_what_is_no_draw_and_what_is_incomplete(tmp_path: Path) -> None:
-    size = (3, 7, 5)
-    root = made_up(tmp_path, size)
-    path, _ = table_of(root, size, lost=((1, 2, 3), (0, 0, 0)))
-    variance.run(str(root), STUDY, [str(path)], str(root / "out.parquet"))
-    found = read_frame(root / "out.parquet").set_index(["specimen", "test"])
+    found, _ = analysed(variance, tmp_path, (3, 7, 5), ((1, 2, 3), (0, 0, 0)))
+    found = found.set_index(["specimen", "test"])
     assert set(found["status"]) == {"done"}
     assert set(found.loc["a", "n_poses"]) == {6}  # pose 0 is no draw
     assert set(found.loc["b", "n_poses"]) == {5}
@@ -331,10 +321,7 @@ def test_variance_leaves_out_what_is_no_draw_and_what_is_incomplete(tmp_path: Pa
 
 
 def test_variance_of_a_study_without_draws_has_a_status(tmp_path: Path) -> None:
-    root = made_up(tmp_path, (1, 1, 1))
-    path, _ = table_of(root, (1, 1, 1))
-    variance.run(str(root), STUDY, [str(path)], str(root / "out.parquet"))
-    found = read_frame(root / "out.parquet")
+    found, _ = analysed(variance, tmp_path, (1, 1, 1))
     assert set(found["status"]) == {"too_few"}
     assert found["pose_share"].isna().all()
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import ResultTables
 from spinepipe.report.style import picture, style
-from spinepipe.studies.range_of_motion import draw as sample_frames
+from spinepipe.studies.range_of_motion import draw
 from spinepipe.studies.range_of_motion.figures.motion import levels_figure, variance_figure
 from spinepipe.studies.range_of_motion.grid import read_grid
 from spinepipe.studies.range_of_motion.page import document, findings
@@ -174,9 +174,7 @@ def test_the_segment_is_shown_with_the_loads_that_were_applied(
     (tmp_path / "config/cohorts/stack/loads.csv").write_text(LOADS)
     parts = []
     for specimen in cohort.specimen_names:
-        sample_frames.sample_frames(
-            str(tmp_path), STUDY, specimen, str(tmp_path / "frames.parquet")
-        )
+        draw.sample_frames(str(tmp_path), STUDY, specimen, str(tmp_path / "frames.parquet"))
         parts.append(read_frame(tmp_path / "frames.parquet"))
     tables = {**found.tables, "frames": pd.concat(parts, ignore_index=True)}
     study = study if virtual else study.model_copy(update={"virtual_tests": None})

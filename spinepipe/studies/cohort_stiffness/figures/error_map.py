@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -31,8 +32,9 @@ MANY_SPECIMENS = 16
 """With more of them only three stages have room."""
 
 _BY_WHOM = {
-    "fitted": "fitted to this specimen",
-    "left_out_specimen": "from the other specimens",
+    "literature": "",
+    "fitted": ", fitted to this specimen",
+    "left_out_specimen": ", from the other specimens",
 }
 _FEW = (
     (PUBLISHED[0], "literature"),
@@ -71,22 +73,22 @@ def stages(loaded: pd.DataFrame, specimens: int) -> list[PanelLine]:
         there = set(chosen.loc[chosen["stage"] == stage, "representation"])
         if not any(name in there and at == stage for name, at in wanted):
             wanted += [(name, stage) for name in _INSTEAD if name in there][:1]
-    found = [
-        PanelLine(_title(name, stage), rows)
+    return [
+        PanelLine(words[:1].upper() + words[1:], rows)
         for name, stage in wanted
+        for words in [f"{IN_WORDS[name]}{_BY_WHOM[stage]}"]
         if len(rows := chosen[(chosen["representation"] == name) & (chosen["stage"] == stage)])
     ]
-    return found
-
-
-def _title(representation: str, stage: str) -> str:
-    name = IN_WORDS[representation]
-    words = name if stage == "literature" else f"{name}, {_BY_WHOM[stage]}"
-    return words[:1].upper() + words[1:]
 
 
 COLORS = "PuOr_r"
 """Purple to orange over white: colour-blind readers tell its ends apart."""
+
+_MISSING: dict[str, Any] = {"hatch": "//////", "lw": 0, "edgecolor": HATCH}
+"""What stands behind cells without a number."""
+
+_FRAME: dict[str, Any] = {"edgecolor": BLACK, "lw": 1.3, "clip_on": False}
+"""Of a place whose measured motion goes against the load."""
 
 MOST_CASES = 6
 _ROW_MM, _LEAST_ROW_MM, _HEAD_MM, _KEY_MM, _NAMES_MM = 4.6, 1.0, 8.0, 34.0, 14.0
@@ -109,15 +111,32 @@ def error_map_figure(
     if not found or not len(values):
         total = count(len(errors), "row")
         return saying(f"No error in a loaded direction can be shown: none of {total} has one.")
-    figure, axes = _grid(cohort, len(found), min(len(cases), MOST_CASES))
+    lines, across = len(found), min(len(cases), MOST_CASES)
+    rows_mm = len(cohort.specimen_names) * _line_mm(cohort, lines)
+    figure = blank(lines * (rows_mm + _HEAD_MM) + _NAMES_MM + _KEY_MM)
+    axes = lines_of(figure, lines * across, across)
+    # A number is written in each cell where it can be read.
+    broad = _cell_mm(cohort, across) >= _CELL_WITH_NUMBER_MM
+    numbers = broad and _line_mm(cohort, lines) >= _LINE_MM
     image = None
     scale = _scale(found)
+    flipped = (
+        signs[signs["verdict"] == "flipped"] if len(signs) else signs.assign(test=[], joint=[])
+    )
     for line, stage in enumerate(found):
         for column, test in enumerate(cases[:MOST_CASES]):
             axis = axes[line][column]
-            grid = _square(stage.rows[stage.rows["test"] == test], cohort)
-            image = _draw(axis, grid, scale, _room(cohort, len(axes[0]), len(found)))
-            _frame(axis, signs, test, cohort)
+            # (S, J) errors, NaN where there is none; levels from cranial to caudal
+            here = stage.rows[stage.rows["test"] == test]
+            wide = here.pivot_table("peak_error", "specimen", "joint", aggfunc="first")
+            wide = wide.reindex(index=cohort.specimen_names, columns=cohort.joint_names[::-1])
+            grid = wide.to_numpy(float)
+            image = _draw(axis, grid, scale, numbers)
+            # A frame around each place whose measured motion goes against the load.
+            for row in flipped[flipped["test"] == test].to_dict("records"):
+                x = cohort.joint_names[::-1].index(row["joint"]) - 0.5
+                y = cohort.specimen_names.index(row["specimen"]) - 0.5
+                axis.add_patch(Rectangle((x, y), 1.0, 1.0, **_FRAME, fill=False, zorder=4))
             _label(axis, cohort, line == len(found) - 1, column == 0)
             words = _over(test, loaded, len(axes[0])) if line == 0 else ""
             axis.set_title(
@@ -125,7 +144,7 @@ def error_map_figure(
             )
         head_line(axes[line][0], line, stage.title, 12.5 if line == 0 else 3.5)
     assert image is not None
-    _explain(figure, axes, image, scale, found, signs)
+    _explain(figure, axes, image, scale, found, bool(len(flipped)))
     return figure
 
 
@@ -140,18 +159,6 @@ def _cell_mm(cohort: Cohort, across: int) -> float:
     return (WIDTH_MM - 6.0 - 1.3 * names - 5.0 * across) / (across * len(cohort.joint_names))
 
 
-def _room(cohort: Cohort, across: int, lines: int) -> bool:
-    """Whether a number can be read in each cell."""
-    wide = _cell_mm(cohort, across) >= _CELL_WITH_NUMBER_MM
-    return wide and _line_mm(cohort, lines) >= _LINE_MM
-
-
-def _grid(cohort: Cohort, lines: int, across: int) -> tuple[Figure, list[list[Axes]]]:
-    rows = len(cohort.specimen_names) * _line_mm(cohort, lines)
-    figure = blank(lines * (rows + _HEAD_MM) + _NAMES_MM + _KEY_MM)
-    return figure, lines_of(figure, lines * across, across)
-
-
 def _scale(found: Sequence[PanelLine]) -> Normalize:
     """Symmetric around zero; an end that few errors reach is drawn in."""
     sizes = [np.abs(finite(stage.rows["peak_error"])) for stage in found]
@@ -162,26 +169,10 @@ def _scale(found: Sequence[PanelLine]) -> Normalize:
     return Normalize(-end, end) if end > 0.0 else Normalize(-1.0, 1.0)
 
 
-def _square(rows: pd.DataFrame, cohort: Cohort) -> Array:
-    """(S, J) errors, NaN where there is none; levels from cranial to caudal."""
-    wide = rows.pivot_table("peak_error", "specimen", "joint", aggfunc="first")
-    wide = wide.reindex(index=list(cohort.specimen_names), columns=list(cohort.joint_names[::-1]))
-    return wide.to_numpy(float)
-
-
 def _draw(axis: Axes, grid: Array, scale: Normalize, numbers: bool) -> AxesImage:
     axis.set_facecolor(EMPTY)
     axis.add_patch(
-        Rectangle(
-            (-0.5, -0.5),
-            grid.shape[1],
-            grid.shape[0],
-            hatch="//////",
-            lw=0,
-            facecolor="none",
-            edgecolor=HATCH,
-            zorder=0,
-        )
+        Rectangle((-0.5, -0.5), *grid.shape[::-1], **_MISSING, facecolor="none", zorder=0)
     )
     shown = np.ma.masked_invalid(grid)
     image = axis.imshow(shown, cmap=COLORS, norm=scale, aspect="auto", zorder=1)
@@ -204,35 +195,13 @@ def _draw(axis: Axes, grid: Array, scale: Normalize, numbers: bool) -> AxesImage
     return image
 
 
-def _frame(axis: Axes, signs: pd.DataFrame, test: str, cohort: Cohort) -> None:
-    """A frame around each place whose measured motion goes against the load."""
-    levels = list(cohort.joint_names[::-1])
-    for _, row in _flipped(signs)[_flipped(signs)["test"] == test].iterrows():
-        x, y = levels.index(row["joint"]), cohort.specimen_names.index(row["specimen"])
-        axis.add_patch(
-            Rectangle(
-                (x - 0.5, y - 0.5),
-                1.0,
-                1.0,
-                fill=False,
-                edgecolor=BLACK,
-                lw=1.3,
-                zorder=4,
-                clip_on=False,
-            )
-        )
-
-
-def _flipped(signs: pd.DataFrame) -> pd.DataFrame:
-    return signs[signs["verdict"] == "flipped"] if len(signs) else signs.assign(test=[], joint=[])
-
-
 def _label(axis: Axes, cohort: Cohort, lowest: bool, leftmost: bool) -> None:
     levels, names = cohort.joint_names[::-1], cohort.specimen_names
     height = axis.get_figure().get_figheight() * 25.4  # type: ignore[union-attr]
     grid = axis.get_gridspec()
     assert grid is not None
     row_mm = (height - _KEY_MM - _NAMES_MM - grid.nrows * _HEAD_MM) / (grid.nrows * len(names))
+    # Of many specimens only every so many have a name.
     every = max(1, int(np.ceil(_LABEL_MM / row_mm)))
     axis.set_yticks(range(0, len(names), every), [short(name, _NAME) for name in names[::every]])
     turned = max(len(name) for name in levels) * 1.25 + 1.0 > _cell_mm(cohort, grid.ncols)
@@ -257,7 +226,7 @@ def _explain(
     image: AxesImage,
     scale: Normalize,
     found: Sequence[PanelLine],
-    signs: pd.DataFrame,
+    flipped: bool,
 ) -> None:
     sizes = np.abs(np.concatenate([finite(stage.rows["peak_error"]) for stage in found]))
     unit = unit_of(found[0].rows)
@@ -274,18 +243,10 @@ def _explain(
     told = "predicted less measured motion at the largest load, loaded direction"
     bar.set_label(f"{told} ({SIGNS[unit]})")
     bar.outline.set_linewidth(0.4)
-    handles = [
-        Patch(
-            facecolor=EMPTY,
-            edgecolor=HATCH,
-            hatch="//////",
-            lw=0,
-            label="not measured, or no result",
-        )
-    ]
-    if len(_flipped(signs)):
+    handles = [Patch(facecolor=EMPTY, **_MISSING, label="not measured, or no result")]
+    if flipped:
         label = "measured motion goes against the load: sign flipped?"
-        handles.append(Patch(facecolor=WHITE, edgecolor=BLACK, lw=1.3, label=label))
+        handles.append(Patch(facecolor=WHITE, **_FRAME, label=label))
     cases = found[0].rows["test"].nunique()
     largest = f"{fixed(float(sizes.max()), 1)}{after_number(unit)}"
     words = [

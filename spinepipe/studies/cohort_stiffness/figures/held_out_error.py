@@ -32,6 +32,7 @@ LEAST = 1e-3
 
 _ROW_MM, _AROUND_MM, _KEY_MM = 13.0, 16.0, 18.0
 _DASHES, _DOTS = (0, (4, 2)), (0, (1, 1))
+_DOT: dict[str, Any] = {"color": OURS, "ms": 3.0, "mew": 0, "alpha": 0.55}
 
 
 def held_out_error_figure(
@@ -46,10 +47,14 @@ def held_out_error_figure(
         return saying("No error of a fit can be shown: no fit has a result.")
     fitted = found[found["stage"].isin(panels)]
     rows = [name for name in NAMES[::-1] if name in set(fitted["representation"])]
-    published = _published(found)
+    # The mean error over specimens of each published set.
+    literature = found[found["stage"] == "literature"]
+    means = literature.groupby("representation")["error"].mean()
+    published = {name: float(means[name]) for name in PUBLISHED if name in means.index}
     figure = blank(max(45.0, _ROW_MM * len(rows) + _AROUND_MM + _KEY_MM))
     axes = side_by_side(figure, len(panels), len(panels), sharey=True, sharex=True)
-    low, high = _reach([*finite(fitted["error"]), *published.values()])
+    sizes = np.maximum([*finite(fitted["error"]), *published.values()], LEAST)
+    low, high = float(sizes.min()) / 1.35, float(sizes.max()) * 1.35
     for index, (name, axis) in enumerate(zip(panels, axes, strict=True)):
         head(axis, index, PANELS[name])
         axis.set_xscale("log")
@@ -84,23 +89,11 @@ def motion_errors(errors: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(found, names=KEYS).rename("error").reset_index()
 
 
-def _published(found: pd.DataFrame) -> dict[str, float]:
-    """Mean error over specimens of each published set."""
-    rows = found[found["stage"] == "literature"]
-    means = rows.groupby("representation")["error"].mean()
-    return {name: float(means[name]) for name in PUBLISHED if name in means.index}
-
-
 def _look(published: str) -> dict[str, Any]:
     """Line of a published set."""
     if named(published).by_level:
         return {"color": THEIRS, "ls": _DOTS, "lw": 1.0}
     return {"color": GREY, "ls": _DASHES, "lw": 1.0}
-
-
-def _reach(values: Sequence[float]) -> tuple[float, float]:
-    sizes = np.maximum(np.asarray(values, dtype=float), LEAST)
-    return float(sizes.min()) / 1.35, float(sizes.max()) * 1.35
 
 
 def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str], unit: str) -> None:
@@ -112,28 +105,13 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str], unit: str) -> No
             note(axis, 0.02, y, "no result", GREY)
             continue
         shown = np.maximum(values, LEAST)
-        axis.plot(
-            shown,
-            y - 0.12 + 0.3 * spread_out(len(values)),
-            "o",
-            color=OURS,
-            ms=3.0,
-            mew=0,
-            alpha=0.55,
-            zorder=3,
-        )
+        axis.plot(shown, y - 0.12 + 0.3 * spread_out(len(values)), "o", **_DOT, zorder=3)
         words = f"{number(float(values.mean()))}{after_number(unit)}"
         interval = mean_of(values).interval
         if interval is not None:
             ends = max(0.0, interval[0]), interval[1]
-            axis.plot(
-                [max(ends[0], low), ends[1]],
-                [y + 0.16] * 2,
-                color=BLACK,
-                lw=1.1,
-                zorder=4,
-                solid_capstyle="butt",
-            )
+            line = [max(ends[0], low), ends[1]]
+            axis.plot(line, [y + 0.16] * 2, color=BLACK, lw=1.1, zorder=4, solid_capstyle="butt")
             words = f"{words} ({number(ends[0])}–{number(ends[1])})"
         middle = max(float(values.mean()), LEAST)
         axis.plot([middle], [y + 0.16], "D", color=BLACK, ms=3.2, mew=0, zorder=5)
@@ -141,9 +119,7 @@ def _draw(axis: Axes, rows: pd.DataFrame, names: Sequence[str], unit: str) -> No
 
 
 def _explain(figure: Figure, published: Mapping[str, float], specimens: int, unit: str) -> None:
-    handles = [
-        Line2D([], [], color=OURS, marker="o", ms=3.0, mew=0, ls="", alpha=0.55, label="a specimen")
-    ]
+    handles = [Line2D([], [], **_DOT, marker="o", ls="", label="a specimen")]
     mean = "mean with 95 % interval" if specimens > 1 else "mean"
     handles.append(Line2D([], [], color=BLACK, marker="D", ms=3.2, mew=0, lw=1.1, label=mean))
     for name, value in published.items():

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.glyphs import BAR_PT, Array, finite, quartiles, spread_out
+from spinepipe.report.glyphs import BAR_PT, finite, quartiles, spread_out
 from spinepipe.report.panels import explain_marks, head, log_ticks, sections
 from spinepipe.report.style import BLACK, GREY, OURS, WHITE, saying
 from spinepipe.report.words import AXIS, case, count, short
-from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import doubted, ends_shown
+from spinepipe.studies.cohort_stiffness.figures.stiffness_by_level import ends_shown, unconstrained
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, OF_JOINTS, SHARED
 from spinepipe.studies.cohort_stiffness.settings import ALL, CohortStiffness, load_cases
 from spinepipe.units import COORDINATES
@@ -45,6 +45,11 @@ def load_case_stiffness_figure(
     names = [name for name in COORDINATES if name in set(found["coordinate"])]
     height = _ROW_MM * len(cases) + _AROUND_MM
     lines, figure = sections([(len(names), height)] * len(shown), _KEY_MM)
+    names_of_cases = []
+    for test in cases[::-1]:  # on two lines
+        words = short(case(test), 32).split(" ")
+        halves = words[: -(-len(words) // 2)], words[-(-len(words) // 2) :]
+        names_of_cases.append("\n".join(" ".join(half) for half in halves if half))
     number_of = 0
     for representation, axes in zip(shown, lines, strict=True):
         for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
@@ -54,7 +59,7 @@ def load_case_stiffness_figure(
                 (found["representation"] == representation) & (found["coordinate"] == name)
             ]
             _draw(axis, here, cases)
-            axis.set_yticks(range(len(cases)), [_two_lines(one) for one in cases[::-1]])
+            axis.set_yticks(range(len(cases)), names_of_cases)
             place = axis.get_subplotspec()
             axis.tick_params(labelleft=place is None or place.is_first_col())
             if index == 0:
@@ -88,13 +93,7 @@ def ratios(stiffness: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     driven = errors[errors["loaded"].astype(bool)] if len(errors) else errors
     pairs = set(zip(driven["test"], driven["coordinate"], strict=True)) if len(errors) else set()
     loads = [key in pairs for key in zip(both["fitted_to"], both["coordinate"], strict=True)]
-    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=doubted(both), loaded=loads)
-
-
-def _two_lines(test: str) -> str:
-    words = short(case(test), 32).split(" ")
-    middle = -(-len(words) // 2)
-    return "\n".join(" ".join(part) for part in (words[:middle], words[middle:]) if part)
+    return both[[*_KEYS, "fitted_to"]].assign(**divided, doubted=unconstrained(both), loaded=loads)
 
 
 def _draw(axis: Axes, rows: pd.DataFrame, cases: Sequence[str]) -> None:
@@ -110,15 +109,8 @@ def _draw(axis: Axes, rows: pd.DataFrame, cases: Sequence[str]) -> None:
         axis.axhline(y - 0.5, color=GREY, lw=0.2, zorder=0)
         here = rows[rows["fitted_to"] == test]
         if not len(here):
-            axis.text(
-                0.02,
-                y,
-                "no result",
-                transform=axis.get_yaxis_transform(),
-                color=GREY,
-                fontsize=6.0,
-                va="center",
-            )
+            place = axis.get_yaxis_transform()
+            axis.text(0.02, y, "no result", transform=place, color=GREY, fontsize=6.0, va="center")
             continue
         _draw_row(axis, here, y)
 
@@ -126,6 +118,7 @@ def _draw(axis: Axes, rows: pd.DataFrame, cases: Sequence[str]) -> None:
 def _reach(rows: pd.DataFrame) -> tuple[float, float]:
     """Both ways equally far, as far as stiffness that the data hold goes."""
     held = rows[~rows["doubted"]] if (~rows["doubted"]).any() else rows
+    # The axis is logarithmic and symmetric about 1: half and twice are equally far.
     sizes = np.abs(np.log(finite(held[["ratio", "low", "high"]])))
     far = float(np.exp(sizes.max())) if len(sizes) else _LEAST_REACH
     end = min(_FARTHEST, max(_LEAST_REACH, far * 1.05))
@@ -138,33 +131,19 @@ def _draw_row(axis: Axes, rows: pd.DataFrame, y: int) -> None:
     color = OURS if loaded else GREY
     low, high = axis.get_xlim()
     n = len(rows)
+    # In order around the middle of the row where they are few, else mixed.
+    shifts = 0.5 * spread_out(n) if n > _FEW else 0.3 - 0.6 * (np.arange(n) + 0.5) / n
     if n > _MOST_INTERVALS:
-        axis.plot(
-            np.clip(rows["ratio"], low, high),
-            y + _shifts(n),
-            "o",
-            color=color,
-            ms=1.8,
-            mew=0,
-            alpha=0.3,
-            zorder=3,
-            rasterized=True,
-        )
+        dots: dict[str, Any] = {"color": color, "ms": 1.8, "mew": 0, "alpha": 0.3, "zorder": 3}
+        axis.plot(np.clip(rows["ratio"], low, high), y + shifts, "o", **dots, rasterized=True)
     else:
-        for at, row in zip(y + _shifts(n), rows.to_dict("records"), strict=True):
+        for at, row in zip(y + shifts, rows.to_dict("records"), strict=True):
             _draw_fit(axis, row, float(at), color, n <= _FEW)
     if n > _FEW:  # of all fits: without those not held by the data the median would be biased
         middle = quartiles(np.clip(finite(rows["ratio"]), low, high))
         axis.plot([middle.median] * 2, [y - 0.36, y + 0.36], color=BLACK, lw=1.2, zorder=6)
-        axis.plot(
-            [middle.low, middle.high],
-            [y, y],
-            color=BLACK,
-            lw=BAR_PT * 0.5,
-            alpha=0.8,
-            solid_capstyle="butt",
-            zorder=5,
-        )
+        bar: dict[str, Any] = {"color": BLACK, "lw": BAR_PT * 0.5, "alpha": 0.8, "zorder": 5}
+        axis.plot([middle.low, middle.high], [y, y], **bar, solid_capstyle="butt")
 
 
 def _draw_fit(axis: Axes, row: dict[Any, Any], y: float, color: str, roomy: bool) -> None:
@@ -174,55 +153,23 @@ def _draw_fit(axis: Axes, row: dict[Any, Any], y: float, color: str, roomy: bool
     beyond = x != row["ratio"]
     ends = ends_shown(row, low, high)
     if ends and not beyond:
-        axis.plot(
-            ends,
-            [y, y],
-            color=color,
-            lw=0.8 if roomy else 0.5,
-            zorder=3,
-            alpha=1.0 if roomy else 0.45,
-            solid_capstyle="butt",
-        )
+        width, alpha = (0.8, 1.0) if roomy else (0.5, 0.45)
+        axis.plot(ends, [y, y], color=color, lw=width, alpha=alpha, zorder=3, solid_capstyle="butt")
     shape = "o" if not beyond else "<" if x == low else ">"
     face = WHITE if row["doubted"] or beyond else color
-    axis.plot(
-        [x],
-        [y],
-        shape,
-        color=color,
-        mfc=face,
-        ms=3.0 if roomy else 2.2,
-        mew=0.6,
-        zorder=4,
-        clip_on=False,
-    )
-
-
-def _shifts(n: int) -> Array:
-    """(n,) places around the middle of a row: in order where they are few, else mixed."""
-    if n > _FEW:
-        return 0.5 * spread_out(n)
-    return 0.3 - 0.6 * (np.arange(n) + 0.5) / n
+    symbol: dict[str, Any] = {"ms": 3.0 if roomy else 2.2, "mew": 0.6, "zorder": 4}
+    axis.plot([x], [y], shape, color=color, mfc=face, **symbol, clip_on=False)
 
 
 def _explain(figure: Figure, rows: pd.DataFrame, tested: Sequence[str]) -> None:
+    symbol: dict[str, Any] = {"marker": "o", "ms": 3.0, "lw": 0.8}
     handles = [
-        Line2D([], [], color=OURS, marker="o", ms=3.0, lw=0.8, label="this load case loads it"),
-        Line2D([], [], color=GREY, marker="o", ms=3.0, lw=0.8, label="it does not"),
+        Line2D([], [], color=OURS, **symbol, label="this load case loads it"),
+        Line2D([], [], color=GREY, **symbol, label="it does not"),
     ]
     if rows["doubted"].any():
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=GREY,
-                marker="o",
-                mfc=WHITE,
-                ms=3.0,
-                lw=0.8,
-                label="not identifiable or at a bound",
-            )
-        )
+        label = "not identifiable or at a bound"
+        handles.append(Line2D([], [], color=GREY, mfc=WHITE, **symbol, label=label))
     words = (
         "Symbol: a specimen, or a joint of it; line: 95 % interval of the fit to this load case; "
         f"black, where more than {_FEW} stand in a row: median and middle half; lines are left out "

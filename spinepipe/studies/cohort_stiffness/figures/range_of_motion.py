@@ -15,7 +15,7 @@ from spinepipe.experiment.double_sigmoid import Zone
 from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, OURS, WHITE, blank, saying
 from spinepipe.report.words import case, count, short, tick
-from spinepipe.studies.cohort_stiffness.curves_compared import KEY, both
+from spinepipe.studies.cohort_stiffness.loop_rows import CURVE_KEY, paired_curves
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.tables import MEASURED
 
@@ -27,7 +27,7 @@ MJ_PER_J = 1000.0
 
 @dataclass(frozen=True)
 class ComparisonPanel:
-    """What a panel compares: points with columns as of `both`, in the unit of its axes."""
+    """What a panel compares: points with columns as of `paired_curves`, in the unit of its axes."""
 
     title: str
     unit: str
@@ -38,7 +38,7 @@ def range_of_motion_figure(
     study: CohortStiffness, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
     """A panel per test for the range of motion, then neutral zones and lost work, where read."""
-    panels = compared(tables["load_displacement"])
+    panels = comparison_panels(tables["load_displacement"])
     shown = panels[:_MOST_PANELS]
     if not shown:
         return saying("No range of motion was both measured and simulated.")
@@ -53,27 +53,29 @@ def range_of_motion_figure(
     return figure
 
 
-def compared(rows: pd.DataFrame) -> list[ComparisonPanel]:
+def comparison_panels(rows: pd.DataFrame) -> list[ComparisonPanel]:
     """What there is to compare; a curve without a neutral zone of the model has one of 0 there."""
     if rows.empty:
         return []
     found = []
-    ranges = both(rows, "range_of_motion", "deg").dropna(subset=["measured", "simulated"])
+    ranges = paired_curves(rows, "range_of_motion", "deg").dropna(subset=["measured", "simulated"])
     for test, points in ranges.groupby("test", sort=False):
         found.append(ComparisonPanel(short(case(str(test)), 32), "range of motion (°)", points))
-    zones = both(rows, "neutral_zone", "deg").dropna(subset="measured")
+    zones = paired_curves(rows, "neutral_zone", "deg").dropna(subset="measured")
     none = rows[(rows["source"] != MEASURED) & (rows["neutral_zone"] == Zone.NOT_MEANINGFUL)]
-    without = zones.merge(none[KEY].assign(none=True), on=KEY, how="left")["none"].notna()
+    without = zones.merge(none[CURVE_KEY].assign(none=True), on=CURVE_KEY, how="left")[
+        "none"
+    ].notna()
     for name in ("simulated", "simulated_way"):
         zones[name] = zones[name].where(~without.to_numpy(), 0.0)
     zones = zones.dropna(subset="simulated")
     if len(zones):
         found.append(ComparisonPanel("Neutral zone", "neutral zone (°)", zones))
-    work = both(rows, "hysteresis_area", "j").dropna(subset=["measured", "simulated"])
+    work = paired_curves(rows, "hysteresis_area", "j").dropna(subset=["measured", "simulated"])
     if len(work):
-        numbers = MJ_PER_J * work.drop(columns=KEY).astype(float)
+        numbers = MJ_PER_J * work.drop(columns=CURVE_KEY).astype(float)
         found.append(
-            ComparisonPanel("Work lost in a cycle", "work lost (mJ)", work[KEY].join(numbers))
+            ComparisonPanel("Work lost in a cycle", "work lost (mJ)", work[CURVE_KEY].join(numbers))
         )
     return found
 
@@ -110,10 +112,8 @@ def _explain(figure: Figure, panels: list[ComparisonPanel]) -> None:
     ]
     loose = any(p.points[["measured_way", "simulated_way"]].isna().any().any() for p in panels)
     if loose:
-        label = "an interval is missing"
-        handles.insert(
-            1, Line2D([], [], color=OURS, marker="o", mfc=WHITE, ms=3.0, lw=0, label=label)
-        )
+        hollow = {"color": OURS, "marker": "o", "mfc": WHITE, "ms": 3.0, "lw": 0}
+        handles.insert(1, Line2D([], [], **hollow, label="an interval is missing"))  # type: ignore[arg-type]
     more = len(panels) - _MOST_PANELS
     rest = f" {count(more, 'further panel')} not shown." if more > 0 else ""
     words = (

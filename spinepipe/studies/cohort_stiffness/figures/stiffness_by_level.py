@@ -1,7 +1,7 @@
 """Figure: fitted stiffness of every specimen, level by level, beside the published values."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,22 +24,17 @@ from spinepipe.studies.cohort_stiffness.representations import (
     named,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.studies.cohort_stiffness.stages import joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import joint_label_of, own_fits
 from spinepipe.units import COORDINATES
 
 
 @dataclass(frozen=True)
 class Mark:
-    """Colour, shape and size of a symbol, and whether it is filled."""
+    """Colour, shape and size of a symbol."""
 
     color: str
     shape: str
     size_pt: float
-    filled: bool = True
-
-    def hollow(self) -> "Mark":
-        """The same symbol, not filled."""
-        return replace(self, filled=False)
 
 
 MOST_INTERVALS = 170
@@ -74,10 +69,11 @@ def stiffness_by_level_figure(
 ) -> Figure:
     """A panel per free coordinate: levels side by side, and in each level the specimens."""
     stiffness = tables["stiffness"]
-    shown = _representations(stiffness, cohort)
-    rows = own(stiffness, shown)
+    own = own_fits(stiffness)
+    shown = _representations(own, cohort)
+    rows = own[own["representation"].isin(shown)]
     if not len(finite(rows["stiffness"])):
-        tried = own(stiffness, _FROM_BEST)["message"]
+        tried = own.loc[own["representation"].isin(_FROM_BEST), "message"]
         why = "; ".join(list(dict.fromkeys(tried[tried != ""]))[:2])
         return saying("No stiffness was found for any specimen" + (f": {why}." if why else "."))
     names = [name for name in COORDINATES if name in set(rows["coordinate"])]
@@ -93,27 +89,17 @@ def stiffness_by_level_figure(
     return figure
 
 
-def _representations(stiffness: pd.DataFrame, cohort: Cohort) -> list[str]:
+def _representations(own: pd.DataFrame, cohort: Cohort) -> list[str]:
     """At most two: those with a value for each joint first; one where two would crowd."""
-    known = own(stiffness, _FROM_BEST).dropna(subset=["stiffness"])
-    found = [name for name in _FROM_BEST if name in set(known["representation"])]
+    known = set(own.dropna(subset=["stiffness"])["representation"])
+    found = [name for name in _FROM_BEST if name in known]
     found = [name for name in found if name not in ASKED_FOR] or found
     free = [name for name in found if name in OF_JOINTS] or found[:1]
     one = len(cohort.joint_names) * len(cohort.specimen_names)
     return free[:2] if one * len(free[:2]) <= MOST_INTERVALS else free[:1]
 
 
-def own(stiffness: pd.DataFrame, representations: Sequence[str]) -> pd.DataFrame:
-    """Stiffness fitted to each specimen's own motion under all load cases."""
-    fitted = stiffness["fitted_to"] == joint_label_of(stiffness)
-    return stiffness[
-        fitted
-        & (stiffness["source"] == "own")
-        & stiffness["representation"].isin(list(representations))
-    ]
-
-
-def doubted(rows: pd.DataFrame) -> pd.Series:
+def unconstrained(rows: pd.DataFrame) -> pd.Series:
     """Whether each stiffness is not held by the data: not identifiable, or at a bound."""
     known = rows["identifiable"].map(lambda flag: flag is None or bool(flag)).astype(bool)
     return ~known | (rows["at_bound"] != "no")
@@ -132,58 +118,41 @@ def _draw(
     cohort: Cohort,
 ) -> None:
     levels = cohort.joint_names[::-1]
-    shade(axis, len(levels))
+    for level in range(0, len(levels), 2):  # every second level a shade darker
+        axis.axvspan(level - 0.5, level + 0.5, color=_SHADE, lw=0, zorder=0)
+    axis.set_xlim(-0.5, len(levels) - 0.5)
     _draw_published(axis, published, levels)
     axis.set_yscale("log")
     axis.set_ylabel(f"stiffness ({stiffness_unit(name)})")
-    label_levels(axis, levels)
+    # Names below the axis, slanted where they are long.
+    slanted = sum(len(level) + 2 for level in levels) > _MOST_LETTERS
+    turned = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted else {}
+    axis.set_xticks(range(len(levels)), [short(level) for level in levels], **turned)  # type: ignore[arg-type]
+    axis.tick_params(axis="x", length=0.0)
     if not len(finite(rows["stiffness"])):
         axis.text(0.5, 0.5, "no stiffness was found", transform=axis.transAxes, ha="center")
         return
-    low, high = reach(rows, published["stiffness"])
+    low, high = _reach(rows, published["stiffness"])
     axis.set_ylim(low, high)
     log_ticks(axis.yaxis, low, high, 6)
     axis.tick_params(axis="y", which="major", length=2.5)
     for level, joint in enumerate(levels):
         here = rows[rows["joint"] == joint]
         if _crowded(cohort):
-            values = finite(here.loc[~doubted(here), "stiffness"])
+            values = finite(here.loc[~unconstrained(here), "stiffness"])
             if len(values):
                 draw_upright(axis, values, level, OURS, 0.5)
             continue
-        at = places(level, cohort.specimen_names, shown)
+        # Where each specimen and representation stands within a level.
+        keys = [(specimen, shown_of) for specimen in cohort.specimen_names for shown_of in shown]
+        at = {key: level + _SHARE * ((i + 0.5) / len(keys) - 0.5) for i, key in enumerate(keys)}
         x = [at[key] for key in zip(here["specimen"], here["representation"], strict=True)]
         for number_of, representation in enumerate(shown):
             chosen = (here["representation"] == representation).to_numpy(bool)
-            draw_marks(axis, here[chosen], pd.Series(x)[chosen], _MARKS[number_of])
+            _draw_marks(axis, here[chosen], pd.Series(x)[chosen], _MARKS[number_of])
 
 
-def places(
-    level: int, specimens: Sequence[str], representations: Sequence[str]
-) -> dict[tuple[str, str], float]:
-    """Where each specimen and representation stands within a level."""
-    keys = [(specimen, name) for specimen in specimens for name in representations]
-    n = len(keys)
-    return {key: level + _SHARE * ((i + 0.5) / n - 0.5) for i, key in enumerate(keys)}
-
-
-def shade(axis: Axes, n: int) -> None:
-    """Every second level a shade darker."""
-    for level in range(0, n, 2):
-        axis.axvspan(level - 0.5, level + 0.5, color=_SHADE, lw=0, zorder=0)
-    axis.set_xlim(-0.5, n - 0.5)
-
-
-def label_levels(axis: Axes, levels: Sequence[str]) -> None:
-    """Names below the axis, slanted where they are long."""
-    slanted = sum(len(name) + 2 for name in levels) > _MOST_LETTERS
-    names = [short(name) for name in levels]
-    turned = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted else {}
-    axis.set_xticks(range(len(levels)), names, **turned)  # type: ignore[arg-type]
-    axis.tick_params(axis="x", length=0.0)
-
-
-def reach(rows: pd.DataFrame, more: object = ()) -> tuple[float, float]:
+def _reach(rows: pd.DataFrame, more: object = ()) -> tuple[float, float]:
     """Ends of the axis.
 
     Parameters
@@ -191,7 +160,7 @@ def reach(rows: pd.DataFrame, more: object = ()) -> tuple[float, float]:
     rows : with stiffness and interval; those the data do not hold count only where all are such.
     more : further values that are on the axis if they are near.
     """
-    held = rows[~doubted(rows)]
+    held = rows[~unconstrained(rows)]
     chosen = held if len(held) else rows
     values = finite(chosen["stiffness"])
     middle = quartiles(values)
@@ -224,10 +193,10 @@ def _look(published: str) -> dict[str, Any]:
     return {"color": GREY, "lw": 0.8, "ls": _DASHES}
 
 
-def draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None:
+def _draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None:
     """Stiffness of each row at its place (n,); the axis has its limits already."""
     low, high = axis.get_ylim()
-    doubt = doubted(rows)
+    doubt = unconstrained(rows)
     for at, row, doubtful in zip(x, rows.to_dict("records"), doubt, strict=True):
         value = row["stiffness"]
         if value is None or not np.isfinite(value):
@@ -237,25 +206,10 @@ def draw_marks(axis: Axes, rows: pd.DataFrame, x: pd.Series, mark: Mark) -> None
         else:
             ends = ends_shown(row, low, high)
             if ends:
-                axis.plot(
-                    [at, at],
-                    ends,
-                    color=mark.color,
-                    lw=0.9,
-                    solid_capstyle="butt",
-                    zorder=3,
-                )
-            face = WHITE if doubtful or not mark.filled else mark.color
-            axis.plot(
-                [at],
-                [value],
-                mark.shape,
-                color=mark.color,
-                mfc=face,
-                ms=mark.size_pt,
-                mew=0.7,
-                zorder=4,
-            )
+                axis.plot([at, at], ends, color=mark.color, lw=0.9, solid_capstyle="butt", zorder=3)
+            symbol: dict[str, Any] = {"color": mark.color, "ms": mark.size_pt, "mew": 0.7}
+            face = WHITE if doubtful else mark.color
+            axis.plot([at], [value], mark.shape, **symbol, mfc=face, zorder=4)
 
 
 def ends_shown(row: Mapping[Any, Any], low: float, high: float) -> list[float]:
@@ -271,32 +225,15 @@ def ends_shown(row: Mapping[Any, Any], low: float, high: float) -> list[float]:
 
 def _at_edge(axis: Axes, x: float, top: float, shape: str, color: str) -> None:
     y = 1.0 - _EDGE if top else _EDGE
-    axis.plot(
-        [x],
-        [y],
-        shape,
-        color=color,
-        mfc=WHITE,
-        ms=3.5,
-        mew=0.8,
-        transform=axis.get_xaxis_transform(),
-        zorder=5,
-    )
+    symbol: dict[str, Any] = {"color": color, "mfc": WHITE, "ms": 3.5, "mew": 0.8, "zorder": 5}
+    axis.plot([x], [y], shape, **symbol, transform=axis.get_xaxis_transform())
 
 
-def handle(mark: Mark, label: str) -> Line2D:
+def _handle(mark: Mark, label: str, filled: bool = True) -> Line2D:
     """The symbol as the key shows it."""
-    return Line2D(
-        [],
-        [],
-        color=mark.color,
-        lw=0.9,
-        marker=mark.shape,
-        ms=mark.size_pt,
-        mfc=mark.color if mark.filled else WHITE,
-        mew=0.7,
-        label=label,
-    )
+    symbol: dict[str, Any] = {"marker": mark.shape, "ms": mark.size_pt, "mew": 0.7}
+    face = mark.color if filled else WHITE
+    return Line2D([], [], color=mark.color, lw=0.9, **symbol, mfc=face, label=label)
 
 
 def _explain(
@@ -308,26 +245,18 @@ def _explain(
 ) -> None:
     handles: list[Line2D] = []
     if _crowded(cohort):
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=OURS,
-                marker="o",
-                ms=2.2,
-                mew=0,
-                ls="",
-                label=f"{IN_WORDS[shown[0]]}, a specimen",
-            )
-        )
+        dot = {"color": OURS, "marker": "o", "ms": 2.2, "mew": 0, "ls": ""}
+        handles.append(Line2D([], [], **dot, label=f"{IN_WORDS[shown[0]]}, a specimen"))  # type: ignore[arg-type]
     else:
-        handles += [handle(mark, IN_WORDS[name]) for mark, name in zip(_MARKS, shown, strict=False)]
+        handles += [
+            _handle(mark, IN_WORDS[name]) for mark, name in zip(_MARKS, shown, strict=False)
+        ]
     published = set(stiffness.loc[stiffness["source"] == "literature", "representation"])
     for name in (name for name in PUBLISHED if name in published):
         handles.append(Line2D([], [], **_look(name), label=IN_WORDS[name]))
-    doubt = bool(doubted(rows[rows["stiffness"].notna()]).any())
+    doubt = bool(unconstrained(rows[rows["stiffness"].notna()]).any())
     if doubt and not _crowded(cohort):
-        handles.append(handle(_MARKS[0].hollow(), "not identifiable or at a bound"))
+        handles.append(_handle(_MARKS[0], "not identifiable or at a bound", filled=False))
     if rows["stiffness"].isna().any() and not _crowded(cohort):
         handles.append(Line2D([], [], color=BLACK, marker="x", ms=3.5, ls="", label="no stiffness"))
     explain_marks(
@@ -340,12 +269,12 @@ def _words(stiffness: pd.DataFrame, rows: pd.DataFrame, cohort: Cohort) -> str:
     fitted = "all load cases" if label == "all" else label.replace("_", " ")
     words = [f"Fitted to {fitted}"]
     if _crowded(cohort):
-        held = rows[~doubted(rows) & rows["high"].notna()]
+        held = rows[~unconstrained(rows) & rows["high"].notna()]
         half = (held["high"] / held["low"]).pow(0.5)
         if len(half):
             words.append(f"median 95 % interval: times and divided by {number(half.median())}")
         words.append("bar: middle half of the specimens, tick: median")
-        lost = int(doubted(rows[rows["stiffness"].notna()]).sum())
+        lost = int(unconstrained(rows[rows["stiffness"].notna()]).sum())
         if lost:
             words.append(f"left out: {count(lost, 'value')} not identifiable or at a bound")
     else:

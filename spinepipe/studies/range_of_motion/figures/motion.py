@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.glyphs import BAR_PT, KEY, THIN_BAR_PT, draw_bar
-from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
+from spinepipe.report.panels import across_of, explain, explain_marks, head, side_by_side
 from spinepipe.report.style import BEST, BLACK, BLUE, GREEN, GREY, OURS, VERMILLION, blank, saying
 from spinepipe.report.words import AXIS, POSITIVE, case, count
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
@@ -48,14 +48,16 @@ def levels_figure(
     if loaded.empty:
         return saying("No motion can be shown: no run has an equilibrium.")
     tests = list(dict.fromkeys(loaded["test"]))
-    several = len(cohort.specimen_names) > 1
+    several = len(cohort.specimen_names) > 1  # then their medians stand beneath all runs
     joints = cohort.joint_names
     height = _LEVEL_MM if len(joints) <= _FEW_ROWS else _ROW_MM_OF_MANY
     axes, figure = panels(tests, joints, height)
     for axis, test in zip(axes, tests, strict=True):
         _draw_levels(axis, loaded[loaded["test"] == test], joints, several)
-    handles = _handles(several)
-    explain_marks(figure, handles, _words_of_levels(summary, several), len(handles))
+    meaning = {OURS: "all joint frames and stiffness sets" + " of all specimens" * several}
+    if several:
+        meaning[BEST] = "medians of the specimens"
+    explain(figure, meaning, _words_of_levels(summary, several))
     return figure
 
 
@@ -66,31 +68,19 @@ def _draw_levels(axis: Axes, rows: pd.DataFrame, joints: tuple[str, ...], severa
     whole = rows[rows["specimen"] == EVERY] if several else rows
     for y, joint in enumerate(joints):
         for row in whole[whole["joint"] == joint].to_dict("records"):
-            _quantile_bar(axis, row, y + 0.17 * several, thick)
+            # the bar of `draw_bar` from quantiles
+            at = [y + 0.17 * several] * 2
+            ends = [row["percentile_5"], row["percentile_95"]]
+            axis.plot(ends, at, color=OURS, lw=0.8, solid_capstyle="butt", zorder=3)
+            quartiles = [row["low_quartile"], row["high_quartile"]]
+            axis.plot(quartiles, at, color=OURS, lw=thick, solid_capstyle="butt", zorder=4)
+            tick: dict[str, Any] = {"color": BLACK, "ms": 1.6 * thick + 0.6, "mew": 1.0}
+            axis.plot([row["median"]], at[:1], "|", **tick, zorder=5)
         own = rows[(rows["joint"] == joint) & (rows["specimen"] != EVERY)]
         if several and len(own):
             draw_bar(axis, own["median"].to_numpy(float), y - 0.2, BEST, thick)
     coordinate = rows["coordinate"].iloc[0]
     axis.set_xlabel(f"{AXIS[coordinate].lower()} (°), + is {POSITIVE[coordinate]}")
-
-
-def _quantile_bar(axis: Axes, row: dict[Any, Any], y: float, thick_pt: float) -> None:
-    """The bar of `draw_bar` from quantiles."""
-    ends = [row["percentile_5"], row["percentile_95"]]
-    axis.plot(ends, [y, y], color=OURS, lw=0.8, solid_capstyle="butt", zorder=3)
-    quartiles = [row["low_quartile"], row["high_quartile"]]
-    axis.plot(quartiles, [y, y], color=OURS, lw=thick_pt, solid_capstyle="butt", zorder=4)
-    axis.plot([row["median"]], [y], "|", color=BLACK, ms=1.6 * thick_pt + 0.6, mew=1.0, zorder=5)
-
-
-def _handles(several: bool) -> list[Line2D]:
-    meaning = {OURS: "all joint frames and stiffness sets" + " of all specimens" * several}
-    if several:
-        meaning[BEST] = "medians of the specimens"
-    return [
-        Line2D([], [], color=color, lw=BAR_PT, solid_capstyle="butt", label=words)
-        for color, words in meaning.items()
-    ]
 
 
 def _words_of_levels(summary: pd.DataFrame, several: bool) -> str:
@@ -131,16 +121,8 @@ def variance_figure(
     for axis, test in zip(axes, tests, strict=True):
         _draw_shares(axis, shown[shown["test"] == test], cohort.joint_names, factors)
     handles = [
-        Line2D(
-            [],
-            [],
-            color=_MARKS[name][0],
-            marker=_MARKS[name][1],
-            ms=3.5,
-            lw=0.8,
-            label=_MARKS[name][2],
-        )
-        for name in factors
+        Line2D([], [], color=color, marker=shape, ms=3.5, lw=0.8, label=words)
+        for color, shape, words in (_MARKS[name] for name in factors)
     ]
     explain_marks(figure, handles, _words_of_shares(shown), len(handles))
     return figure
@@ -158,27 +140,16 @@ def _draw_shares(
                 at = y + 0.3 - 0.6 * number / (len(factors) - 1)
                 ends = [100.0 * row[f"{name}_low"], 100.0 * row[f"{name}_high"]]
                 axis.plot(ends, [at, at], color=color, lw=0.8, solid_capstyle="butt", zorder=3)
-                axis.plot(
-                    [100.0 * row[f"{name}_share"]],
-                    [at],
-                    shape,
-                    color=color,
-                    ms=2.6,
-                    mew=0.0,
-                    clip_on=False,
-                    zorder=4,
-                )
+                symbol: dict[str, Any] = {"ms": 2.6, "mew": 0.0, "clip_on": False, "zorder": 4}
+                axis.plot([100.0 * row[f"{name}_share"]], [at], shape, color=color, **symbol)
     axis.set_xlim(0.0, 100.0)
     axis.set_xlabel("share of variance (%)")
 
 
 def _words_of_shares(shown: pd.DataFrame) -> str:
     first = shown.iloc[0]
-    poses = (
-        f"{count(int(first['n_poses']), 'drawn pose')} each"
-        if first["specimen"] == EVERY
-        else (f"{count(int(first['n_poses']), 'drawn pose')} of {first['specimen']}")
-    )
+    whose = "each" if first["specimen"] == EVERY else f"of {first['specimen']}"
+    poses = f"{count(int(first['n_poses']), 'drawn pose')} {whose}"
     sets = count(int(first["n_stiffness"]), "drawn stiffness set")
     specimens = count(int(first["n_specimens"]), "specimen")
     return f"symbol: estimate, line: 95 % interval; {specimens}, {poses}, {sets}"
