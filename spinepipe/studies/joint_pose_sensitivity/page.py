@@ -187,16 +187,12 @@ def _of(
         yield sortable(name, title, about, in_full(frame), STATISTICS.columns)
         yield _folded(frame, study.significance)
     elif name == "importance":
-        yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
+        # by factor, and one row with its message for each tree that could not be grown
+        none = frame[frame["status"] != "done"].drop_duplicates(TREE)[[*TREE, "n", "message"]]
+        trees = pd.concat([importance_by_factor(frame), none], ignore_index=True)
+        yield sortable(name, title, about, trees, _IMPORTANCE)
     else:
         yield from page_tables(_SHAPES[name], title, frame)
-
-
-def _trees(importance: pd.DataFrame) -> pd.DataFrame:
-    """Importance by factor, and one row with its message for each tree that could not be grown."""
-    none = importance[importance["status"] != "done"].drop_duplicates(TREE)
-    told = none[[*TREE, "n", "message"]]
-    return pd.concat([importance_by_factor(importance), told], ignore_index=True)
 
 
 def _folded(frame: pd.DataFrame, alpha: float) -> Sortable:

@@ -5,8 +5,8 @@ import json
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import digest_of
 from spinepipe.marks import with_mark
+from spinepipe.studies.joint_pose_sensitivity.filters import ranked
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranked
 from spinepipe.tables import read_frame
 
 

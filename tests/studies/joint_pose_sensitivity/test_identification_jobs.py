@@ -31,6 +31,7 @@ from spinepipe.studies.joint_pose_sensitivity import (
 )
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
+from spinepipe.studies.joint_pose_sensitivity.landmarks import palpated
 from spinepipe.studies.joint_pose_sensitivity.settings import SETS_PER_BATCH
 from spinepipe.studies.joint_pose_sensitivity.tables import BOOTSTRAP, PRECISION_ERRORS
 from spinepipe.studies.joint_pose_sensitivity.variables import (
@@ -769,10 +770,10 @@ def test_landmark_errors_of_every_sd_draw_the_same_directions(tmp_path: Path) ->
     exact = cohort.landmarks.iloc[0]
     offsets = []
     for sd in (0.5, 2.0):
-        sets = landmark_errors._landmark_sets(settings, cohort, "a", sd)
+        sets = palpated(settings, cohort, "a").with_sd(sd, 20, settings.seed, "precision/a")
         point = [s[exact["vertebra"]][exact["landmark"]] for s in sets]
         offsets.append(1000.0 * np.array(point) - exact[["x_mm", "y_mm", "z_mm"]].to_numpy(float))
-    assert len(offsets[0]) == settings.landmark_precision.poses > 1
+    assert len(offsets[0]) == 20
     np.testing.assert_allclose(offsets[1], 4.0 * offsets[0], rtol=0, atol=1e-9)
     assert np.abs(offsets[1]).std() > 0.5
 

@@ -21,7 +21,7 @@ from spinepipe.problems import InputError
 from spinepipe.report.page.document import ResultTables
 from spinepipe.report.style import style
 from spinepipe.studies.joint_pose_sensitivity.figures.load_point import load_point_figure
-from spinepipe.studies.joint_pose_sensitivity.findings_of_load_point import load_point
+from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import load_point
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.load_point_effect import effect
 from spinepipe.studies.joint_pose_sensitivity.over_load_point import allowed

@@ -11,7 +11,7 @@ import pytest
 from small_project import Project
 
 from spinepipe.marks import read_json
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranked
+from spinepipe.studies.joint_pose_sensitivity.filters import ranked
 from spinepipe.studies.read import check
 from spinepipe.units import COORDINATE_COLUMNS
 

@@ -145,14 +145,10 @@ def _reasons(table: pd.DataFrame, what: str) -> str:
     return f"no {what} for {len(without)} of {count(cells, 'error')}: {told}"
 
 
-def _span(numbers: pd.Series) -> str:
-    low, high = numbers.min(), numbers.max()
-    return f"{low}" if low == high else f"{low}–{high}"
-
-
 def _words(tables: Mapping[str, pd.DataFrame], rows: PanelRows) -> str:
     grid = tables["variance_shares"]
-    poses, sets = (_span(grid[name]) for name in ("n_poses", "n_stiffness"))
+    ends = [(grid[name].min(), grid[name].max()) for name in ("n_poses", "n_stiffness")]
+    poses, sets = (f"{low}" if low == high else f"{low}–{high}" for low, high in ends)
     told = f"Grid of {poses} joint poses times {sets} stiffness sets" if len(grid) else ""
     lines = "line: 95 % interval; tree: share of the squared error that splits remove, r² from "
     parts = [told, rows.note, f"{lines}cross-validation"]
