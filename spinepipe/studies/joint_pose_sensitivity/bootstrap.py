@@ -43,7 +43,7 @@ def run(
     """Write the rows, one per joint, of the fits of one batch of sets."""
     settings, cohort = study_and_cohort(root, study)
     first = int(batch) * SETS_PER_BATCH
-    sets = sampled(settings, specimen, bootstrap)[first : first + SETS_PER_BATCH]
+    sets = sample_sets(settings, specimen, bootstrap)[first : first + SETS_PER_BATCH]
     found = _fits(root, settings, cohort, specimen, loading, sets)
     key = {"specimen": specimen, "bootstrap": bootstrap, "loading": loading}
     rows = [
@@ -61,7 +61,7 @@ def run(
     write(from_rows(BOOTSTRAP, rows), output, provenance("bootstrap", settings, cohort, [specimen]))
 
 
-def sampled(
+def sample_sets(
     settings: JointPoseSensitivity, specimen: str, bootstrap: str
 ) -> tuple[tuple[Array, Array], ...]:
     """Start stiffness (6,) and damping (6,) of every set, SI; what is not drawn is the study's."""
@@ -123,6 +123,7 @@ def _rests(problems: Sequence[Problem], found: Sequence[Fit]) -> list[bool]:
     rests = [True] * len(found)
     moving = [n for n, p in enumerate(problems) if p.course is not None and found[n].status.usable]
     evaluators: list[Evaluator] = []
+    # all behind the first share its chain, so that they are solved in one stack
     for number in moving:
         still = replace(problems[number], course=None)
         evaluators.append(Evaluator(still, evaluators[0] if evaluators else None))

@@ -71,7 +71,7 @@ def above_start(values: Array, start: Array, times: float) -> Flags:
     return values >= times * start
 
 
-def ranked(settings: JointPoseSensitivity, calibrations: pd.DataFrame) -> list[dict[str, Any]]:
+def rank_fits(settings: JointPoseSensitivity, calibrations: pd.DataFrame) -> list[dict[str, Any]]:
     """The stiffness sets of the reduced dataset of a specimen, least cost first.
 
     Each with its name, the pose it comes from, cost, and stiffness (J or 1, 6) SI.

@@ -224,19 +224,14 @@ def _widest(part: str, rows: pd.DataFrame) -> str:
     """The widest spread of a part of the study, under each loading."""
     if (rows["n"] < FEWEST_FOR_SPREAD).all():
         return f"{_WHAT[part]} not told, with fewer than {FEWEST_FOR_SPREAD} fits of a kind"
-    told = [
-        f"{_spread(fits)} {LOADING_NAMES[str(loading)]}"
-        for loading, fits in rows.groupby("loading", sort=False)
-    ]
+    told = []
+    for loading, fits in rows.groupby("loading", sort=False):
+        enough = fits[fits["n"] >= FEWEST_FOR_SPREAD]
+        share = 100.0 * float((enough["iqr"] / enough["median"]).max())  # NaN of none
+        spread = f"{'below 0.01' if share < 0.01 else number(share, 2)} %"
+        few = f"fewer than {FEWEST_FOR_SPREAD} fits"
+        told.append(f"{few if enough.empty else spread} {LOADING_NAMES[str(loading)]}")
     return f"{_WHAT[part]} {', '.join(told)}"
-
-
-def _spread(fits: pd.DataFrame) -> str:
-    enough = fits[fits["n"] >= FEWEST_FOR_SPREAD]
-    if enough.empty:
-        return f"fewer than {FEWEST_FOR_SPREAD} fits"
-    share = 100.0 * float((enough["iqr"] / enough["median"]).max())
-    return f"{'below 0.01' if share < 0.01 else number(share, 2)} %"
 
 
 def _lost(counts: pd.DataFrame) -> str:

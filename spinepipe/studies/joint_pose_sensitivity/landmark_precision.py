@@ -172,6 +172,7 @@ def required_precision(
     found = _crossing(sds, below.mean(axis=1), share)
     n = errors.shape[1]
     drawn = np.random.default_rng(seed).integers(0, n, (bootstraps, n))
+    # whole samples are drawn again, so that what SDs have in common stays together
     repeated = np.array([_crossing(sds, below[:, row].mean(axis=1), share) for row in drawn])
     low, high = np.percentile(repeated, CONFIDENCE, method="inverted_cdf")
     outside = [f"begins below {sds[0]:g} mm"] if low == -np.inf else []
@@ -196,5 +197,6 @@ def _crossing(sds: Array, below: Array, share: float) -> float:
     after = int(short[0])
     if after == 0:
         return -np.inf
+    # straight between the SDs on either side
     fraction = (below[after - 1] - share) / (below[after - 1] - below[after])
     return float(sds[after - 1] + fraction * (sds[after] - sds[after - 1]))

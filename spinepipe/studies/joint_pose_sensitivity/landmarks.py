@@ -11,7 +11,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import MM_PER_M
 
-Placed = dict[str, dict[str, Array]]
+LandmarkPoints = dict[str, dict[str, Array]]
 """Vertebra to landmark to position (3,)."""
 
 
@@ -41,7 +41,7 @@ class Landmarks:
         found: Array = self.sd_mm / MM_PER_M
         return found
 
-    def with_sd(self, sd_mm: float, count: int, seed: int, name: str) -> Iterator[Placed]:
+    def with_sd(self, sd_mm: float, count: int, seed: int, name: str) -> Iterator[LandmarkPoints]:
         """So many sets in m, sampled with one SD of all.
 
         Every SD draws the same directions, so that what is made of them differs by SD alone.
@@ -51,7 +51,7 @@ class Landmarks:
         return (by_vertebra(self.names, points) for points in drawn[:count] / MM_PER_M)
 
 
-def palpated(settings: JointPoseSensitivity, cohort: Cohort, specimen: str) -> Landmarks:
+def landmarks_of(settings: JointPoseSensitivity, cohort: Cohort, specimen: str) -> Landmarks:
     """The landmarks as the cohort lists them, with the SD that the study gives them."""
     assert cohort.landmarks is not None  # asked for when the study was checked
     rows = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
@@ -61,9 +61,9 @@ def palpated(settings: JointPoseSensitivity, cohort: Cohort, specimen: str) -> L
     return Landmarks(names, rows[["x_mm", "y_mm", "z_mm"]].to_numpy(float), sd)
 
 
-def by_vertebra(names: Iterable[tuple[str, str]], points: Iterable[Array]) -> Placed:
+def by_vertebra(names: Iterable[tuple[str, str]], points: Iterable[Array]) -> LandmarkPoints:
     """Points by their vertebra and name."""
-    placed: Placed = {}
+    placed: LandmarkPoints = {}
     for (vertebra, landmark), point in zip(names, points, strict=True):
         placed.setdefault(vertebra, {})[landmark] = point
     return placed

@@ -138,6 +138,7 @@ def _places(sd: float, grid: tuple[float, ...]) -> Array:
     """Equally probable places of a normal of this SD about 0, cut off where the grid ends."""
     if sd == 0.0:
         return np.zeros(1)
+    # middles of slices of equal probability
     low, high = norm.cdf(np.array([grid[0], grid[-1]]) / sd)
     shares: Array = low + (high - low) * (np.arange(NODES) + 0.5) / NODES
     places: Array = sd * norm.ppf(shares)
@@ -169,6 +170,7 @@ class Mixture:
 
     def quantile(self, share: float) -> float:
         """The stiffness below which so much lies; NaN where that is open."""
+        # the share below rises with the logarithm: one root, found by Brent's method
         ends = self.middle.min() - FARTHEST, self.middle.max() + FARTHEST
         if self.share_below(ends[0]) >= share or self.share_below(ends[1]) <= share:
             return float("nan")
@@ -187,6 +189,7 @@ def _at(
         np.log(here[column].to_numpy(float))
         for column in (f"{name}_{unit}", f"{name}_low_{unit}", f"{name}_high_{unit}")
     )
+    # a region's end lies where the t distribution's argument is its 97.5 % point
     limit = float(t.ppf(AT[-1], degrees))
     below, above = limit / (value - low), limit / (high - value)
     usable = here["status"].isin(USABLE).to_numpy()

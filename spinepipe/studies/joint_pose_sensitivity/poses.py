@@ -11,7 +11,11 @@ from spinepipe.frames import zxy_angles
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.landmarks import Placed, by_vertebra, palpated
+from spinepipe.studies.joint_pose_sensitivity.landmarks import (
+    LandmarkPoints,
+    by_vertebra,
+    landmarks_of,
+)
 from spinepipe.studies.joint_pose_sensitivity.tables import LANDMARKS, POSES
 from spinepipe.tables import from_rows, read_frame, to_arrow, write
 from spinepipe.units import MM_PER_M, ROTATIONS
@@ -23,7 +27,7 @@ _ANGLES = [f"{name}_deg" for name in ROTATIONS]
 def sample(root: str, study: str, specimen: str, output: str) -> None:
     """Write the landmark sets of one specimen, pose by pose."""
     settings, cohort = study_and_cohort(root, study)
-    marks = palpated(settings, cohort, specimen)
+    marks = landmarks_of(settings, cohort, specimen)
     sampled, poses = sample_landmarks(
         marks.points_mm, marks.sd_mm, settings.poses, settings.seed, specimen
     )
@@ -53,7 +57,7 @@ def build(root: str, study: str, landmarks: str, specimen: str, output: str) -> 
     write(from_rows(POSES, rows), output, made_by)
 
 
-def _joints(cohort: Cohort, points: Placed) -> list[dict[str, Any]]:
+def _joints(cohort: Cohort, points: LandmarkPoints) -> list[dict[str, Any]]:
     """One row per joint, without numbers where the landmarks define no frame."""
     try:
         frames = frames_from_landmarks(cohort.vertebrae, points)

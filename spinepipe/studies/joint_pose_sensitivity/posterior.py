@@ -25,7 +25,7 @@ from spinepipe.model import RefusedModel
 from spinepipe.statics import FreeParameter
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.landmarks import palpated
+from spinepipe.studies.joint_pose_sensitivity.landmarks import landmarks_of
 from spinepipe.studies.joint_pose_sensitivity.posterior_rows import (
     PREDICTIONS,
     PosteriorQuantity,
@@ -90,7 +90,7 @@ def _rows(
         found = fit(alone, settings.calibration.starts, specimen_seed(settings.seed, specimen))
         if not found.status.usable:
             return [refused_row(f"no fit in the cohort's own pose: {found.message}")], [], []
-        marks = palpated(settings, cohort, specimen)
+        marks = landmarks_of(settings, cohort, specimen)
         own = posterior_of(settings, cohort, alone, marks, scatter_of(settings, found))
         target = own.target()
     except (RefusedModel, ValueError) as error:
@@ -166,7 +166,7 @@ def _joints(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[PosteriorQ
     found = []
     for joint, axis in product(range(len(names)), range(6)):
         if not before[joint, axis].any():
-            continue
+            continue  # no free landmark moves it
         here = slope[joint, axis]
         near = float(top.by[0, joint, axis]), float(np.sqrt(here @ covariance @ here))
         prior = float(np.linalg.norm(before[joint, axis]))
@@ -214,6 +214,7 @@ def _weights(own: SpecimenPosterior, specimen: str, poses: str, start: Array) ->
         target: Target = own.target_in(np.array([placed[number] for number in some]))
         target.evaluator.forget()
         found |= dict(zip(some, modes(target, np.tile(start, (len(some), 1))), strict=True))
+    # weights in proportion to the evidence; less its largest, or exp would under- or overflow
     evidence = np.array([found[n].log_evidence if n in found else -np.inf for n in range(count)])
     weights = np.exp(evidence - evidence.max()) if np.isfinite(evidence).any() else 0.0 * evidence
     total = float(weights.sum()) or 1.0

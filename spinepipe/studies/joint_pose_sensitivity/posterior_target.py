@@ -59,6 +59,7 @@ class StiffnessAndLandmarks:
         """Moves of the logarithms, then offsets and tilts, and their derivatives."""
         count = len(self.low)
         moves, slopes = between(self.low, self.high, z[:, :count])
+        # offsets and tilts by landmarks, chain rule; each stiffness hangs on its own z alone
         placed, sd = self.placed(z), self.landmarks.sd[self.free, None]
         x = np.hstack([moves, _in_order(placed.by).reshape(len(z), -1)])
         jacobian = np.zeros((*x.shape, z.shape[1]))
@@ -215,6 +216,7 @@ def posterior_of(
         *free_parameters(model, first, TRANSLATIONS, "per_joint"),
         *free_parameters(model, first + 1, tilts, "per_joint"),
     )
+    # landmarks have a prior and no bounds
     anywhere = np.full(len(free) - len(alone.free), np.inf)
     problem = replace(
         alone,

@@ -155,6 +155,7 @@ class Specimen:
             return
         error = f"{coordinate}_error"
         values = grid.to_numpy(float)
+        # blocks are poses and treatments sets of stiffness, then the other way round
         yield Tested("friedman", joint, error, "stiffness", "", friedman(values))
         yield Tested("friedman", joint, error, "pose", "", friedman(values.T))
         family = f"two-factor: {error} at {joint} against"

@@ -17,7 +17,7 @@ from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import Program, System, settle
 from spinepipe.statics.batched import Stack
 from spinepipe.status import Status
-from spinepipe.studies.joint_pose_sensitivity.filters import ranked
+from spinepipe.studies.joint_pose_sensitivity.filters import rank_fits
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
     sampled_poses,
@@ -51,7 +51,7 @@ def run(
     settings, cohort = study_and_cohort(root, study)
     inputs = specimen_inputs(root, study, specimen, cohort.digest)
     fits = pd.concat([read_frame(path) for path in calibrations])
-    best = {one["name"]: np.array(one["stiffness"]) for one in ranked(settings, fits)}
+    best = {one["name"]: np.array(one["stiffness"]) for one in rank_fits(settings, fits)}
     of_pose, sampled = fits.set_index("pose"), sampled_poses(poses)
     asked: list[tuple[tuple[Pose, ...] | str, Array | str]] = []
     values: Array | str

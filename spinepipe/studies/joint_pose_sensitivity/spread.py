@@ -12,7 +12,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
 from spinepipe.jobs.digest import provenance
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.landmarks import palpated
+from spinepipe.studies.joint_pose_sensitivity.landmarks import landmarks_of
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import SPREAD_OVER_LANDMARK_SD
 from spinepipe.tables import from_rows, write
@@ -39,7 +39,7 @@ def _rows(
     settings: JointPoseSensitivity, cohort: Cohort, specimen: str, sd_mm: float
 ) -> Iterator[dict[str, Any]]:
     """One row per joint and coordinate; the directions are those of the study's own poses."""
-    marks, found = palpated(settings, cohort, specimen), []
+    marks, found = landmarks_of(settings, cohort, specimen), []
     for points in marks.with_sd(sd_mm, settings.poses, settings.seed, specimen):
         try:
             frames = frames_from_landmarks(cohort.vertebrae, points)

@@ -52,6 +52,7 @@ def _mean_error(
     lost = pd.DataFrame(measured & errors.isna().to_numpy(), columns=list(COORDINATES))
     by = [simulations[key].reset_index(drop=True) for key in _RUN]
     mean = errors.reset_index(drop=True).groupby(by, sort=False).mean()
+    # a coordinate that was measured in a step without a pose has no mean
     complete = ~lost.groupby(by, sort=False).any()
     return mean.where(complete).reset_index()
 

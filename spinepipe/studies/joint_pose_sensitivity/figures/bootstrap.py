@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.glyphs import STRIP_KEY, Array, draw_strip, finite, rounded
+from spinepipe.report.glyphs import STRIP_KEY, draw_strip, finite, rounded
 from spinepipe.report.panels import (
     EVERY_JOINT,
     MOST_ACROSS,
@@ -82,7 +82,12 @@ def bootstrap_figure(
     errors = solved[[ERROR[name] for name in measured]].notna().any(axis=1)
     moving = [name for name in cohort.joint_names if (errors & solved["joint"].eq(name)).any()]
     lower, relative = bootstrap_rows(solved, columns, cohort.specimen_names, moving, most)
-    room = _room_for_words([(len(free), upper), (len(measured), lower)])
+    # words stand beside rows only where the page does not become too tall by them
+    tall = sum(
+        -(-n // MOST_ACROSS) * _height(rows, MOST_ROWS_WITH_WORDS)
+        for n, rows in ((len(free), upper), (len(measured), lower))
+    )
+    room = MOST_ROWS_WITH_WORDS if tall + _KEY_MM <= TALLEST_MM else 0
     parts = [(len(free), _height(upper, room)), (len(measured), _height(lower, room))]
     across = MOST_ACROSS if room else _MOST_ACROSS
     (above, *others), figure = sections([part for part in parts if part[0]], _KEY_MM, across)
@@ -110,12 +115,6 @@ def bootstrap_figure(
         dashed="" if pooled else "start of the other fits",
     )
     return figure
-
-
-def _room_for_words(parts: Sequence[tuple[int, PanelRows]]) -> int:
-    """Up to how many rows of a panel have words: none where the page would be too small."""
-    height = sum(-(-n // MOST_ACROSS) * _height(rows, MOST_ROWS_WITH_WORDS) for n, rows in parts)
-    return MOST_ROWS_WITH_WORDS if height + _KEY_MM <= TALLEST_MM else 0
 
 
 def _height(rows: PanelRows, room: int) -> float:
@@ -188,17 +187,13 @@ def _draw_stiffness(
         if start and not relative:
             axis.plot(ends, [y, y], color=GREY, lw=7.0, alpha=0.2, solid_capstyle="butt", zorder=1)
         draw_strip(axis, values, y, OURS)
-    _limit(axis, samples, [] if relative else list(ends))
-    label_rows(axis, rows, below=0.5, above=0.75)
-    axis.set_xlabel("share of own median" if relative else f"stiffness ({stiffness_unit(name)})")
-
-
-def _limit(axis: Axes, samples: Sequence[Array], more: list[float]) -> None:
-    low = min([*(values.min() for values in samples), *more]) / _LEAST_SPREAD
-    high = max([*(values.max() for values in samples), *more]) * _LEAST_SPREAD
+    found = np.concatenate([*samples, *([] if relative else [np.array(ends)])])
+    low, high = found.min() / _LEAST_SPREAD, found.max() * _LEAST_SPREAD
     axis.set_xlim(low, high)
     log_ticks(axis.xaxis, low, high, _FEW_TICKS)
     axis.tick_params(axis="x", labelsize=_TICK_PT)
+    label_rows(axis, rows, below=0.5, above=0.75)
+    axis.set_xlabel("share of own median" if relative else f"stiffness ({stiffness_unit(name)})")
 
 
 def _draw_errors(name: str, axis: Axes, rows: PanelRows, relative: bool, cohort: str) -> None:

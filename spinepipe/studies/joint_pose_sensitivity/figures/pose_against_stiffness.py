@@ -43,7 +43,10 @@ def pose_against_stiffness_figure(
     )
     every = ((upper, "signed"), (upper, "absolute"), (lower, "tree"))
     parts = [(rows, what) for rows, what in every if len(rows)]
-    panels, figure = sections([(len(names), _height(rows)) for rows, _ in parts], _KEY_MM)
+    heights = [
+        len(rows) * (_ROW_MM if rows.with_numbers else _NARROW_MM) + _AROUND_MM for rows, _ in parts
+    ]
+    panels, figure = sections([(len(names), height) for height in heights], _KEY_MM)
     for part, ((rows, what), axes) in enumerate(zip(parts, panels, strict=True)):
         for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
             head(axis, part * len(names) + index, f"{AXIS[name]}: {_TITLES[what]}")
@@ -73,10 +76,6 @@ def _done(table: pd.DataFrame) -> pd.DataFrame:
 def _without(table: pd.DataFrame) -> pd.DataFrame:
     """One row for each joint and coordinate that has no result."""
     return table[table["status"] != "done"].drop_duplicates(TREE)
-
-
-def _height(rows: PanelRows) -> float:
-    return len(rows) * (_ROW_MM if rows.with_numbers else _NARROW_MM) + _AROUND_MM
 
 
 def _draw(axis: Axes, rows: PanelRows, name: str, what: str) -> None:

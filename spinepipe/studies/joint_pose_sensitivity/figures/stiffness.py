@@ -63,7 +63,15 @@ def stiffness_figure(
     per_joint = study.calibration.grouping == "per_joint"
     joints = cohort.joint_names if per_joint else (EVERY_JOINT,)
     rows = rows_of(solved, cohort.specimen_names, joints)
-    panels = [_panel(study, cohort, name) for name in COORDINATES if name in study.calibration.free]
+    panels = []
+    for name, column, start in zip(
+        COORDINATES, STIFFNESS_COLUMNS, study.stiffness.in_order(), strict=True
+    ):
+        published, factor = stiffness_quartiles(cohort.name, column), study.calibration.bound_factor
+        quartiles_of_paper = published and Quartiles(*published, 0)
+        if name in study.calibration.free:
+            ends = start / factor, start * factor
+            panels.append(_StiffnessPanel(name, column, start, *ends, quartiles_of_paper))
     axes, figure = grid(len(panels), rows, row_height(rows, 22.0))
     for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
         head(axis, index, AXIS[panel.coordinate])
@@ -93,16 +101,6 @@ class _StiffnessPanel:
         """The values that do not stand at a bound."""
         above, below = self.low * (1.0 + AT_BOUND), self.high * (1.0 - AT_BOUND)
         return values[(values > above) & (values < below)]
-
-
-def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _StiffnessPanel:
-    index = COORDINATES.index(coordinate)
-    start = study.stiffness.in_order()[index]
-    factor = study.calibration.bound_factor
-    column = STIFFNESS_COLUMNS[index]
-    published = stiffness_quartiles(cohort.name, column)
-    paper = published and Quartiles(*published, 0)
-    return _StiffnessPanel(coordinate, column, start, start / factor, start * factor, paper)
 
 
 def _draw(panel: _StiffnessPanel, axis: Axes, rows: PanelRows, solved: pd.DataFrame) -> None:
