@@ -198,7 +198,9 @@ def _bootstrap_fit() -> float:
     """Median CPU seconds of a fit from a sampled start, in the cohort's own joint poses."""
     settings, cohort = study_and_cohort(ROOT, STUDY)
     frames = specimen_inputs(ROOT, STUDY, SPECIMEN, cohort.digest).frames
-    starts = [start for start, _ in bootstrap.sampled(settings, SPECIMEN, "start")[:BOOTSTRAP_FITS]]
+    starts = [
+        start for start, _ in bootstrap.sample_sets(settings, SPECIMEN, "start")[:BOOTSTRAP_FITS]
+    ]
     seconds = [
         cpu_seconds(partial(fit, calibration_problem(ROOT, settings, SPECIMEN, frames, start)), 1)
         for start in starts

@@ -14,11 +14,8 @@ from spinepipe.calibrate.posterior import between, modes, normal_of
 from spinepipe.calibrate.sampler import sample
 from spinepipe.jobs.code import code_digest
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.posterior_target import (
-    made_of,
-    palpated,
-    problem_of,
-)
+from spinepipe.studies.joint_pose_sensitivity.landmarks import landmarks_of
+from spinepipe.studies.joint_pose_sensitivity.posterior_target import posterior_of, problem_of
 from tests.generators import palpated_joints
 from tests.generators.palpated_joints import FACTOR, FREE, MARKS, START, Joint, joint, write
 
@@ -97,7 +94,7 @@ def _phantom(root: str, name: str, one: Joint, seed: int) -> Iterator[dict[str, 
     alone = problem_of(root, settings, name)
     found = fit(alone, 1, seed)
     assert found.status.usable, (name, found.message)
-    own = made_of(settings, cohort, alone, palpated(settings, cohort, name), 0.0)
+    own = posterior_of(settings, cohort, alone, landmarks_of(settings, cohort, name), 0.0)
     target, (low, high) = own.target(), own.bounds
     start = np.zeros(own.unknowns.size)
     start[: len(FREE)] = normal_of(low, high, found.x)

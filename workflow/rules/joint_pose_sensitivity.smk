@@ -1,6 +1,6 @@
 # Study kind joint_pose_sensitivity: how much of the answer hangs on where joints were placed.
 # The jobs stand in spinepipe/studies/joint_pose_sensitivity; see `run_job` for their arguments.
-from spinepipe.studies.joint_pose_sensitivity.kind import METHODS
+from spinepipe.studies.joint_pose_sensitivity.settings import METHODS
 
 POSES = results_of("joint_pose_sensitivity")
 

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.jobs.digest import provenance
-from spinepipe.statistics import Agreement, bland_altman
+from spinepipe.statistics import bland_altman
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.tables import (
     AGREEMENT,
@@ -49,17 +49,15 @@ def _coordinates(part: pd.DataFrame) -> Iterator[dict[str, Any]]:
             continue
         known = pair.dropna().to_numpy(float)
         found = bland_altman(known[:, 0], known[:, 1])
-        yield {"coordinate": name, "unit": unit, **_row(found)}
-
-
-def _row(found: Agreement) -> dict[str, Any]:
-    """Numbers of a row; the correlation only where it says something of a bias."""
-    rho, p = found.proportional.effect, found.proportional.p
-    told = NOTHING_TO_TELL if rho is None else TOLD if found.comparable else NOT_MEANINGFUL
-    return {
-        **{name: getattr(found, name) for name in _NUMBERS},
-        "proportional_rho": rho if told == TOLD else None,
-        "proportional_p": p if told == TOLD else None,
-        "proportional": told,
-        "status": found.status.value,
-    }
+        # the correlation of difference and mean only where it says something of a bias
+        rho, p = found.proportional.effect, found.proportional.p
+        told = NOTHING_TO_TELL if rho is None else TOLD if found.comparable else NOT_MEANINGFUL
+        yield {
+            "coordinate": name,
+            "unit": unit,
+            **{number: getattr(found, number) for number in _NUMBERS},
+            "proportional_rho": rho if told == TOLD else None,
+            "proportional_p": p if told == TOLD else None,
+            "proportional": told,
+            "status": found.status.value,
+        }

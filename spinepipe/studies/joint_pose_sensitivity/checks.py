@@ -16,8 +16,6 @@ from spinepipe.studies.parts import AUTO
 from spinepipe.studies.places import at, unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
-__all__ = ["check_joint_pose_sensitivity"]
-
 
 def check_joint_pose_sensitivity(
     document: YamlDocument, study: JointPoseSensitivity, cohort: Cohort
@@ -46,7 +44,10 @@ def _landmarks(
         found = f"cohort '{cohort.name}', which has none"
         yield InputProblem(*at(document, "cohort"), found, allowed, "choose another cohort")
         return
-    for problem in landmark_problems(_draft(cohort, cohort.landmarks), set()):
+    tables = {"specimens": cohort.specimens, "landmarks": cohort.landmarks}
+    absent = frozenset(TABLES) - set(tables)
+    draft = Draft(cohort.name, cohort.vertebrae, cohort.gravity, tables, absent)
+    for problem in landmark_problems(draft, set()):
         place = (problem.file, None, problem.column)  # blank lines may have shifted the rows
         yield InputProblem(*place, problem.found, problem.allowed, problem.remedy)
     frame = cohort.landmarks[cohort.landmarks["landmark"].isin(FRAME_LANDMARKS)]
@@ -57,12 +58,6 @@ def _landmarks(
         allowed = "a number in mm, or an sd_mm for every landmark of a joint frame"
         remedy = "set landmark_sd_mm or fill the column"
         yield InputProblem(*at(document, "landmark_sd_mm"), found, allowed, remedy)
-
-
-def _draft(cohort: Cohort, landmarks: pd.DataFrame) -> Draft:
-    tables = {"specimens": cohort.specimens, "landmarks": landmarks}
-    absent = frozenset(TABLES) - set(tables)
-    return Draft(cohort.name, cohort.vertebrae, cohort.gravity, tables, absent)
 
 
 def _loading(
@@ -99,10 +94,8 @@ def _load_point(
         return
     forces = ["fx_n", "fy_n", "fz_n"]
     loads = cohort.loads[cohort.loads["test"].isin(study.tests or cohort.tests)]
-    preload = cohort.preload
-    if loads[forces].abs().gt(0.0).any(axis=None):
-        return
-    if preload is not None and preload[forces].abs().gt(0.0).any(axis=None):
+    acting = [table for table in (loads, cohort.preload) if table is not None]
+    if any(table[forces].abs().gt(0.0).any(axis=None) for table in acting):
         return
     found = "other load points, but no force in any chosen test"
     place = at(document, "load_point")

@@ -10,7 +10,6 @@ from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.problems import InputError
-from spinepipe.statics import with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.exports import needed, problem, refuse, written
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
@@ -18,7 +17,7 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
     sampled_poses,
     start_stiffness,
 )
-from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
+from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem, fitted_stiffness
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.tables import read_frame
@@ -44,28 +43,27 @@ def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -
     if wanted.start:
         stiffness, origin = start_stiffness(study), "start of the study"
     elif pose is None:
-        stiffness, origin = _fitted(study, wanted, frames), "fitted in this pose"
+        stiffness, origin = _fitted(study, wanted), "fitted in this pose"
     else:
         stiffness, origin = _calibrated(wanted.results, specimen, pose), "calibrated for this pose"
     model = bushing_model(study, cohort, specimen, frames, stiffness)
     return written(model, f"joint pose {name}, stiffness: {origin}")
 
 
-def _fitted(study: JointPoseSensitivity, wanted: WantedFiles, frames: tuple[Pose, ...]) -> Array:
-    """(J, 6) stiffness fitted in these frames, as the study fits.
+def _fitted(study: JointPoseSensitivity, wanted: WantedFiles) -> Array:
+    """(J, 6) stiffness fitted in the cohort's own joint pose, as the study fits.
 
     Raises
     ------
     InputError
         Where there is no fit to use.
     """
-    asked = calibration_problem(str(wanted.root), study, wanted.specimen, frames)
+    asked = calibration_problem(str(wanted.root), study, wanted.specimen)
     found = fit(asked, study.calibration.starts, study.seed)
     if not found.status.usable:
         allowed, remedy = "a fit in the cohort's own joint pose", "add --start for the start"
         raise InputError([problem("SPECIMEN", f"no fit: {found.message}", allowed, remedy)])
-    values: Array = with_parameters(asked.model, asked.free, found.x).effects[0].values
-    return values
+    return fitted_stiffness(asked, found.x)
 
 
 def _sampled(results: Path, specimen: str, pose: int) -> tuple[Pose, ...]:
@@ -78,8 +76,9 @@ def _sampled(results: Path, specimen: str, pose: int) -> tuple[Pose, ...]:
     """
     path = results / "poses.parquet"
     if not path.is_file():
-        remedy = f"run `snakemake {_relative(path)}` first, or leave --pose out"
-        raise InputError([problem("--pose", f"no {_relative(path)}", "a computed study", remedy)])
+        name = "/".join(path.parts[-3:])  # from the folder of the Snakefile
+        remedy = f"run `snakemake {name}` first, or leave --pose out"
+        raise InputError([problem("--pose", f"no {name}", "a computed study", remedy)])
     poses = sampled_poses(str(path))
     frames, reason = poses.of(specimen, pose)
     if frames is None:
@@ -110,7 +109,3 @@ def _calibrated(results: Path, specimen: str, pose: int) -> Array:
         remedy = "choose another pose, or add --start for the start"
         raise InputError([problem("--pose", found, "a pose whose fit ended", remedy)])
     return values
-
-
-def _relative(path: Path) -> str:
-    return "/".join(path.parts[-3:])

@@ -1,4 +1,10 @@
-"""The published filters of fits: what has not moved, and what has moved too far."""
+"""Which fits count: what the published filters keep of them, best first.
+
+A fit that has not moved from its start has failed, one that has moved too far is an outlier
+(Gould 2024a, section 2.5); what is left is the reduced dataset.
+"""
+
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,7 +17,9 @@ from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
 _ROUNDING = 1e-12
+"""Of the limit: a value that is exactly so far from its start still counts as near."""
 
 
 def judge_poses(settings: JointPoseSensitivity, calibrations: pd.DataFrame) -> pd.DataFrame:
@@ -27,10 +35,7 @@ def judge_bootstrap(settings: JointPoseSensitivity, bootstrap: pd.DataFrame) -> 
 
 
 def _judged(
-    settings: JointPoseSensitivity,
-    fits: pd.DataFrame,
-    start: NDArray[np.float64],
-    keys: list[str],
+    settings: JointPoseSensitivity, fits: pd.DataFrame, start: Array, keys: list[str]
 ) -> pd.DataFrame:
     """Flags of every fit; where stiffness is per joint, over all rows of the fit."""
     rule = settings.success
@@ -52,16 +57,40 @@ def _judged(
 def near_start(values: Array, start: Array, percent: float) -> Flags:
     """(n, k) whether values (n, k) differ from their start (k,) or (n, k) by at most that share.
 
-    Gould 2024a, section 2.5: a stiffness within 1 % of its start has not been optimised. A value
-    that is exactly that far still counts as near; NaN, no value, is not near.
+    NaN, no value, is not near.
     """
     limit = np.abs(start) * (percent / 100.0) * (1.0 + _ROUNDING)
     return np.abs(values - start) <= limit
 
 
 def above_start(values: Array, start: Array, times: float) -> Flags:
-    """(n, k) whether values (n, k) reach that many times their start (k,) or (n, k).
+    """(n, k) whether values (n, k) reach that many times their start (k,) or (n, k); NaN does not.
 
-    Gould 2024a, section 2.5: an order of magnitude above the start is an outlier. NaN is none.
+    In the paper an order of magnitude.
     """
     return values >= times * start
+
+
+def rank_fits(settings: JointPoseSensitivity, calibrations: pd.DataFrame) -> list[dict[str, Any]]:
+    """The stiffness sets of the reduced dataset of a specimen, least cost first.
+
+    Each with its name, the pose it comes from, cost, and stiffness (J or 1, 6) SI.
+
+    Parameters
+    ----------
+    calibrations : rows of the table, of this specimen alone.
+    """
+    judged = judge_poses(settings, calibrations)
+    reduced = calibrations[calibrations["pose"].isin(judged.loc[judged["reduced"], "pose"])]
+    costs = reduced.groupby("pose")["cost"].first().sort_values(kind="stable")
+    return [
+        {
+            "name": f"best{rank:02d}",
+            "pose": int(pose),
+            "cost": float(costs[pose]),
+            "stiffness": reduced.loc[reduced["pose"] == pose, list(STIFFNESS_COLUMNS)]
+            .to_numpy(float)
+            .tolist(),
+        }
+        for rank, pose in enumerate(costs.index, start=1)
+    ]

@@ -1,7 +1,5 @@
 """Key findings of a joint-pose study as sentences, their numbers computed from its tables."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
@@ -14,9 +12,11 @@ from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import 
     required_words,
 )
 from spinepipe.studies.joint_pose_sensitivity.figures.success import refused
-from spinepipe.studies.joint_pose_sensitivity.findings_of_load_point import load_point
-from spinepipe.studies.joint_pose_sensitivity.findings_of_posterior import posterior
-from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import stiffness
+from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import (
+    load_point,
+    posterior,
+    stiffness,
+)
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
 FOLDED = 5.0
@@ -148,8 +148,10 @@ def _precision(study: JointPoseSensitivity, results: ResultTables) -> str:
         f"with {WHOSE[str(whose)]} {_required(part, asked.sd_mm)}"
         for whose, part in chosen.groupby("stiffness")
     ]
+    low, high = int(chosen["n"].min()), int(chosen["n"].max())
+    poses = count(high, "pose") if low == high else f"{low} to {count(high, 'pose')}"
     told = f"{goal}, the SD of a landmark per axis may be at most: {'; '.join(parts)}"
-    return f"{told} ({_poses(chosen)} per SD). {_too_few(chosen, asked.share)}".strip()
+    return f"{told} ({poses} per SD). {_too_few(low, asked.share)}".strip()
 
 
 def _required(part: pd.DataFrame, sampled: tuple[float, ...]) -> str:
@@ -168,14 +170,8 @@ def _required(part: pd.DataFrame, sampled: tuple[float, ...]) -> str:
     return ", but ".join([f"{fixed(least['sd_mm'])} mm ({which})", *why])
 
 
-def _poses(chosen: pd.DataFrame) -> str:
-    low, high = int(chosen["n"].min()), int(chosen["n"].max())
-    return count(high, "pose") if low == high else f"{low} to {count(high, 'pose')}"
-
-
-def _too_few(chosen: pd.DataFrame, share: float) -> str:
+def _too_few(n: int, share: float) -> str:
     """That so few poses cannot show the share, even if all of them were below the limits."""
-    n = int(chosen["n"].min())
     low = float(proportion_confint(n, n, method="wilson")[0]) if n else 0.0
     if low >= share:
         return ""
@@ -218,30 +214,24 @@ def _bootstraps(study: JointPoseSensitivity, results: ResultTables) -> str:
         & (rows["quantity"] == "stiffness")
         & rows["coordinate"].isin(study.calibration.free)
     ].dropna(subset=["median"])
-    parts = list(_widest(chosen))
+    parts = [_widest(str(part), fits) for part, fits in chosen.groupby("part", sort=False)]
     lead = "Middle half (IQR) of the fitted stiffness as a share of its median, widest direction"
     told = f"{lead}: {'; '.join(parts)}." if parts else ""
     return " ".join(words for words in (told, _lost(counts)) if words)
 
 
-def _widest(chosen: pd.DataFrame) -> Iterator[str]:
-    for part, rows in chosen.groupby("part", sort=False):
-        if (rows["n"] < FEWEST_FOR_SPREAD).all():
-            yield f"{_WHAT[str(part)]} not told, with fewer than {FEWEST_FOR_SPREAD} fits of a kind"
-            continue
-        told = [
-            f"{_spread(fits)} {LOADING_NAMES[str(loading)]}"
-            for loading, fits in rows.groupby("loading", sort=False)
-        ]
-        yield f"{_WHAT[str(part)]} {', '.join(told)}"
-
-
-def _spread(fits: pd.DataFrame) -> str:
-    enough = fits[fits["n"] >= FEWEST_FOR_SPREAD]
-    if enough.empty:
-        return f"fewer than {FEWEST_FOR_SPREAD} fits"
-    share = 100.0 * float((enough["iqr"] / enough["median"]).max())
-    return f"{'below 0.01' if share < 0.01 else number(share, 2)} %"
+def _widest(part: str, rows: pd.DataFrame) -> str:
+    """The widest spread of a part of the study, under each loading."""
+    if (rows["n"] < FEWEST_FOR_SPREAD).all():
+        return f"{_WHAT[part]} not told, with fewer than {FEWEST_FOR_SPREAD} fits of a kind"
+    told = []
+    for loading, fits in rows.groupby("loading", sort=False):
+        enough = fits[fits["n"] >= FEWEST_FOR_SPREAD]
+        share = 100.0 * float((enough["iqr"] / enough["median"]).max())  # NaN of none
+        spread = f"{'below 0.01' if share < 0.01 else number(share, 2)} %"
+        few = f"fewer than {FEWEST_FOR_SPREAD} fits"
+        told.append(f"{few if enough.empty else spread} {LOADING_NAMES[str(loading)]}")
+    return f"{_WHAT[part]} {', '.join(told)}"
 
 
 def _lost(counts: pd.DataFrame) -> str:
@@ -252,14 +242,13 @@ def _lost(counts: pd.DataFrame) -> str:
     for part, what in _WHAT.items():
         rows = counts[counts["part"] == part]
         fits, lost = int(rows["fits"].sum()), int((rows["fits"] - rows["solved"]).sum())
+        each = rows.assign(lost=rows["fits"] - rows["solved"]).groupby("loading", sort=False)
+        where = [
+            f"{LOADING_NAMES[str(loading)]} {int(of['lost'])} of {int(of['fits'])}"
+            for loading, of in each[["lost", "fits"]].sum().iterrows()
+            if of["lost"]
+        ]
         if fits:
-            told = f" ({', '.join(_where(rows))})" if lost else ""
+            told = f" ({', '.join(where)})" if lost else ""
             parts.append(f"{what} {lost} of {fits}{told}")
     return f"Fits lost, without a stiffness: {'; '.join(parts)}." if parts else ""
-
-
-def _where(rows: pd.DataFrame) -> Iterator[str]:
-    for loading, part in rows.groupby("loading", sort=False):
-        lost = int((part["fits"] - part["solved"]).sum())
-        if lost:
-            yield f"{LOADING_NAMES[str(loading)]} {lost} of {int(part['fits'].sum())}"

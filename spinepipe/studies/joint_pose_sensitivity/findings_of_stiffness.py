@@ -1,18 +1,31 @@
-"""Stiffness of a joint-pose study as sentences: what is held by the data, and what is not."""
+"""What is known of stiffness, as sentences: over joint poses and load points, by the posterior."""
+
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 
 from spinepipe.report.page.document import ResultTables
 from spinepipe.report.panels import EVERY_JOINT
-from spinepipe.report.words import AXIS, count, number, percent
-from spinepipe.status import USABLE
+from spinepipe.report.words import AXIS, count, fixed, listed, number, percent, tick
+from spinepipe.status import USABLE, Status
 from spinepipe.studies.joint_pose_sensitivity.filters import near_start
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
 
 MOSTLY = 0.5
 """Where more fits have an open region, the median value is one that the data do not exclude."""
+
+CHANGES = 0.1
+"""Share of a stiffness by which it must differ over the load points to be named."""
+
+ALIKE = 0.5
+"""Where weights count for more than this share of the poses, the data hardly tell them apart."""
+
+FEW = 10.0
+"""Weights that count for fewer poses than this hang on which poses happened to be drawn."""
+
+# --- over joint poses -----------------------------------------------------------------------------
 
 
 def stiffness(study: JointPoseSensitivity, results: ResultTables) -> str:
@@ -26,12 +39,16 @@ def stiffness(study: JointPoseSensitivity, results: ResultTables) -> str:
         & (rows["quantity"] == "stiffness")
         & rows["coordinate"].isin(study.calibration.free)
     ].dropna(subset=["median"])
-    solved = _reduced(results)
-    kept = _kept_starts(study, results)
-    chosen = chosen[~chosen["coordinate"].isin(list(kept))]
+    fitted, success = results.table("calibrations"), results.table("success")
+    solved = fitted if fitted.empty else fitted[fitted["status"].isin(USABLE)]
+    at_start = {} if fitted.empty else _at_start(study, solved)
+    if not (solved.empty or success.empty):  # the reduced poses
+        kept = success.loc[success["reduced"], ["specimen", "pose"]]
+        solved = solved.merge(kept, on=["specimen", "pose"])
+    chosen = chosen[~chosen["coordinate"].isin(list(at_start))]
     is_open = chosen["open_share"].astype(float) > MOSTLY
     held = [
-        _medians(part, chosen) + _doubt(solved, str(name), part)
+        _medians(part, chosen) + _not_identifiable(solved, str(name), part)
         for name, part in chosen[~is_open].groupby("coordinate", sort=False)
     ]
     not_held = [
@@ -40,22 +57,18 @@ def stiffness(study: JointPoseSensitivity, results: ResultTables) -> str:
     told = (
         f"Median stiffness over the reduced poses: {'; '.join(held)}." if held else "",
         f"Not held by the data: {'; '.join(not_held)}." if not_held else "",
-        f"Nothing is known of {'; '.join(kept.values())}." if kept else "",
-        _exact(solved) if held or not_held or kept else "",
+        f"Nothing is known of {'; '.join(at_start.values())}." if at_start else "",
+        _exact(solved) if held or not_held or at_start else "",
     )
     return " ".join(words for words in told if words)
 
 
-def _kept_starts(study: JointPoseSensitivity, results: ResultTables) -> dict[str, str]:
+def _at_start(study: JointPoseSensitivity, solved: pd.DataFrame) -> dict[str, str]:
     """Coordinates whose stiffness most fits left where it started, and in words how many.
 
     Such a value is the study's own input; a median of it is no result. Values that the data hold
     are left alone, wherever they are.
     """
-    fitted = results.table("calibrations")
-    if fitted.empty:
-        return {}
-    solved = fitted[fitted["status"].isin(USABLE)]
     found: dict[str, str] = {}
     for name, column, start in zip(
         COORDINATES, STIFFNESS_COLUMNS, study.stiffness.in_order(), strict=True
@@ -87,18 +100,6 @@ def _not_held(part: pd.DataFrame, chosen: pd.DataFrame) -> str:
         f"{number(first['lower_end_low_quartile'])} to {number(first['lower_end_high_quartile'])}"
     )
     return f"{told} of fits; lower ends {ends} {first['unit']} (IQR)"
-
-
-def _reduced(results: ResultTables) -> pd.DataFrame:
-    """Solved fits of the reduced poses."""
-    fitted, success = results.table("calibrations"), results.table("success")
-    if fitted.empty:
-        return fitted
-    solved = fitted[fitted["status"].isin(USABLE)]
-    if success.empty:
-        return solved
-    kept = success.loc[success["reduced"], ["specimen", "pose"]]
-    return solved.merge(kept, on=["specimen", "pose"])
 
 
 def _medians(part: pd.DataFrame, chosen: pd.DataFrame) -> str:
@@ -136,7 +137,7 @@ def _place(row: pd.Series, part: pd.DataFrame) -> str:
     return " ".join(words)
 
 
-def _doubt(solved: pd.DataFrame, name: str, part: pd.DataFrame) -> str:
+def _not_identifiable(solved: pd.DataFrame, name: str, part: pd.DataFrame) -> str:
     """The share of fitted values that the data do not hold, where there are any."""
     if solved.empty:
         return ""
@@ -161,3 +162,224 @@ def _exact(solved: pd.DataFrame) -> str:
         return "All fits are exact: as many readings as unknowns, so no misfit can show."
     which = f"All {len(each)} fits" if few == len(each) else f"{few} of {len(each)} fits"
     return f"{which} have no more readings than unknowns: such fits are exact or undetermined."
+
+
+# --- over load points -----------------------------------------------------------------------------
+
+
+def load_point(results: ResultTables) -> str:
+    """How stiffness hangs on the load point, whether the readings tell it, and its range then."""
+    rows = results.table("load_point_effect")
+    if rows.empty or rows["stated"].isna().all():
+        return ""
+    reach = (rows["highest"] - rows["lowest"]) / rows["stated"]
+    named = rows.assign(reach=reach)[reach > CHANGES]
+    least = f"{tick(100.0 * CHANGES)} %"
+    points = count(int(rows["points"].max()), "load point")
+    if named.empty:
+        told = f"No fitted stiffness differs by more than {least} over {points}."
+        return " ".join((told, _excluded_points(rows)))
+    largest = named.sort_values("reach", ascending=False, kind="stable")
+    each = largest.drop_duplicates("coordinate")
+    parts = [_changes(row, named, rows) for _, row in each.iterrows()]
+    others = rows["coordinate"].nunique() > len(each)
+    rest = f"; the others differ by less than {least}" if others else ""
+    told = f"Over {points}, {'; '.join(parts)}{rest}."
+    ranges = [_range(row, rows) for _, row in each.iterrows()]
+    return " ".join(one for one in (told, _excluded_points(rows), *ranges) if one)
+
+
+def _changes(row: pd.Series, named: pd.DataFrame, rows: pd.DataFrame) -> str:
+    """``flexion–extension stiffness is 9.61 to 31.1 N m/rad (21.1 at the study's): …``."""
+    name, unit = AXIS[row["coordinate"]].lower(), row["unit"]
+    slopes = [
+        f"{fixed(row[f'per_mm_{way}'])} per mm {way}"
+        for way in ("anterior", "superior")
+        if pd.notna(row[f"per_mm_{way}"])
+    ]
+    return (
+        f"{name} stiffness{_whose(row, named, rows)} is {number(row['lowest'])} to "
+        f"{number(row['highest'])} {unit} ({number(row['stated'])} where the study puts the load"
+        f"{'; ' if slopes else ''}{' and '.join(slopes)})"
+    )
+
+
+def _whose(row: pd.Series, named: pd.DataFrame, rows: pd.DataFrame) -> str:
+    """Of several specimens or joints, in how many it differs, and in which most."""
+    of = rows[rows["coordinate"] == row["coordinate"]]
+    if len(of) == 1:
+        return ""
+    here = int((named["coordinate"] == row["coordinate"]).sum())
+    place = " ".join(one for one in (row["specimen"], row["joint"]) if one != EVERY_JOINT)
+    return f" (in {here} of {len(of)}, most in {place})"
+
+
+def _excluded_points(rows: pd.DataFrame) -> str:
+    """Whether the readings exclude any load point."""
+    each = rows.drop_duplicates("specimen")
+    told = each.dropna(subset=["allowed"])
+    if told.empty:
+        return "Whether motion tells load points apart cannot be said: too few readings."
+    excluded = int((told["fitted"] - told["allowed"]).sum())
+    fitted = int(told["fitted"].sum())
+    costs = ""
+    if told["cost_lowest"].notna().any():
+        low, high = told["cost_lowest"].min(), told["cost_highest"].max()
+        costs = f" (cost {fixed(low)} to {fixed(high)} times that of the study's point)"
+    if excluded:
+        return f"The readings exclude {excluded} of {fitted} load points with a fit{costs}."
+    return f"The readings exclude none{costs}: motion does not tell where the load acted."
+
+
+def _range(row: pd.Series, rows: pd.DataFrame) -> str:
+    """The range with the load point uncertain, beside that of the fit."""
+    sds = [
+        f"{tick(row[f'{way}_sd_mm'])} mm {way}"
+        for way in ("anterior", "superior")
+        if row[f"{way}_sd_mm"] > 0.0
+    ]
+    if not sds:
+        return ""
+    whose = ""
+    if (rows["coordinate"] == row["coordinate"]).sum() > 1:
+        place = " ".join(one for one in (row["specimen"], row["joint"]) if one != EVERY_JOINT)
+        whose = f" in {place}"
+    return (
+        f"With the load known to {' and '.join(sds)} (SD), {AXIS[row['coordinate']].lower()} "
+        f"stiffness{whose} lies in {_ends(row, 'uncertain')} {row['unit']} (95 %), "
+        f"not in {_ends(row, 'stated')}."
+    )
+
+
+def _ends(row: pd.Series, which: str) -> str:
+    """``14.2 to 61``; an open end is told as such."""
+    low, high = row[f"{which}_low"], row[f"{which}_high"]
+    start = number(low) if pd.notna(low) else "an open lower end"
+    end = number(high) if pd.notna(high) else "an open upper end"
+    return f"{start} to {end}"
+
+
+# --- the posterior --------------------------------------------------------------------------------
+
+
+def posterior(results: ResultTables) -> list[str]:
+    """Sentences of stiffness, landmarks, predicted motion and poses; none without the tables."""
+    rows = results.table("posterior")
+    if rows.empty:
+        return []
+    lost = rows[rows["status"] != Status.CONVERGED.value]
+    good = rows[rows["status"] == Status.CONVERGED.value]
+    told = [
+        _without_posterior(lost),
+        _intervals(good[good["quantity"] == "stiffness"]),
+        _known_landmarks(good[good["quantity"] == "landmark"]),
+        _readings_in_band(results.table("posterior_motion")),
+        *_pose_weights(results.table("pose_weights")),
+    ]
+    return [sentence for sentence in told if sentence]
+
+
+def _without_posterior(lost: pd.DataFrame) -> str:
+    """Which specimens have no posterior to be believed, and why."""
+    if lost.empty:
+        return ""
+    first = lost.drop_duplicates("specimen")
+    why = [f"{row['specimen']} ({row['message']})" for _, row in first.iterrows()]
+    return f"No posterior is told of {listed(why)}."
+
+
+def _intervals(rows: pd.DataFrame) -> str:
+    """Interval of each stiffness of one specimen; of several, how many have both ends."""
+    if rows.empty:
+        return ""
+    lead = "With landmarks unknown to their palpation error"
+    if len(rows) > len(COORDINATES):
+        closed = int((~(rows["open_below"].astype(bool) | rows["open_above"].astype(bool))).sum())
+        return (
+            f"{lead}, {closed} of {len(rows)} stiffnesses have a 95 % interval that the data make; "
+            "of the others the prior's bound makes an end."
+        )
+    return f"{lead}, 95 % of the posterior: {'; '.join(_interval(r) for _, r in rows.iterrows())}."
+
+
+def _interval(row: pd.Series) -> str:
+    coordinate = COORDINATES[STIFFNESS_COLUMNS.index(row["unknown"])]
+    unit = STIFFNESS_UNITS[coordinate]
+    where = "" if row["joint"] == "*" else f" of {row['joint']}"
+    name = f"{AXIS[coordinate].lower()}{where}"
+    low, high = number(row["low"]), number(row["high"])
+    if row["open_below"] and row["open_above"]:
+        return f"{name} not known"
+    if row["open_above"]:
+        return f"{name} above {low} {unit}, its upper end not known"
+    if row["open_below"]:
+        return f"{name} below {high} {unit}, its lower end not known"
+    return f"{name} {low} to {high} {unit} (median {number(row['median'])})"
+
+
+def _known_landmarks(rows: pd.DataFrame) -> str:
+    """Of how many landmark coordinates the data tell anything."""
+    if rows.empty:
+        return ""
+    known = int((~rows["prior_dominated"].astype(bool)).sum())
+    if not known:
+        return (
+            f"Motion tells next to nothing of where landmarks are: of {len(rows)} coordinates none "
+            "is known by a tenth better than by palpation."
+        )
+    return (
+        f"Motion tells something of {known} of {len(rows)} landmark coordinates: these are known "
+        "by a tenth better, or more, than by palpation."
+    )
+
+
+def _readings_in_band(rows: pd.DataFrame) -> str:
+    """How many readings lie where the posterior says that readings lie."""
+    read = rows[(rows["status"] == Status.CONVERGED.value) & rows["inside"].notna()]
+    if read.empty:
+        return ""
+    inside = int(read["inside"].astype(bool).sum())
+    return (
+        f"{inside} of {len(read)} readings lie in the 95 % band that the posterior predicts for "
+        "them. The same readings made the band: this can refute the model, not confirm it."
+    )
+
+
+def _pose_weights(rows: pd.DataFrame) -> Iterator[str]:
+    """Of each specimen: whether data tell its poses apart, and which pose and stiffness to take."""
+    for specimen, part in rows.groupby("specimen", sort=False):
+        each = part.drop_duplicates("pose").set_index("pose")["weight"]
+        if not each.sum():
+            continue
+        effective = 1.0 / float((each**2).sum())
+        lead = (
+            f"{specimen}: by what they make of the data, {count(len(each), 'sampled pose')} weigh "
+            f"as much as {fixed(effective, 0)} alike would"
+        )
+        best, share = int(str(each.idxmax())), percent(round(1e4 * float(each.max())), 10_000)
+        if effective > ALIKE * len(each):
+            yield (
+                f"{lead}. The data hardly tell poses apart: no pose is to be chosen, and the "
+                f"likeliest, {best}, has {share} of the weight."
+            )
+        elif effective < FEW:
+            yield (
+                f"{lead}. Few were drawn where the data want them: which pose is likeliest hangs "
+                "on the draw. Go by the posterior, or sample more poses."
+            )
+        else:
+            yield (
+                f"{lead}. The data prefer some: the likeliest, {best}, has {share} of the "
+                f"weight, with {_suiting(part[part['pose'] == best])}."
+            )
+
+
+def _suiting(rows: pd.DataFrame) -> str:
+    """The stiffnesses that suit a pose."""
+    found = []
+    for _, row in rows.iterrows():
+        coordinate = COORDINATES[STIFFNESS_COLUMNS.index(row["unknown"])]
+        where = "" if row["joint"] == "*" else f" of {row['joint']}"
+        value = f"{number(row['value'])} {STIFFNESS_UNITS[coordinate]}"
+        found.append(f"{AXIS[coordinate].lower()}{where} {value}")
+    return "; ".join(found)

@@ -6,10 +6,8 @@ import numpy as np
 
 from spinepipe.calibrate.rank import Rank, rank_at_start
 from spinepipe.cohort import Cohort
-from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel
 from spinepipe.problems import InputProblem
-from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.study import STUDIES
@@ -39,18 +37,12 @@ def told(
 
 def _rank(study: JointPoseSensitivity, cohort: Cohort, root: Path, specimen: str) -> Rank:
     sd = cohort.measurement_sd
-    noise = None if sd is None else _noise(sd.translation_mm, sd.rotation_deg)
-    frames = specimen_inputs(str(root), study.study, specimen, cohort.digest).frames
+    noise = None if sd is None else to_si(np.repeat([sd.translation_mm, sd.rotation_deg], 3))
     try:
-        problem = calibration_problem(str(root), study, specimen, frames)
+        problem = calibration_problem(str(root), study, specimen)
         return rank_at_start(problem, noise, study.calibration.identifiable_below)
     except RefusedModel as error:
         return Rank(None, (False,) * len(study.calibration.free), str(error))
-
-
-def _noise(translation_mm: float, rotation_deg: float) -> Array:
-    noise: Array = to_si(np.repeat([translation_mm, rotation_deg], 3))
-    return noise
 
 
 def _warned(
@@ -67,18 +59,12 @@ def _warned(
     worst = min(short, key=lambda name: short[name].rank or 0)
     found, free = short[worst], study.calibration.free
     joints = len(found.silent) // len(free)
-    silent = [
-        name
-        for name in sorted(free, key=COORDINATES.index)
-        if all(found.silent[place] for place in _places(free.index(name), len(free), joints))
-    ]
+    of = {  # unknowns stand coordinate by coordinate, each joint by joint
+        name: found.silent[at * joints : (at + 1) * joints] for at, name in enumerate(free)
+    }
+    silent = [name for name in sorted(free, key=COORDINATES.index) if all(of[name])]
     told_words = f"{len(found.silent)} stiffnesses, of which the data of {worst} tell {found.rank}"
     keep = f": {', '.join(silent)} would keep {'its' if len(silent) == 1 else 'their'} start"
     remedy = f"write `free: auto` or leave some out{keep if silent else ''}"
     place = (f"{STUDIES.as_posix()}/{study.study}.yaml", None, KEY)
     return [InputProblem(*place, told_words, "as many as the data tell", remedy)]
-
-
-def _places(coordinate: int, free: int, joints: int) -> range:
-    """Numbers of the unknowns of a free coordinate, joint by joint."""
-    return range(coordinate * joints, (coordinate + 1) * joints)

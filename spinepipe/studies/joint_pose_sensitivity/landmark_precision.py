@@ -20,13 +20,15 @@ from spinepipe.studies.joint_pose_sensitivity.tables import (
 from spinepipe.tables import from_rows, read_frames, write
 
 CONFIDENCE = (2.5, 97.5)
+"""Percentiles of the bootstrap that make a 95 % interval."""
 
 BOOTSTRAPS = 1000
+QUANTILES = {"median": 50, "p90": 90, "p95": 95, "largest": 100}
 COLUMNS = {"translation": "translation_error_mm", "rotation": "rotation_error_deg"}
 
 
 @dataclass(frozen=True)
-class Required:
+class RequiredPrecision:
     """The largest SD that will do, with its 95 % interval.
 
     None where one lies outside the sampled SDs; the message says on which side.
@@ -83,15 +85,11 @@ def _spread(
             low, high = proportion_confint(below, len(values), method="wilson")
             key = {"motion": kind, "sd_mm": float(sd), "unit": unit, "n": len(values)}
             shares = {"below": below / len(values), "below_low": low, "below_high": high}
-            yield {**key, "limit": limit, **shares, **_quantiles(values)}
-
-
-def _quantiles(values: Array) -> dict[str, Any]:
-    """Quantiles of the errors there are."""
-    known = values[np.isfinite(values)]
-    names = ("median", "p90", "p95", "largest")
-    found = np.percentile(known, [50, 90, 95, 100]).tolist() if len(known) else [None] * 4
-    return {"without_result": len(values) - len(known), **dict(zip(names, found, strict=True))}
+            known = values[np.isfinite(values)]
+            ends = np.percentile(known, [*QUANTILES.values()]) if len(known) else [None] * 4
+            quantiles = dict(zip(QUANTILES, ends, strict=True))
+            lost = {"without_result": len(values) - len(known)}
+            yield {**key, "limit": limit, **shares, **lost, **quantiles}
 
 
 def _required(
@@ -107,16 +105,19 @@ def _required(
         sds, n = grid.index.to_numpy(float), grid.shape[1]
         why = _not_of_landmarks(shares[kind])
         found = (
-            Required(None, None, None, why)
+            RequiredPrecision(None, None, None, why)
             if why
             else required_precision(sds, grid.to_numpy(float), 1.0, asked.share, BOOTSTRAPS, seed)
         )
-        ends = {f"sd_{end}_mm": getattr(found, end) for end in ("low", "high")}
-        numbers = {"sd_mm": found.sd, **ends, "message": found.message}
-        too_few = "" if why else _too_few(n, asked.share)
-        numbers["message"] = "; ".join(filter(None, (found.message, too_few)))
-        key = {"motion": kind, "share": asked.share, "n": n}
-        yield {**key, **numbers, "nominal_share": shares[kind]}
+        too_few = ""
+        if not why and proportion_confint(n, n, method="wilson")[0] < asked.share:
+            too_few = f"{n} poses cannot show a share of {asked.share:g}: take more"
+        yield {
+            **{"motion": kind, "share": asked.share, "n": n},
+            **{"sd_mm": found.sd, "sd_low_mm": found.low, "sd_high_mm": found.high},
+            "message": "; ".join(filter(None, (found.message, too_few))),
+            "nominal_share": shares[kind],
+        }
 
 
 def nominal_shares(
@@ -148,12 +149,6 @@ def _not_of_landmarks(share: float | None) -> str:
     )
 
 
-def _too_few(n: int, share: float) -> str:
-    """What must be said when not even all poses below the limit would show the share."""
-    low, _ = proportion_confint(n, n, method="wilson")
-    return f"{n} poses cannot show a share of {share:g}: take more" if low < share else ""
-
-
 def _limits(asked: LandmarkPrecision) -> dict[str, tuple[float, str]]:
     return {
         "translation": (asked.translation_limit_mm, "mm"),
@@ -163,7 +158,7 @@ def _limits(asked: LandmarkPrecision) -> dict[str, tuple[float, str]]:
 
 def required_precision(
     sds: Array, errors: Array, limit: float, share: float, bootstraps: int, seed: int
-) -> Required:
+) -> RequiredPrecision:
     """The largest SD at which so large a share of samples has an error below the limit.
 
     The share is taken as straight between the sampled SDs; the interval is a percentile bootstrap
@@ -177,10 +172,18 @@ def required_precision(
     found = _crossing(sds, below.mean(axis=1), share)
     n = errors.shape[1]
     drawn = np.random.default_rng(seed).integers(0, n, (bootstraps, n))
+    # whole samples are drawn again, so that what SDs have in common stays together
     repeated = np.array([_crossing(sds, below[:, row].mean(axis=1), share) for row in drawn])
     low, high = np.percentile(repeated, CONFIDENCE, method="inverted_cdf")
-    message = _message(sds, found) or _beyond(sds, low, high)
-    return Required(_inside(found), _inside(low), _inside(high), message)
+    outside = [f"begins below {sds[0]:g} mm"] if low == -np.inf else []
+    outside += [f"ends above {sds[-1]:g} mm"] if high == np.inf else []
+    message = f"the interval {' and '.join(outside)}" if outside else ""
+    if found == np.inf:
+        message = f"{sds[-1]:g} mm will do, the largest that was sampled"
+    elif found == -np.inf:
+        message = f"{sds[0]:g} mm will not do, the smallest that was sampled"
+    sd, *ends = (float(end) if np.isfinite(end) else None for end in (found, low, high))
+    return RequiredPrecision(sd, ends[0], ends[1], message)
 
 
 def _crossing(sds: Array, below: Array, share: float) -> float:
@@ -194,24 +197,6 @@ def _crossing(sds: Array, below: Array, share: float) -> float:
     after = int(short[0])
     if after == 0:
         return -np.inf
+    # straight between the SDs on either side
     fraction = (below[after - 1] - share) / (below[after - 1] - below[after])
     return float(sds[after - 1] + fraction * (sds[after] - sds[after - 1]))
-
-
-def _inside(sd: float) -> float | None:
-    return float(sd) if np.isfinite(sd) else None
-
-
-def _message(sds: Array, found: float) -> str:
-    if found == np.inf:
-        return f"{sds[-1]:g} mm will do, the largest that was sampled"
-    if found == -np.inf:
-        return f"{sds[0]:g} mm will not do, the smallest that was sampled"
-    return ""
-
-
-def _beyond(sds: Array, low: float, high: float) -> str:
-    """Which ends of the interval lie outside the sampled SDs, "" for none."""
-    ends = [f"begins below {sds[0]:g} mm"] if low == -np.inf else []
-    ends += [f"ends above {sds[-1]:g} mm"] if high == np.inf else []
-    return f"the interval {' and '.join(ends)}" if ends else ""

@@ -122,8 +122,11 @@ def _uncertain(asked: LoadPoint, part: pd.DataFrame, name: str, unit: str) -> di
     degrees = int(stated_of(part)["degrees_of_freedom"])
     if degrees < 1:
         return {**nothing, "message": "as many unknowns as readings: fits have no region"}
-    weights, places = _prior(asked)
-    found, lost = _at(part, name, unit, degrees, weights, places)
+    ways = (
+        _places(asked.anterior_sd_mm, asked.anterior_mm),
+        _places(asked.superior_sd_mm, asked.superior_mm),
+    )
+    found, lost = _at(part, name, unit, degrees, np.array(list(product(*ways))))
     if found is None:
         return {**nothing, "message": "no stiffness was found near the load points"}
     ends = [cell(found.quantile(share)) for share in AT]
@@ -131,20 +134,11 @@ def _uncertain(asked: LoadPoint, part: pd.DataFrame, name: str, unit: str) -> di
     return {**dict(zip(names, ends, strict=True)), "message": told}
 
 
-def _prior(asked: LoadPoint) -> tuple[Array, Array]:
-    """Weights (P,) and places (P, 2), mm: equally probable ones, inside the grid."""
-    ways = (
-        _places(asked.anterior_sd_mm, asked.anterior_mm),
-        _places(asked.superior_sd_mm, asked.superior_mm),
-    )
-    places = np.array(list(product(*ways)))
-    return np.full(len(places), 1.0 / len(places)), places
-
-
 def _places(sd: float, grid: tuple[float, ...]) -> Array:
     """Equally probable places of a normal of this SD about 0, cut off where the grid ends."""
     if sd == 0.0:
         return np.zeros(1)
+    # middles of slices of equal probability
     low, high = norm.cdf(np.array([grid[0], grid[-1]]) / sd)
     shares: Array = low + (high - low) * (np.arange(NODES) + 0.5) / NODES
     places: Array = sd * norm.ppf(shares)
@@ -153,7 +147,7 @@ def _places(sd: float, grid: tuple[float, ...]) -> Array:
 
 @dataclass(frozen=True)
 class Mixture:
-    """Of regions of the logarithm of a stiffness.
+    """A mixture of regions of the logarithm of a stiffness, each two halves of a t distribution.
 
     Attributes
     ----------
@@ -176,6 +170,7 @@ class Mixture:
 
     def quantile(self, share: float) -> float:
         """The stiffness below which so much lies; NaN where that is open."""
+        # the share below rises with the logarithm: one root, found by Brent's method
         ends = self.middle.min() - FARTHEST, self.middle.max() + FARTHEST
         if self.share_below(ends[0]) >= share or self.share_below(ends[1]) <= share:
             return float("nan")
@@ -183,9 +178,9 @@ class Mixture:
 
 
 def _at(
-    part: pd.DataFrame, name: str, unit: str, degrees: int, weights: Array, places: Array
+    part: pd.DataFrame, name: str, unit: str, degrees: int, places: Array
 ) -> tuple[Mixture | None, float]:
-    """The fits at places of the load, straight between those of the grid; and the share lost.
+    """The fits at equally probable places (P, 2) of the load, mm, and the share of these lost.
 
     Lost is what lies beside a point of the grid without a fit.
     """
@@ -194,30 +189,33 @@ def _at(
         np.log(here[column].to_numpy(float))
         for column in (f"{name}_{unit}", f"{name}_low_{unit}", f"{name}_high_{unit}")
     )
+    # a region's end lies where the t distribution's argument is its 97.5 % point
     limit = float(t.ppf(AT[-1], degrees))
     below, above = limit / (value - low), limit / (high - value)
     usable = here["status"].isin(USABLE).to_numpy()
     cost = np.log(np.maximum(here["cost"].to_numpy(float), TINY))
-    seen = np.array([value, np.nan_to_num(below), np.nan_to_num(above), cost])
-    seen[:, ~usable] = np.nan
-    at = _between(here, seen, places)
+    numbers = np.array([value, np.nan_to_num(below), np.nan_to_num(above), cost])
+    numbers[:, ~usable] = np.nan
+    at = _between(here, numbers, places)
     there = np.isfinite(at).all(axis=0)
     if not there.any():
         return None, 1.0
     middle, below, above, cost = at[:, there]
+    weights = np.full(len(places), 1.0 / len(places))
+    # likelihood of the place with the scatter integrated out: cost^(-d/2)
     fitting = weights[there] * np.exp(-0.5 * degrees * (cost - cost.min()))
     lost = 1.0 - float(weights[there].sum())
     return Mixture(fitting / fitting.sum(), middle, below, above, degrees), lost
 
 
-def _between(here: pd.DataFrame, seen: Array, places: Array) -> Array:
-    """(4, P) of what is seen (4, N) at the points of a grid, at places (P, 2), mm."""
+def _between(here: pd.DataFrame, numbers: Array, places: Array) -> Array:
+    """(4, P) at places (P, 2), mm, straight between numbers (4, N) at the points of a grid."""
     levels = [np.unique(here[shift].to_numpy(float)) for shift in SHIFTS]
     shape = tuple(len(level) for level in levels)
     used = [way for way in (0, 1) if shape[way] > 1]
     if not used:
-        return np.repeat(seen, len(places), axis=1)
-    grid = seen.T.reshape(*(shape[way] for way in used), len(seen))
+        return np.repeat(numbers, len(places), axis=1)
+    grid = numbers.T.reshape(*(shape[way] for way in used), len(numbers))
     straight = RegularGridInterpolator([levels[way] for way in used], grid)
     found: Array = straight(places[:, used]).T
     return found

@@ -5,7 +5,7 @@ anew: the grid is a profile of the cost over the load point. What rise the scatt
 with the degrees of freedom that are left when the load point, too, is an unknown.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -13,22 +13,21 @@ from typing import Any
 import numpy as np
 from scipy.stats import f
 
-from spinepipe.calibrate import Problem, fit
+from spinepipe.calibrate import fit
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance
 from spinepipe.model import RefusedModel
-from spinepipe.statics import with_parameters
 from spinepipe.status import Status
-from spinepipe.studies.joint_pose_sensitivity.fitted_stiffness import stiffness_cells
-from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
+from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem, fit_rows
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import STIFFNESS_OVER_LOAD_POINT
 from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M
 
 LEVEL = 0.95
+"""Of the region of load points that the readings allow."""
 
 
 def run(root: str, study: str, specimen: str, output: str) -> None:
@@ -36,7 +35,7 @@ def run(root: str, study: str, specimen: str, output: str) -> None:
     settings, cohort = study_and_cohort(root, study)
     asked = settings.load_point
     points = tuple(product(asked.anterior_mm, asked.superior_mm))
-    tried = [list(_rows(root, settings, specimen, *point)) for point in points]
+    tried = [_rows(root, settings, specimen, *point) for point in points]
     unknowns = sum(len(shifts) > 1 for shifts in (asked.anterior_mm, asked.superior_mm))
     flags = allowed([rows[0] for rows in tried], unknowns)
     rows = [{**row, "allowed": flag} for at, flag in zip(tried, flags, strict=True) for row in at]
@@ -61,51 +60,28 @@ def allowed(fits: Sequence[Mapping[str, Any]], unknowns: int) -> list[bool | Non
     least, left = float(best["cost"]), int(best["degrees_of_freedom"]) - unknowns
     if left < 1 or unknowns < 1:
         return [None] * len(fits)
+    # profile likelihood: the rise of least squares over its least value is distributed as F
     highest = least * (1.0 + unknowns * float(f.ppf(LEVEL, unknowns, left)) / left)
     return [None if one["cost"] is None else bool(one["cost"] <= highest) for one in fits]
 
 
 def _rows(
     root: str, settings: JointPoseSensitivity, specimen: str, anterior: float, superior: float
-) -> Iterator[dict[str, Any]]:
-    """One row, or one per joint where stiffness is per joint."""
-    key = {
-        "specimen": specimen,
-        "anterior_shift_mm": anterior,
-        "superior_shift_mm": superior,
-    }
-    options = settings.calibration
-    shared = options.grouping == "per_specimen"
-    try:
-        problem = _problem(root, settings, specimen, anterior, superior)
-        seed = specimen_seed(settings.seed, f"load_point/{specimen}")
-        found = fit(problem, options.starts, seed, options.identifiable_below, profiled=True)
-    except RefusedModel as error:
-        ended = {"status": Status.REFUSED.value, "message": str(error)}
-        for name in ("*",) if shared else study_and_cohort(root, settings.study)[1].joint_names:
-            yield {**key, "joint": name, "cost": None, "degrees_of_freedom": 0, **ended}
-        return
-    model = with_parameters(problem.model, problem.free, found.x)
-    for joint in range(1) if shared else range(model.n_joints):
-        yield {
-            **key,
-            "joint": "*" if shared else model.joints[joint],
-            **stiffness_cells(problem, found, model, joint),
-            "cost": found.cost if found.status.usable else None,
-            "degrees_of_freedom": found.uncertainty.degrees_of_freedom,
-            "status": found.status.value,
-            "message": found.message,
-        }
-
-
-def _problem(
-    root: str, settings: JointPoseSensitivity, specimen: str, anterior: float, superior: float
-) -> Problem:
-    """The study's fit in the cohort's own joint poses, every load point moved (mm)."""
+) -> list[dict[str, Any]]:
+    """Fits in the cohort's own joint poses, every load point moved (mm); rows as `fit_rows`."""
     _, cohort = study_and_cohort(root, settings.study)
-    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).frames
-    problem = calibration_problem(root, settings, specimen, frames)
-    stated = np.array(settings.load_point_shift_mm.in_order())
-    shift = (stated + np.array([anterior, superior, 0.0])) / MM_PER_M
-    tested = measured_specimen(cohort, specimen, settings.tests or cohort.tests, shift).tested
-    return replace(problem, cases=tested)
+    options = settings.calibration
+    seed = specimen_seed(settings.seed, f"load_point/{specimen}")
+    try:
+        stated = np.array(settings.load_point_shift_mm.in_order())
+        shift = (stated + np.array([anterior, superior, 0.0])) / MM_PER_M
+        tested = measured_specimen(cohort, specimen, settings.tests or cohort.tests, shift).tested
+        problem = replace(calibration_problem(root, settings, specimen), cases=tested)
+        found = fit(problem, options.starts, seed, options.identifiable_below, profiled=True)
+        rows = fit_rows(problem, found, options.grouping)
+    except RefusedModel as error:
+        ended = {"cost": None, "degrees_of_freedom": 0, "status": Status.REFUSED.value}
+        names = ("*",) if options.grouping == "per_specimen" else cohort.joint_names
+        rows = [{"joint": name, **ended, "message": str(error)} for name in names]
+    key = {"specimen": specimen, "anterior_shift_mm": anterior, "superior_shift_mm": superior}
+    return [{**key, **row} for row in rows]

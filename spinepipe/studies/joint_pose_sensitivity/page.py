@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import pandas as pd
 
@@ -75,7 +76,10 @@ _IMPORTANCE = (
 )
 
 _FOLD = ["specimen", "family", "test", "joint", "response", "factor"]
-_NO_EFFECT = "no test is significant after Bonferroni's correction"
+_OPEN: dict[str, Any] = {
+    "nullable": True,
+    "empty": "no test is significant after Bonferroni's correction",
+}
 FOLDED = (
     Column("specimen", "text", "name of the specimen"),
     Column("test", "text", "name of the test"),
@@ -89,20 +93,8 @@ FOLDED = (
     Column("bonferroni", "integer", "significant after Bonferroni's correction"),
     Column("holm", "integer", "significant after Holm's correction"),
     Column("effect_name", "text", "what the effect size is called"),
-    Column(
-        "effect_lowest",
-        "number",
-        "smallest effect significant after Bonferroni",
-        nullable=True,
-        empty=_NO_EFFECT,
-    ),
-    Column(
-        "effect_highest",
-        "number",
-        "largest effect significant after Bonferroni",
-        nullable=True,
-        empty=_NO_EFFECT,
-    ),
+    Column("effect_lowest", "number", "smallest effect significant after Bonferroni", **_OPEN),
+    Column("effect_highest", "number", "largest effect significant after Bonferroni", **_OPEN),
 )
 
 
@@ -185,28 +177,20 @@ def _of(
     about = _SHAPES[name].about
     if name == "statistics":
         yield sortable(name, title, about, in_full(frame), STATISTICS.columns)
-        yield _folded(frame, study.significance)
+        about = (
+            "Tests done again and again with a stiffness set or a pose held fixed: how many are "
+            f"significant at {study.significance:g}, and how large the effects of these are. One "
+            "row per test, joint, response and factor; every single test is in statistics.parquet."
+        )
+        title = "Tests of significance, two factors"
+        yield sortable(name, title, about, folded(frame, study.significance), FOLDED)
     elif name == "importance":
-        yield sortable(name, title, about, _trees(frame), _IMPORTANCE)
+        # by factor, and one row with its message for each tree that could not be grown
+        none = frame[frame["status"] != "done"].drop_duplicates(TREE)[[*TREE, "n", "message"]]
+        trees = pd.concat([importance_by_factor(frame), none], ignore_index=True)
+        yield sortable(name, title, about, trees, _IMPORTANCE)
     else:
         yield from page_tables(_SHAPES[name], title, frame)
-
-
-def _trees(importance: pd.DataFrame) -> pd.DataFrame:
-    """Importance by factor, and one row with its message for each tree that could not be grown."""
-    none = importance[importance["status"] != "done"].drop_duplicates(TREE)
-    told = none[[*TREE, "n", "message"]]
-    return pd.concat([importance_by_factor(importance), told], ignore_index=True)
-
-
-def _folded(frame: pd.DataFrame, alpha: float) -> Sortable:
-    about = (
-        "Tests done again and again with a stiffness set or a pose held fixed: how many are "
-        f"significant at {alpha:g}, and how large the effects of these are. One row per test, "
-        "joint, response and factor; every single test is in statistics.parquet."
-    )
-    title = "Tests of significance, two factors"
-    return sortable("statistics", title, about, folded(frame, alpha), FOLDED)
 
 
 def in_full(statistics: pd.DataFrame) -> pd.DataFrame:

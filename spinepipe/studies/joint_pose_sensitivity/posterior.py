@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from spinepipe.calibrate import Fit, fit
+from spinepipe.calibrate import fit
 from spinepipe.calibrate.posterior import Mode, Target, between, modes, normal_of
-from spinepipe.calibrate.sampler import Convergence, MarkovChains, convergence, sample
+from spinepipe.calibrate.sampler import MarkovChains, convergence, sample
 from spinepipe.calibrate.solvers import AtRest, CaseResiduals
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.landmark_frames import displacement
@@ -25,6 +25,7 @@ from spinepipe.model import RefusedModel
 from spinepipe.statics import FreeParameter
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.inputs import sampled_poses, study_and_cohort
+from spinepipe.studies.joint_pose_sensitivity.landmarks import landmarks_of
 from spinepipe.studies.joint_pose_sensitivity.posterior_rows import (
     PREDICTIONS,
     PosteriorQuantity,
@@ -35,8 +36,7 @@ from spinepipe.studies.joint_pose_sensitivity.posterior_rows import (
 )
 from spinepipe.studies.joint_pose_sensitivity.posterior_target import (
     SpecimenPosterior,
-    made_of,
-    palpated,
+    posterior_of,
     problem_of,
     scatter_of,
     stiffness_values,
@@ -51,10 +51,10 @@ from spinepipe.tables import from_rows, write
 from spinepipe.units import MM_PER_M, STIFFNESS_COLUMNS
 
 PREDICTED = 400
-"""Draws from which motion is predicted, evenly taken."""
+"""Draws from which motion is predicted, evenly taken: bands of 95 % have 10 beyond each end."""
 
 TOGETHER = 50
-"""Points that are solved at once."""
+"""Points that are solved in one stack."""
 
 
 def run(
@@ -90,13 +90,14 @@ def _rows(
         found = fit(alone, settings.calibration.starts, specimen_seed(settings.seed, specimen))
         if not found.status.usable:
             return [refused_row(f"no fit in the cohort's own pose: {found.message}")], [], []
-        marks = palpated(settings, cohort, specimen)
-        own = made_of(settings, cohort, alone, marks, scatter_of(settings, found))
+        marks = landmarks_of(settings, cohort, specimen)
+        own = posterior_of(settings, cohort, alone, marks, scatter_of(settings, found))
         target = own.target()
     except (RefusedModel, ValueError) as error:
         return [refused_row(str(error))], [], []
-    weights = _weights(own, specimen, poses, _start(own, found))
-    start = np.concatenate([_start(own, found), np.zeros(3 * len(own.unknowns.free))])
+    fitted = normal_of(*own.bounds, found.x)  # z of the stiffnesses of the fit
+    weights = _weights(own, specimen, poses, fitted)
+    start = np.concatenate([fitted, np.zeros(3 * len(own.unknowns.free))])
     mode = modes(target, start[None])[0]
     if mode.point is None:
         return [refused_row(mode.message)], [], weights
@@ -104,11 +105,6 @@ def _rows(
     seed = specimen_seed(settings.seed, f"posterior/{specimen}")
     chains = sample(target, mode, asked.chains, asked.warm_up, asked.draws, seed)
     return *_sampled(own, mode, chains, seed), weights
-
-
-def _start(own: SpecimenPosterior, found: Fit) -> Array:
-    """z (p,) of the stiffnesses of a fit."""
-    return normal_of(*own.bounds, found.x)
 
 
 def _sampled(
@@ -120,9 +116,10 @@ def _sampled(
     ended = Status.NOT_CONVERGED if found.message else Status.CONVERGED
     told = {"status": ended.value, "message": found.message}
     believed = ended.usable
+    columns = (found.r_hat.tolist(), found.ess_bulk.tolist(), found.ess_tail.tolist())
     rows = [
         {**posterior_row(quantity, *numbers, believed=believed), **told}
-        for quantity, numbers in zip(quantities, _numbers(found), strict=True)
+        for quantity, *numbers in zip(quantities, *columns, strict=True)
     ]
     marks, free = own.landmarks, own.unknowns.free
     for place in np.setdiff1d(np.arange(len(marks.names)), free).tolist():
@@ -132,39 +129,33 @@ def _sampled(
     return rows, [{**row, **nothing, **told} for row in _motion(own, chains.z, seed)]
 
 
-def _numbers(found: Convergence) -> list[tuple[float, float, float]]:
-    columns = (found.r_hat, found.ess_bulk, found.ess_tail)
-    return list(zip(*(column.tolist() for column in columns), strict=True))
-
-
 def _quantities(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[PosteriorQuantity]:
     """What is told: stiffnesses, landmarks, and where these put the joints."""
     assert mode.point is not None
-    top, count, unknowns = mode.point.z, len(own.stiffnesses), own.unknowns
+    stiffnesses, unknowns, marks = own.alone.free, own.unknowns, own.landmarks
     sd = np.sqrt(np.diagonal(mode.covariance))
+    near = list(zip(mode.point.z.tolist(), sd.tolist(), strict=True))  # Laplace's normal
+    start = stiffness_values(own.alone, np.zeros(len(stiffnesses))).tolist()
     found = []
-    for place, stiffness in enumerate(own.stiffnesses):
-        bounds = own.bounds[0][place], own.bounds[1][place]
+    for place, (stiffness, low, high) in enumerate(zip(stiffnesses, *own.bounds, strict=True)):
+        where, here = _where(own, stiffness), z[..., place]
         found.append(
-            PosteriorQuantity.stiffness(
-                _where(own, stiffness),
-                z[..., place],
-                (float(top[place]), float(sd[place])),
-                bounds,
-                float(stiffness_values(own.alone, np.zeros(count))[place]),
-            )
+            PosteriorQuantity.stiffness(where, here, near[place], (low, high), start[place])
         )
-    for number, (mark, axis) in enumerate(product(unknowns.free.tolist(), "xyz")):
-        place, scale = count + number, float(own.landmarks.sd[mark] * MM_PER_M)
-        names, near = own.landmarks.names[mark], (float(top[place]), float(sd[place]))
-        found.append(PosteriorQuantity.landmark(names, axis, z[..., place], near, scale))
+    for place, (mark, axis) in enumerate(product(unknowns.free, "xyz"), start=len(stiffnesses)):
+        names, scale = marks.names[mark], float(marks.sd[mark] * MM_PER_M)
+        found.append(PosteriorQuantity.landmark(names, axis, z[..., place], near[place], scale))
     return [*found, *_joints(own, mode, z)]
 
 
 def _joints(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[PosteriorQuantity]:
-    """Offset and tilt of each joint that landmarks may move."""
+    """Offset and tilt of each joint that landmarks may move.
+
+    They follow from the landmarks: near the mode linearly, by the slopes there (delta method), and
+    the prior's SD by the slopes where the landmarks were palpated.
+    """
     assert mode.point is not None
-    count, names = len(own.stiffnesses), own.alone.model.joints
+    count, names = len(own.alone.free), own.alone.model.joints
     draws = own.unknowns.placed(z.reshape(-1, z.shape[-1])).by
     top = own.unknowns.placed(mode.point.z[None])
     at_home = own.unknowns.placed(np.zeros((1, z.shape[-1])))
@@ -175,7 +166,7 @@ def _joints(own: SpecimenPosterior, mode: Mode, z: Array) -> Sequence[PosteriorQ
     found = []
     for joint, axis in product(range(len(names)), range(6)):
         if not before[joint, axis].any():
-            continue
+            continue  # no free landmark moves it
         here = slope[joint, axis]
         near = float(top.by[0, joint, axis]), float(np.sqrt(here @ covariance @ here))
         prior = float(np.linalg.norm(before[joint, axis]))
@@ -223,6 +214,7 @@ def _weights(own: SpecimenPosterior, specimen: str, poses: str, start: Array) ->
         target: Target = own.target_in(np.array([placed[number] for number in some]))
         target.evaluator.forget()
         found |= dict(zip(some, modes(target, np.tile(start, (len(some), 1))), strict=True))
+    # weights in proportion to the evidence; less its largest, or exp would under- or overflow
     evidence = np.array([found[n].log_evidence if n in found else -np.inf for n in range(count)])
     weights = np.exp(evidence - evidence.max()) if np.isfinite(evidence).any() else 0.0 * evidence
     total = float(weights.sum()) or 1.0
@@ -238,7 +230,7 @@ def _pose_rows(
     own: SpecimenPosterior, number: int, mode: Mode | None, weight: float, refused: str
 ) -> Rows:
     """A row per free stiffness of a pose, without numbers where it has none."""
-    places = [dict(zip(("joint", "unknown"), _where(own, k), strict=True)) for k in own.stiffnesses]
+    places = [dict(zip(("joint", "unknown"), _where(own, k), strict=True)) for k in own.alone.free]
     if mode is None or mode.point is None:
         why = Status.REFUSED if mode is None else Status.NOT_CONVERGED
         told = {"weight": 0.0, "status": why.value, "message": refused}

@@ -78,7 +78,7 @@ class PosteriorQuantity:
 
         joint, column = where
         place = {"quantity": "stiffness", "joint": joint, "unknown": column}
-        edge = float(-ndtri(NEAR_BOUND))
+        edge = float(-ndtri(NEAR_BOUND))  # z is standard normal where the prior is uniform
         beside = (bool(np.mean(z < -edge) >= OPEN), bool(np.mean(z > edge) >= OPEN))
         unit = STIFFNESS_UNITS[COORDINATES[STIFFNESS_COLUMNS.index(column)]]
         normal = near[0] + near[1] * ndtri(_MIDS)
@@ -173,11 +173,13 @@ def motion_rows(
     """Bands of the motion, and of a new reading of it, beside what was measured."""
     rng = np.random.default_rng(seed)
     scale = np.sqrt(problem.weights) * DISPLAY_PER_SI
+    # residuals are weighted: an SD of a reading is that of its residual over the root of its weight
     with np.errstate(divide="ignore", invalid="ignore"):
         sd = np.where(scale > 0.0, np.sqrt(noise.variance) / scale, np.nan)
     rows: list[dict[str, Any]] = []
     for number, case in enumerate(problem.cases):
         motion = np.stack([subtract_baseline(one.readings[number], case.zeroed) for one in seen])
+        # a new reading has an error of its own and, where the case is zeroed, that of step 0
         read = motion + subtract_baseline(
             np.moveaxis(sd * rng.standard_normal(motion.shape), 0, 1), case.zeroed
         ).swapaxes(0, 1)

@@ -14,48 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.calibrate import Evaluator, Fit, Problem
-from spinepipe.calibrate.posterior import (
-    ResidualNoise,
-    Target,
-    between,
-    noise_of,
-)
+from spinepipe.calibrate.posterior import ResidualNoise, Target, between, noise_of
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.landmark_frames import Displaced, LandmarkFrames
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import ScopedEffect
-from spinepipe.statics import FreeParameter, free_parameters
-from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
+from spinepipe.statics import free_parameters
+from spinepipe.studies.joint_pose_sensitivity.landmarks import Landmarks
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import DISPLAY_PER_SI, MM_PER_M, TRANSLATIONS
-
-_POINT = ["x_mm", "y_mm", "z_mm"]
-
-
-@dataclass(frozen=True)
-class Landmarks:
-    """A specimen's landmarks.
-
-    Attributes
-    ----------
-    names : (vertebra, landmark) of each. points : (L, 3) m, ground. sd : (L,) m, per axis.
-    """
-
-    names: tuple[tuple[str, str], ...]
-    points: Array
-    sd: Array
-
-
-def palpated(settings: JointPoseSensitivity, cohort: Cohort, specimen: str) -> Landmarks:
-    """The landmarks as the cohort lists them, with the SD that the study gives them."""
-    assert cohort.landmarks is not None
-    rows = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
-    own = rows["sd_mm"].fillna(0.0).to_numpy(float)
-    sd = own if settings.landmark_sd_mm is None else np.full(len(rows), settings.landmark_sd_mm)
-    names = tuple(zip(rows["vertebra"], rows["landmark"], strict=True))
-    return Landmarks(names, rows[_POINT].to_numpy(float) / MM_PER_M, sd / MM_PER_M)
+from spinepipe.units import DISPLAY_PER_SI, TRANSLATIONS
 
 
 @dataclass(frozen=True)
@@ -79,21 +48,18 @@ class StiffnessAndLandmarks:
         """Stiffnesses and three axes of each free landmark."""
         return len(self.low) + 3 * len(self.free)
 
-    def displaced(self, z: Array) -> Array:
-        """(P, F, 3) displacement of the free landmarks at points z (P, m), m."""
-        moved = z[:, len(self.low) :].reshape(len(z), -1, 3)
-        return moved * self.landmarks.sd[self.free, None]
-
     def placed(self, z: Array) -> Displaced:
         """The joints' frames at points z (P, m)."""
         points = np.tile(self.landmarks.points, (len(z), 1, 1))
-        points[:, self.free] += self.displaced(z)
+        moved = z[:, len(self.low) :].reshape(len(z), -1, 3)  # of free landmarks, in their SDs
+        points[:, self.free] += moved * self.landmarks.sd[self.free, None]
         return self.frames.at(points, self.free)
 
     def at(self, numbers: Sequence[int], z: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Moves of the logarithms, then offsets and tilts, and their derivatives."""
         count = len(self.low)
         moves, slopes = between(self.low, self.high, z[:, :count])
+        # offsets and tilts by landmarks, chain rule; each stiffness hangs on its own z alone
         placed, sd = self.placed(z), self.landmarks.sd[self.free, None]
         x = np.hstack([moves, _in_order(placed.by).reshape(len(z), -1)])
         jacobian = np.zeros((*x.shape, z.shape[1]))
@@ -154,11 +120,6 @@ class SpecimenPosterior:
     landmarks: Landmarks
     scatter: float
 
-    @property
-    def stiffnesses(self) -> tuple[FreeParameter, ...]:
-        """The free stiffnesses."""
-        return self.alone.free
-
     @cached_property
     def evaluator(self) -> Evaluator:
         """Of the problem; a reading that was zeroed shares the error of step 0."""
@@ -167,7 +128,7 @@ class SpecimenPosterior:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """(p,) each, of the logarithms of stiffness: the study's, inside those of the fit."""
-        count, drawn_in = len(self.stiffnesses), self.evaluator.problem
+        count, drawn_in = len(self.alone.free), self.evaluator.problem
         factor = self.settings.posterior.stiffness_factor
         reach = np.inf if factor is None else np.log(factor)
         low, high = drawn_in.lower[:count], drawn_in.upper[:count]
@@ -214,9 +175,7 @@ def problem_of(root: str, settings: JointPoseSensitivity, specimen: str) -> Prob
     RefusedModel
         When frames and loads make no model.
     """
-    _, cohort = study_and_cohort(root, settings.study)
-    frames = specimen_inputs(root, settings.study, specimen, cohort.digest).frames
-    alone = calibration_problem(root, settings, specimen, frames)
+    alone = calibration_problem(root, settings, specimen)
     return replace(alone, correlated=any(case.zeroed for case in alone.cases))
 
 
@@ -236,7 +195,7 @@ def scatter_of(settings: JointPoseSensitivity, found: Fit) -> float:
     return float(np.sqrt(found.cost / freedom))
 
 
-def made_of(
+def posterior_of(
     settings: JointPoseSensitivity,
     cohort: Cohort,
     alone: Problem,
@@ -257,6 +216,7 @@ def made_of(
         *free_parameters(model, first, TRANSLATIONS, "per_joint"),
         *free_parameters(model, first + 1, tilts, "per_joint"),
     )
+    # landmarks have a prior and no bounds
     anywhere = np.full(len(free) - len(alone.free), np.inf)
     problem = replace(
         alone,

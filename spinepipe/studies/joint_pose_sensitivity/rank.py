@@ -5,8 +5,8 @@ import json
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import digest_of
 from spinepipe.marks import with_mark
+from spinepipe.studies.joint_pose_sensitivity.filters import rank_fits
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranked
 from spinepipe.tables import read_frame
 
 
@@ -15,7 +15,7 @@ def run(root: str, study: str, calibrations: str, output: str) -> None:
     settings, cohort = study_and_cohort(root, study)
     fits = read_frame(calibrations)
     best = {
-        specimen: ranked(settings, fits[fits["specimen"] == specimen])[: settings.best_models]
+        specimen: rank_fits(settings, fits[fits["specimen"] == specimen])[: settings.best_models]
         for specimen in cohort.specimen_names
     }
     data = with_mark(best, digest_of("rank", settings, cohort))

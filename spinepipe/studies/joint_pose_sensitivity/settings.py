@@ -148,6 +148,13 @@ class Dynamic(BaseModel):
     )
 
 
+EXACT, DEFAULT = "exact", "forward_run_default_step"
+SANE, RAW_UNITS = "forward_run_sane_step", "forward_run_raw_units"
+METHODS = (EXACT, DEFAULT, SANE, RAW_UNITS)
+"""Ways of fitting that are compared; in raw units with the default step, but on stiffness in N/m
+and N m/rad instead of multiples of its start."""
+
+
 class Methods(BaseModel):
     """The same fits by forward runs with derivatives by differences, as published."""
 

@@ -10,6 +10,7 @@ import pandas as pd
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.tested_rows import Tested, corrected_rows
+from spinepipe.marks import read_json
 from spinepipe.statistics import (
     chi_squared_normality,
     friedman,
@@ -19,7 +20,6 @@ from spinepipe.statistics import (
     spearman,
 )
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import STATISTICS
 from spinepipe.studies.joint_pose_sensitivity.variables import (
@@ -43,7 +43,7 @@ def run(root: str, study: str, tables: list[str], best: str, output: str) -> Non
     frames = read_frames(tables)
     seen = readings(frames["simulations"], cohort.zeroed_at_step_0)
     errors, motion = absolute_error(seen), measured_size(seen[seen["stiffness"] == "calibrated"])
-    ranked_sets = ranking(best)
+    ranked_sets = read_json(best)
     rows: list[dict[str, Any]] = []
     for specimen in cohort.specimen_names:
         judged = frames["success"]
@@ -155,6 +155,7 @@ class Specimen:
             return
         error = f"{coordinate}_error"
         values = grid.to_numpy(float)
+        # blocks are poses and treatments sets of stiffness, then the other way round
         yield Tested("friedman", joint, error, "stiffness", "", friedman(values))
         yield Tested("friedman", joint, error, "pose", "", friedman(values.T))
         family = f"two-factor: {error} at {joint} against"

@@ -17,13 +17,13 @@ from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import Program, System, settle
 from spinepipe.statics.batched import Stack
 from spinepipe.status import Status
+from spinepipe.studies.joint_pose_sensitivity.filters import rank_fits
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
     sampled_poses,
     specimen_inputs,
     study_and_cohort,
 )
-from spinepipe.studies.joint_pose_sensitivity.ranking import judging, ranked
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import SIMULATIONS
 from spinepipe.tables import read_frame, to_arrow, write
@@ -51,25 +51,32 @@ def run(
     settings, cohort = study_and_cohort(root, study)
     inputs = specimen_inputs(root, study, specimen, cohort.digest)
     fits = pd.concat([read_frame(path) for path in calibrations])
-    best = {one["name"]: np.array(one["stiffness"]) for one in ranked(settings, fits)}
+    best = {one["name"]: np.array(one["stiffness"]) for one in rank_fits(settings, fits)}
     of_pose, sampled = fits.set_index("pose"), sampled_poses(poses)
     asked: list[tuple[tuple[Pose, ...] | str, Array | str]] = []
+    values: Array | str
     for place in parts.values():
         placed, no_frames = sampled.of(specimen, int(place["pose"]))
         if place["stiffness"] == "calibrated":
-            values = _calibrated(of_pose.loc[[int(place["pose"])]])
+            own = of_pose.loc[[int(place["pose"])]]
+            values = own[list(STIFFNESS_COLUMNS)].to_numpy(float)
+            if not np.isfinite(values).all():
+                values = f"not calibrated: {own['message'].iloc[0]}"
         else:
             lacking = f"fewer fits in the reduced dataset than {place['stiffness']} asks for"
             values = best.get(place["stiffness"], lacking)
         asked.append((no_frames if placed is None else placed, values))
     read = [mark_of(path) for path in (poses, *calibrations)]
+    rule = settings.success.model_dump_json()  # decides which fits are ranked
     made_by = {
-        own: provenance("simulate", settings, cohort, [specimen], [*read, *rule])
-        for own, rule in ((True, []), (False, [judging(settings)]))
+        own: provenance("simulate", settings, cohort, [specimen], [*read, *rules])
+        for own, rules in ((True, []), (False, [rule]))
     }
     ends = _solve_all(settings, cohort, inputs, asked)
     for (path, place), (frames, _), ended in zip(parts.items(), asked, ends, strict=True):
-        tested = inputs.tested if isinstance(frames, str) else _in_frames(inputs, frames)
+        tested = inputs.tested
+        if not isinstance(frames, str):  # readings as seen in the frames of the pose
+            tested = tuple(one.in_frames(inputs.frames, frames) for one in tested)
         rows = [
             {**row, "stiffness": place["stiffness"], "joint": cohort.joint_names[row["joint"]]}
             for one, steps in zip(tested, ended, strict=True)
@@ -79,19 +86,8 @@ def run(
         write(to_arrow(TABLE, columns), path, made_by[place["stiffness"] == "calibrated"])
 
 
-def _calibrated(rows: pd.DataFrame) -> Array | str:
-    """Stiffness (J or 1, 6) that was calibrated in a pose, or why there is none."""
-    values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)
-    whole = np.isfinite(values).all()
-    return values if whole else f"not calibrated: {rows['message'].iloc[0]}"
-
-
-def _in_frames(inputs: MeasuredSpecimen, frames: tuple[Pose, ...]) -> tuple[MeasuredCycle, ...]:
-    return tuple(one.in_frames(inputs.frames, frames) for one in inputs.tested)
-
-
 @dataclass(frozen=True)
-class _Ended:
+class _StepResult:
     """How a load step ended: pose (n,) or None, and what was left to go to equilibrium (n,)."""
 
     q: Array | None
@@ -100,13 +96,8 @@ class _Ended:
     remaining: Array | None = None
 
 
-_Ends = list[list[_Ended]]
+_Ends = list[list[_StepResult]]
 """Of all steps of all cases."""
-
-
-def _refused(inputs: MeasuredSpecimen, reason: str) -> _Ends:
-    refused = _Ended(None, Status.REFUSED, reason)
-    return [[refused] * len(case.steps) for case in inputs.cases]
 
 
 def _solve_all(
@@ -125,7 +116,8 @@ def _solve_all(
             models.append(bushing_model(settings, cohort, inputs.specimen, frames, values))
             ends.append(None)
         except RefusedModel as error:
-            ends.append(_refused(inputs, str(error)))
+            refused = _StepResult(None, Status.REFUSED, str(error))
+            ends.append([[refused] * len(case.steps) for case in inputs.cases])
     if settings.loading == "settle":
         found = iter([_settle(settings, inputs, model) for model in models])
     else:
@@ -143,7 +135,7 @@ def _balance(inputs: MeasuredSpecimen, models: Sequence[SpineModel]) -> list[_En
     messages = {**stack.warnings(found.q), **found.messages}
     each = zip(found.q.reshape(len(found.q), -1), found.status.tolist(), strict=True)
     ended = [
-        _Ended(None if np.isnan(q[0]) else q, Status(status), messages.get(lane, ""))
+        _StepResult(None if np.isnan(q[0]) else q, Status(status), messages.get(lane, ""))
         for lane, (q, status) in enumerate(each)
     ]
     by_run = [ended[first:end] for first, end in pairwise(stack.first.tolist())]
@@ -160,12 +152,12 @@ def _settle(settings: JointPoseSensitivity, inputs: MeasuredSpecimen, model: Spi
             program = Program.constant(system.slots.loading(step.wrenches))
             end = settle(system, program, settings.settle_time_s)
             pose = end.q if end.status.usable else None
-            ended.append(_Ended(pose, end.status, end.message, end.remaining))
+            ended.append(_StepResult(pose, end.status, end.message, end.remaining))
         ends.append(ended)
     return ends
 
 
-def _zeroed(ended: list[_Ended]) -> list[_Ended]:
+def _zeroed(ended: list[_StepResult]) -> list[_StepResult]:
     """Poses less that of step 0, as the cohort's readings are; none where step 0 has none."""
     first = ended[0]
     if first.q is None:
@@ -174,7 +166,7 @@ def _zeroed(ended: list[_Ended]) -> list[_Ended]:
     return [replace(end, q=None if end.q is None else end.q - first.q) for end in ended]
 
 
-def _case_rows(one: MeasuredCycle, ended: list[_Ended]) -> Iterator[dict[str, Any]]:
+def _case_rows(one: MeasuredCycle, ended: list[_StepResult]) -> Iterator[dict[str, Any]]:
     """One row per step and joint (by number) of a case; mm and deg."""
     case = one.case
     for step, measured, end in zip(case.steps, from_si(one.measured), ended, strict=True):

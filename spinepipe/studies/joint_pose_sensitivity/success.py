@@ -17,7 +17,11 @@ from spinepipe.studies.joint_pose_sensitivity.tables import (
 )
 from spinepipe.tables import from_rows, read_frames, write
 
-FLAGS = ("solved", "near_start_any", "near_start_all", "outlier", "reduced")
+FLAGS = {
+    **{name: name for name in ("solved", "near_start_any", "near_start_all", "reduced")},
+    "outliers": "outlier",
+}
+"""Columns of counts, and the flag of a fit that each counts."""
 
 ARRIVED = 1.01
 """A fit has arrived when its cost is at most this many times the least found for its pose."""
@@ -42,18 +46,15 @@ def counts(root: str, study: str, tables: list[str], output: str) -> None:
     if "bootstrap" in frames:
         fits = judge_bootstrap(settings, frames["bootstrap"]).groupby("bootstrap", sort=False)
         parts += [(f"{name}_bootstrap", rows) for name, rows in fits]
-    rows = [row for part in parts for row in _counts(*part)]
+    rows = [
+        {
+            **{"specimen": specimen, "part": part, "loading": loading, "fits": len(fits)},
+            **{column: int(fits[flag].sum()) for column, flag in FLAGS.items()},
+        }
+        for part, judged in parts
+        for (specimen, loading), fits in judged.groupby(["specimen", "loading"], sort=False)
+    ]
     write(from_rows(COUNTS, rows), output, provenance("counts", settings, cohort))
-
-
-def _counts(part: str, judged: pd.DataFrame) -> list[dict[str, Any]]:
-    rows = []
-    for (specimen, loading), fits in judged.groupby(["specimen", "loading"], sort=False):
-        taken = {flag: int(fits[flag].sum()) for flag in FLAGS}
-        taken["outliers"] = taken.pop("outlier")
-        key = {"specimen": specimen, "part": part, "loading": loading}
-        rows.append({**key, "fits": len(fits), **taken})
-    return rows
 
 
 def success_by_method(root: str, study: str, tables: list[str], output: str) -> None:

@@ -9,9 +9,9 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
+from spinepipe.marks import read_json
 from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import LOWER_ENDS, SUMMARY, region_columns
 from spinepipe.studies.joint_pose_sensitivity.variables import (
@@ -36,16 +36,16 @@ def run(root: str, study: str, tables: list[str], best: str, output: str) -> Non
     settings, cohort = study_and_cohort(root, study)
     frames = read_frames(tables)
     frames["simulations"] = readings(frames["simulations"], cohort.zeroed_at_step_0)
-    rows = list(_pose_rows(settings, frames, _best_poses(best)))
+    keys = [(name, ranked["pose"]) for name, sets in read_json(best).items() for ranked in sets]
+    best_poses = pd.DataFrame(keys, columns=["specimen", "pose"])
+    rows = list(_pose_rows(settings, frames, best_poses))
     if "bootstrap" in frames:
         rows += _bootstrap_rows(settings, cohort, frames["bootstrap"])
     write(from_rows(SUMMARY, rows), output, provenance("summary", settings, cohort))
 
 
-def _best_poses(best: str) -> pd.DataFrame:
-    ranked_sets = ranking(best)
-    keys = [(specimen, ranked["pose"]) for specimen, sets in ranked_sets.items() for ranked in sets]
-    return pd.DataFrame(keys, columns=["specimen", "pose"])
+FEW_OPEN_BELOW = 0.1
+"""Share of fits without a lower end up to which the others' lower ends speak for all."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def _pose_rows(
     calibrated = frames["simulations"][frames["simulations"]["stiffness"] == "calibrated"]
     errors, sizes = absolute_error(calibrated), measured_size(calibrated)
     judged = frames["success"]
-    keep = {
+    keep = {  # the poses of each dataset
         "all": frames["poses"][["specimen", "pose"]].drop_duplicates(),
         "reduced": judged.loc[judged["reduced"], ["specimen", "pose"]],
         "best": best,
@@ -134,10 +134,6 @@ def _stiffness_rows(
             values = rows[column].to_numpy(float)
             row = part.row("stiffness", str(joint), name, STIFFNESS_UNITS[name], values)
             yield row | _regions(rows, name)
-
-
-FEW_OPEN_BELOW = 0.1
-"""Share of fits without a lower end up to which the others' lower ends speak for all."""
 
 
 def _regions(fits: pd.DataFrame, name: str) -> dict[str, Any]:
@@ -183,28 +179,17 @@ def _bootstrap_rows(
     judged = judge_bootstrap(settings, fits)
     kept = fits.merge(judged.loc[judged["reduced"], keys], on=keys)
     motion = _own_motion(settings, cohort)
+    as_in_simulations = {f"{name}_error_{unit}": name for name, unit in COORDINATE_UNITS.items()}
     for specimen, bootstrap, loading in fits[keys[:3]].drop_duplicates().itertuples(index=False):
         for dataset, chosen in (("all", fits), ("reduced", kept)):
             part = _SummaryKey(f"{bootstrap}_bootstrap", str(loading), dataset, str(specimen))
             here = chosen[(chosen[keys[:3]] == [specimen, bootstrap, loading]).all(axis=1)]
-            yield from _stiffness_rows(settings, part, _by_fit(settings, here, fits))
-            yield from _error_rows(part, _named(here), motion[motion["specimen"] == specimen])
-
-
-def _by_fit(
-    settings: JointPoseSensitivity, fits: pd.DataFrame, every: pd.DataFrame
-) -> pd.DataFrame:
-    """Stiffness rows as in calibrations: one per fit where all joints share it."""
-    if settings.calibration.grouping == "per_joint":
-        return fits
-    return fits[fits["joint"] == every["joint"].iloc[0]].assign(joint="*")
-
-
-def _named(fits: pd.DataFrame) -> pd.DataFrame:
-    """Errors of bootstrap fits with columns as in `absolute_error`."""
-    return fits.rename(
-        columns={f"{name}_error_{unit}": name for name, unit in COORDINATE_UNITS.items()}
-    )
+            of_fits = here
+            if settings.calibration.grouping == "per_specimen":  # one row per fit, of all joints
+                of_fits = here[here["joint"] == fits["joint"].iloc[0]].assign(joint="*")
+            yield from _stiffness_rows(settings, part, of_fits)
+            own = motion[motion["specimen"] == specimen]
+            yield from _error_rows(part, here.rename(columns=as_in_simulations), own)
 
 
 def _own_motion(settings: JointPoseSensitivity, cohort: Cohort) -> pd.DataFrame:

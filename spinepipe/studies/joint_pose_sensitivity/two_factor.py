@@ -10,10 +10,10 @@ import pandas as pd
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
+from spinepipe.marks import read_json
 from spinepipe.sensitivity.shares import VarianceShare, VarianceShares, variance_shares
 from spinepipe.sensitivity.tree import Tree, regression_tree
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranking
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, VARIANCE_SHARES
 from spinepipe.studies.joint_pose_sensitivity.variables import (
@@ -40,7 +40,7 @@ def run(
         found.merge(kept, on=["specimen", "pose"])
         for found in (absolute_error(simulations), signed_error(simulations))
     )
-    ranked_sets = ranking(best)
+    ranked_sets = read_json(best)
     divided: list[dict[str, Any]] = []
     grown: list[dict[str, Any]] = []
     for specimen in cohort.specimen_names:
@@ -54,7 +54,7 @@ def run(
             divided += [{**key, **row} for row in _shares(*both)]
             seed = specimen_seed(settings.seed, f"tree/{specimen}/{joint}/{coordinate}")
             sets = {one["name"]: np.array(one["stiffness"]) for one in ranked_sets[specimen]}
-            tree = Grown(settings, cohort.joint_names, parameters, sets, seed)
+            tree = TreeData(settings, cohort.joint_names, parameters, sets, seed)
             grown += [{**key, **row} for row in tree.rows(grid)]
     origin = provenance("two_factor", settings, cohort)
     write(from_rows(VARIANCE_SHARES, divided), variance_shares, origin)
@@ -98,7 +98,7 @@ def _interval(share: VarianceShare | None) -> dict[str, float | None]:
 
 
 @dataclass(frozen=True)
-class Grown:
+class TreeData:
     """What a tree is grown on: pose parameters (deg, mm) and the fitted stiffnesses' logarithms.
 
     Attributes
@@ -114,28 +114,21 @@ class Grown:
 
     def rows(self, grid: pd.DataFrame) -> Iterator[dict[str, Any]]:
         """One row per predictor."""
+        free = self.settings.calibration.free
         of_pose = [str(name) for name in self.parameters.columns]
-        of_stiffness = self._stiffness_names()
+        of_stiffness = [f"{name}_stiffness" for name in free]
+        if self.settings.calibration.grouping == "per_joint":
+            of_stiffness = [f"{joint}_{name}" for joint in self.joints for name in of_stiffness]
         pose = self.parameters.loc[grid.index].to_numpy(float)
-        sets = [self._stiffness(str(name)) for name in grid.columns]
+        columns = [COORDINATES.index(name) for name in free]
+        sets = [np.log(self.sets[str(name)][:, columns]).ravel() for name in grid.columns]
         stiffness = np.array(sets).reshape(grid.shape[1], len(of_stiffness))  # there may be none
         x = np.hstack([np.repeat(pose, grid.shape[1], axis=0), np.tile(stiffness, (len(grid), 1))])
+        # runs of one pose stay together in cross-validation
         groups = np.repeat(np.arange(len(grid)), grid.shape[1])
         names = (*of_pose, *of_stiffness)
         tree = regression_tree(x, grid.to_numpy(float).ravel(), names, self.seed, groups=groups)
         yield from _importance(tree, len(of_pose), grid.size)
-
-    def _stiffness_names(self) -> list[str]:
-        free = self.settings.calibration.free
-        if self.settings.calibration.grouping == "per_specimen":
-            return [f"{name}_stiffness" for name in free]
-        return [f"{joint}_{name}_stiffness" for joint in self.joints for name in free]
-
-    def _stiffness(self, name: str) -> Array:
-        """(k,) logarithms of the fitted stiffnesses of a set, joint by joint."""
-        columns = [COORDINATES.index(free) for free in self.settings.calibration.free]
-        logarithms: Array = np.log(self.sets[name][:, columns]).ravel()
-        return logarithms
 
 
 def _importance(tree: Tree, n_pose: int, n: int) -> Iterator[dict[str, Any]]:

@@ -1,6 +1,6 @@
 """What statistics are made of: errors of runs, their two-factor grid, and poses as factors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,9 @@ _AXES: Mapping[str, str] = {
 def readings(rows: pd.DataFrame, zeroed_at_step_0: bool) -> pd.DataFrame:
     """Rows that are readings: where motion is zeroed at step 0, that step's zeros are none."""
     return rows[has_reading(rows["step"], zeroed_at_step_0)]
+
+
+_RUN = ["specimen", "pose", "stiffness", "joint"]
 
 
 def absolute_error(simulations: pd.DataFrame) -> pd.DataFrame:
@@ -43,32 +46,29 @@ def signed_error(simulations: pd.DataFrame) -> pd.DataFrame:
 def _mean_error(
     simulations: pd.DataFrame, sized: Callable[[pd.DataFrame], pd.DataFrame]
 ) -> pd.DataFrame:
-    keys = ["specimen", "pose", "stiffness", "joint"]
     columns = [f"error_{name}" for name in COORDINATE_COLUMNS]
     errors = sized(simulations[columns]).set_axis(list(COORDINATES), axis=1)
     measured = simulations[[f"measured_{name}" for name in COORDINATE_COLUMNS]].notna().to_numpy()
     lost = pd.DataFrame(measured & errors.isna().to_numpy(), columns=list(COORDINATES))
-    by = [simulations[key].reset_index(drop=True) for key in keys]
+    by = [simulations[key].reset_index(drop=True) for key in _RUN]
     mean = errors.reset_index(drop=True).groupby(by, sort=False).mean()
+    # a coordinate that was measured in a step without a pose has no mean
     complete = ~lost.groupby(by, sort=False).any()
     return mean.where(complete).reset_index()
 
 
 def measured_size(simulations: pd.DataFrame) -> pd.DataFrame:
     """Mean absolute measured motion, rows and columns as `absolute_error`."""
-    keys = ["specimen", "pose", "stiffness", "joint"]
     columns = [f"measured_{name}" for name in COORDINATE_COLUMNS]
     sizes = simulations[columns].abs().set_axis(list(COORDINATES), axis=1)
-    by = [simulations[key] for key in keys]
-    return sizes.groupby(by, sort=False).mean().reset_index()
+    return sizes.groupby([simulations[key] for key in _RUN], sort=False).mean().reset_index()
 
 
 def measured_coordinates(errors: pd.DataFrame) -> list[tuple[str, str]]:
     """(joint, coordinate) of which any run has an error, in the order of joints."""
-    joints: Sequence[str] = list(dict.fromkeys(errors["joint"]))
     return [
         (joint, name)
-        for joint in joints
+        for joint in dict.fromkeys(errors["joint"])
         for name in COORDINATES
         if np.isfinite(errors.loc[errors["joint"] == joint, name].to_numpy(float)).any()
     ]
@@ -96,10 +96,8 @@ def pose_parameters(poses: pd.DataFrame) -> pd.DataFrame:
     """
     named = poses.rename(columns=dict(_AXES))
     wide = named.pivot(index="pose", columns="joint", values=list(_AXES.values()))
-    joints = list(dict.fromkeys(poses["joint"]))
-    order = [(name, joint) for joint in joints for name in _AXES.values()]
-    found = wide[order]
-    return found.set_axis([f"{joint}_{name}" for name, joint in order], axis=1)
+    order = [(name, joint) for joint in dict.fromkeys(poses["joint"]) for name in _AXES.values()]
+    return wide[order].set_axis([f"{joint}_{name}" for name, joint in order], axis=1)
 
 
 def pose_factors(poses: pd.DataFrame) -> pd.DataFrame:

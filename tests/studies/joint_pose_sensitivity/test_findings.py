@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 from study_cases import STUDY, Size, project
@@ -82,15 +81,9 @@ def test_methods_that_were_refused_are_not_unsuccessful(study: JointPoseSensitiv
 
 def calibrations(identifiable: list[bool], freedom: list[int]) -> list[dict[str, Any]]:
     """Solved fits, one per pose."""
+    same = {"specimen": "a", "joint": "*", "status": "converged"}
     return [
-        {
-            "specimen": "a",
-            "pose": pose,
-            "joint": "*",
-            "status": "converged",
-            "extension_identifiable": flag,
-            "degrees_of_freedom": n,
-        }
+        {**same, "pose": pose, "extension_identifiable": flag, "degrees_of_freedom": n}
         for pose, (flag, n) in enumerate(zip(identifiable, freedom, strict=True))
     ]
 
@@ -212,6 +205,14 @@ def test_open_ends_and_few_poses_of_landmark_precision_are_told(
     assert "cannot show" in precise(study, required(0.95, 0.65, 1.2, n=72)), "72 / 75.84 < 0.95"
 
 
+def test_precision_is_told_of_the_one_kind_of_motion_that_was_measured(
+    study: JointPoseSensitivity,
+) -> None:
+    words = precise(study, required(1.25, 1.0, 1.5, motion="rotation", stiffness="calibrated"))
+    assert "to stay below 1°, the SD" in words
+    assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in words
+
+
 def test_specimens_are_not_an_interval(study: JointPoseSensitivity) -> None:
     rows = [required(0.95, 0.6, 1.2), required(2.6, 2.2, NAN, specimen="b")]
     assert "0.95 mm (smallest of 2 specimens, a) (6 poses" in precise(study, *rows)
@@ -288,19 +289,9 @@ def test_trees_that_could_not_be_grown_have_a_row_that_says_why(
     study: JointPoseSensitivity,
 ) -> None:
     cell = {"specimen": "a", "joint": "J", "coordinate": "extension", "n": 18}
-    rows = [
-        {
-            **cell,
-            "predictor": name,
-            "factor": "pose",
-            "importance": np.nan,
-            "leaves": np.nan,
-            "r2": np.nan,
-            "status": "too_few",
-            "message": "18 rows; at least 20",
-        }
-        for name in ("p1", "p2")
-    ]
+    cell |= dict.fromkeys(("importance", "leaves", "r2"), NAN)
+    cell |= {"factor": "pose", "status": "too_few", "message": "18 rows; at least 20"}
+    rows = [{**cell, "predictor": name} for name in ("p1", "p2")]
     frames = StudyTables({"importance": pd.DataFrame(rows)})
     (table,) = shown_tables(study, ResultTables(frames, {}, {}))
     (row,) = table.rows

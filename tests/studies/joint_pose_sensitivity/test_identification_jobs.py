@@ -31,6 +31,7 @@ from spinepipe.studies.joint_pose_sensitivity import (
 )
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.landmark_precision import required_precision
+from spinepipe.studies.joint_pose_sensitivity.landmarks import landmarks_of
 from spinepipe.studies.joint_pose_sensitivity.settings import SETS_PER_BATCH
 from spinepipe.studies.joint_pose_sensitivity.tables import BOOTSTRAP, PRECISION_ERRORS
 from spinepipe.studies.joint_pose_sensitivity.variables import (
@@ -143,16 +144,7 @@ def test_the_grid_leaves_out_empty_sets_and_poses_that_lack_a_run() -> None:
 
 
 def two_joint_poses() -> pd.DataFrame:
-    columns = (
-        "pose",
-        "joint",
-        "x_mm",
-        "y_mm",
-        "z_mm",
-        "extension_deg",
-        "right_bending_deg",
-        "left_rotation_deg",
-    )
+    columns = "pose joint x_mm y_mm z_mm extension_deg right_bending_deg left_rotation_deg"
     rows = [
         (2, "Q", 3.0, 0.0, 0.0, 1.0, 2.0, 0.0),
         (2, "P", 0.0, 4.0, 0.0, 3.0, -2.0, 1.0),
@@ -161,7 +153,7 @@ def two_joint_poses() -> pd.DataFrame:
         (9, "Q", 8.0, 0.0, 0.0, 0.0, 4.0, 0.0),
         (9, "P", 0.0, 7.0, 4.0, 0.0, 6.0, 0.0),
     ]
-    return pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame(rows, columns=columns.split())
 
 
 def test_pose_factors_are_means_over_joints() -> None:
@@ -274,14 +266,13 @@ class Run:
     def table(self, name: str) -> pd.DataFrame:
         """A table, made of the others if a job makes it."""
         base = self._files("simulations", "success", "poses", "calibrations")
+        more = [f for f in self._files("bootstrap") if Path(f).exists()]
         output = self._files(name)[0]
         match name:
             case "counts":
-                extra = [f for f in self._files("bootstrap") if Path(f).exists()]
-                success.counts(self.root, STUDY, [*base, *extra], output)
+                success.counts(self.root, STUDY, [*base, *more], output)
             case "summary":
-                extra = [f for f in self._files("bootstrap") if Path(f).exists()]
-                summary.run(self.root, STUDY, [*base, *extra], self.best, output)
+                summary.run(self.root, STUDY, [*base, *more], self.best, output)
             case "statistics":
                 significance.run(self.root, STUDY, base, self.best, output)
             case "variance_shares" | "importance":
@@ -626,14 +617,14 @@ def test_sampled_starts_and_damping(tmp_path: Path) -> None:
     settings, _ = study_and_cohort(root, STUDY)
     ten = settings.damping_bootstrap.model_copy(update={"sets": 10})
     settings = settings.model_copy(update={"damping_bootstrap": ten})
-    starts = bootstrap.sampled(settings, "a", "start")
+    starts = bootstrap.sample_sets(settings, "a", "start")
     assert len(starts) == 100
     low, high = settings.start_bootstrap.lowest, settings.start_bootstrap.highest
     for start, damping in starts:
         assert (start >= low.in_order()).all()
         assert (start <= high.in_order()).all()
         assert damping.tolist() == [1000.0] * 3 + [1.4] * 3
-    damped = bootstrap.sampled(settings, "a", "damping")
+    damped = bootstrap.sample_sets(settings, "a", "damping")
     assert len(damped) == 10
     for start, damping in damped:
         assert start.tolist() == list(START)
@@ -642,7 +633,7 @@ def test_sampled_starts_and_damping(tmp_path: Path) -> None:
         assert 100.0 <= damping[0] <= 10000.0
         assert 0.14 <= damping[5] <= 14.0
     assert len({damping[0] for _, damping in damped}) == 10
-    other = bootstrap.sampled(settings, "b", "damping")
+    other = bootstrap.sample_sets(settings, "b", "damping")
     assert other[0][1][0] != damped[0][1][0]
 
 
@@ -675,31 +666,28 @@ def test_a_straight_spine_in_compression_and_flexion_in_closed_form(
 Grids = dict[str, list[list[float | None]]]
 
 
-def precision_file(path: Path, grids: Grids, nominal: float | None = 0.05) -> str:
-    """Errors of poses at 1 and 2 mm, by kind of motion; None without result."""
+def with_study(tmp_path: Path, size: Size, text: str) -> Path:
+    """A project whose study file has more keys."""
+    root = project(tmp_path, size)
+    study = root / "config" / "studies" / f"{STUDY}.yaml"
+    study.write_text(study.read_text() + text)
+    return root
+
+
+def precision_tables(
+    tmp_path: Path, grids: Grids, nominal: float | None = 0.05, study: str = ""
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Tables of errors of poses at 1 and 2 mm, by kind of motion; None without result."""
+    root = with_study(tmp_path, Size(specimens=("a",)), study)
     rows = []
-    as_they_are = {f"nominal_{name}": nominal for name in grids}
     for level, sd in enumerate((1.0, 2.0)):
         for pose in range(len(next(iter(grids.values()))[level])):
             found = {name: grid[level][pose] for name, grid in grids.items()}
             lost = all(value is None for value in found.values())
-            key = {"specimen": "a", "sd_mm": sd, "pose": pose, "stiffness": "calibrated"}
-            rows.append(
-                {
-                    **key,
-                    **found,
-                    **as_they_are,
-                    "status": "unstable" if lost else "converged",
-                    "message": "",
-                }
-            )
-    return write_rows(path, PRECISION_ERRORS, rows)
-
-
-def precision_tables(
-    root: Path, grids: Grids, nominal: float | None = 0.05
-) -> tuple[pd.DataFrame, pd.DataFrame]:
-    errors = precision_file(root / "precision_errors.parquet", grids, nominal)
+            row = {"specimen": "a", "sd_mm": sd, "pose": pose, "stiffness": "calibrated"} | found
+            row |= {f"nominal_{name}": nominal for name in grids}
+            rows.append({**row, "status": "unstable" if lost else "converged", "message": ""})
+    errors = write_rows(root / "precision_errors.parquet", PRECISION_ERRORS, rows)
     files = [str(root / f"{name}.parquet") for name in ("precision", "required")]
     landmark_precision.run(str(root), STUDY, [errors], *files)
     spread, required = (read_frame(file) for file in files)
@@ -707,14 +695,12 @@ def precision_tables(
 
 
 def test_precision_counts_lost_poses_as_above_the_limit(tmp_path: Path) -> None:
-    root = project(tmp_path, Size(specimens=("a",)))
-    study = root / "config" / "studies" / f"{STUDY}.yaml"
-    study.write_text(study.read_text() + "landmark_precision: {share: 0.5}\n")
     grids = {
         "translation_error_mm": [[0.1, 0.2, 0.3, 0.4], [0.5, 1.5, None, 0.7]],
         "rotation_error_deg": [[0.1, 0.2, 0.3, 2.0], [3.0, 0.2, None, 4.0]],
     }
-    spread, required = precision_tables(root, grids)
+    study = "landmark_precision: {share: 0.5}\n"
+    spread, required = precision_tables(tmp_path, grids, study=study)
     row = spread.loc[("translation", 2.0)]
     assert (row["n"], row["without_result"], row["below"]) == (4, 1, 0.5)
     assert (row["median"], row["largest"]) == (0.7, 1.5)
@@ -729,17 +715,15 @@ def test_precision_counts_lost_poses_as_above_the_limit(tmp_path: Path) -> None:
 
 
 def test_precision_of_one_kind_of_motion(tmp_path: Path) -> None:
-    root = project(tmp_path, Size(specimens=("a",)))
     grids = {"rotation_error_deg": [[0.1, 0.2], [0.3, 0.4]]}
-    spread, required = precision_tables(root, grids)
+    spread, required = precision_tables(tmp_path, grids)
     assert set(spread.index.get_level_values("motion")) == {"rotation"}
     assert required.index.tolist() == ["rotation"]
 
 
 def test_precision_where_every_pose_is_lost_is_not_silence(tmp_path: Path) -> None:
-    root = project(tmp_path, Size(specimens=("a",)))
     grids = {"translation_error_mm": [[None] * 3] * 2, "rotation_error_deg": [[None] * 3] * 2}
-    spread, required = precision_tables(root, grids)
+    spread, required = precision_tables(tmp_path, grids)
     assert len(spread) == 4
     assert (spread["below"] == 0.0).all()
     assert (spread["without_result"] == 3).all()
@@ -754,9 +738,8 @@ def test_no_precision_is_told_where_the_nominal_pose_does_not_fit(
     tmp_path: Path, nominal: float | None, says: str
 ) -> None:
     """The limit is 1 deg; 4 of 5 poses are below it, which says nothing of landmarks then."""
-    root = project(tmp_path, Size(specimens=("a",)))
     grids = {"rotation_error_deg": [[0.1] * 5, [0.1] * 4 + [3.0]]}
-    _, required = precision_tables(root, grids, nominal)
+    _, required = precision_tables(tmp_path, grids, nominal)
     row = required.loc["rotation"]
     assert row[["sd_mm", "sd_low_mm", "sd_high_mm"]].isna().all()
     assert says in row["message"]
@@ -769,10 +752,10 @@ def test_landmark_errors_of_every_sd_draw_the_same_directions(tmp_path: Path) ->
     exact = cohort.landmarks.iloc[0]
     offsets = []
     for sd in (0.5, 2.0):
-        sets = landmark_errors._landmark_sets(settings, cohort, "a", sd)
+        sets = landmarks_of(settings, cohort, "a").with_sd(sd, 20, settings.seed, "precision/a")
         point = [s[exact["vertebra"]][exact["landmark"]] for s in sets]
         offsets.append(1000.0 * np.array(point) - exact[["x_mm", "y_mm", "z_mm"]].to_numpy(float))
-    assert len(offsets[0]) == settings.landmark_precision.poses > 1
+    assert len(offsets[0]) == 20
     np.testing.assert_allclose(offsets[1], 4.0 * offsets[0], rtol=0, atol=1e-9)
     assert np.abs(offsets[1]).std() > 0.5
 
@@ -780,12 +763,10 @@ def test_landmark_errors_of_every_sd_draw_the_same_directions(tmp_path: Path) ->
 @pytest.mark.full
 def test_landmark_errors_say_why_there_are_none(tmp_path: Path) -> None:
     """A joint without any stiffness in flexion tips over, in the cohort's own pose too."""
-    root = project(tmp_path, Size(specimens=("a",), free=("superior",)))
-    study = root / "config" / "studies" / f"{STUDY}.yaml"
     soft = (
         "stiffness: {extension_nm_per_rad: 0.001}\nlandmark_precision: {sd_mm: [1.0], poses: 1}\n"
     )
-    study.write_text(study.read_text().replace("poses: 12\n", f"poses: 12\n{soft}"))
+    root = with_study(tmp_path, Size(specimens=("a",), free=("superior",)), soft)
     output = str(tmp_path / "errors.parquet")
     landmark_errors.run(str(root), STUDY, "a", "1", output)
     rows = read_frame(output).set_index("stiffness")

@@ -13,7 +13,7 @@ import pytest
 from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.joint_pose_sensitivity import poses, posterior
 from spinepipe.studies.joint_pose_sensitivity.figures.posterior import posterior_figure
-from spinepipe.studies.joint_pose_sensitivity.findings_of_posterior import posterior as sentences
+from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import posterior as sentences
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from tests.generators.palpated_joints import START, joint, write
 

@@ -21,7 +21,6 @@ from spinepipe.report.page.document import Picture, ResultTables, sortable
 from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from spinepipe.report.specimen import view_of
 from spinepipe.schema import Column
-from spinepipe.studies.joint_pose_sensitivity.findings import findings
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import document, folded, in_full
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
@@ -192,34 +191,15 @@ def test_findings_are_the_numbers_of_the_tables() -> None:
     assert "forward run default step 9 of 54" in many[5]
 
 
-def test_precision_is_told_of_the_one_kind_of_motion_that_was_measured(tmp_path: Path) -> None:
-    root = project(tmp_path, SIZES["one specimen"])
-    study, _ = study_and_cohort(str(root), STUDY)
-    row = {"specimen": "a", "stiffness": "calibrated", "motion": "rotation", "message": ""}
-    row |= {"n": 100, "sd_mm": 1.25, "sd_low_mm": 1.0, "sd_high_mm": 1.5}
-    tables = StudyTables({"required_precision": pd.DataFrame([row])})
-    (told,) = findings(study, ResultTables(tables, {}, {}))
-    assert "to stay below 1°, the SD" in told
-    assert "stiffness fitted to each pose 1.25 mm (1.00–1.50)" in told
-
-
 def test_comparison_with_the_paper_is_counted_and_shown(tmp_path: Path) -> None:
     verdicts = ["inside"] * 3 + ["outside"] * 2 + ["contradicted", "not_computed"]
+    same = {"where": "Table 1", "unit": "mm", "paper": 1.0, "limit": "two_sided"}
+    same |= {"reason": "as <it> is", "evidence": "independent"}
     rows = [
-        {
-            "id": f"q{n}",
-            "where": "Table 1",
-            "quantity": f"quantity {n}",
-            "unit": "mm",
-            "paper": 1.0,
-            "ours": float(n),
-            "limit": "two_sided",
-            "verdict": verdict,
-            "reason": "as <it> is",
-            "evidence": "contradicted" if verdict == "contradicted" else "independent",
-        }
+        {**same, "id": f"q{n}", "quantity": f"quantity {n}", "ours": float(n), "verdict": verdict}
         for n, verdict in enumerate(verdicts)
     ]
+    rows[5]["evidence"] = "contradicted"
     size = SIZES["one specimen"]
     folder = results(project(tmp_path, size), size)
     against = read_frame(write_table(folder, "against_gould_2024a", rows))
@@ -348,16 +328,8 @@ def test_solids_of_vertebrae_with_two_endplates_one_or_none() -> None:
 
 
 def test_repeated_tests_are_folded_and_counted() -> None:
-    one = {
-        "specimen": "a",
-        "family": "F",
-        "test": "T",
-        "joint": "*",
-        "response": "r",
-        "factor": "f",
-        "effect_name": "rho",
-        "family_size": 4,
-    }
+    one = {"specimen": "a", "family": "F", "test": "T", "joint": "*", "response": "r"}
+    one |= {"factor": "f", "effect_name": "rho", "family_size": 4}
     numbers = [(0.9, 0.001, 0.004, 0.004), (-0.5, 0.02, 0.08, 0.04), (0.8, 0.002, 0.008, 0.006)]
     rows = [
         {**one, "stratum": str(k), "effect": e, "p": p, "p_bonferroni": b, "p_holm": h}

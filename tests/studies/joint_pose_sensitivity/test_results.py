@@ -11,7 +11,7 @@ import pytest
 from small_project import Project
 
 from spinepipe.marks import read_json
-from spinepipe.studies.joint_pose_sensitivity.ranking import ranked
+from spinepipe.studies.joint_pose_sensitivity.filters import rank_fits
 from spinepipe.studies.read import check
 from spinepipe.units import COORDINATE_COLUMNS
 
@@ -50,6 +50,6 @@ def test_simulations_are_with_the_sets_of_the_ranking(eight: Project) -> None:
     fits = table(eight, "calibrations")
     best = read_json(eight.path(f"results/{study}/best.json"))
     assert set(best) == {"s01"}
-    assert best["s01"] == ranked(settings, fits)[: settings.best_models]
+    assert best["s01"] == rank_fits(settings, fits)[: settings.best_models]
     names = {one["name"] for one in best["s01"]}
     assert set(table(eight, "simulations")["stiffness"]) == {"calibrated", *names}

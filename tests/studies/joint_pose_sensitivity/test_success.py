@@ -17,13 +17,6 @@ def test_near_the_start_is_within_the_percentage_either_way() -> None:
     np.testing.assert_array_equal(near_start(values, START, 1.0), expected)
 
 
-def test_each_fit_may_have_a_start_of_its_own() -> None:
-    values = np.array([[100.0], [100.0]])
-    starts = np.array([[100.5], [200.0]])
-    np.testing.assert_array_equal(near_start(values, starts, 1.0), [[True], [False]])
-    np.testing.assert_array_equal(above_start(values, starts / 20.0, 10.0), [[True], [True]])
-
-
 def test_far_above_the_start_is_from_so_many_times_on() -> None:
     values = np.array([[1000.0, 399.9], [999.0, 4000.0], [np.nan, 40.0]])
     expected = [[True, False], [False, True], [False, False]]

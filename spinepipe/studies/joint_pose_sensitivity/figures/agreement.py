@@ -1,6 +1,6 @@
 """Figure: predicted against measured motion after Bland and Altman."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pandas as pd
@@ -47,7 +47,10 @@ def agreement_figure(
     if len(known) > MOST_PANELS:
         return _draw_rows(cohort, known, settling(study))
     panels = [_panel(row, tables, len(cohort.specimen_names)) for _, row in known.iterrows()]
-    figure, axes = _grid(len(panels), known["coordinate"].nunique())
+    coordinates = known["coordinate"].nunique()  # a column for each, where there are several
+    across = min(len(panels), coordinates if coordinates > 1 else _ACROSS_AT_MOST)
+    figure = blank(-(-len(panels) // across) * _PANEL_MM + _KEY_MM)
+    axes = side_by_side(figure, len(panels), across)
     for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
         head(axis, index, panel.title)
         _draw(axis, panel)
@@ -104,13 +107,6 @@ def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int)
     words = [row["specimen"]] if n_specimens > 1 else []
     title = ", ".join([*words, row["joint"], AXIS[row["coordinate"]].lower()])
     return _AgreementPanel(row, readings, title)
-
-
-def _grid(n: int, n_coordinates: int) -> tuple[Figure, Sequence[Axes]]:
-    across = min(n, n_coordinates if n_coordinates > 1 else _ACROSS_AT_MOST)
-    down = -(-n // across)
-    figure = blank(down * _PANEL_MM + _KEY_MM)
-    return figure, side_by_side(figure, n, across)
 
 
 def _draw(axis: Axes, panel: _AgreementPanel) -> None:

@@ -1,7 +1,7 @@
 """Figure: how much fitted stiffness and errors hang on start values, damping and loading."""
 
 from collections.abc import Mapping, Sequence
-from itertools import product
+from itertools import compress, product
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.glyphs import STRIP_KEY, Array, draw_strip, finite, rounded
+from spinepipe.report.glyphs import STRIP_KEY, draw_strip, finite, rounded
 from spinepipe.report.panels import (
     EVERY_JOINT,
     MOST_ACROSS,
@@ -34,6 +34,10 @@ from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, 
 
 _RANGE_OF = "quasi_static"
 """The loading whose ranges of stiffness are published."""
+
+STIFFNESS = dict(zip(COORDINATES, STIFFNESS_COLUMNS, strict=True))
+ERROR = {name: f"{name}_error_{'mm' if name in TRANSLATIONS else 'deg'}" for name in COORDINATES}
+"""Columns of each coordinate."""
 
 SAMPLED = {"start": "start", "damping": "damping"}
 """What is sampled, as printed; the first stands on top."""
@@ -67,15 +71,23 @@ def bootstrap_figure(
     if not found:
         return saying(f"No stiffness was found in any of {count(tried, 'bootstrap fit')}.")
     free: list[str] = [name for name in COORDINATES if name in study.calibration.free]
-    measured = [name for name in COORDINATES if solved[_error(name)].notna().any()]
-    columns = [_stiffness(name) for name in free] + [_error(name) for name in measured]
+    measured = [name for name in COORDINATES if solved[ERROR[name]].notna().any()]
+    columns = [STIFFNESS[name] for name in free] + [ERROR[name] for name in measured]
     shared = study.calibration.grouping == "per_specimen"
     joints = (EVERY_JOINT,) if shared else cohort.joint_names
-    most = _most_rows(len(free), len(measured))
+    # how many narrow rows a panel may have for all lines of panels to fit on the page
+    lines = sum(-(-n // _MOST_ACROSS) for n in (len(free), len(measured)))
+    most = int(((TALLEST_MM - _KEY_MM) / lines - _AROUND_MM) / _NARROW_MM)
     upper, pooled = bootstrap_rows(solved, columns, cohort.specimen_names, joints, most)
-    moving = [name for name in cohort.joint_names if _has_error(solved, name, measured)]
+    errors = solved[[ERROR[name] for name in measured]].notna().any(axis=1)
+    moving = [name for name in cohort.joint_names if (errors & solved["joint"].eq(name)).any()]
     lower, relative = bootstrap_rows(solved, columns, cohort.specimen_names, moving, most)
-    room = _room_for_words([(len(free), upper), (len(measured), lower)])
+    # words stand beside rows only where the page does not become too tall by them
+    tall = sum(
+        -(-n // MOST_ACROSS) * _height(rows, MOST_ROWS_WITH_WORDS)
+        for n, rows in ((len(free), upper), (len(measured), lower))
+    )
+    room = MOST_ROWS_WITH_WORDS if tall + _KEY_MM <= TALLEST_MM else 0
     parts = [(len(free), _height(upper, room)), (len(measured), _height(lower, room))]
     across = MOST_ACROSS if room else _MOST_ACROSS
     (above, *others), figure = sections([part for part in parts if part[0]], _KEY_MM, across)
@@ -84,44 +96,29 @@ def bootstrap_figure(
         head(axis, index, AXIS[name])
         _draw_stiffness(name, axis, upper, study, pooled)
         if len(upper) <= room:
-            _tell_stiffness(name, axis, upper, pooled, cohort.name)
+            _tell(axis, upper, STIFFNESS[name], pooled)
+            for y, frame in enumerate(upper.frames):
+                _write_range(axis, cohort.name, name, frame, y - 0.36)
     for index, (name, axis) in enumerate(zip(measured, below, strict=True)):
         head(axis, len(free) + index, AXIS[name])
         _draw_errors(name, axis, lower, relative, cohort.name)
         if len(lower) <= room:
-            _tell(axis, lower, _error(name), relative)
-    words = _words(tried, found, upper)
-    explain(figure, _bars(cohort.name), words, dashed="" if pooled else "start of the other fits")
+            _tell(axis, lower, ERROR[name], relative)
+    bars = {OURS: "fits in the cohort's own joint poses"}
+    paper = GOULD_2024A.beside(cohort.name)
+    if paper:
+        bars[THEIRS] = f"{paper[0]}, median and range"
+    explain(
+        figure,
+        bars,
+        _words(tried, found, upper),
+        dashed="" if pooled else "start of the other fits",
+    )
     return figure
-
-
-def _most_rows(n_above: int, n_below: int) -> int:
-    """How many narrow rows a panel may have for all lines of panels to fit on the page."""
-    lines = sum(-(-n // _MOST_ACROSS) for n in (n_above, n_below))
-    return int(((TALLEST_MM - _KEY_MM) / lines - _AROUND_MM) / _NARROW_MM)
-
-
-def _room_for_words(parts: Sequence[tuple[int, PanelRows]]) -> int:
-    """Up to how many rows of a panel have words: none where the page would be too small."""
-    height = sum(-(-n // MOST_ACROSS) * _height(rows, MOST_ROWS_WITH_WORDS) for n, rows in parts)
-    return MOST_ROWS_WITH_WORDS if height + _KEY_MM <= TALLEST_MM else 0
 
 
 def _height(rows: PanelRows, room: int) -> float:
     return len(rows) * (_ROW_MM if len(rows) <= room else _NARROW_MM) + _AROUND_MM
-
-
-def _has_error(solved: pd.DataFrame, joint: str, measured: Sequence[str]) -> bool:
-    rows = solved.loc[solved["joint"] == joint, [_error(name) for name in measured]]
-    return bool(rows.notna().any(axis=None))
-
-
-def _stiffness(name: str) -> str:
-    return STIFFNESS_COLUMNS[COORDINATES.index(name)]
-
-
-def _error(name: str) -> str:
-    return f"{name}_error_{'mm' if name in TRANSLATIONS else 'deg'}"
 
 
 def bootstrap_rows(
@@ -139,7 +136,11 @@ def bootstrap_rows(
     keys = list(product(SAMPLED, LOADINGS, specimens, reversed(joints)))
     parts = [(key, part) for key in keys if len(part := _part(solved, *key))]
     if len(parts) <= most:
-        labels = [_label(*key, len(specimens), len(joints)) for key, _ in reversed(parts)]
+        told = (True, True, len(specimens) > 1, len(joints) > 1)  # what tells rows apart
+        labels = [
+            ", ".join(compress((SAMPLED[sampled], LOADING_NAMES[loading], *place), told))
+            for (sampled, loading, *place), _ in reversed(parts)
+        ]
         return PanelRows(tuple(labels), tuple(part for _, part in reversed(parts)), ""), False
     relative = pd.concat([_from_median(part, columns) for _, part in parts])
     groups = [
@@ -171,15 +172,6 @@ def _from_median(part: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
     return moved
 
 
-def _label(
-    sampled: str, loading: str, specimen: str, joint: str, n_specimens: int, n_joints: int
-) -> str:
-    words = [SAMPLED[sampled], LOADING_NAMES[loading]]
-    words += [specimen] if n_specimens > 1 else []
-    words += [joint] if n_joints > 1 else []
-    return ", ".join(words)
-
-
 def _draw_stiffness(
     name: str, axis: Axes, rows: PanelRows, study: JointPoseSensitivity, relative: bool
 ) -> None:
@@ -189,29 +181,25 @@ def _draw_stiffness(
     axis.set_xscale("log")
     if not relative:
         mark_start(axis, study.stiffness.in_order()[index])
-    samples = [finite(frame[_stiffness(name)]) for frame in rows.frames]
+    samples = [finite(frame[STIFFNESS[name]]) for frame in rows.frames]
     for y, (frame, values) in enumerate(zip(rows.frames, samples, strict=True)):
         start = frame["bootstrap"].iloc[0] == "start"
         if start and not relative:
             axis.plot(ends, [y, y], color=GREY, lw=7.0, alpha=0.2, solid_capstyle="butt", zorder=1)
         draw_strip(axis, values, y, OURS)
-    _limit(axis, samples, [] if relative else list(ends))
-    label_rows(axis, rows, below=0.5, above=0.75)
-    axis.set_xlabel("share of own median" if relative else f"stiffness ({stiffness_unit(name)})")
-
-
-def _limit(axis: Axes, samples: Sequence[Array], more: list[float]) -> None:
-    low = min([*(values.min() for values in samples), *more]) / _LEAST_SPREAD
-    high = max([*(values.max() for values in samples), *more]) * _LEAST_SPREAD
+    found = np.concatenate([*samples, *([] if relative else [np.array(ends)])])
+    low, high = found.min() / _LEAST_SPREAD, found.max() * _LEAST_SPREAD
     axis.set_xlim(low, high)
     log_ticks(axis.xaxis, low, high, _FEW_TICKS)
     axis.tick_params(axis="x", labelsize=_TICK_PT)
+    label_rows(axis, rows, below=0.5, above=0.75)
+    axis.set_xlabel("share of own median" if relative else f"stiffness ({stiffness_unit(name)})")
 
 
 def _draw_errors(name: str, axis: Axes, rows: PanelRows, relative: bool, cohort: str) -> None:
     axis.xaxis.set_major_locator(MaxNLocator(_FEW_TICKS))
     for y, frame in enumerate(rows.frames):
-        values = rounded(finite(frame[_error(name)]))
+        values = rounded(finite(frame[ERROR[name]]))
         if not len(values):
             continue
         draw_strip(axis, values, y, OURS)
@@ -242,13 +230,6 @@ def draw_paper(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) 
     axis.plot([median], [y], "D", color=THEIRS, ms=2.6, mew=0.0, zorder=4)
 
 
-def _tell_stiffness(name: str, axis: Axes, rows: PanelRows, relative: bool, cohort: str) -> None:
-    """Numbers of each row, and the paper's below them."""
-    _tell(axis, rows, _stiffness(name), relative)
-    for y, frame in enumerate(rows.frames):
-        _write_range(axis, cohort, name, frame, y - 0.36)
-
-
 def _write_range(axis: Axes, cohort: str, name: str, row: pd.DataFrame, y: float) -> None:
     """Width of the range of a stiffness, where it is published (its place is not)."""
     column = STIFFNESS_COLUMNS[COORDINATES.index(name)]
@@ -272,12 +253,6 @@ def _paper(cohort: str) -> Mapping[str, Any]:
     """Numbers of the paper that the cohort was rebuilt from, empty where there is none."""
     found = GOULD_2024A.beside(cohort)
     return {} if found is None else found[1]
-
-
-def _bars(cohort: str) -> dict[str, str]:
-    bars = {OURS: "fits in the cohort's own joint poses"}
-    paper = GOULD_2024A.beside(cohort)
-    return bars | ({THEIRS: f"{paper[0]}, median and range"} if paper else {})
 
 
 def _words(tried: int, found: int, rows: PanelRows) -> str:

@@ -30,11 +30,12 @@ from spinepipe.studies.joint_pose_sensitivity.variables import readings
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 OWN = "calibrated"
+_COLUMN = dict(zip(COORDINATES, COORDINATE_COLUMNS, strict=True))
 _RUN = ["specimen", "pose", "stiffness", "test", "cycle"]
 
 
 @dataclass(frozen=True)
-class _Set:
+class _RunGroup:
     """A group of simulations: what it is called, its colour and where in a row it is drawn."""
 
     name: str
@@ -53,20 +54,20 @@ def errors_figure(
     """
     simulations = tables["simulations"]
     measured = [
-        name
-        for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
-        if simulations[f"error_{column}"].notna().any()
+        name for name, column in _COLUMN.items() if simulations[f"error_{column}"].notna().any()
     ]
-    runs = _failed_runs(simulations)
+    # one row per run (a test of a pose with a stiffness): did a step end without equilibrium?
+    failed = simulations.assign(failed=~simulations["status"].isin(USABLE))
+    runs = failed.groupby(_RUN)["failed"].any().reset_index()
     simulations = readings(simulations, cohort.zeroed_at_step_0)
     if not measured:
         total = count(len(runs), "simulation")
         return saying(f"No error can be shown: none of {total} reached a measured equilibrium.")
-    columns = [f"error_{_column(name)}" for name in measured]
+    columns = [f"error_{_COLUMN[name]}" for name in measured]
     known = simulations[simulations[columns].notna().any(axis=1)]
     rows = rows_of(known, cohort.specimen_names, cohort.joint_names)
     own = known["stiffness"] == OWN
-    sets = [_Set("own", OURS, 0.17, known[own]), _Set("best", BEST, -0.23, known[~own])]
+    sets = [_RunGroup("own", OURS, 0.17, known[own]), _RunGroup("best", BEST, -0.23, known[~own])]
     axes, figure = grid(len(measured) + 1, rows, row_height(rows, 15.0), 4)
     for index, (name, axis) in enumerate(zip(measured, axes, strict=False)):
         head(axis, index, AXIS[name])
@@ -77,13 +78,9 @@ def errors_figure(
     return figure
 
 
-def _column(coordinate: str) -> str:
-    return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
-
-
-def _draw(name: str, axis: Axes, rows: PanelRows, sets: Sequence[_Set]) -> None:
+def _draw(name: str, axis: Axes, rows: PanelRows, sets: Sequence[_RunGroup]) -> None:
     """One coordinate: two bars per row, the second below the first."""
-    column = f"error_{_column(name)}"
+    column = f"error_{_COLUMN[name]}"
     axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
     axis.xaxis.set_major_locator(MaxNLocator(5))
     thick = BAR_PT if rows.with_numbers else THIN_BAR_PT
@@ -98,12 +95,6 @@ def _draw(name: str, axis: Axes, rows: PanelRows, sets: Sequence[_Set]) -> None:
                     note(axis, 0.02, y + group.offset + 0.19, words, group.color)
     axis.set_xlabel(f"error ({unit(name)}), + is {POSITIVE[name]}")
     label_rows(axis, rows, below=0.45, above=0.55)
-
-
-def _failed_runs(simulations: pd.DataFrame) -> pd.DataFrame:
-    """One row per run (a test of a pose with a stiffness): did a step end without equilibrium?"""
-    failed = ~simulations["status"].isin(USABLE)
-    return simulations.assign(failed=failed).groupby(_RUN)["failed"].any().reset_index()
 
 
 def _draw_failures(axis: Axes, runs: pd.DataFrame) -> None:
@@ -137,9 +128,9 @@ def _draw_failures(axis: Axes, runs: pd.DataFrame) -> None:
     axis.spines["left"].set_visible(False)
 
 
-def _bars(sets: Sequence[_Set], runs: pd.DataFrame, rows: PanelRows) -> dict[str, str]:
+def _bars(sets: Sequence[_RunGroup], runs: pd.DataFrame, rows: PanelRows) -> dict[str, str]:
     """Meaning of each colour."""
-    best = f"all poses with the {count(_n_best(runs), 'best set')}"
+    best = f"all poses with the {count(len(set(runs['stiffness']) - {OWN}), 'best set')}"
     return {
         OURS: f"each pose with its own calibration ({_readings(rows, sets[0])})",
         BEST: f"{best} of the specimen ({_readings(rows, sets[1])})",
@@ -155,11 +146,7 @@ def _words(runs: pd.DataFrame, rows: PanelRows, study: JointPoseSensitivity) -> 
     return " ".join(["; ".join(part for part in parts if part) + ".", settled]).strip()
 
 
-def _n_best(runs: pd.DataFrame) -> int:
-    return len(set(runs["stiffness"]) - {OWN})
-
-
-def _readings(rows: PanelRows, group: _Set) -> str:
+def _readings(rows: PanelRows, group: _RunGroup) -> str:
     """How many errors a bar stands for, over all rows."""
     numbers = [int(frame.index.isin(group.rows.index).sum()) for frame in rows.frames]
     low, high = int(np.min(numbers)), int(np.max(numbers))

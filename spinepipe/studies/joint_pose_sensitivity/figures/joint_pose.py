@@ -1,6 +1,6 @@
 """Figure: how far the sampled landmarks move each joint's origin and turn its axes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -43,8 +43,10 @@ def joint_pose_figure(
         kind = "origin" if column in _ORIGIN else "orientation"
         head(axis, index, f"{AXIS[_NAMES[column]]} {kind}")
         _draw(column, axis, rows, nominal, cohort)
-    _equal_reach(axes[:3])
-    _equal_reach(axes[3:])
+    for panels in (axes[:3], axes[3:]):  # the same limits left and right of the nominal value
+        reach = max(abs(end) for axis in panels for end in axis.get_xlim())
+        for axis in panels:
+            axis.set_xlim(-reach, reach)
     failed = total - len(sampled[["specimen", "pose"]].drop_duplicates())
     bars = {OURS: "sampled landmarks"}
     paper = GOULD_2024A.beside(cohort.name)
@@ -52,13 +54,6 @@ def joint_pose_figure(
         bars[THEIRS] = f"{paper[0]}, Tables 7 and 8, complete set (IQR drawn around the median)"
     explain(figure, bars, _words(total, failed, rows))
     return figure
-
-
-def _equal_reach(axes: Sequence[Axes]) -> None:
-    """The same limits left and right of the nominal value in each of the panels."""
-    reach = max(abs(end) for axis in axes for end in axis.get_xlim())
-    for axis in axes:
-        axis.set_xlim(-reach, reach)
 
 
 def _nominal(cohort: Cohort) -> pd.DataFrame:
@@ -97,19 +92,16 @@ def _draw(column: str, axis: Axes, rows: PanelRows, nominal: pd.DataFrame, cohor
         if paper is not None:
             less = Quartiles(paper.low - center, paper.median - center, paper.high - center, 0)
             draw_iqr(axis, less, y - 0.22, THEIRS)
-        if rows.with_numbers:
-            _write(axis, y, found, center, paper)
+        if rows.with_numbers:  # median and width of the middle half, ours left, the paper's right
+            note(axis, 0.02, y + 0.55, _median(center + found.median, found), OURS)
+            if paper is not None:
+                note(axis, 0.98, y + 0.55, _median(paper.median, paper), THEIRS, ha="right")
     label_rows(axis, rows, below=0.4, above=0.7)
     axis.set_xlabel(f"sampled less nominal ({unit(_NAMES[column])})")
 
 
-def _write(axis: Axes, y: int, found: Quartiles, center: float, paper: Quartiles | None) -> None:
-    """Median and width of the middle half, ours on the left and the paper's on the right."""
-    ours = f"{fixed(center + found.median)} (IQR {fixed(found.iqr)})"
-    note(axis, 0.02, y + 0.55, ours, OURS)
-    if paper is not None:
-        theirs = f"{fixed(paper.median)} (IQR {fixed(paper.iqr)})"
-        note(axis, 0.98, y + 0.55, theirs, THEIRS, ha="right")
+def _median(median: float, found: Quartiles) -> str:
+    return f"{fixed(median)} (IQR {fixed(found.iqr)})"
 
 
 def _paper(cohort: Cohort, joint: str, column: str) -> Quartiles | None:

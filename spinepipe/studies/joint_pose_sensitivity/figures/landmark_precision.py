@@ -1,6 +1,7 @@
 """Figure: how precise landmarks must be for errors below a limit."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -69,27 +70,28 @@ def required_words(row: pd.Series, sampled: Sequence[float]) -> str:
     return f"{fixed(row['sd_mm'])} mm ({start} to {end})"
 
 
-def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
+def _draw_curves(
+    axis: Axes, here: pd.DataFrame, column: str, band: tuple[str, str], dashed: bool, factor: float
+) -> None:
+    """A line per specimen and stiffness; of one specimen with a band, of several their median."""
     alone = here["specimen"].nunique() == 1
     for (_, whose), rows in here.groupby(["specimen", "stiffness"]):
         rows = rows.sort_values("sd_mm")
-        color = COLORS[str(whose)]
-        axis.plot(
-            rows["sd_mm"],
-            rows["median"],
-            color=color,
-            marker="o",
-            ms=2.5,
-            lw=1.2 if alone else 0.5,
-            alpha=1.0 if alone else 0.4,
-        )
+        color, x = COLORS[str(whose)], rows["sd_mm"]
+        thin: dict[str, Any] = {"lw": 1.2 if alone else 0.5, "alpha": 1.0 if alone else 0.4}
+        axis.plot(x, factor * rows[column], color=color, marker="o", ms=2.5, **thin)
         if alone:
-            axis.fill_between(
-                rows["sd_mm"], rows["median"], rows["p95"], color=color, alpha=0.15, lw=0
-            )
-            axis.plot(rows["sd_mm"], rows["p95"], color=color, lw=0.8, ls=(0, (4, 2)))
-    if not alone:
-        _draw_middle(axis, here, "median", 1.0)
+            low, high = (factor * rows[end] for end in band)
+            axis.fill_between(x, low, high, color=color, alpha=0.15, lw=0)
+        if alone and dashed:
+            axis.plot(x, factor * rows[band[1]], color=color, lw=0.8, ls=(0, (4, 2)))
+    for whose, rows in here.groupby("stiffness") if not alone else ():
+        middle = factor * rows.groupby("sd_mm")[column].median()
+        axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
+
+
+def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
+    _draw_curves(axis, here, "median", ("median", "p95"), dashed=True, factor=1.0)
     limit = float(here["limit"].iloc[0])
     axis.axhline(limit, color=GREY, lw=0.8, ls=":")
     axis.annotate(
@@ -109,24 +111,7 @@ def _draw_errors(axis: Axes, here: pd.DataFrame, symbol: str) -> None:
 def _draw_shares(
     axis: Axes, here: pd.DataFrame, required: pd.DataFrame, study: JointPoseSensitivity
 ) -> None:
-    alone = here["specimen"].nunique() == 1
-    for (_, whose), rows in here.groupby(["specimen", "stiffness"]):
-        rows = rows.sort_values("sd_mm")
-        color = COLORS[str(whose)]
-        axis.plot(
-            rows["sd_mm"],
-            100.0 * rows["below"],
-            color=color,
-            marker="o",
-            ms=2.5,
-            lw=1.2 if alone else 0.5,
-            alpha=1.0 if alone else 0.4,
-        )
-        if alone:
-            low, high = 100.0 * rows["below_low"], 100.0 * rows["below_high"]
-            axis.fill_between(rows["sd_mm"], low, high, color=color, alpha=0.15, lw=0)
-    if not alone:
-        _draw_middle(axis, here, "below", 100.0)
+    _draw_curves(axis, here, "below", ("below_low", "below_high"), dashed=False, factor=100.0)
     asked = 100.0 * study.landmark_precision.share
     axis.axhline(asked, color=GREY, lw=0.8, ls=":")
     axis.annotate(
@@ -140,18 +125,11 @@ def _draw_shares(
         fontsize=6.0,
         color=INK[GREY],
     )
+    sampled = study.landmark_precision.sd_mm
     for place, (whose, rows) in enumerate(required.groupby("stiffness")):
-        sampled = study.landmark_precision.sd_mm
         _mark_required(axis, rows, COLORS[str(whose)], 6.0 + 8.0 * place, sampled)
     axis.set_ylim(-2.0, 106.0)
     axis.set_xlim(0.0, None)
-
-
-def _draw_middle(axis: Axes, here: pd.DataFrame, column: str, factor: float) -> None:
-    """Median over the specimens as a thick line."""
-    for whose, rows in here.groupby("stiffness"):
-        middle = factor * rows.groupby("sd_mm")[column].median()
-        axis.plot(middle.index, middle, color=COLORS[str(whose)], lw=1.8)
 
 
 def _mark_required(

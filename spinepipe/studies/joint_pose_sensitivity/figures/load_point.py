@@ -13,7 +13,7 @@ from spinepipe.report.panels import across_of, explain, head, side_by_side
 from spinepipe.report.style import GREY, INK, OURS, THEIRS, blank, saying
 from spinepipe.report.words import AXIS, count, fixed, stiffness_unit, tick
 from spinepipe.status import USABLE
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A, stiffness_quartiles
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
 
@@ -54,7 +54,11 @@ def load_point_figure(
             _region(axis, solved, name, column, (along, across))
         _lines(axis, solved, column, (along, across), alone)
         axis.set_ylabel(f"stiffness ({stiffness_unit(name)})")
-        _paper(axis, cohort, column)
+        published = stiffness_quartiles(cohort.name, column)
+        if published:
+            low, middle, high = published
+            axis.axhspan(low, high, color=THEIRS, alpha=0.18, lw=0, zorder=1)
+            axis.axhline(middle, color=THEIRS, lw=1.0, zorder=2)
     head(axes[-1], n - 1, "Cost")
     relative = _relative_cost(solved)
     _lines(axes[-1], relative, "relative", (along, across), alone)
@@ -143,18 +147,6 @@ def _relative_cost(solved: pd.DataFrame) -> pd.DataFrame:
     relative = solved["cost"] / solved["specimen"].map(stated)
     found = solved.assign(relative=relative).drop_duplicates(["specimen", *WAYS.values()])
     return found.assign(joint="*")
-
-
-def _paper(axis: Axes, cohort: Cohort, column: str) -> None:
-    """The paper's median and quartiles, for the cohort that was rebuilt from it."""
-    paper = GOULD_2024A.beside(cohort.name)
-    if paper is None or column not in paper[1]["reduced_stiffness"]["median"]:
-        return
-    low, middle, high = (
-        paper[1]["reduced_stiffness"][at][column] for at in ("quartile_25", "median", "quartile_75")
-    )
-    axis.axhspan(low, high, color=THEIRS, alpha=0.18, lw=0, zorder=1)
-    axis.axhline(middle, color=THEIRS, lw=1.0, zorder=2)
 
 
 def _words(effect: pd.DataFrame, across: str, alone: bool) -> str:

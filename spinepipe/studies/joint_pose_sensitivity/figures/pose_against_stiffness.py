@@ -43,7 +43,10 @@ def pose_against_stiffness_figure(
     )
     every = ((upper, "signed"), (upper, "absolute"), (lower, "tree"))
     parts = [(rows, what) for rows, what in every if len(rows)]
-    panels, figure = sections([(len(names), _height(rows)) for rows, _ in parts], _KEY_MM)
+    heights = [
+        len(rows) * (_ROW_MM if rows.with_numbers else _NARROW_MM) + _AROUND_MM for rows, _ in parts
+    ]
+    panels, figure = sections([(len(names), height) for height in heights], _KEY_MM)
     for part, ((rows, what), axes) in enumerate(zip(parts, panels, strict=True)):
         for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
             head(axis, part * len(names) + index, f"{AXIS[name]}: {_TITLES[what]}")
@@ -73,10 +76,6 @@ def _done(table: pd.DataFrame) -> pd.DataFrame:
 def _without(table: pd.DataFrame) -> pd.DataFrame:
     """One row for each joint and coordinate that has no result."""
     return table[table["status"] != "done"].drop_duplicates(TREE)
-
-
-def _height(rows: PanelRows) -> float:
-    return len(rows) * (_ROW_MM if rows.with_numbers else _NARROW_MM) + _AROUND_MM
 
 
 def _draw(axis: Axes, rows: PanelRows, name: str, what: str) -> None:
@@ -145,14 +144,10 @@ def _reasons(table: pd.DataFrame, what: str) -> str:
     return f"no {what} for {len(without)} of {count(cells, 'error')}: {told}"
 
 
-def _span(numbers: pd.Series) -> str:
-    low, high = numbers.min(), numbers.max()
-    return f"{low}" if low == high else f"{low}–{high}"
-
-
 def _words(tables: Mapping[str, pd.DataFrame], rows: PanelRows) -> str:
     grid = tables["variance_shares"]
-    poses, sets = (_span(grid[name]) for name in ("n_poses", "n_stiffness"))
+    ends = [(grid[name].min(), grid[name].max()) for name in ("n_poses", "n_stiffness")]
+    poses, sets = (f"{low}" if low == high else f"{low}–{high}" for low, high in ends)
     told = f"Grid of {poses} joint poses times {sets} stiffness sets" if len(grid) else ""
     lines = "line: 95 % interval; tree: share of the squared error that splits remove, r² from "
     parts = [told, rows.note, f"{lines}cross-validation"]

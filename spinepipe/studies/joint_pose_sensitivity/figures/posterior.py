@@ -84,17 +84,14 @@ def _draw_stiffness(
             ends += [row["low"], row["high"], *near]
             if rows.with_numbers:
                 told = f"{number(row['median'])} ({number(row['low'])}–{number(row['high'])})"
-                note(axis, 0.02, y + 0.32, told + _open(row), OURS)
+                sides = [side for side in ("below", "above") if row[f"open_{side}"]]
+                told += f", open {' and '.join(sides)}" if sides else ""
+                note(axis, 0.02, y + 0.32, told, OURS)
     low, high = 0.8 * min(ends), 1.25 * max(ends)
     axis.set_xlim(low, high)
     log_ticks(axis.xaxis, low, high)
     axis.set_xlabel(f"stiffness ({STIFFNESS_UNITS[coordinate]})")
     label_rows(axis, rows, below=0.5, above=0.6)
-
-
-def _open(row: pd.Series) -> str:
-    sides = [side for side in ("below", "above") if row[f"open_{side}"]]
-    return f", open {' and '.join(sides)}" if sides else ""
 
 
 def _draw_motion(axis: Axes, read: pd.DataFrame, unit: str, index: int) -> None:

@@ -37,7 +37,7 @@ from spinepipe.report.style import GREY, OURS, THEIRS, note, saying
 from spinepipe.report.words import AXIS, count, number, percent, stiffness_unit
 from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import MOSTLY
-from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A, stiffness_quartiles
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import region_columns
 from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
@@ -63,7 +63,15 @@ def stiffness_figure(
     per_joint = study.calibration.grouping == "per_joint"
     joints = cohort.joint_names if per_joint else (EVERY_JOINT,)
     rows = rows_of(solved, cohort.specimen_names, joints)
-    panels = [_panel(study, cohort, name) for name in COORDINATES if name in study.calibration.free]
+    panels = []
+    for name, column, start in zip(
+        COORDINATES, STIFFNESS_COLUMNS, study.stiffness.in_order(), strict=True
+    ):
+        published, factor = stiffness_quartiles(cohort.name, column), study.calibration.bound_factor
+        quartiles_of_paper = published and Quartiles(*published, 0)
+        if name in study.calibration.free:
+            ends = start / factor, start * factor
+            panels.append(_StiffnessPanel(name, column, start, *ends, quartiles_of_paper))
     axes, figure = grid(len(panels), rows, row_height(rows, 22.0))
     for index, (panel, axis) in enumerate(zip(panels, axes, strict=True)):
         head(axis, index, AXIS[panel.coordinate])
@@ -93,26 +101,6 @@ class _StiffnessPanel:
         """The values that do not stand at a bound."""
         above, below = self.low * (1.0 + AT_BOUND), self.high * (1.0 - AT_BOUND)
         return values[(values > above) & (values < below)]
-
-
-def _panel(study: JointPoseSensitivity, cohort: Cohort, coordinate: str) -> _StiffnessPanel:
-    index = COORDINATES.index(coordinate)
-    start = study.stiffness.in_order()[index]
-    factor = study.calibration.bound_factor
-    column = STIFFNESS_COLUMNS[index]
-    paper = _paper(cohort, column)
-    return _StiffnessPanel(coordinate, column, start, start / factor, start * factor, paper)
-
-
-def _paper(cohort: Cohort, column: str) -> Quartiles | None:
-    found = GOULD_2024A.beside(cohort.name)
-    if found is None:
-        return None
-    reduced = found[1]["reduced_stiffness"]
-    if column not in reduced["median"]:
-        return None
-    low, high = reduced["quartile_25"][column], reduced["quartile_75"][column]
-    return Quartiles(low, reduced["median"][column], high, 0)
 
 
 def _draw(panel: _StiffnessPanel, axis: Axes, rows: PanelRows, solved: pd.DataFrame) -> None:
@@ -199,17 +187,13 @@ def _shares(panel: _StiffnessPanel, frame: pd.DataFrame) -> str:
 
 def _tell_far_bound(panel: _StiffnessPanel, axis: Axes, values: Array, y: float) -> None:
     """Where fits ended at a bound beyond the axis, say at its edge how many and where it is."""
+    ends = axis.get_xlim()
     for bound, x, words in ((panel.low, 0.0, "← {} at {}"), (panel.high, 1.0, "{} at {} →")):
         there = int(np.isclose(values, bound, rtol=AT_BOUND).sum())
-        if there and not _shown(axis, bound):
+        if there and not ends[0] < bound < ends[1]:
             told = words.format(percent(there, len(values)), number(bound))
             side = "right" if x else "left"
             note(axis, x, y, told, OURS, ha=side)
-
-
-def _shown(axis: Axes, x: float) -> bool:
-    low, high = axis.get_xlim()
-    return bool(low < x < high)
 
 
 def _words(bound_factor: float, found: int, poses: int, rows: PanelRows) -> str:

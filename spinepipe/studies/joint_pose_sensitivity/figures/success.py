@@ -36,7 +36,9 @@ def success_figure(
     methods = [name for name in dict.fromkeys(shares["method"]) if name not in why][::-1]
     if not methods:
         return saying("Not compared: " + "; ".join(dict.fromkeys(why.values())) + ".")
-    paper = _paper(cohort)
+    found = GOULD_2024A.beside(cohort.name)
+    counts = found and found[1]["counts"]
+    paper = counts and (counts["pose_samples_successful"], counts["pose_samples"])
     figure = blank(_AROUND_MM + _ROW_MM * (len(methods) + bool(paper)))
     axes = side_by_side(figure, 3, 3, sharey=True)
     for index, axis in enumerate(axes):
@@ -51,8 +53,8 @@ def success_figure(
     _draw_fits(axes[2], fits, "evaluations", methods)
     axes[2].set_xlabel("runs")
     bars = {OURS: "the same poses, fitted in each way"}
-    if paper:
-        bars[THEIRS] = f"{paper[0]}, {paper[2]} poses"
+    if found and paper:
+        bars[THEIRS] = f"{found[0]}, {paper[1]} poses"
     explain(figure, bars, _words(study, len(set(shares["specimen"])), why))
     return figure
 
@@ -73,17 +75,8 @@ def method_name(name: str) -> str:
     return name.replace("forward_run_", "forward run,\n").replace("_", " ")
 
 
-def _paper(cohort: Cohort) -> tuple[str, int, int] | None:
-    """Name, successful fits and fits of the paper."""
-    found = GOULD_2024A.beside(cohort.name)
-    if found is None:
-        return None
-    counts = found[1]["counts"]
-    return found[0], counts["pose_samples_successful"], counts["pose_samples"]
-
-
 def _draw_shares(
-    axis: Axes, shares: pd.DataFrame, methods: Sequence[str], paper: tuple[str, int, int] | None
+    axis: Axes, shares: pd.DataFrame, methods: Sequence[str], paper: tuple[int, int] | None
 ) -> None:
     pooled = shares.groupby("method")[_COUNTS].sum()
     for y, method in enumerate(methods):
@@ -93,7 +86,7 @@ def _draw_shares(
         words = f"least cost: {arrived} of {fits}"
         note(axis, 0.02, y - 0.36, words, BLACK)
     if paper:
-        _draw_share(axis, -1, paper[1], paper[2], THEIRS)
+        _draw_share(axis, -1, *paper, THEIRS)
     axis.set_xlim(-2.0, 102.0)
     axis.set_xlabel("share of fits (%)")
 
