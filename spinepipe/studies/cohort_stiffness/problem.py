@@ -25,19 +25,16 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.model_mark import base_marks
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
-from spinepipe.statics import free_parameters
 from spinepipe.studies.base_model import beside_bushings, own_values
 from spinepipe.studies.cohort_stiffness.nuisances import free_nuisances, nuisance_effects
 from spinepipe.studies.cohort_stiffness.representations import named
 from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStiffness, tests_of
 from spinepipe.studies.cohort_stiffness.stiffening import free_growth, laws
 from spinepipe.studies.parts import Damping, stiffness_of_joints
-from spinepipe.units import COORDINATES, ROTATIONS, STIFFNESS_COLUMNS, TRANSLATIONS
+from spinepipe.studies.problem import BUSHING, stiffness_problem
+from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 FIRST_CYCLE = 1
-BUSHING = 0
-"""Its place in a model: laws that stiffen follow it, then nuisances, then effects of a base."""
-
 SEEN = "the base model's effects have values found on this specimen, for the file has none for all"
 
 
@@ -120,29 +117,24 @@ def calibration_problem(
     """
     start, one = start_stiffness(study, cohort, representation), named(representation)
     growth = np.zeros(start.shape) if one.stiffens else None
-    # Effects in the order that `BUSHING` tells of; all but the bushing start without effect.
+    # Behind the bushings come laws that stiffen, nuisances, effects of a base. All but the last
+    # start without effect.
     stiffening = laws(study, growth)
     nuisances = nuisance_effects(study, representation, len(start))
     beside = (*stiffening, *nuisances, *others)
     model = stiff_model(cohort, specimen, frames, start, beside)
-    names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in study.free]
     assert one.grouping is not None  # nothing of a published set is fitted
-    stiffness = free_parameters(model, BUSHING, names, one.grouping)
     growths = free_growth(study, model, representation)
     errors, sds = free_nuisances(study, model, representation, BUSHING + 1 + len(stiffening))
-    free = stiffness + growths + errors
-    # Stiffness moves as a logarithm: bounds are start / factor and start x factor. Of growth and
-    # nuisances those that their effects declare stand.
-    reach = np.full(len(free), np.inf)
-    reach[: len(stiffness)] = np.log(study.bound_factor)
-    prior_sd = np.append(np.full(len(stiffness + growths), np.inf), sds) if errors else None
     cases = tuple(
         MeasuredCase(one.case, _in_cost(study, one), cohort.zeroed_at_step_0) for one in tested
     )
-    shared = study.cost == "measurement_sd" and cohort.zeroed_at_step_0
-    weights = _weights(study, cohort)
-    return Problem(
-        *(model, cases, free, weights, -reach, reach, None, shared, one.stiffens, prior_sd)
+    return stiffness_problem(
+        *(model, cases, study.free, one.grouping, study.bound_factor, _weights(study, cohort)),
+        further=growths + errors,
+        further_sd=np.append(np.full(len(growths), np.inf), sds) if errors else None,
+        correlated=study.cost == "measurement_sd" and cohort.zeroed_at_step_0,
+        along_bounds=one.stiffens,
     )
 
 

@@ -21,9 +21,13 @@ from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics.batched import Cases, Spines, solve_many
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.largest_moment import largest_moment
-from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.start import DescribedSpecimen, asked_tests, start_of
+from spinepipe.studies.global_sensitivity.start import (
+    DescribedSpecimen,
+    asked_tests,
+    problem_of,
+    start_of,
+)
 from spinepipe.studies.global_sensitivity.tables import BASE_MOTION, BASE_STIFFNESS, EVERY
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.studies.selected_tests import AskedTest

@@ -11,8 +11,8 @@ from spinepipe.model import RefusedModel
 from spinepipe.statics import with_parameters
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, made_of_batches
-from spinepipe.studies.global_sensitivity.problem import problem_of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
+from spinepipe.studies.global_sensitivity.start import problem_of
 from spinepipe.studies.global_sensitivity.tables import CALIBRATED
 from spinepipe.tables import to_arrow, write
 from spinepipe.units import STIFFNESS_COLUMNS

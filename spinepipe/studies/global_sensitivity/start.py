@@ -1,13 +1,15 @@
 """Where the variation of a specimen starts: its own spine, landmarks and tests."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.calibrate import Problem
 from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.measured import measured_cycles
 from spinepipe.cohort.specimen import (
     followers,
     joint_frames,
@@ -17,7 +19,9 @@ from spinepipe.cohort.specimen import (
 )
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
-from spinepipe.model import SpineModel
+from spinepipe.model import LoadCase, SpineModel
+from spinepipe.studies.global_sensitivity.settings import SampleCalibration
+from spinepipe.studies.problem import measured_in_frames, stiffness_problem
 from spinepipe.studies.selected_tests import AskedTest, asked, first_cycles
 
 Flags = NDArray[np.bool_]
@@ -127,3 +131,28 @@ def moved_by(known: Flags, given: Flags, vertebra: int, landmark: int) -> list[i
         and not given[joint]
         and (whole[vertebra] or facing[joint] == landmark)
     ]
+
+
+def problem_of(
+    options: SampleCalibration,
+    cohort: Cohort,
+    start: DescribedSpecimen,
+    model: SpineModel,
+    cases: Sequence[LoadCase],
+    free: Sequence[str],
+) -> Problem:
+    """The fit to measured motion of one stiffness for all joints in each free coordinate.
+
+    Parameters
+    ----------
+    start : the specimen as the cohort has it.
+    model, cases : its spine and loads, perhaps with other joint frames and load points, into which
+        the readings are brought.
+    free : coordinates.
+    """
+    specimen = model.specimen
+    tested = measured_cycles(cohort, specimen, [test.case for test in start.tests])
+    moved = measured_in_frames(tested, joint_frames(cohort, specimen), model.frames)
+    measured = [replace(one, case=case) for case, one in zip(cases, moved, strict=True)]
+    weights = np.array(options.weights.in_order(), dtype=float)
+    return stiffness_problem(model, measured, free, "per_specimen", options.bound_factor, weights)
