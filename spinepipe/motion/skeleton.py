@@ -60,14 +60,12 @@ class Skeleton:
 
 def skeleton_of(joints: Sequence[Pose], masses: Masses) -> Skeleton:
     """From the poses (17,) of the joints' frames in ground, all coordinates being zero."""
-    below = (Pose(np.eye(3), joints[0].origin), *joints[:-1])
-    steps = tuple(_seen_from(lower, joint) for lower, joint in zip(below, joints, strict=True))
-    return Skeleton(steps, masses)
-
-
-def _seen_from(lower: Pose, upper: Pose) -> Pose:
-    turn = lower.rotation.T
-    return Pose(turn @ upper.rotation, turn @ (upper.origin - lower.origin))
+    steps, lower = [], Pose(np.eye(3), joints[0].origin)
+    for joint in joints:
+        turn = lower.rotation.T
+        steps.append(Pose(turn @ joint.rotation, turn @ (joint.origin - lower.origin)))
+        lower = joint
+    return Skeleton(tuple(steps), masses)
 
 
 def body_poses(skeleton: Skeleton, q: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Job: how far motions are from the truth, per person, trial, approach and level."""
+"""Jobs: how far motions are from the truth, of each person and over all of them."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -8,13 +8,13 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.tracking.error_metrics import Bones, ErrorFromTruth, bones_of, errors_of
-from spinepipe.studies.tracking.forms import STANCE
-from spinepipe.studies.tracking.reload_motions import ReloadedMotions, kinds_of_trials, motions
-from spinepipe.studies.tracking.scaled_persons import factors_in
+from spinepipe.motion.scaling import SEGMENTS
+from spinepipe.statistics.outcome import mean_of
+from spinepipe.studies.tracking.error_metrics import Bones, Truth, bones_of, errors_of, truths
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.tables import ERRORS
-from spinepipe.studies.tracking.truth import Truth, truths
+from spinepipe.studies.tracking.tables import ACCURACY, ERRORS
+from spinepipe.studies.tracking.tracked_motions import motions
+from spinepipe.studies.tracking.trials import STANCE, kinds_of_trials
 from spinepipe.tables import from_rows, read_frames, write
 
 
@@ -23,11 +23,12 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     settings, cohort = study_of_kind(Tracking, root, study)
     known = list(truths(dict(cohort.further)))
     found = read_frames(tables)
-    scaled = settings.scaling == "markers"
-    bones = {
-        name: bones_of(cohort, name, factors_in(found["sizes"], name) if scaled else None)
-        for name in {truth.specimen for truth in known}
-    }
+    bones = {}
+    for name in {truth.specimen for truth in known}:
+        # the skeleton as it was tracked: as large as markers say, where they say it
+        sizes = found["sizes"][found["sizes"]["specimen"] == name].set_index("segment")["factor"]
+        scaled = settings.scaling == "markers" and not sizes.isna().any()
+        bones[name] = bones_of(cohort, name, sizes[list(SEGMENTS)].to_numpy() if scaled else None)
     rows = list(error_rows(found["tracked"], known, bones, kinds_of_trials(cohort)))
     write(from_rows(ERRORS, rows), output, provenance("errors", settings, cohort))
 
@@ -40,29 +41,43 @@ def error_rows(
 ) -> Iterator[dict[str, Any]]:
     """Rows by motion with a truth, measure and level."""
     by_trial = {(truth.specimen, truth.trial): truth for truth in known}
-    for moved in motions(tracked):
-        key = moved.specimen, moved.trial
+    for motion in motions(tracked):
+        key = motion.specimen, motion.trial
         if key not in by_trial:
             continue
-        for off in errors_of(moved, by_trial[key], bones[moved.specimen]):
+        for off in errors_of(motion, by_trial[key], bones[motion.specimen]):
             if off.measure == "joint_angle_deg" and kinds[key] == STANCE:
                 continue
-            yield from _rows(moved, off)
+            for k, level in enumerate(off.levels):
+                size = off.size[off.known[:, k], k]
+                if len(size):
+                    yield motion.names | {
+                        "measure": off.measure,
+                        "level": level,
+                        "mean": float(size.mean()),
+                        "p95": float(np.percentile(size, 95.0)),
+                        "largest": float(size.max()),
+                        "n": len(size),
+                    }
 
 
-def _rows(moved: ReloadedMotions, off: ErrorFromTruth) -> Iterator[dict[str, Any]]:
-    for k, level in enumerate(off.levels):
-        size = off.size[off.told[:, k], k]
-        if not len(size):
-            continue
+def accuracy(root: str, study: str, tables: list[str], output: str) -> None:
+    """Write ``accuracy.parquet``: mean of persons' mean errors, and its 95 % interval."""
+    settings, cohort = study_of_kind(Tracking, root, study)
+    rows = list(accuracy_rows(read_frames(tables)["errors"]))
+    write(from_rows(ACCURACY, rows), output, provenance("accuracy", settings, cohort))
+
+
+def accuracy_rows(errors: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Rows by trial, approach and measure: a person counts once, whatever was known of them."""
+    named = ["trial", "approach", "measure"]
+    for key, rows in errors.groupby(named, sort=False, observed=True):
+        mean = mean_of(rows.groupby("specimen", sort=False)["mean"].mean().to_numpy(float))
+        low, high = mean.interval or (None, None)
         yield {
-            "specimen": moved.specimen,
-            "trial": moved.trial,
-            "approach": moved.approach,
-            "measure": off.measure,
-            "level": level,
-            "mean": float(size.mean()),
-            "p95": float(np.percentile(size, 95.0)),
-            "largest": float(size.max()),
-            "n": len(size),
+            **dict(zip(named, (str(part) for part in key), strict=True)),
+            "mean": mean.value,
+            "low": low,
+            "high": high,
+            "n_specimens": mean.n,
         }

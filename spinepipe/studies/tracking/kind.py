@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
@@ -11,23 +12,18 @@ from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
-from spinepipe.studies.tracking.approaches_of_trials import calibrated_in, tried
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
-from spinepipe.studies.tracking.extra_inputs import (
-    marks_of_export,
-    marks_of_motion,
-    marks_of_tracking,
-)
-from spinepipe.studies.tracking.forms import FORMS
+from spinepipe.studies.tracking.persons import motion_digests
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, profiled_persons
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.trials import FORMS, approaches_on_trials, calibration_of
 
 _ANALYSES = (
     Job("ranges", "", ("tracked",), ("ranges",)),
     Job("sharing", "", ("tracked",), ("sharing",)),
-    Job("similarity", "", ("tracked",), ("similarity",)),
+    Job("similarity", "sharing:similarity", ("tracked",), ("similarity",)),
     Job("errors", "", ("tracked", "sizes"), ("errors",)),
-    Job("accuracy", "", ("errors",), ("accuracy",)),
+    Job("accuracy", "errors:accuracy", ("errors",), ("accuracy",)),
     Job(
         "against_wang_2021",
         "",
@@ -81,13 +77,13 @@ class TrackingFiles(StudyFiles):
         Figure(
             "stiffness_profiles",
             "Whether markers tell stiffness",
-            "figures.stiffness_profiles:stiffness_profiles_figure",
+            "figures.stiffness:stiffness_profiles_figure",
             ("profile_points", "profiles"),
         ),
         Figure(
             "stiffness_by_level",
             "What calibration makes of stiffness",
-            "figures.stiffness_by_level:stiffness_by_level_figure",
+            "figures.stiffness:stiffness_by_level_figure",
             ("stiffness",),
             ("profiles",),
         ),
@@ -107,9 +103,9 @@ class TrackingFiles(StudyFiles):
         """The files of a study of a cohort."""
         names = cohort.specimen_names
         taken: dict[tuple[str, str, str], str | None] = {
-            (name, trial, approach): calibrated_in(cohort, name, trial, approach)
+            (name, trial, approach): calibration_of(cohort, name, trial, approach)
             for name in names
-            for trial, approach in tried(study, cohort, name)
+            for trial, approach in approaches_on_trials(study, cohort, name)
         }
         return cls(study, names, taken)
 
@@ -181,6 +177,25 @@ class TrackingFiles(StudyFiles):
             yield ""
 
 
+def _digests_of_motion(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Of the recorded motion of a person, as declared jobs are asked for it."""
+    return motion_digests(expected.cohort, place["specimen"])
+
+
+def _digests_of_tracking(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Of motion, and of the calibration that the approach takes over."""
+    found = _digests_of_motion(expected, place)
+    law = calibration_of(expected.cohort, place["specimen"], place["trial"], place["approach"])
+    if law is None:
+        return found
+    return [*found, expected.of_job("calibrate", {"specimen": place["specimen"], "law": law})]
+
+
+def _digests_of_export(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Of the tracked motion that is written for another program."""
+    return [expected.of_job("track", place)]
+
+
 _COUNTED = ignoring("approaches", "profiles", "trade_off", "drawn_approaches")
 _ASKED = tuple(
     name for name in Tracking.model_fields if name not in {*Study.model_fields, "kind", "scaling"}
@@ -195,30 +210,30 @@ KIND = Kind(
     checks_at_start=(check_recordings,),
     tables=all_declared(__file__),
     jobs=(
-        Job("calibrate", ignores=_COUNTED, also=marks_of_motion),
+        Job("calibrate", ignores=_COUNTED, also=_digests_of_motion),
         Job(
             "track",
             many=True,
             ignores=ignoring("approaches", "profiles", "trade_off"),
-            also=marks_of_tracking,
+            also=_digests_of_tracking,
         ),
         Job(
             "profile",
             ignores=ignoring("approaches", "trade_off", "drawn_approaches", "intervals"),
-            also=marks_of_motion,
+            also=_digests_of_motion,
         ),
         Job(
             "weigh",
             ignores=ignoring("approaches", "profiles", "drawn_approaches"),
-            also=marks_of_motion,
+            also=_digests_of_motion,
         ),
-        Job("examine", ignores=ignoring(*_ASKED, "scaling"), also=marks_of_motion),
+        Job("examine", ignores=ignoring(*_ASKED, "scaling"), also=_digests_of_motion),
         Job(
             "skeleton",
             "opensim:skeleton",
             ignores=ignoring(*_ASKED),
             makes=("opensim/{specimen}.osim",),
-            also=marks_of_motion,
+            also=_digests_of_motion,
         ),
         Job(
             "motion",
@@ -226,7 +241,7 @@ KIND = Kind(
             many=True,
             ignores=ignoring(*_ASKED, "scaling"),
             makes=("opensim/{specimen}/{trial}/{approach}.mot",),
-            also=marks_of_export,
+            also=_digests_of_export,
         ),
         *_ANALYSES,
     ),

@@ -9,14 +9,11 @@ from moving_spine import spine
 
 from spinepipe.frames import rotation_zxy
 from spinepipe.motion.skeleton import BODIES, JOINTS, body_poses
-from spinepipe.studies.tracking.accuracy import accuracy_rows
-from spinepipe.studies.tracking.error_metrics import Bones
-from spinepipe.studies.tracking.errors import error_rows
+from spinepipe.studies.tracking.error_metrics import Bones, truths
+from spinepipe.studies.tracking.errors import accuracy_rows, error_rows
 from spinepipe.studies.tracking.profile import verdict
 from spinepipe.studies.tracking.ranges import range_rows
-from spinepipe.studies.tracking.reload_motions import IN_ORDER, motions
-from spinepipe.studies.tracking.sharing import sharing_rows
-from spinepipe.studies.tracking.similarity import similarity_rows
+from spinepipe.studies.tracking.sharing import sharing_rows, similarity_rows
 from spinepipe.studies.tracking.tables import (
     ACCURACY,
     ERRORS,
@@ -24,7 +21,7 @@ from spinepipe.studies.tracking.tables import (
     SHARING,
     SIMILARITY,
 )
-from spinepipe.studies.tracking.truth import truths
+from spinepipe.studies.tracking.tracked_motions import IN_ORDER, motions
 from spinepipe.tables import from_rows
 from spinepipe.units import COORDINATE_COLUMNS, DEG_PER_RAD, DISPLAY_PER_SI, MM_PER_M
 
