@@ -23,7 +23,8 @@ JOINTS = tuple(f"{upper}{lower}" for lower, upper in pairwise(BODIES))
 
 PELVIS = 0
 LUMBAR = slice(0, 6)
-"""L5S1 to T12L1 among the joints."""
+LUMBAR_JOINTS = JOINTS[LUMBAR]
+"""L5S1 to T12L1."""
 
 
 @dataclass(frozen=True, eq=False)

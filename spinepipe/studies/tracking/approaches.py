@@ -82,6 +82,7 @@ def sample_at_nodes(settings: Tracking, person: TrackedPerson, trial: MarkerTria
 
 def mean_frame(trial: MarkerTrial) -> MarkerTrial:
     """The mean of a trial as its only frame."""
+    # of each marker over the frames that see it
     count = trial.seen.sum(axis=0)
     places = np.where(trial.seen[..., None], trial.places, 0.0).sum(axis=0)
     mean = places / np.maximum(count, 1)[:, None]
@@ -189,6 +190,7 @@ def _driven(ratios: Array) -> Array:
     ----------
     ratios : (17, 3) shares of joints in extension, right bending and left rotation.
     """
+    # the pelvis moves by its own six; each joint by its share of the three sums
     pelvis = SHAPE[1]
     found = np.zeros((COUNT, pelvis + len(ROTATIONS)))
     found[:pelvis, :pelvis] = np.eye(pelvis)
@@ -201,6 +203,7 @@ def _frame_by_frame(
     ask: MotionObjective, seen: SampledTrial, ratios: Array | None = None
 ) -> ApproachMotion:
     """Each frame by itself; how fast it went follows from the curve through the frames."""
+    # a natural spline through the frames tells speed and acceleration; one posture has neither
     found = postures(ask, seen, ratios)
     grid = seen.grid
     rest = np.zeros_like(found.q)

@@ -71,6 +71,7 @@ def stiffness_rows(
     ----------
     high : (17, 6, 2) N and N m, largest passive load of each side in the motions.
     """
+    # generic laws at the same loads: at both ends of their range, and as they are
     lower, usual, upper = (
         PassiveLaw(generic.a * factor, generic.b).stiffness_at(high)
         for factor in (generic.lower, np.ones(SHAPE), generic.upper)

@@ -164,6 +164,8 @@ def _rightwards(look: LoadedTrial) -> Array | None:
     groups = (front, back, top)
     if not all(group.any() for group in groups) or np.ptp(look.markers.at[on_pelvis, 0]) < DEEP_M:
         return None
+    # forwards from the markers behind to those ahead, up to the highest body: means of groups that
+    # are whole, so that no marker's loss moves them
     whole = np.all([seen[:, group].all(axis=1) for group in groups], axis=0)
     first, last, highest = (at[:, group].mean(axis=1) for group in groups)
     forwards, up = first - last, highest - (first + last) / 2.0
@@ -184,6 +186,7 @@ def _exchanged(look: LoadedTrial) -> Iterator[InputProblem]:
     # of the first tenth, the frame that sees the most
     early = max(1, len(look.trial.time_s) // 10)
     frame = int(np.argmax(np.where(told, look.trial.seen.sum(axis=1), 0)[:early]))
+    # the worst pair is put right before the next is looked for: an exchange bends other lines too
     places = look.trial.places[frame].copy()
     model = look.neutral @ rotations[frame].T
     there = look.trial.seen[frame]
@@ -197,6 +200,7 @@ def _exchanged(look: LoadedTrial) -> Iterator[InputProblem]:
 
 def _worst_pair(places: Array, model: Array, there: NDArray[np.bool_]) -> tuple[int, int] | None:
     """Which two markers stand backwards the most; None: no two do."""
+    # cosine of the angle between each line of two markers and that of the set, times both lengths
     lines, wanted = (at[:, None] - at[None, :] for at in (places, model))
     lengths, asked = (np.linalg.norm(line, axis=-1) for line in (lines, wanted))
     along = np.einsum("abi,abi->ab", lines, wanted)
@@ -228,6 +232,7 @@ def _exchanged_later(look: LoadedTrial) -> Iterator[InputProblem]:
     markers = np.arange(places.shape[1])
     steps = np.linalg.norm(places - places[before, markers], axis=-1)
     steps[~recent] = 0.0
+    # two that jump in one frame are exchanged if each lands where the other was
     for frame in np.flatnonzero((steps > JUMP_M).any(axis=1)).tolist():
         step, last = steps[frame], places[before[frame], markers]
         jumped = np.flatnonzero(step > JUMP_M).tolist()

@@ -1,4 +1,4 @@
-"""Jobs: how far motions are from the truth, of each person and over all of them."""
+"""Job: how far motions are from the truth, per person, trial, approach and level."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -9,10 +9,9 @@ import pandas as pd
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.scaling import SEGMENTS
-from spinepipe.statistics.outcome import mean_of
 from spinepipe.studies.tracking.error_metrics import Bones, Truth, bones_of, errors_of, truths
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.tables import ACCURACY, ERRORS
+from spinepipe.studies.tracking.tables import ERRORS
 from spinepipe.studies.tracking.tracked_motions import motions
 from spinepipe.studies.tracking.trials import STANCE, kinds_of_trials
 from spinepipe.tables import from_rows, read_frames, write
@@ -59,25 +58,3 @@ def error_rows(
                         "largest": float(size.max()),
                         "n": len(size),
                     }
-
-
-def accuracy(root: str, study: str, tables: list[str], output: str) -> None:
-    """Write ``accuracy.parquet``: mean of persons' mean errors, and its 95 % interval."""
-    settings, cohort = study_of_kind(Tracking, root, study)
-    rows = list(accuracy_rows(read_frames(tables)["errors"]))
-    write(from_rows(ACCURACY, rows), output, provenance("accuracy", settings, cohort))
-
-
-def accuracy_rows(errors: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Rows by trial, approach and measure: a person counts once, whatever was known of them."""
-    named = ["trial", "approach", "measure"]
-    for key, rows in errors.groupby(named, sort=False, observed=True):
-        mean = mean_of(rows.groupby("specimen", sort=False)["mean"].mean().to_numpy(float))
-        low, high = mean.interval or (None, None)
-        yield {
-            **dict(zip(named, (str(part) for part in key), strict=True)),
-            "mean": mean.value,
-            "low": low,
-            "high": high,
-            "n_specimens": mean.n,
-        }

@@ -128,6 +128,7 @@ def _ranking(measure: str, words: str, rows: pd.DataFrame) -> Iterator[ApproachR
     whole = wide.dropna(axis="columns")
     if whole.empty:
         return
+    # a person counts once: the mean over levels, then over trials
     values = whole.groupby(level="specimen").mean()
     means = {
         name: float(values[name].to_numpy(float).mean())

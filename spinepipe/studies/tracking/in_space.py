@@ -176,6 +176,7 @@ def page_motions(every: list[MotionInSpace]) -> list[MotionInSpace]:
 
 def boxes(one: MotionInSpace, frame: Frame) -> Array:
     """(8 B, 3) mm, corners of a box for each body, as large in all frames as in the first."""
+    # a box is as high as the way to the next joint of the first frame; the uppermost as the last
     start = one.frames[0].places
     apart = np.linalg.norm(np.diff(start, axis=0), axis=1)
     above = np.append(apart, apart[-1] if len(apart) else abs(_PELVIS_MM[1]))
@@ -227,6 +228,7 @@ def _parts(one: MotionInSpace) -> Iterator[Any]:
     corners, links, measured, modelled, apart = (
         {letter: first[letter][k] for letter in "xyz"} for k in range(5)
     )
+    # one mesh of all boxes: the triangles of the first, eight corners further for each body
     faces = np.concatenate([_FACES + 8 * k for k in range(len(one.bodies))])
     i, j, k = faces.T.tolist()
     yield go.Mesh3d(
@@ -262,6 +264,7 @@ def _markers(
 
 def _moved(one: MotionInSpace, frame: Frame) -> dict[str, list[Any]]:
     """Places of every trace by axis: corners, joints, markers, and lines between markers."""
+    # lines from model to measured are one trace, broken by an empty point after each
     gap = np.full_like(frame.modelled, np.nan)
     apart = np.stack([frame.modelled, frame.measured, gap], axis=1).reshape(-1, 3)
     clouds = (boxes(one, frame), frame.places, frame.measured, frame.modelled, apart)

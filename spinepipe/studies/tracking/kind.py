@@ -23,7 +23,7 @@ _ANALYSES = (
     Job("sharing", "", ("tracked",), ("sharing",)),
     Job("similarity", "sharing:similarity", ("tracked",), ("similarity",)),
     Job("errors", "", ("tracked", "sizes"), ("errors",)),
-    Job("accuracy", "errors:accuracy", ("errors",), ("accuracy",)),
+    Job("accuracy", "", ("errors",), ("accuracy",)),
     Job(
         "against_wang_2021",
         "",

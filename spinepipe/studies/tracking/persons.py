@@ -227,6 +227,7 @@ def read_recording(row: Row, cohort: str, folder: Path) -> MarkerRecording:
 
 def trial_of(row: Row, markers: MarkerSet, recorded: MarkerRecording) -> MarkerTrial:
     """The trial of a row; markers of the set that the file lacks are never seen."""
+    # markers in the order of the set
     n = len(recorded.time_s)
     places, seen = np.zeros((n, len(markers), 3)), np.zeros((n, len(markers)), dtype=bool)
     for k, name in enumerate(markers.names):
@@ -265,6 +266,7 @@ def skeleton_in(cohort: Cohort, specimen: str, subject: Subject) -> Skeleton:
             xx, yy, zz, xy, xz, yz = (float(row[name]) for name in _INERTIA)
             whole = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             about[k] = turn.T @ whole @ turn
+    # bodies.csv is in ground axes, seen from the body here; inertias that none tells are made up
     steps = skeleton_of(joints, Masses(kg.copy(), com.copy(), np.zeros_like(about))).steps
     told = np.isfinite(about).all(axis=(1, 2))[:, None, None]
     if not told.all():

@@ -92,6 +92,7 @@ def profile_costs(
     for order in (range(middle, len(ratios)), range(middle - 1, -1, -1)):
         starts, parameters = first
         for k in order:
+            # parameters are logarithms over the generic elements: those held are the ratio's own
             parameters = np.where(held, np.log(ratios[k]), parameters)
             solved = solve(ask, seen, starts, parameters, held)
             if not solved.status.usable:
@@ -99,6 +100,7 @@ def profile_costs(
             starts, parameters = list(solved.coefficients), solved.parameters
             if k == middle:
                 first = starts, parameters
+            # the prior of what is held does not count, else it would close what markers leave open
             prior = float(np.sum((parameters[held] / ask.sizes.size) ** 2))
             found[k] = solved.cost - prior
     return found
@@ -127,6 +129,7 @@ def verdict(ratios: Array, costs: Array, message: str = "") -> Row:
     settled = np.isfinite(costs)
     if not settled.any():
         return _verdict_row(None, None, None, message or "no fit settled")
+    # costs are sums of squares over variance: twice the fall of the log likelihood
     at, over = np.log(ratios[settled]), costs[settled] - costs[settled].min()
     best = int(np.argmin(over))
     lost = int((~settled).sum())

@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.skeleton import JOINTS, LUMBAR, PELVIS
+from spinepipe.motion.skeleton import LUMBAR, LUMBAR_JOINTS, PELVIS
 from spinepipe.statistics.waveforms import MultipleCorrelation, multiple_correlation
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import (
     DONE,
+    INSTANTS,
     SHARING,
     SIMILARITY,
     TOO_FEW,
@@ -36,10 +37,6 @@ from spinepipe.studies.tracking.trials import AXIS, kinds_of_trials
 from spinepipe.tables import from_rows, read_frames, write
 
 LEAST_RAD = float(np.deg2rad(2.0))
-LUMBAR_JOINTS = JOINTS[LUMBAR]
-
-INSTANTS = 101
-"""One per percent of the cycle, ends included."""
 
 ENOUGH = 0.5
 """Share of the instants of a window at which a person has to be turned enough to count."""
@@ -97,6 +94,7 @@ def shares_of(motion: TrackedMotion, kind: str, instants: int | None = None) -> 
         return None
     first, last = motion.time_s[0], motion.time_s[-1]
     times = motion.time_s if instants is None else np.linspace(first, last, instants)
+    # a share where the lumbar spine as a whole is turned enough, of the sum over its joints
     turned = motion.at(times)[:, PELVIS + 1 :, 3 + AXIS[kind]][:, LUMBAR]
     total = turned.sum(axis=1)
     enough = np.abs(total) >= LEAST_RAD
@@ -154,6 +152,7 @@ def _correlation(
     which one of the others is not.
     """
     inside = persons[0].inside(window)
+    # a curve: all joints at the instants that every remaining person has
     kept = [one for one in persons if one.enough[inside].mean() >= ENOUGH]
     used = np.logical_and.reduce([inside, *(one.enough for one in kept)])
     curves = np.array([one.share[used].T.ravel() for one in kept])

@@ -51,6 +51,7 @@ def weight_rows(
     """Rows of a trial by ratio."""
     seen = sample_at_nodes(settings, person, trial)
     ask = objective_of(settings, person, APPROACH)
+    # loads count so many times as much as the study has them, all else stays
     for ratio in sorted(settings.trade_off):
         heavier = replace(ask, sizes=replace(ask.sizes, loads=ratio * ask.sizes.loads))
         begun = time.process_time()

@@ -9,8 +9,9 @@ from moving_spine import spine
 
 from spinepipe.frames import rotation_zxy
 from spinepipe.motion.skeleton import BODIES, JOINTS, body_poses
+from spinepipe.studies.tracking.accuracy import accuracy_rows
 from spinepipe.studies.tracking.error_metrics import Bones, truths
-from spinepipe.studies.tracking.errors import accuracy_rows, error_rows
+from spinepipe.studies.tracking.errors import error_rows
 from spinepipe.studies.tracking.profile import verdict
 from spinepipe.studies.tracking.ranges import range_rows
 from spinepipe.studies.tracking.sharing import sharing_rows, similarity_rows

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
-from spinepipe.motion.skeleton import JOINTS, PELVIS, body_poses
+from spinepipe.motion.skeleton import JOINTS, LUMBAR_JOINTS, PELVIS, body_poses
 from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, lettered
 from spinepipe.report.style import BLACK, blank, saying
@@ -27,7 +27,7 @@ from spinepipe.studies.tracking.figures.line_styles import (
     zero_line,
 )
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.sharing import INSTANTS, LUMBAR_JOINTS
+from spinepipe.studies.tracking.tables import INSTANTS
 from spinepipe.studies.tracking.tracked_motions import TrackedMotion, motions
 from spinepipe.studies.tracking.trials import AXIS, kinds_of_trials
 from spinepipe.studies.tracking.words import short_of
@@ -63,6 +63,7 @@ class Courses:
     @property
     def calm(self) -> list[str]:
         """Approaches that stay on the axis."""
+        # what goes far beyond the calmest approach would flatten all other curves
         reach = {name: float(np.abs(persons).max()) for name, persons in self.found.items()}
         most = max(_TIMES * min(reach.values()), _LEAST_DEG)
         return [name for name, size in reach.items() if size <= most]
@@ -180,6 +181,7 @@ def _of_truth(cohort: Cohort, truth: Truth, time_s: Array, kind: str) -> Iterato
     """(101,) deg of each lumbar joint; the neutral pose is that of the model."""
     skeleton = bones_of(cohort, truth.specimen).skeleton
     neutral = joint_rotations(body_poses(skeleton, np.zeros((1, len(JOINTS) + 1, 6)))[0])
+    # rotation of the joint from the neutral pose, as its coordinates have it
     turned = np.swapaxes(neutral, -1, -2) @ joint_rotations(truth.turns)
     angles = DEG_PER_RAD * zxy_angles(turned)[..., AXIS[kind]]
     for k in range(len(LUMBAR_JOINTS)):

@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
+from spinepipe.motion.skeleton import LUMBAR_JOINTS
 from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
 from spinepipe.report.style import GREY, blank, saying
@@ -24,7 +25,6 @@ from spinepipe.studies.tracking.figures.line_styles import (
     zero_line,
 )
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.sharing import LUMBAR_JOINTS
 from spinepipe.studies.tracking.tables import WINDOW
 
 MOST_TRIALS = 4

@@ -128,6 +128,7 @@ def _verdict(points: pd.DataFrame, row: "pd.Series[Any]") -> str:
 
 def _course(axis: Axes, points: pd.DataFrame, look: LineStyle) -> None:
     """The curve; arrows where it leaves the panel, crosses where no fit settled."""
+    # cost over ratio: marks inside the panel, triangles at its top, crosses at the limit
     points = points.sort_values("ratio")
     cost = points["cost_over_best"].to_numpy(float)
     ratio = points["ratio"].to_numpy(float)
@@ -151,6 +152,7 @@ def _interval(
     low = reach[0] if pd.isna(row["low"]) else float(row["low"])
     high = reach[1] if pd.isna(row["high"]) else float(row["high"])
     axis.plot([low, high], [y, y], color=look.color, lw=2.2, solid_capstyle="butt", zorder=3)
+    # an arrow's tip stands at the end of the panel, a closed end at its own place
     for at, is_open, marker in ((low, row["open_below"], "<"), (high, row["open_above"], ">")):
         mark = marker if is_open else "|"
         shift = {"<": 1.06, ">": 1.0 / 1.06}.get(mark, 1.0)
