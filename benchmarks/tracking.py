@@ -126,5 +126,5 @@ def beside_ipopt() -> list[Beside]:
         took = cpu_seconds(lambda asked=asked: solve(asked, [seen], start), 3).median
         with tempfile.TemporaryDirectory() as folder:
             peer = short_chain.by_ipopt(cost, Path(folder))
-        found.append(Beside(cost, took, peer.cpu_s, ours.costs.total, peer.cost))
+        found.append(Beside(cost, took, peer.cpu_s, ours.cost, peer.cost))
     return found

@@ -29,7 +29,7 @@ from spinepipe.studies.tracking.approaches import (
     objective_of,
     sample_at_nodes,
 )
-from spinepipe.studies.tracking.error_metrics import Bones, Truth, errors_of, truths
+from spinepipe.studies.tracking.error_metrics import Truth, errors_of, truths
 from spinepipe.studies.tracking.kind import KIND
 from spinepipe.studies.tracking.persons import TrackedPerson, person_of, ratios_of
 from spinepipe.studies.tracking.profile import (
@@ -89,7 +89,7 @@ class Made:
         write(one.wanted, [one], folder)
         self.cohort = read(folder, KIND.forms)
         self.person: TrackedPerson = person_of(self.cohort, one.name, folder)
-        self.bones = Bones(self.person.skeleton, self.person.centres)
+        self.bones = self.person.skeleton, self.person.centres
         self.truths: dict[str, Truth] = {
             truth.trial: truth for truth in truths(dict(self.cohort.further))
         }
@@ -113,9 +113,9 @@ class Made:
             seen = sample_at_nodes(SETTINGS, self.person, trial)
             found = find_motion(approach, ask, seen, ratios_of(self.cohort))
             moved = TrackedMotion("", trial.name, approach, found.watched.grid.times_s, found.q)
-            for off in errors_of(moved, self.truths[trial.name], self.bones):
-                if off.told.any():
-                    mean = float(off.size[off.told].mean())
+            for off in errors_of(moved, self.truths[trial.name], *self.bones):
+                if off.known.any():
+                    mean = float(off.size[off.known].mean())
                     named = {"motion": trial.kind, "approach": approach, "measure": off.measure}
                     yield {**named, "error": mean, "status": found.status.value}
 

@@ -11,13 +11,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
-from spinepipe.motion.scaling import body_factors, steps_of
 from spinepipe.motion.skeleton import BODIES, JOINTS, PELVIS, Skeleton, body_poses, rotations
-from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.tracking.persons import centres_of, skeleton_in
 from spinepipe.studies.tracking.tracked_motions import TrackedMotion
 from spinepipe.studies.tracking.trials import TRUTH_CENTRES
 from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
@@ -69,24 +65,6 @@ def truths(further: dict[str, pd.DataFrame]) -> Iterator[Truth]:
 
 
 @dataclass(frozen=True, eq=False)
-class Bones:
-    """A person's skeleton, and the centres (18, 3) m of its bodies in their frames."""
-
-    skeleton: Skeleton
-    centres: Array
-
-
-def bones_of(cohort: Cohort, specimen: str, factors: Array | None = None) -> Bones:
-    """A person's skeleton and centres; factors : (3,) by which its parts were made larger."""
-    skeleton = skeleton_in(cohort, specimen, subject_of(cohort, specimen))
-    centres = centres_of(cohort, specimen, skeleton)
-    if factors is None:
-        return Bones(skeleton, centres)
-    grown = Skeleton(steps_of(skeleton, factors), skeleton.masses)
-    return Bones(grown, body_factors(factors)[:, None] * centres)
-
-
-@dataclass(frozen=True, eq=False)
 class ErrorFromTruth:
     """Errors of a measure.
 
@@ -102,10 +80,17 @@ class ErrorFromTruth:
     known: NDArray[np.bool_]
 
 
-def errors_of(motion: TrackedMotion, truth: Truth, bones: Bones) -> Iterator[ErrorFromTruth]:
-    """Errors of a motion at the instants of its truth."""
-    turns, places = body_poses(bones.skeleton, motion.at(truth.time_s))
-    at = places + np.einsum("fbij,bj->fbi", turns, bones.centres)
+def errors_of(
+    motion: TrackedMotion, truth: Truth, skeleton: Skeleton, centres: Array
+) -> Iterator[ErrorFromTruth]:
+    """Errors of a motion at the instants of its truth.
+
+    Parameters
+    ----------
+    skeleton, centres : of the person, centres (18, 3) m of bodies in their frames.
+    """
+    turns, places = body_poses(skeleton, motion.at(truth.time_s))
+    at = places + np.einsum("fbij,bj->fbi", turns, centres)
     apart = MM_PER_M * np.linalg.norm(at - truth.centres, axis=-1)
     above = slice(PELVIS + 1, None)
     yield ErrorFromTruth("centre_mm", BODIES[above], apart[:, above], truth.known[:, above])

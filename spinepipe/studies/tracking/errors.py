@@ -6,10 +6,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.scaling import SEGMENTS
-from spinepipe.studies.tracking.error_metrics import Bones, Truth, bones_of, errors_of, truths
+from spinepipe.motion.scaling import SEGMENTS, body_factors, steps_of
+from spinepipe.motion.skeleton import Skeleton
+from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.tracking.error_metrics import Truth, errors_of, truths
+from spinepipe.studies.tracking.persons import centres_of, skeleton_in
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import ERRORS
 from spinepipe.studies.tracking.tracked_motions import motions
@@ -25,9 +29,14 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     bones = {}
     for name in {truth.specimen for truth in known}:
         # the skeleton as it was tracked: as large as markers say, where they say it
+        skeleton = skeleton_in(cohort, name, subject_of(cohort, name))
+        centres = centres_of(cohort, name, skeleton)
         sizes = found["sizes"][found["sizes"]["specimen"] == name].set_index("segment")["factor"]
-        scaled = settings.scaling == "markers" and not sizes.isna().any()
-        bones[name] = bones_of(cohort, name, sizes[list(SEGMENTS)].to_numpy() if scaled else None)
+        if settings.scaling == "markers" and not sizes.isna().any():
+            factors = sizes[list(SEGMENTS)].to_numpy(float)
+            skeleton = Skeleton(steps_of(skeleton, factors), skeleton.masses)
+            centres = body_factors(factors)[:, None] * centres
+        bones[name] = skeleton, centres
     rows = list(error_rows(found["tracked"], known, bones, kinds_of_trials(cohort)))
     write(from_rows(ERRORS, rows), output, provenance("errors", settings, cohort))
 
@@ -35,16 +44,16 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 def error_rows(
     tracked: pd.DataFrame,
     known: list[Truth],
-    bones: Mapping[str, Bones],
+    bones: Mapping[str, tuple[Skeleton, Array]],
     kinds: Mapping[tuple[str, str], str],
 ) -> Iterator[dict[str, Any]]:
-    """Rows by motion with a truth, measure and level."""
+    """Rows by motion with a truth, measure and level; bones : skeleton and centres by person."""
     by_trial = {(truth.specimen, truth.trial): truth for truth in known}
     for motion in motions(tracked):
         key = motion.specimen, motion.trial
         if key not in by_trial:
             continue
-        for off in errors_of(motion, by_trial[key], bones[motion.specimen]):
+        for off in errors_of(motion, by_trial[key], *bones[motion.specimen]):
             if off.measure == "joint_angle_deg" and kinds[key] == STANCE:
                 continue
             for k, level in enumerate(off.levels):

@@ -15,7 +15,7 @@ from spinepipe.studies.tracking.approaches import (
     objective_of,
     sample_at_nodes,
 )
-from spinepipe.studies.tracking.error_metrics import Bones, Truth, errors_of, truths
+from spinepipe.studies.tracking.error_metrics import Truth, errors_of, truths
 from spinepipe.studies.tracking.fit_rows import Row, failed_row, fit_row
 from spinepipe.studies.tracking.persons import TrackedPerson, motion_digests, person_of
 from spinepipe.studies.tracking.settings import Approach, Tracking
@@ -73,7 +73,7 @@ def _errors(
     if truth is None:
         return sizes
     motion = TrackedMotion(person.name, trial, APPROACH, found.watched.grid.times_s, found.q)
-    for off in errors_of(motion, truth, Bones(person.skeleton, person.centres)):
+    for off in errors_of(motion, truth, person.skeleton, person.centres):
         if off.measure in MEASURED and off.known.any():
             sizes[off.measure] = float(off.size[off.known].mean())
     return sizes

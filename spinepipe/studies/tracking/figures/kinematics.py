@@ -17,7 +17,8 @@ from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, lettered
 from spinepipe.report.style import BLACK, blank, saying
 from spinepipe.report.words import capital, listed, plain
-from spinepipe.studies.tracking.error_metrics import Truth, bones_of, joint_rotations, truths
+from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.tracking.error_metrics import Truth, joint_rotations, truths
 from spinepipe.studies.tracking.figures.line_styles import (
     choose_approaches,
     key_of,
@@ -26,6 +27,7 @@ from spinepipe.studies.tracking.figures.line_styles import (
     styles_of_approaches,
     zero_line,
 )
+from spinepipe.studies.tracking.persons import skeleton_in
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import INSTANTS
 from spinepipe.studies.tracking.tracked_motions import TrackedMotion, motions
@@ -179,7 +181,7 @@ def _true(
 
 def _of_truth(cohort: Cohort, truth: Truth, time_s: Array, kind: str) -> Iterator[Array]:
     """(101,) deg of each lumbar joint; the neutral pose is that of the model."""
-    skeleton = bones_of(cohort, truth.specimen).skeleton
+    skeleton = skeleton_in(cohort, truth.specimen, subject_of(cohort, truth.specimen))
     neutral = joint_rotations(body_poses(skeleton, np.zeros((1, len(JOINTS) + 1, 6)))[0])
     # rotation of the joint from the neutral pose, as its coordinates have it
     turned = np.swapaxes(neutral, -1, -2) @ joint_rotations(truth.turns)
