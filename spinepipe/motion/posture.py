@@ -158,16 +158,16 @@ def _cost(ask: MotionObjective, watched: SampledTrial, q: Array) -> Array:
         off = MuscleDemand.of(watched, ask).residuals(ask.passive, (q, rest, rest))
         return np.asarray(found + np.sum(off**2, axis=1))
     if ask.passive is not None:
-        found += np.sum(_stretched(ask, q)[0] ** 2, axis=1)
+        found += np.sum(_spring_loads(ask, q)[0] ** 2, axis=1)
     return np.asarray(found)
 
 
-def _by_themselves(ask: MotionObjective, q: Array) -> tuple[Array, Array]:
+def _own_costs(ask: MotionObjective, q: Array) -> tuple[Array, Array]:
     """(F, 108) each: curvature and slope of what each coordinate costs by itself."""
     over, steep = (one.reshape(len(q), COUNT) for one in range_excess(ask, q))
     curved, pulled = steep**2, over * steep
     if ask.passive is not None and not ask.loads:
-        stretched, stiff = _stretched(ask, q)
+        stretched, stiff = _spring_loads(ask, q)
         curved[:, PELVIS + 6 :] += stiff**2
         pulled[:, PELVIS + 6 :] += stretched * stiff
     return curved, pulled
@@ -178,7 +178,7 @@ def _steps_of_joints(
 ) -> Array:
     """(F, 108) damped steps where each coordinate moves by itself, and no load costs."""
     markers, found = watched.markers, np.empty(q.shape)
-    curved, pulled = _by_themselves(ask, q)
+    curved, pulled = _own_costs(ask, q)
     turned, apart = joints_of(watched.skeleton)
     damped_steps(
         q,
@@ -203,7 +203,7 @@ def _normal(
 ) -> tuple[Array, Array]:
     """Gauss and Newton's matrix (F, n, n) and slope (F, n), of the numbers that `whole` maps."""
     off, slopes = Markers(watched, ask).with_slopes(q)
-    curved, pulled = _by_themselves(ask, q)
+    curved, pulled = _own_costs(ask, q)
     slope = slopes @ whole
     square = whole.T @ (curved[..., None] * whole) + np.swapaxes(slope, 1, 2) @ slope
     down = pulled @ whole + (off[:, None] @ slope)[:, 0]
@@ -217,7 +217,7 @@ def _normal(
     return square, down
 
 
-def _stretched(ask: MotionObjective, q: Array) -> tuple[Array, Array]:
+def _spring_loads(ask: MotionObjective, q: Array) -> tuple[Array, Array]:
     """(F, 102) loads of passive elements over their size, as springs at rest, and their slopes."""
     assert ask.passive is not None
     force, stiffness, _ = ask.passive.with_slopes(q[:, 1:])

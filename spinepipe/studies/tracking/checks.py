@@ -67,12 +67,12 @@ def check_tracking(
     yield from unknown_names(
         document, "profiles.specimens", "specimen", study.profiles.specimens, names
     )
-    yield from _recorded(cohort)
+    yield from _persons_and_trials(cohort)
     if not list(_tables(document, cohort)):
         yield from _bodies(cohort)
 
 
-def _recorded(cohort: Cohort) -> Iterator[InputProblem]:
+def _persons_and_trials(cohort: Cohort) -> Iterator[InputProblem]:
     """Persons, trials and markers."""
     further = cohort.further
     if SUBJECTS.stem in further:
@@ -85,7 +85,9 @@ def check_recordings(
     document: YamlDocument, _study: Tracking, cohort: Cohort, _root: Path
 ) -> Iterator[InputProblem]:
     """Everything that is wrong with files of motion; nothing where tables cannot be relied on."""
-    if not any((*_tables(document, cohort), *_recorded(cohort))) and not any(_bodies(cohort)):
+    if not any((*_tables(document, cohort), *_persons_and_trials(cohort))) and not any(
+        _bodies(cohort)
+    ):
         yield from recording_problems(cohort)
 
 

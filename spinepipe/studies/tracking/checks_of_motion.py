@@ -47,7 +47,7 @@ def motion_problems(look: LoadedTrial) -> Iterator[InputProblem]:
     found = list(marker_problems(look))
     yield from found
     if look.trial.kind != STANCE and not any("swapped" in p.found for p in found):
-        yield from _moved(look)
+        yield from _cut_off_or_misnamed(look)
 
 
 def _size(look: LoadedTrial) -> float | None:
@@ -102,7 +102,7 @@ def _better_axes(axes: str, turn: Array) -> str:
     return " ".join(sign + letter for sign, letter in zip(signs, _LETTERS[places], strict=True))
 
 
-def _moved(look: LoadedTrial) -> Iterator[InputProblem]:
+def _cut_off_or_misnamed(look: LoadedTrial) -> Iterator[InputProblem]:
     """A motion that is cut off, or has another's name."""
     ranges = trunk_rotation_deg(look)
     if ranges is None:

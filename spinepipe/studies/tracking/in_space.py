@@ -118,10 +118,10 @@ def motions_of(drawn: pd.DataFrame) -> Iterator[MotionInSpace]:
     for person, trial, approach in order:
         rows = groups[person, trial, approach]
         words = [plain(str(trial)), short_of(str(approach))]
-        yield _shown(", ".join([str(person), *words] if several else words), rows)
+        yield _motion(", ".join([str(person), *words] if several else words), rows)
 
 
-def _shown(name: str, rows: pd.DataFrame) -> MotionInSpace:
+def _motion(name: str, rows: pd.DataFrame) -> MotionInSpace:
     # by kind and frame, in the order of the skeleton and of the marker set
     of_kind = {kind: rows[rows["kind"] == kind] for kind in ("body", MODELLED, MEASURED)}
     there = set(of_kind["body"]["name"])
@@ -212,7 +212,7 @@ def _scene(one: MotionInSpace) -> Any:
     scene = json.loads(go.Figure(data=parts, layout=layout).to_json(engine="json"))
     if len(one.frames) > 1:
         scene["frames"] = [
-            {"name": f"{fixed(frame.time_s)} s", **_moved(one, frame)} for frame in one.frames
+            {"name": f"{fixed(frame.time_s)} s", **_coordinates(one, frame)} for frame in one.frames
         ]
     return scene
 
@@ -223,8 +223,8 @@ def _ends(points: Array, margin_mm: float) -> tuple[Array, Array]:
 
 
 def _parts(one: MotionInSpace) -> Iterator[Any]:
-    """Traces of the first frame, in the order of what `_moved` changes."""
-    first = _moved(one, one.frames[0])
+    """Traces of the first frame, in the order of what `_coordinates` changes."""
+    first = _coordinates(one, one.frames[0])
     corners, links, measured, modelled, apart = (
         {letter: first[letter][k] for letter in "xyz"} for k in range(5)
     )
@@ -262,7 +262,7 @@ def _markers(
     )
 
 
-def _moved(one: MotionInSpace, frame: Frame) -> dict[str, list[Any]]:
+def _coordinates(one: MotionInSpace, frame: Frame) -> dict[str, list[Any]]:
     """Places of every trace by axis: corners, joints, markers, and lines between markers."""
     # lines from model to measured are one trace, broken by an empty point after each
     gap = np.full_like(frame.modelled, np.nan)
