@@ -44,6 +44,13 @@ FULL = ("weights",)
 """Motions anew with loads counting more and less."""
 
 
+def _figure(
+    name: str, title: str, *reads: str, file: str = "", also: tuple[str, ...] = ()
+) -> Figure:
+    """A figure whose function has its name, in the file of its name or another."""
+    return Figure(name, title, f"figures.{file or name}:{name}_figure", reads, also)
+
+
 @dataclass(frozen=True)
 class TrackingFiles(StudyFiles):
     """The result files of one study of tracked motions.
@@ -56,43 +63,20 @@ class TrackingFiles(StudyFiles):
     full = FULL
     joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, *_OF_RECORDINGS, "weights")
     drawings = (
-        Figure(
-            "error_by_level",
-            "How far vertebrae are from the truth",
-            "figures.error_by_level:error_by_level_figure",
-            ("errors",),
+        _figure("error_by_level", "How far vertebrae are from the truth", "errors"),
+        _figure("kinematics", "How lumbar joints turn", "tracked"),
+        _figure("motion_sharing", "How lumbar joints share a motion", "sharing"),
+        _figure(
+            *("stiffness_profiles", "Whether markers tell stiffness"),
+            *("profile_points", "profiles"),
+            file="stiffness",
         ),
-        Figure(
-            "kinematics",
-            "How lumbar joints turn",
-            "figures.kinematics:kinematics_figure",
-            ("tracked",),
+        _figure(
+            *("stiffness_by_level", "What calibration makes of stiffness", "stiffness"),
+            file="stiffness",
+            also=("profiles",),
         ),
-        Figure(
-            "motion_sharing",
-            "How lumbar joints share a motion",
-            "figures.motion_sharing:motion_sharing_figure",
-            ("sharing",),
-        ),
-        Figure(
-            "stiffness_profiles",
-            "Whether markers tell stiffness",
-            "figures.stiffness:stiffness_profiles_figure",
-            ("profile_points", "profiles"),
-        ),
-        Figure(
-            "stiffness_by_level",
-            "What calibration makes of stiffness",
-            "figures.stiffness:stiffness_by_level_figure",
-            ("stiffness",),
-            ("profiles",),
-        ),
-        Figure(
-            "trade_off",
-            "Markers against loads",
-            "figures.trade_off:trade_off_figure",
-            ("weights",),
-        ),
+        _figure("trade_off", "Markers against loads", "weights"),
     )
 
     study: Tracking

@@ -104,7 +104,7 @@ def document(study: Tracking, cohort: Cohort, results: ResultTables) -> Document
         pictures=list(results.pictures.values()),
         tables=shown_tables(results),
         metadata=results.metadata,
-        left_out=left_out(study, results),
+        left_out=left_out(results),
         headline=Headline(_unbroken(found.words), _unbroken(found.how_sure), found.warnings),
         space=spine_in_space(results.table(DRAWN.name)),
     )
@@ -127,7 +127,7 @@ def shown_tables(results: ResultTables) -> list[Sortable]:
     return found
 
 
-def left_out(study: Tracking, results: ResultTables) -> tuple[str, ...]:
+def left_out(results: ResultTables) -> tuple[str, ...]:
     """What there is nothing of, each with the reason."""
     parts = []
     if results.table("errors").empty:

@@ -108,9 +108,9 @@ def test_what_went_wrong_stands_at_the_top_of_its_table() -> None:
 
 
 def test_what_there_is_nothing_of_is_told_with_its_reason() -> None:
-    assert left_out(study_of(Size()), results(Size())) == ()
+    assert left_out(results(Size())) == ()
     size = Size(1, truth=False, approaches=("ik", "optk_generic"))
-    told = left_out(study_of(size), results(size))
+    told = left_out(results(size))
     assert len(told) == 2
     assert "(where vertebrae truly were is not known)" in told[0]
     assert "(no approach asks for it)" in told[1]

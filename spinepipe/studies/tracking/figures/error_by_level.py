@@ -60,14 +60,11 @@ def error_by_level_figure(
             index = 2 * k + list(LEVELS).index(measure)
             head(axis, index, f"{capital(plain(trial))}: {LABELS[measure][0]}")
             own = rows[rows["measure"] == measure]
-            _panel(axis, own[own["trial"] == trial], measure, looks, _ends(own))
+            # panels of a measure share their axis: errors of all trials
+            ends = float(own["mean"].min()), float(own["mean"].max())
+            _panel(axis, own[own["trial"] == trial], measure, looks, ends)
     _explain(figure, looks, rows, len(trials) - len(shown))
     return figure
-
-
-def _ends(rows: pd.DataFrame) -> tuple[float, float]:
-    """Least and largest error of all trials: panels of a measure share their axis."""
-    return float(rows["mean"].min()), float(rows["mean"].max())
 
 
 def _panel(

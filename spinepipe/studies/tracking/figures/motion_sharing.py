@@ -77,7 +77,11 @@ def _trial(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, LineStyle]) -> No
     axis.set_xticks(range(len(LUMBAR_JOINTS)), LUMBAR_JOINTS)
     axis.set_xlim(-0.5, len(LUMBAR_JOINTS) - 0.5)
     axis.set_ylabel("share of the lumbar rotation (%)")
-    _ends(axis, 100.0 * known["share"].to_numpy(float))
+    # all shares that are not beyond the edges, zero, and up to 40 % at least
+    all_of_them = 100.0 * known["share"].to_numpy(float)
+    low, high = max(_FARTHEST[0], all_of_them.min()), min(_FARTHEST[1], all_of_them.max())
+    bottom = max(min(low - _MARGIN, -_MARGIN), _FARTHEST[0])
+    axis.set_ylim(bottom, min(max(high + _MARGIN, 40.0), _FARTHEST[1]))
 
 
 def _mark(axis: Axes, x: float, shares: Array, look: LineStyle) -> None:
@@ -94,15 +98,6 @@ def _mark(axis: Axes, x: float, shares: Array, look: LineStyle) -> None:
     else:
         edge, marker = (low, "v") if mean <= low else (high, "^")
         axis.plot([x], [edge], marker=marker, color=look.color, ms=4.0, clip_on=False, zorder=4)
-
-
-def _ends(axis: Axes, shares: Array) -> None:
-    low, high = max(_FARTHEST[0], shares.min()), min(_FARTHEST[1], shares.max())
-    axis.set_ylim(min(low - _MARGIN, -_MARGIN), max(high + _MARGIN, 40.0))
-    if axis.get_ylim()[0] < _FARTHEST[0]:
-        axis.set_ylim(bottom=_FARTHEST[0])
-    if axis.get_ylim()[1] > _FARTHEST[1]:
-        axis.set_ylim(top=_FARTHEST[1])
 
 
 def _explain(figure: Figure, looks: dict[str, LineStyle], rows: pd.DataFrame, more: int) -> None:

@@ -192,7 +192,11 @@ def stiffness_by_level_figure(
     known = closed_elements(tables.get("profiles", pd.DataFrame()))
     figure = blank(_LEVELS_MM + _KEY_MM)
     axes = side_by_side(figure, len(ROTATIONS), len(ROTATIONS), sharey=True)
-    ends = _ratio_ends(rows)
+    # one axis for all: marks, generic bands, and half to twice generic at least
+    band = rows[["generic_low", "generic_high"]].to_numpy(float) / _generic(rows)[:, None]
+    values = np.concatenate([rows["ratio_to_generic"].to_numpy(float), band.ravel(), [0.5, 2.0]])
+    values = values[np.isfinite(values) & (values > 0.0)]
+    ends = 0.85 * float(values.min()), 1.18 * float(values.max())
     for index, (axis, coordinate) in enumerate(zip(axes, ROTATIONS, strict=True)):
         head(axis, index, AXIS[coordinate])
         _levels(axis, rows[rows["coordinate"] == coordinate], coordinate, known, ends)
@@ -212,14 +216,6 @@ def closed_elements(profiles: pd.DataFrame) -> set[tuple[str, str, str]]:
         for row in sure.to_dict("records")
         for joint in JOINTS[REGIONS.get(str(row["region"]), slice(0))]
     }
-
-
-def _ratio_ends(rows: pd.DataFrame) -> tuple[float, float]:
-    ratios = rows["ratio_to_generic"].to_numpy(float)
-    band = rows[["generic_low", "generic_high"]].to_numpy(float) / _generic(rows)[:, None]
-    values = np.concatenate([ratios, band.ravel(), [0.5, 2.0]])
-    values = values[np.isfinite(values) & (values > 0.0)]
-    return 0.85 * float(values.min()), 1.18 * float(values.max())
 
 
 def _generic(rows: pd.DataFrame) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
