@@ -12,9 +12,8 @@ import numpy as np
 from benchmarks.memory import peak_mib
 from benchmarks.study import ROOT
 from benchmarks.timing import cpu_seconds
-from spinepipe.motion.objective import Ask, ForceCost, Watched, watched
-from spinepipe.motion.passive import PassiveLaw
-from spinepipe.motion.passive_elements import passive_elements
+from spinepipe.motion.objective import ForceCost, MotionObjective, SampledTrial, sample_trial
+from spinepipe.motion.passive import PassiveLaw, passive_elements
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import MarkerTrial
 from spinepipe.motion.trajectory import OptimalMotions, solve
@@ -59,7 +58,7 @@ class Beside:
         return self.peer_s / self.ours_s
 
 
-def trials() -> tuple[Watched, Watched]:
+def trials() -> tuple[SampledTrial, SampledTrial]:
     """Forwards and back, and to a side and back; markers are some millimetres off."""
     frames = 2 * INTERVALS + 1
     by = np.sin(np.linspace(0.0, np.pi, frames)) ** 2
@@ -74,16 +73,16 @@ def trials() -> tuple[Watched, Watched]:
         kind = "flexion_extension" if axis == 3 else "lateral_bending"
         times = np.linspace(0.0, LONG_S, frames)
         trial = MarkerTrial(kind, kind, times, places, seen, "hanging")
-        found.append(watched(moving_spine.spine(), on, trial, INTERVALS))
+        found.append(sample_trial(moving_spine.spine(), on, trial, INTERVALS))
     return found[0], found[1]
 
 
-def _ask() -> Ask:
+def _ask() -> MotionObjective:
     shipped = passive_elements()
-    return Ask(passive=PassiveLaw(shipped.a, shipped.b), force_cost=COST)
+    return MotionObjective(passive=PassiveLaw(shipped.a, shipped.b), force_cost=COST)
 
 
-def _starts(seen: tuple[Watched, ...]) -> list[np.ndarray]:
+def _starts(seen: tuple[SampledTrial, ...]) -> list[np.ndarray]:
     return [np.zeros((one.grid.coefficients, 18, 6)) for one in seen]
 
 
@@ -127,5 +126,5 @@ def beside_ipopt() -> list[Beside]:
         took = cpu_seconds(lambda asked=asked: solve(asked, [seen], start), 3).median
         with tempfile.TemporaryDirectory() as folder:
             peer = short_chain.by_ipopt(cost, Path(folder))
-        found.append(Beside(cost, took, peer.cpu_s, ours.costs.total, peer.cost))
+        found.append(Beside(cost, took, peer.cpu_s, ours.cost, peer.cost))
     return found

@@ -13,7 +13,7 @@ from spinepipe.calibrate import Problem, fit
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, MeasuredCase, ScopedEffect, SpineModel
-from spinepipe.motion.objective import SHAPE, Ask, watched
+from spinepipe.motion.objective import SHAPE, MotionObjective, sample_trial
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import postures
 from spinepipe.motion.skeleton import BODIES as TRACKED
@@ -85,9 +85,9 @@ def track_a_spine_that_stands() -> None:
     trial = MarkerTrial(
         "", "", np.arange(2.0), places, np.ones(places.shape[:2], dtype=bool), "hanging"
     )
-    seen = watched(Skeleton(steps, masses), markers, trial, 1)
-    postures(Ask(loads=False), seen)
-    solve(Ask(force_cost="level_difference"), [seen], [seen.grid.through(q)])
+    seen = sample_trial(Skeleton(steps, masses), markers, trial, 1)
+    postures(MotionObjective(loads=False), seen)
+    solve(MotionObjective(force_cost="level_difference"), [seen], [seen.grid.through(q)])
 
 
 def hold_a_trunk_upright() -> None:

@@ -72,6 +72,8 @@ class BandFactor:
         # two coefficients past the end, with which nothing hangs together, spare the loop its ends
         found = np.zeros((len(grown) + REACH - 1, *band.blocks.shape[1:]))
         for k, own in enumerate(band.blocks):
+            # pivot block: L = chol(A), then the two blocks under it, and what they leave of the
+            # next two columns (right-looking block Cholesky; Golub and Van Loan 2013, section 4.2)
             here = found[k]
             here += own
             here[0].reshape(-1)[:: size + 1] += grown[k]
@@ -118,6 +120,7 @@ def bordered_step(
     ----------
     square, slope : (P, P) and (P,) of the shared parameters alone, damped.
     """
+    # Schur complement of the shared parameters, by the half-solved border: L^-1 [border, slope]
     halves, shared = [], len(slope)
     for band, factor in zip(bands, factors, strict=True):
         halves.append(factor.forwards(np.dstack([band.border, band.slope])))
@@ -125,6 +128,7 @@ def bordered_step(
         gram = flat.T @ flat
         square, slope = square - gram[:shared, :shared], slope - gram[:shared, shared]
     step: Array = -np.asarray(np.linalg.solve(square, slope), dtype=float) if shared else slope
+    # back into each band: -A^-1 (slope + border step)
     weights = np.append(step, 1.0)
     return [
         -factor.backwards(half @ weights) for half, factor in zip(halves, factors, strict=True)

@@ -28,7 +28,7 @@ _PER_SI = np.array([1.0 if name in TRANSLATIONS else DEG_PER_RAD for name in COO
 _HERE = Pose(np.eye(3), np.zeros(3))
 
 
-def usable(names: Sequence[str]) -> tuple[str, ...]:
+def opensim_names(names: Sequence[str]) -> tuple[str, ...]:
     """Names that OpenSim can take; in others _ stands for what it cannot take, and a number."""
     taken = {name for name in names if parts.NAME.fullmatch(name)}
     found = []
@@ -62,9 +62,8 @@ def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
     parts.told(model, "gravity", parts.numbers(STANDARD_GRAVITY))
     bodies, joints, listed = (parts.listed(model, kind) for kind in ("Body", "Joint", "Marker"))
     masses = skeleton.masses
-    for k, body in enumerate(BODIES):
-        about = masses.about_com[k]
-        bodies.append(parts.body(body, float(masses.kg[k]), masses.com[k], about))
+    for body, kg, com, about in zip(BODIES, masses.kg, masses.com, masses.about_com, strict=True):
+        bodies.append(parts.body(body, float(kg), com, about))
     paths = ("/ground", *(f"/bodyset/{body}" for body in BODIES))
     steps = (_HERE, *skeleton.steps)
     named = zip((PELVIS_JOINT, *JOINTS), pairwise(paths), steps, strict=True)

@@ -1,28 +1,49 @@
-"""Tables of joints that come along and that a cohort may replace.
+"""Tables of joints that come along and that a cohort may replace: ranges of motion, ratios.
 
 A table names joints (`L4L5`) and coordinates (`extension`) in rows; units are those of files: mm,
 deg, N, N m and what is made of them. Each row tells its source. Tables that come along also tell
 how sure a row is: confirmed (read in the source), derived (worked out from such), from_memory (in
 no text at hand; never used to accept a result), choice (no source at all).
+
+`bounds.csv`: rotations are the wider of White and Panjabi 1990 and, where they are larger, segments
+in the rig at 7.5 N m (Wilke 2017); what is printed for flexion and extension together is parted as
+regions of the spine do it. Neither source has translations: those are choices but one. The file
+holds the raw range; how much wider a motion may be ("increased by 150 %", which is 1.5 or 2.5
+times) is a setting.
+
+`ratios.csv`: joints that turn in fixed shares of one rotation, which inverse kinematics is
+constrained with. A set has up to three driving rotations, the sums over its joints of extension,
+right bending and left rotation. A joint that a set does not name is locked: `christophy_2012`
+shares out L1-S1 and holds all from T12L1 upwards stiff. Wang 2021 also used shares of Bruno 2015
+and of Shojaei 2017, which are printed in no text at hand; a cohort that has them brings them.
+`white_panjabi_1990` is no set of the paper: it shares T1-S1 out as ranges of motion are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from spinepipe.effects.contract import Array
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.units import COORDINATES, DISPLAY_PER_SI
-
-GIVEN = "given"
-"""Status of rows of a cohort's own table that tells none."""
+from spinepipe.problems import InputError, InputProblem
+from spinepipe.units import COORDINATES, DISPLAY_PER_SI, ROTATIONS
 
 FIRST_LINE = 2
 """Line of the first row, where an editor shows it."""
 
 SIDES = ("positive", "negative")
+
+BOUNDS_FILE = "bounds.csv"
+ENDS = ("low", "high")
+"""mm or deg."""
+
+RATIOS_FILE = "ratios.csv"
+
+SUM_DIFFERS = 2e-3
+"""By how much shares may miss 1: seventeen of them, rounded to four digits."""
 
 
 def packaged_rows(name: str, numbers: Sequence[str]) -> pd.DataFrame:
@@ -31,12 +52,6 @@ def packaged_rows(name: str, numbers: Sequence[str]) -> pd.DataFrame:
         rows = pd.read_csv(text, dtype=str, keep_default_na=False)
     rows.index = pd.RangeIndex(FIRST_LINE, FIRST_LINE + len(rows))
     return rows.astype(dict.fromkeys(numbers, float))
-
-
-def with_status(rows: pd.DataFrame) -> pd.DataFrame:
-    """A cohort's own rows, those without a status as given."""
-    told = rows["status"] if "status" in rows else pd.Series(GIVEN, rows.index)
-    return rows.assign(status=told.fillna(GIVEN))
 
 
 def joint_places(rows: pd.DataFrame) -> NDArray[np.int64]:
@@ -49,7 +64,52 @@ def coordinate_places(rows: pd.DataFrame) -> NDArray[np.int64]:
     return np.array([COORDINATES.index(name) for name in rows["coordinate"]], dtype=np.int64)
 
 
-def per_si(coordinates: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(N,) what one m or rad is in mm or deg."""
-    found: NDArray[np.float64] = DISPLAY_PER_SI[coordinates]
+def bounds(own: pd.DataFrame | None = None) -> Array:
+    """(17, 6, 2) m and rad, lowest (at most zero) and highest (at least zero) coordinate of joints.
+
+    Parameters
+    ----------
+    own : sound rows of a cohort's `bounds.csv`, mm and deg, which replace those that come along.
+    """
+    limits = np.full((len(JOINTS), len(COORDINATES), len(ENDS)), np.nan)
+    for rows in [packaged_rows(BOUNDS_FILE, ENDS), *([] if own is None else [own])]:
+        coordinate = coordinate_places(rows)
+        values = rows[list(ENDS)].to_numpy(float) / DISPLAY_PER_SI[coordinate][:, None]
+        limits[joint_places(rows), coordinate] = values
+    return limits
+
+
+def ratio_sets(own: pd.DataFrame | None = None, file: str = RATIOS_FILE) -> dict[str, Array]:
+    """Shares (17, 3) of joints in extension, right bending and left rotation, by name of the set.
+
+    Parameters
+    ----------
+    own : sound rows of a cohort's `ratios.csv`, indexed by line; its sets take the place of those
+        of their name that come along.
+    file : its name in messages.
+
+    Raises
+    ------
+    InputError
+        Of shares that do not sum to 1.
+    """
+    if own is not None and (problems := list(_wrong_sums(own, file))):
+        raise InputError(problems)
+    found: dict[str, Array] = {}
+    for rows in [packaged_rows(RATIOS_FILE, ("ratio",)), *([] if own is None else [own])]:
+        for name, part in rows.groupby("set", sort=False):
+            shares = np.zeros((len(JOINTS), len(ROTATIONS)))
+            rotation = coordinate_places(part) - COORDINATES.index(ROTATIONS[0])
+            shares[joint_places(part), rotation] = part["ratio"].to_numpy(float)
+            found[str(name)] = shares
     return found
+
+
+def _wrong_sums(rows: pd.DataFrame, file: str) -> Iterator[InputProblem]:
+    """Shares of a rotation that are not all of it."""
+    for (name, coordinate), part in rows.groupby(["set", "coordinate"], sort=False):
+        total = float(part["ratio"].sum())
+        if abs(total - 1.0) > SUM_DIFFERS:
+            found = f"ratios of {coordinate} in {name} sum to {total:.4g}"
+            line = int(str(part.index[0]))
+            yield InputProblem(file, line, "ratio", found, "a sum of 1", "divide each by their sum")

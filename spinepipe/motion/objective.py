@@ -79,7 +79,7 @@ class ResidualScales:
 
 
 @dataclass(frozen=True, eq=False)
-class Ask:
+class MotionObjective:
     """What a motion costs besides its markers.
 
     Attributes
@@ -87,7 +87,8 @@ class Ask:
     free : (18, 6) which coordinates there are; the others stay zero.
     low, high : (18, 6) m and rad, range of each; infinite without.
     passive : passive elements, None for none.
-    loads : whether loads cost at all. force_cost : which of them do, see `terms.Loads`.
+    loads : whether loads cost at all. force_cost : which of them do, see
+        `residual_terms.MuscleDemand`.
     smooth : whether accelerations cost.
     fitted : (17, 6) coordinates whose passive elements are calibrated.
     """
@@ -111,7 +112,7 @@ class Ask:
 
 
 @dataclass(frozen=True, eq=False)
-class Watched:
+class SampledTrial:
     """A trial at the nodes of a grid: what markers were seen there.
 
     Attributes
@@ -128,13 +129,15 @@ class Watched:
     weight: Array
     shares: Array | None = None
 
-    def at(self, nodes: NDArray[np.int64]) -> "Watched":
+    def at(self, nodes: NDArray[np.int64]) -> "SampledTrial":
         """Some of the nodes, each by itself."""
         shares = None if self.shares is None else self.shares[nodes]
         return replace(self, places=self.places[nodes], weight=self.weight[nodes], shares=shares)
 
 
-def watched(skeleton: Skeleton, markers: MarkerSet, trial: MarkerTrial, intervals: int) -> Watched:
+def sample_trial(
+    skeleton: Skeleton, markers: MarkerSet, trial: MarkerTrial, intervals: int
+) -> SampledTrial:
     """A trial at nodes from its first frame to its last, between the frames that saw a marker.
 
     A marker counts at a node if a frame saw it within half a step; of one frame there is one node.
@@ -152,4 +155,4 @@ def watched(skeleton: Skeleton, markers: MarkerSet, trial: MarkerTrial, interval
         weight[:, k] = share * (apart <= _NEAR * grid.step_s)
         for axis in range(3):
             places[:, k, axis] = np.interp(grid.times_s, times[seen], trial.places[seen, k, axis])
-    return Watched(skeleton, markers, grid, places, weight)
+    return SampledTrial(skeleton, markers, grid, places, weight)

@@ -35,7 +35,9 @@ def joints_of(skeleton: Skeleton) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def chain(q: Array, turned: Array, apart: Array, turns: Array, origins: Array, axes: Array) -> None:
+def forward_kinematics(
+    q: Array, turned: Array, apart: Array, turns: Array, origins: Array, axes: Array
+) -> None:
     """Forward kinematics of one posture (18, 6), joint after joint from the pelvis up.
 
     Parameters
@@ -49,6 +51,7 @@ def chain(q: Array, turned: Array, apart: Array, turns: Array, origins: Array, a
         now = q[b]
         cz, cx, cy = np.cos(now[3]), np.cos(now[4]), np.cos(now[5])
         sz, sx, sy = np.sin(now[3]), np.sin(now[4]), np.sin(now[5])
+        # the joint's frame in ground: of the body below, times the fixed step
         for i in range(3):
             for j in range(3):
                 base[i, j] = (
@@ -61,7 +64,8 @@ def chain(q: Array, turned: Array, apart: Array, turns: Array, origins: Array, a
             for j in range(3):
                 origins[b, i] += below[i, j] * apart[b, j] + base[i, j] * now[j]
                 axes[b, j, i] = base[i, j]
-            # x and y after the extension, y and z after the bending, z and x after the rotation
+            # rotation Z, X', Y'' applied to a row of axes, one plane rotation at a time: x and y
+            # after the extension, y and z after the bending, z and x after the rotation
             x, y = base[i, 0] * cz + base[i, 1] * sz, base[i, 1] * cz - base[i, 0] * sz
             y, z = y * cx + base[i, 2] * sx, base[i, 2] * cx - y * sx
             axes[b, 3, i], axes[b, 4, i], axes[b, 5, i] = base[i, 2], x, y
@@ -87,7 +91,7 @@ def _place(
     bodies = len(turned)
     turns, origins, axes = np.empty((bodies, 3, 3)), np.empty((bodies, 3)), np.empty((bodies, 6, 3))
     for f in range(len(q)):
-        chain(q[f], turned, apart, turns, origins, axes)
+        forward_kinematics(q[f], turned, apart, turns, origins, axes)
         for k in range(len(body)):
             own, p = turns[body[k]], places[f, k]
             for i in range(3):

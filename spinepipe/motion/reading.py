@@ -4,26 +4,23 @@ Units and frame rates are those that the file tells. Nothing is guessed: what is
 what is doubtful is refused with its place.
 """
 
-from collections import Counter
 from collections.abc import Callable
-from math import isnan
+from math import isnan, nan
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spinepipe.documents.text import MOST_CSV_BYTES
 from spinepipe.effects.contract import Array
 from spinepipe.motion.reading_c3d import read_c3d
-from spinepipe.motion.reading_csv import read_csv
-from spinepipe.motion.reading_trc import read_trc
-from spinepipe.motion.recorded import Recorded
+from spinepipe.motion.reading_text import read_csv, read_trc
+from spinepipe.motion.recording import MarkerRecording, without_subjects
 from spinepipe.problems import InputError, InputProblem
 
 DEFAULT_AXES = "x y z"
 """Axes of a file that are those of ground: forwards, up, to the right."""
 
-READERS: dict[str, Callable[[Path, str], Recorded]] = {
+READERS: dict[str, Callable[[Path, str], MarkerRecording]] = {
     ".trc": read_trc,
     ".c3d": read_c3d,
     ".csv": read_csv,
@@ -47,12 +44,10 @@ class NoFrameError(InputError):
         self.late = late
 
 
-Axes = NDArray[np.float64]
-"""(3, 3): ground axes in rows, axes of the file in columns."""
-
-
-def axes_of(text: str) -> Axes:
+def axes_of(text: str) -> Array:
     """(3, 3) of a text that tells what forwards, up and right are in the axes of the file.
+
+    Ground axes are in rows, axes of the file in columns.
 
     Raises
     ------
@@ -77,7 +72,7 @@ def read_motion(
     start_s: float | None = None,
     end_s: float | None = None,
     file: str | None = None,
-) -> Recorded:
+) -> MarkerRecording:
     """Markers of a file in ground axes.
 
     Parameters
@@ -104,14 +99,17 @@ def read_motion(
         found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_CSV_BYTES / 1e6:g} MB"
         raise InputError([InputProblem(name, None, None, found, allowed, "crop it")])
     raw = reader(path, name)
-    kept = _kept(raw.time_s, start_s, end_s)
+    # frames from start to end, of which either may be open
+    start, end = (nan if time_s is None else time_s for time_s in (start_s, end_s))
+    kept = ~((raw.time_s < start - ON_TIME_S) | (raw.time_s > end + ON_TIME_S))
     if not kept.any():
-        found = f"no frame from {_told(start_s)} to {_told(end_s)}"
+        ends = ("an end" if isnan(time_s) else f"{time_s:g} s" for time_s in (start, end))
+        found = f"no frame from {' to '.join(ends)}"
         allowed = f"times from {raw.time_s[0]:g} to {raw.time_s[-1]:g} s"
         problem = InputProblem(name, None, None, found, allowed, "correct start_s and end_s")
-        raise NoFrameError(problem, late=start_s is not None and start_s > raw.time_s[-1])
-    names, renamed = _names(raw.names, name)
-    return Recorded(
+        raise NoFrameError(problem, late=bool(start > raw.time_s[-1]))
+    names, renamed = without_subjects(raw.names, name)
+    return MarkerRecording(
         names,
         raw.time_s[kept],
         raw.places[kept] @ turn.T,
@@ -119,41 +117,3 @@ def read_motion(
         (*raw.repaired, *renamed),
         1 + int(np.argmax(kept)),
     )
-
-
-def _told(time_s: float | None) -> str:
-    return "an end" if time_s is None or isnan(time_s) else f"{time_s:g} s"
-
-
-def _kept(time_s: Array, start_s: float | None, end_s: float | None) -> NDArray[np.bool_]:
-    kept = np.ones(len(time_s), dtype=bool)
-    if start_s is not None and not isnan(start_s):
-        kept &= time_s >= start_s - ON_TIME_S
-    if end_s is not None and not isnan(end_s):
-        kept &= time_s <= end_s + ON_TIME_S
-    return kept
-
-
-def _names(names: tuple[str, ...], file: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names without their subject where that leaves each once, and what was done.
-
-    Raises
-    ------
-    InputError
-        Of names that come twice.
-    """
-    again = [name for name, count in Counter(names).items() if count > 1]
-    if again:
-        found = f"{', '.join(again)} more than once"
-        raise InputError(
-            [InputProblem(file, None, None, found, "each marker once", "rename one of them")]
-        )
-    short = [name.rpartition(":")[2].strip() for name in names]
-    counts = Counter(short)
-    chosen = tuple(
-        cut if cut and counts[cut] == 1 else name for name, cut in zip(names, short, strict=True)
-    )
-    subjects = sorted(
-        {name.rpartition(":")[0] for name, cut in zip(names, chosen, strict=True) if name != cut}
-    )
-    return chosen, tuple(f"names of markers without '{subject}:'" for subject in subjects)

@@ -1,14 +1,37 @@
-"""Motion as `.c3d`: units and rate of its own; a negative residual says: not seen."""
+"""Motion as `.c3d`: units and rate of its own; a negative residual says: not seen.
 
-from collections.abc import Iterator
+Nothing that a file tells of its sizes is trusted: a parameter may claim gigabytes, a list may lead
+back to its beginning. Libraries for this form end the process then, or fill the memory. By The C3D
+File Format, User Guide (2008): blocks of 512 bytes; parameters in groups, one behind the other,
+each with the way to the next; frames of four numbers a marker, then of analog channels.
+"""
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from spinepipe.effects.contract import Array
-from spinepipe.motion.c3d_form import BLOCK, FormError, Parts, reals, taken_apart, words
-from spinepipe.motion.recorded import Recorded, recorded, unit_of
+from spinepipe.motion.recording import MarkerRecording, recording_from, unit_of
 from spinepipe.problems import InputError, InputProblem
+
+BLOCK = 512
+MAGIC = 0x50
+MOST_DIMENSIONS = 7
+
+INTEL, DEC, MIPS = 84, 85, 86
+"""By which processor numbers were written."""
+
+CHARACTERS, BYTE, WORD, REAL = -1, 1, 2, 4
+"""Types of parameters."""
+
+Value = tuple[str, ...] | tuple[float, ...]
+
+Parameters = Mapping[tuple[str, str], Value]
+"""Texts or numbers by group and name, both in capitals."""
 
 SLOWEST, FASTEST = 1.0, 100_000.0
 """Frames a second."""
@@ -22,7 +45,91 @@ MORE_LABELS = ("LABELS", *(f"LABELS{k}" for k in range(2, 10)))
 AGAIN = "export the motion again"
 
 
-def read_c3d(path: Path, file: str) -> Recorded:
+class FormError(ValueError):
+    """A file that does not hold together; the text says what was found."""
+
+
+@dataclass(frozen=True)
+class C3dFile:
+    """Header and parameters of a file, and all its bytes.
+
+    Attributes
+    ----------
+    data : all bytes. processor : of its numbers. behind : byte behind the last parameter.
+    points, analog : markers, and numbers of analog channels, in a frame.
+    first, last : numbers of frames, from 1. start : byte where frames begin.
+    header_scale : of whole numbers; negative: numbers are reals. header_rate : frames a second.
+    """
+
+    data: bytes
+    processor: int
+    parameters: Parameters
+    behind: int
+    points: int
+    analog: int
+    first: int
+    last: int
+    start: int
+    header_scale: float
+    header_rate: float
+
+    def texts(self, name: str) -> list[str]:
+        """Texts of a parameter of POINT."""
+        return [one for one in self.parameters.get(("POINT", name), ()) if isinstance(one, str)]
+
+    def numbers(self, group: str, name: str) -> list[float]:
+        """Numbers of a parameter."""
+        return [one for one in self.parameters.get((group, name), ()) if not isinstance(one, str)]
+
+    def number(self, name: str) -> float | None:
+        """The first number of a parameter of POINT; None where there is none."""
+        return next(iter(self.numbers("POINT", name)), None)
+
+    @property
+    def rate(self) -> float:
+        """Frames a second."""
+        return self.number("RATE") or self.header_rate
+
+    @property
+    def scale(self) -> float:
+        """Of whole numbers; negative: numbers are reals."""
+        return self.number("SCALE") or self.header_scale
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of markers."""
+        return [name for key in MORE_LABELS for name in self.texts(key)]
+
+    @property
+    def frames_told(self) -> set[int]:
+        """How many frames header, POINT and TRIAL tell; counts that are full tell nothing."""
+        # TRIAL has two 16-bit words for each end, so that it holds of any recording
+        ends = (self.numbers("TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END"))
+        of_trial = [words[0] + 65_536.0 * words[1] for words in ends if len(words) == 2]
+        if len(of_trial) == 2:
+            return {int(of_trial[1] - of_trial[0] + 1)}
+        told = list[float]()
+        if self.last < COUNT_ENDS:
+            told.append(self.last - self.first + 1)
+        if (frames := self.number("FRAMES")) is not None and np.isfinite(frames):
+            told.append(frames)
+        return {int(one) for one in told if 0 < one < COUNT_ENDS or one > COUNT_ENDS}
+
+    @property
+    def room(self) -> int:
+        """Frames that are in the file; none where they would begin within the parameters."""
+        if self.start < self.behind or not self.points:
+            return 0
+        bytes_of_frame = (4 if self.scale < 0.0 else 2) * (4 * self.points + self.analog)
+        return (len(self.data) - self.start) // bytes_of_frame
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, as told; where nothing tells it, as many as are there."""
+        return next(iter(self.frames_told), self.room)
+
+
+def read_c3d(path: Path, file: str) -> MarkerRecording:
     """Markers of a `.c3d`, in the axes of the file; its first frame tells when it begins.
 
     Parameters
@@ -35,119 +142,153 @@ def read_c3d(path: Path, file: str) -> Recorded:
         Where it cannot be read, tells neither unit nor rate, or contradicts itself.
     """
     try:
-        parts = taken_apart(path.read_bytes())
+        whole = parse_c3d(path.read_bytes())
     except FormError as error:
         raise InputError([InputProblem(file, None, None, str(error), "a .c3d", AGAIN)]) from error
-    problems = list(_contradictions(parts, file))
+    problems = list(_contradictions(whole, file))
     if problems:
         raise InputError(problems)
-    scale = unit_of(file, None, "POINT:UNITS", next(iter(_texts(parts, "UNITS")), ""))
-    raw, residuals = _frames(parts, _number_of_frames(parts))
-    places = np.where((residuals < 0.0)[..., None], np.nan, scale * raw)
-    time_s = (max(parts.header.first - 1, 0) + np.arange(len(raw))) / _rate(parts)
-    return recorded(tuple(_labels(parts)[: raw.shape[1]]), time_s, places)
+    unit_m = unit_of(file, None, "POINT:UNITS", next(iter(whole.texts("UNITS")), ""))
+    # four numbers a marker: its place and a residual; then analog channels, which are left out
+    in_frame, scale = 4 * whole.points + whole.analog, whole.scale
+    number = whole.frames * in_frame
+    if scale < 0.0:
+        cells = reals(whole.data, whole.start, number, whole.processor)
+    else:
+        unsigned = words(whole.data, whole.start, number, whole.processor)
+        cells = np.where(unsigned < 1 << 15, unsigned, unsigned - (1 << 16)).astype(np.float64)
+    rows = cells.reshape(whole.frames, in_frame)[:, : 4 * whole.points]
+    points = rows.reshape(whole.frames, -1, 4)
+    raw, residuals = points[..., :3] * (1.0 if scale < 0.0 else scale), points[..., 3]
+    places = np.where((residuals < 0.0)[..., None], np.nan, unit_m * raw)
+    time_s = (max(whole.first - 1, 0) + np.arange(len(raw))) / whole.rate
+    return recording_from(tuple(whole.labels[: whole.points]), time_s, places)
 
 
-def _texts(parts: Parts, name: str) -> list[str]:
-    """Texts of a parameter of POINT."""
-    return [one for one in parts.parameters.get(("POINT", name), ()) if isinstance(one, str)]
-
-
-def _numbers(parts: Parts, group: str, name: str) -> list[float]:
-    """Numbers of a parameter."""
-    return [one for one in parts.parameters.get((group, name), ()) if not isinstance(one, str)]
-
-
-def _number(parts: Parts, name: str) -> float | None:
-    """The first number of a parameter of POINT; None where there is none."""
-    return next(iter(_numbers(parts, "POINT", name)), None)
-
-
-def _rate(parts: Parts) -> float:
-    return _number(parts, "RATE") or parts.header.rate
-
-
-def _scale(parts: Parts) -> float:
-    return _number(parts, "SCALE") or parts.header.scale
-
-
-def _labels(parts: Parts) -> list[str]:
-    return [name for key in MORE_LABELS for name in _texts(parts, key)]
-
-
-def _contradictions(parts: Parts, file: str) -> Iterator[InputProblem]:
+def _contradictions(whole: C3dFile, file: str) -> Iterator[InputProblem]:
     """What the file tells that cannot be, or that its other half tells otherwise."""
-    header, rate, scale = parts.header, _rate(parts), _scale(parts)
 
     def problem(place: str, found: str, allowed: str) -> InputProblem:
         return InputProblem(file, None, place, found, allowed, AGAIN)
 
-    if not SLOWEST <= rate <= FASTEST:
+    if not SLOWEST <= whole.rate <= FASTEST:
         allowed = f"{SLOWEST:g} to {FASTEST:g} frames a second"
-        yield problem("POINT:RATE", f"{rate:g} frames a second", allowed)
-    if not np.isfinite(scale) or scale == 0.0:
-        yield problem("POINT:SCALE", f"a scale of {scale:g}", "a finite number that is not zero")
-    used = _number(parts, "USED")
-    if not header.points or (used is not None and used != header.points):
+        yield problem("POINT:RATE", f"{whole.rate:g} frames a second", allowed)
+    if not np.isfinite(whole.scale) or whole.scale == 0.0:
+        found, allowed = f"a scale of {whole.scale:g}", "a finite number that is not zero"
+        yield problem("POINT:SCALE", found, allowed)
+    used = whole.number("USED")
+    if not whole.points or (used is not None and used != whole.points):
         told = "" if used is None else f", {used:g} in its parameters"
-        found = f"{header.points} markers in the header{told}"
+        found = f"{whole.points} markers in the header{told}"
         yield problem("POINT:USED", found, "at least one, the same twice")
-    elif len(_labels(parts)) < header.points:
-        found = f"{len(_labels(parts))} names of {header.points} markers"
+    elif len(whole.labels) < whole.points:
+        found = f"{len(whole.labels)} names of {whole.points} markers"
         yield problem("POINT:LABELS", found, "a name for each")
-    frames = _frames_told(parts)
+    frames = whole.frames_told
     if len(frames) > 1:
         found = f"{' frames and '.join(map(str, sorted(frames)))} frames"
         yield problem("POINT:FRAMES", found, "the same in header and parameters")
-    elif header.first > header.last:
-        found = f"frames from {header.first} to {header.last}"
+    elif whole.first > whole.last:
+        found = f"frames from {whole.first} to {whole.last}"
         yield problem("POINT:FRAMES", found, "a first frame before the last")
-    elif not _number_of_frames(parts) or _number_of_frames(parts) > _room(parts):
+    elif not whole.frames or whole.frames > whole.room:
         told = f" of {next(iter(frames))}" if frames else ""
-        found = f"room for {max(_room(parts), 0)}{told} frames"
+        found = f"room for {max(whole.room, 0)}{told} frames"
         yield problem("POINT:FRAMES", found, "all that are told; the file may be cut off")
 
 
-def _frames_told(parts: Parts) -> set[int]:
-    """How many frames header, POINT and TRIAL tell; counts that are full tell nothing."""
-    header, told = parts.header, list[float]()
-    ends = (_numbers(parts, "TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END"))
-    of_trial = [words[0] + 65_536.0 * words[1] for words in ends if len(words) == 2]
-    if len(of_trial) == 2:
-        return {int(of_trial[1] - of_trial[0] + 1)}
-    if header.last < COUNT_ENDS:
-        told.append(header.last - header.first + 1)
-    if (frames := _number(parts, "FRAMES")) is not None and np.isfinite(frames):
-        told.append(frames)
-    return {int(one) for one in told if 0 < one < COUNT_ENDS or one > COUNT_ENDS}
+def parse_c3d(data: bytes) -> C3dFile:
+    """Header and parameters of a file.
+
+    Raises
+    ------
+    FormError
+        Where it does not hold together.
+    """
+    if len(data) < 2 * BLOCK or data[1] != MAGIC or data[0] < 2:
+        raise FormError("no header of a .c3d")
+    start = (data[0] - 1) * BLOCK
+    if len(data) < start + 4:
+        raise FormError("a file that ends before its parameters")
+    processor = data[start + 3]
+    if processor not in (INTEL, DEC, MIPS):
+        raise FormError(f"numbers of a processor {processor}")
+    parameters, behind = _parameters(data, start + 4, processor)
+    # the header: 16-bit words from byte 2, the scale at 12, the first block of frames at 16, rate
+    points, analog, first, last = words(data, 2, 4, processor).tolist()
+    (scale,), (rate,) = reals(data, 12, 1, processor), reals(data, 20, 1, processor)
+    (block,) = words(data, 16, 1, processor).tolist()
+    start = (block - 1) * BLOCK
+    return C3dFile(
+        *(data, processor, parameters, behind, points, analog, first, last),
+        start,
+        float(scale),
+        float(rate),
+    )
 
 
-def _number_of_frames(parts: Parts) -> int:
-    """As told; where nothing tells it, as many as are there."""
-    return next(iter(_frames_told(parts)), _room(parts))
+def words(data: bytes, at: int, number: int, processor: int) -> NDArray[np.int64]:
+    """So many 16-bit numbers without a sign."""
+    form = ">u2" if processor == MIPS else "<u2"
+    return np.frombuffer(data, form, number, at).astype(np.int64)
 
 
-def _bytes_of_frame(parts: Parts) -> int:
-    each = 4 if _scale(parts) < 0.0 else 2
-    return each * (4 * parts.header.points + parts.header.analog)
+def reals(data: bytes, at: int, number: int, processor: int) -> NDArray[np.float64]:
+    """So many 32-bit reals; of a DEC they have exchanged halves and are four times as large."""
+    if processor != DEC:
+        form = ">f4" if processor == MIPS else "<f4"
+        return np.frombuffer(data, form, number, at).astype(np.float64)
+    halves = np.frombuffer(data, "<u2", 2 * number, at).reshape(-1, 2)
+    return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel().astype(np.float64) / 4.0
 
 
-def _room(parts: Parts) -> int:
-    """Frames that are in the file; none where they would begin within the parameters."""
-    start = (parts.header.data_block - 1) * BLOCK
-    if start < parts.behind or not parts.header.points:
-        return 0
-    return (len(parts.data) - start) // _bytes_of_frame(parts)
-
-
-def _frames(parts: Parts, number: int) -> tuple[Array, Array]:
-    """(F, K, 3) places in units of the file, and (F, K) residuals."""
-    header, scale = parts.header, _scale(parts)
-    start, in_frame = (header.data_block - 1) * BLOCK, 4 * header.points + header.analog
-    if scale < 0.0:
-        cells = reals(parts.data, start, number * in_frame, parts.processor)
+def _parameters(data: bytes, at: int, processor: int) -> tuple[Parameters, int]:
+    """All parameters, and where they end."""
+    groups: dict[int, str] = {}
+    found: list[tuple[int, str, Value]] = []
+    while at + 2 <= len(data):
+        length, group = struct.unpack_from("<bb", data, at)  # of a locked entry it is negative
+        way_at = at + 2 + abs(length)
+        if not length:
+            break
+        if way_at + 2 > len(data):
+            raise FormError("a file that ends within its parameters")
+        name = data[at + 2 : way_at].decode("ascii", "replace").upper()
+        (way,) = struct.unpack_from(">h" if processor == MIPS else "<h", data, way_at)
+        if group < 0:
+            groups[-group] = name
+        else:
+            found.append((group, name, _value(data, way_at + 2, name, processor)))
+        if way < 0 or (0 < way < 2):
+            raise FormError(f"a parameter {name!a} that leads nowhere")
+        if not way:
+            break
+        at = way_at + way
     else:
-        whole = words(parts.data, start, number * in_frame, parts.processor)
-        cells = np.where(whole < 1 << 15, whole, whole - (1 << 16)).astype(np.float64)
-    points = cells.reshape(number, in_frame)[:, : 4 * header.points].reshape(number, -1, 4)
-    return points[..., :3] * (1.0 if scale < 0.0 else scale), points[..., 3]
+        raise FormError("parameters that have no end")
+    return {(groups.get(group, ""), name): value for group, name, value in found}, at
+
+
+def _value(data: bytes, at: int, name: str, processor: int) -> Value:
+    """The array of a parameter, the first size changing fastest; texts are one size less."""
+    if at + 2 > len(data):
+        raise FormError("a file that ends within its parameters")
+    kind, dimensions = struct.unpack_from("<bB", data, at)
+    sizes = list(data[at + 2 : at + 2 + dimensions])
+    begin, size = at + 2 + dimensions, abs(kind) * prod(sizes)
+    if dimensions > MOST_DIMENSIONS or len(sizes) < dimensions or begin + size > len(data):
+        raise FormError(f"a parameter {name!a} of {size} bytes, which are not there")
+    if kind == CHARACTERS:
+        letters = data[begin : begin + size]
+        longest = sizes[0] if sizes else size
+        number = prod(sizes[1:]) if longest else 0
+        pieces = (letters[k * longest : (k + 1) * longest] for k in range(number))
+        return tuple(piece.decode("utf-8", "replace").strip(" \0") for piece in pieces)
+    if kind == BYTE:
+        return tuple(map(float, data[begin : begin + size]))
+    if kind == WORD:
+        return tuple(map(float, words(data, begin, prod(sizes), processor)))
+    if kind == REAL:
+        return tuple(map(float, reals(data, begin, prod(sizes), processor)))
+    raise FormError(f"a parameter {name!a} of type {kind}")

@@ -5,28 +5,100 @@ All come as residuals, so that a cost is a sum of squares and half its curvature
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numba import njit
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.objective import SHAPE, Ask, Watched
+from spinepipe.motion.objective import SHAPE, MotionObjective, SampledTrial
 from spinepipe.motion.passive import PassiveLaw
 from spinepipe.motion.points import COUNT, marker_places, with_slopes
-from spinepipe.motion.rigid_body import RigidBodies, bodies_of
-from spinepipe.motion.skeleton import JOINTS
+from spinepipe.motion.skeleton import BODIES, JOINTS, Skeleton
+from spinepipe.units import STANDARD_GRAVITY
+
+_AXES_OF_JOINT = (
+    *(pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ),
+    *(pin.JointModelRZ, pin.JointModelRX, pin.JointModelRY),
+)
+"""Six joints of one coordinate stand for each of ours, so that generalised forces belong to the
+coordinates: a load on `extension` is the moment about the axis of that rotation."""
 
 _PELVIS = 6
 """Coordinates of the pelvis; what holds it up is the seat, and costs nothing."""
+
+
+class RigidBodies:
+    """Inverse dynamics of a skeleton: recursive Newton-Euler and its derivatives, by pinocchio.
+
+    Carpentier and Mansard 2018 for the derivatives.
+
+    Parameters
+    ----------
+    weight : whether gravity pulls.
+    """
+
+    def __init__(self, skeleton: Skeleton, weight: bool = True) -> None:
+        self._model, parent, masses = pin.Model(), 0, skeleton.masses
+        for body, name in enumerate(BODIES):
+            here = pin.SE3.Identity()
+            if body:
+                step = skeleton.steps[body - 1]
+                here = pin.SE3(np.asarray(step.rotation, float), np.asarray(step.origin, float))
+            for k, joint in enumerate(_AXES_OF_JOINT):
+                parent = self._model.addJoint(parent, joint(), here, f"{name}_{k}")
+                here = pin.SE3.Identity()
+            com, about = masses.com[body].copy(), masses.about_com[body].copy()
+            inertia = pin.Inertia(float(masses.kg[body]), com, about)
+            self._model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+        self._model.gravity.linear = np.asarray(STANDARD_GRAVITY) if weight else np.zeros(3)
+        self._data = self._model.createData()
+
+    def loads(self, q: Array, velocity: Array, acceleration: Array) -> Array:
+        """(F, 108) N and N m that hold and move the bodies, of postures (F, 108)."""
+        return np.array(
+            [
+                pin.rnea(self._model, self._data, *now)
+                for now in zip(q, velocity, acceleration, strict=True)
+            ]
+        )
+
+    def with_slopes(self, q: Array, velocity: Array, acceleration: Array) -> tuple[Array, Array]:
+        """Loads (F, 108), and slopes (F, 3, 108, 108) by places, velocities and accelerations."""
+        loads = np.empty((len(q), COUNT))
+        slopes = np.empty((len(q), 3, COUNT, COUNT))
+        for k, now in enumerate(zip(q, velocity, acceleration, strict=True)):
+            pin.computeRNEADerivatives(self._model, self._data, *now)
+            loads[k] = self._data.tau
+            slopes[k, 0], slopes[k, 1] = self._data.dtau_dq, self._data.dtau_dv
+            slopes[k, 2] = self._data.M
+        _mirror(slopes[:, 2])
+        return loads, slopes
+
+
+@njit(cache=True)
+def _mirror(matrices: Array) -> None:
+    """Below their diagonals what is above: pinocchio writes one half of an inertia matrix."""
+    for k in range(len(matrices)):
+        for i in range(len(matrices[k])):
+            for j in range(i):
+                matrices[k, i, j] = matrices[k, j, i]
+
+
+@lru_cache(maxsize=8)
+def bodies_of(skeleton: Skeleton, weight: bool = True) -> RigidBodies:
+    """The bodies of a skeleton, made once: making them takes as long as fifty postures."""
+    return RigidBodies(skeleton, weight)
 
 
 @dataclass(frozen=True, eq=False)
 class Markers:
     """Markers off their places, over their size; (F, 3 K) and slopes (F, 3 K, 108)."""
 
-    watched: Watched
-    ask: Ask
+    watched: SampledTrial
+    ask: MotionObjective
 
     def residuals(self, q: Array) -> Array:
         """Of postures (F, 18, 6)."""
@@ -77,10 +149,10 @@ class MuscleDemand:
     """
 
     bodies: RigidBodies
-    ask: Ask
+    ask: MotionObjective
 
     @classmethod
-    def of(cls, watched: Watched, ask: Ask) -> "MuscleDemand":
+    def of(cls, watched: SampledTrial, ask: MotionObjective) -> "MuscleDemand":
         """Of the bodies of a trial."""
         return cls(bodies_of(watched.skeleton, ask.force_cost != "minus_gravity"), ask)
 
@@ -118,8 +190,10 @@ class MuscleDemand:
         flat = [one.reshape(frames, COUNT) for one in motion]
         for k in range(frames):
             loads, by_motion = self.bodies.with_slopes(*(one[k : k + 1] for one in flat))
+            # chain rule: by motion, then by the coefficients that make it
             each = np.empty((weights.shape[1], count, COUNT))
             _by_coefficients(by_motion[0], stiffness[k], size, weights, each)
+            # levels against each other: the metric is sparse, so it is not multiplied out
             weighed = each
             if self.ask.force_cost == "level_difference":
                 weighed = np.empty_like(each)
@@ -156,7 +230,7 @@ class MuscleDemand:
         return np.concatenate([np.diff(by_level, axis=axis), whole], axis=axis)
 
 
-def beyond(ask: Ask, q: Array) -> tuple[Array, Array]:
+def range_excess(ask: MotionObjective, q: Array) -> tuple[Array, Array]:
     """How far coordinates (F, 18, 6) are beyond their range, over its size; and its slope."""
     over = np.maximum(q - ask.high, 0.0) + np.minimum(q - ask.low, 0.0)
     size = np.broadcast_to(ask.sizes.beyond, SHAPE)

@@ -8,12 +8,10 @@ A cluster is a plate that no body scales: its middle moves with its vertebra's s
 it keep their distances. Pairs within one cluster tell nothing of size and are left out.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spinepipe.decomposition import bounded_least_squares, svd
 from spinepipe.effects.contract import Array
@@ -67,40 +65,42 @@ def segment_of(body: int) -> int:
     )
 
 
-def fitted(
-    skeleton: Skeleton,
-    markers: MarkerSet,
-    static: MarkerTrial,
-    pairs: Sequence[tuple[str, str]] | None = None,
-) -> ScalingFit:
+def fit_scaling(skeleton: Skeleton, markers: MarkerSet, static: MarkerTrial) -> ScalingFit:
     """The factors that fit the subject's static trial.
 
     Parameters
     ----------
     skeleton, markers : generic; the neutral pose is taken for the subject's.
     static : the subject stands still; its markers are those of `markers`, in their order.
-    pairs : of markers by name; None: all that were seen, but those within one cluster.
 
     Raises
     ------
     ValueError
-        Where a marker was never seen in a pair that is asked for, the pairs leave a factor open,
-        or a factor is none of a person.
+        Where the pairs leave a factor open, or a factor is none of a person.
     """
-    chosen, measured = _measured(markers, static, pairs)
+    # pairs of markers and their mean distances, over frames with both in sight
+    pairs: list[tuple[int, int]] = []
+    distances: list[float] = []
+    for one, other in combinations(range(len(markers)), 2):
+        both = static.seen[:, one] & static.seen[:, other]
+        plate = markers.cluster[one] and markers.cluster[one] == markers.cluster[other]
+        if both.any() and not plate:
+            apart = static.places[both, other] - static.places[both, one]
+            pairs.append((one, other))
+            distances.append(float(np.linalg.norm(apart, axis=1).mean()))
+    if not pairs:
+        raise ValueError(f"no pair of markers is in sight in {static.name}")
+    chosen, measured = np.array(pairs, dtype=np.int64), np.array(distances)
     by_factor, fixed = _places(skeleton, markers)
     across = by_factor[chosen[:, 1]] - by_factor[chosen[:, 0]]
     plates = fixed[chosen[:, 1]] - fixed[chosen[:, 0]]
 
-    def gaps(factors: Array) -> Array:
-        return across @ factors + plates
-
     def residual(factors: Array) -> Array:
-        found: Array = np.linalg.norm(gaps(factors), axis=1) - measured
+        found: Array = np.linalg.norm(across @ factors + plates, axis=1) - measured
         return found
 
     def jacobian(factors: Array) -> Array:
-        gap = gaps(factors)
+        gap = across @ factors + plates
         return np.einsum("nc,ncs->ns", gap / np.linalg.norm(gap, axis=1)[:, None], across)
 
     _require_told(jacobian(np.ones(len(SEGMENTS))))
@@ -109,7 +109,13 @@ def fitted(
     solved = bounded_least_squares(
         residual, start, jacobian, (limits[0], limits[1]), ftol=CLOSE, xtol=CLOSE, gtol=CLOSE
     )
-    _require_plausible(solved.x)
+    for name, factor in zip(SEGMENTS, solved.x, strict=True):
+        # a factor at a limit is none that was found
+        if not SMALLEST * (1.0 + UNTOLD) < factor < LARGEST * (1.0 - UNTOLD):
+            raise ValueError(
+                f"the {name} part would be {factor:.2f} times the generic one; check the markers' "
+                "names and the units of the static trial"
+            )
     left = np.abs(solved.fun) * MM_PER_M
     worst = int(np.argmax(left))
     first, second = chosen[worst]
@@ -123,6 +129,7 @@ def fitted(
 
 
 def _require_told(jacobian: Array) -> None:
+    """Refuses pairs whose distances do not hang on each factor, or on all factors alike."""
     told = np.linalg.norm(jacobian, axis=0)
     for name, size in zip(SEGMENTS, told, strict=True):
         if size <= UNTOLD * told.max():
@@ -132,58 +139,19 @@ def _require_told(jacobian: Array) -> None:
         raise ValueError("pairs of markers do not tell the sizes of the three parts apart")
 
 
-def _require_plausible(factors: Array) -> None:
-    for name, factor in zip(SEGMENTS, factors, strict=True):
-        if not SMALLEST * (1.0 + UNTOLD) < factor < LARGEST * (1.0 - UNTOLD):
-            raise ValueError(
-                f"the {name} part would be {factor:.2f} times the generic one; check the markers' "
-                "names and the units of the static trial"
-            )
-
-
-def _measured(
-    markers: MarkerSet, static: MarkerTrial, pairs: Sequence[tuple[str, str]] | None
-) -> tuple[NDArray[np.int64], Array]:
-    """Pairs of markers (N, 2) and their mean distances (N,) m over frames with both in sight."""
-    asked = combinations(range(len(markers)), 2) if pairs is None else _named(markers, pairs)
-    chosen: list[tuple[int, int]] = []
-    distances: list[float] = []
-    for one, other in asked:
-        if markers.cluster[one] and markers.cluster[one] == markers.cluster[other]:
-            continue
-        both = static.seen[:, one] & static.seen[:, other]
-        if not both.any():
-            if pairs is None:
-                continue
-            names = f"{markers.names[one]} and {markers.names[other]}"
-            raise ValueError(f"{names} are never in sight together in {static.name}")
-        apart = static.places[both, other] - static.places[both, one]
-        chosen.append((one, other))
-        distances.append(float(np.linalg.norm(apart, axis=1).mean()))
-    if not chosen:
-        raise ValueError(f"no pair of markers is in sight in {static.name}")
-    return np.array(chosen, dtype=np.int64), np.array(distances)
-
-
-def _named(markers: MarkerSet, pairs: Sequence[tuple[str, str]]) -> list[tuple[int, int]]:
-    unknown = sorted({name for pair in pairs for name in pair} - set(markers.names))
-    if unknown:
-        raise ValueError(f"no marker is called {unknown[0]}")
-    return [(markers.names.index(one), markers.names.index(other)) for one, other in pairs]
-
-
 def _places(skeleton: Skeleton, markers: MarkerSet) -> tuple[Array, Array]:
     """Markers in the neutral pose as what grows with each factor (K, 3, 3) and what does not.
 
     Place (K, 3) m = first @ factors + second.
     """
+    # a body's origin is the sum of the steps below it, each as large as the body that it leads from
     turns, origins = body_poses(skeleton, np.zeros((len(BODIES), len(COORDINATES))))
-    by_body = np.zeros((len(BODIES), 3, len(SEGMENTS)))
+    body_factors = np.zeros((len(BODIES), 3, len(SEGMENTS)))
     for k in range(len(JOINTS)):
-        by_body[k + 1] = by_body[k]
-        by_body[k + 1, :, segment_of(k)] += origins[k + 1] - origins[k]
+        body_factors[k + 1] = body_factors[k]
+        body_factors[k + 1, :, segment_of(k)] += origins[k + 1] - origins[k]
     plates = _on_plates(markers)
-    by_factor = by_body[markers.body].copy()
+    by_factor = body_factors[markers.body].copy()
     for k, body in enumerate(markers.body):
         grown = markers.at[k] - plates[k]
         by_factor[k, :, segment_of(int(body))] += turns[body] @ grown
@@ -199,20 +167,20 @@ def _on_plates(markers: MarkerSet) -> Array:
     return found
 
 
-def by_body(factors: Array) -> Array:
+def body_factors(factors: Array) -> Array:
     """(18,) how many times as large bodies are, of factors (3,) of `SEGMENTS`."""
     return np.array([factors[segment_of(k)] for k in range(len(BODIES))])
 
 
 def steps_of(skeleton: Skeleton, factors: Array) -> tuple[Pose, ...]:
     """(17,) steps from joint to joint as large as the factors (3,) say."""
-    size = by_body(factors)
+    size = body_factors(factors)
     return tuple(
         Pose(step.rotation, size[k] * step.origin) for k, step in enumerate(skeleton.steps)
     )
 
 
-def scaled(
+def scale_skeleton(
     skeleton: Skeleton, markers: MarkerSet, factors: Array, mass_kg: float
 ) -> tuple[Skeleton, MarkerSet]:
     """Skeleton and markers as large as the factors (3,) say, masses summing to mass_kg.
@@ -221,7 +189,7 @@ def scaled(
     ----------
     mass_kg : of all that the skeleton's bodies carry, pelvis to T1.
     """
-    size = by_body(factors)
+    size = body_factors(factors)
     given = skeleton.masses
     heavier = mass_kg / float(given.kg.sum())
     masses = Masses(

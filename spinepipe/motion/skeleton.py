@@ -23,7 +23,8 @@ JOINTS = tuple(f"{upper}{lower}" for lower, upper in pairwise(BODIES))
 
 PELVIS = 0
 LUMBAR = slice(0, 6)
-"""L5S1 to T12L1 among the joints."""
+LUMBAR_JOINTS = JOINTS[LUMBAR]
+"""L5S1 to T12L1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +61,12 @@ class Skeleton:
 
 def skeleton_of(joints: Sequence[Pose], masses: Masses) -> Skeleton:
     """From the poses (17,) of the joints' frames in ground, all coordinates being zero."""
-    below = (Pose(np.eye(3), joints[0].origin), *joints[:-1])
-    steps = tuple(_seen_from(lower, joint) for lower, joint in zip(below, joints, strict=True))
-    return Skeleton(steps, masses)
-
-
-def _seen_from(lower: Pose, upper: Pose) -> Pose:
-    turn = lower.rotation.T
-    return Pose(turn @ upper.rotation, turn @ (upper.origin - lower.origin))
+    steps, lower = [], Pose(np.eye(3), joints[0].origin)
+    for joint in joints:
+        turn = lower.rotation.T
+        steps.append(Pose(turn @ joint.rotation, turn @ (joint.origin - lower.origin)))
+        lower = joint
+    return Skeleton(tuple(steps), masses)
 
 
 def body_poses(skeleton: Skeleton, q: Array) -> tuple[Array, Array]:

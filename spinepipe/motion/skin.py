@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.objective import SHAPE, ResidualScales, Watched
+from spinepipe.motion.objective import SHAPE, ResidualScales, SampledTrial
 from spinepipe.motion.skeleton import PELVIS, body_poses
 
 WHOLE_BEND_RAD = float(np.deg2rad(60.0))
@@ -28,7 +28,7 @@ ON_PELVIS = 0.3
 _UP = 1
 
 
-def with_sliding_skin(watched: Watched, q: Array, sizes: ResidualScales) -> Watched:
+def with_sliding_skin(watched: SampledTrial, q: Array, sizes: ResidualScales) -> SampledTrial:
     """The trial, its markers weighed as skin slides in postures near the true ones.
 
     Parameters
@@ -38,14 +38,14 @@ def with_sliding_skin(watched: Watched, q: Array, sizes: ResidualScales) -> Watc
     if sizes.own_skin_m == 0.0 and sizes.shared_skin_m == 0.0:
         return watched
     turns, _ = body_poses(watched.skeleton, q)
-    bend = bends(watched, turns) / WHOLE_BEND_RAD
+    bend = trunk_bend(watched, turns) / WHOLE_BEND_RAD
     body = np.asarray(watched.markers.body)
     share = np.where(body == PELVIS, ON_PELVIS, 1.0)
     way = (bend[:, None] * share)[..., None] * turns[:, body][..., _UP]
-    return replace(watched, shares=shares(watched, way, sizes))
+    return replace(watched, shares=whitening(watched, way, sizes))
 
 
-def bends(watched: Watched, turns: Array) -> Array:
+def trunk_bend(watched: SampledTrial, turns: Array) -> Array:
     """(F,) rad, how far T1 is turned against the pelvis, from the neutral pose; turns of bodies."""
     rest, _ = body_poses(watched.skeleton, np.zeros(SHAPE))
     now = np.swapaxes(turns[:, PELVIS], 1, 2) @ turns[:, -1]
@@ -54,13 +54,14 @@ def bends(watched: Watched, turns: Array) -> Array:
     return found
 
 
-def shares(watched: Watched, way: Array, sizes: ResidualScales) -> Array:
+def whitening(watched: SampledTrial, way: Array, sizes: ResidualScales) -> Array:
     """(F, 3 K, 3 K) that make errors of markers independent, of size `sizes.marker_m`.
 
     Parameters
     ----------
     way : (F, K, 3) how skin under each marker slides, per metre.
     """
+    # variance over that of a marker: of one vertebra, and of all but the pelvis
     body, count = np.asarray(watched.markers.body), len(watched.markers)
     one = body[:, None] == body
     spine = (body[:, None] != PELVIS) & (body != PELVIS)
@@ -73,5 +74,6 @@ def shares(watched: Watched, way: Array, sizes: ResidualScales) -> Array:
     seen = weight > 0.0
     covariance *= seen[:, :, None] & seen[:, None, :]  # what is out of sight hangs with nothing
     covariance += np.eye(3 * count) / np.where(seen, weight, 1.0)[:, None, :]
+    # whitening: with C = L L', errors times the inverse of L are independent
     found: Array = np.linalg.inv(np.linalg.cholesky(covariance)) * seen[:, None, :]
     return found

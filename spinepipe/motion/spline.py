@@ -7,7 +7,6 @@ it, so that what is asked of a node touches three coefficients (de Boor 2001, ch
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.linalg import solve_banded
 
 from spinepipe.effects.contract import Array
@@ -68,6 +67,7 @@ class KnotGrid:
         The natural spline: with no acceleration at the first and last node.
         """
         count = self.coefficients
+        # a matrix of five diagonals: 1 4 1 in each row, second differences in the first and last
         bands = np.zeros((5, count))
         bands[2, 1:-1], bands[1, 2:], bands[3, :-2] = 4.0 / 6.0, 1.0 / 6.0, 1.0 / 6.0
         bands[2, 0], bands[1, 1], bands[0, 2] = 1.0, -2.0, 1.0
@@ -76,8 +76,3 @@ class KnotGrid:
         flat[1:-1] = places.reshape(len(places), -1)
         solved: Array = solve_banded((2, 2), bands, flat)
         return solved.reshape(count, *places.shape[1:])
-
-    def curve(self, coefficients: Array) -> BSpline:
-        """The curve at any time between the first node and the last."""
-        knots = self.start_s + self.step_s * np.arange(-_DEGREE, self.intervals + _DEGREE + 1)
-        return BSpline(knots, coefficients, _DEGREE)

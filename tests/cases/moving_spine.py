@@ -5,8 +5,18 @@ from functools import cache
 import numpy as np
 
 from spinepipe.frames import Pose, rotation_zxy
+from spinepipe.motion.objective import SampledTrial, sample_trial
 from spinepipe.motion.passive import PassiveLaw
-from spinepipe.motion.skeleton import BODIES, JOINTS, MarkerSet, Masses, Skeleton, skeleton_of
+from spinepipe.motion.points import marker_places
+from spinepipe.motion.skeleton import (
+    BODIES,
+    JOINTS,
+    MarkerSet,
+    MarkerTrial,
+    Masses,
+    Skeleton,
+    skeleton_of,
+)
 
 CLUSTERS = ("T1", "T3", "T7", "T11", "L2", "L4")
 SINGLES = ("T5", "T9", "T12", "L3")
@@ -75,3 +85,22 @@ def postures(seed: int, frames: int, size: float = 0.1) -> np.ndarray:
     """(F, 18, 6) m and rad, translations a tenth of that."""
     drawn = np.random.default_rng(seed).normal(0.0, size, (frames, len(BODIES), 6))
     return drawn * np.array([0.1] * 3 + [1.0] * 3)
+
+
+def trial_at(places: np.ndarray, step_s: float = 0.1) -> MarkerTrial:
+    """A trial of markers at places (F, K, 3) m, all seen."""
+    times, seen = step_s * np.arange(len(places)), np.ones(places.shape[:2], dtype=bool)
+    return MarkerTrial("made", "flexion_extension", times, places, seen, "hanging")
+
+
+def sampled(
+    q: np.ndarray,
+    on: MarkerSet | None = None,
+    off: np.ndarray | float = 0.0,
+    step_s: float = 0.1,
+    intervals: int | None = None,
+) -> SampledTrial:
+    """Markers of postures (F, 18, 6), off their places by as much; every frame a node, or fewer."""
+    worn = markers() if on is None else on
+    trial = trial_at(marker_places(spine(), worn, q) + off, step_s)
+    return sample_trial(spine(), worn, trial, len(q) - 1 if intervals is None else intervals)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from moving_spine import everywhere, law, spine
 
-from spinepipe.motion.objective import Ask, ForceCost, Watched, watched
+from spinepipe.motion.objective import ForceCost, MotionObjective, SampledTrial, sample_trial
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import MarkerSet, MarkerTrial, Masses, Skeleton
 
@@ -47,7 +47,7 @@ def markers() -> MarkerSet:
     return MarkerSet(names, on.body[some], on.at[some], on.weight[some], empty)
 
 
-def trial() -> Watched:
+def trial() -> SampledTrial:
     """Forwards and sideways and back in two seconds, markers some millimetres off."""
     by = np.sin(np.linspace(0.0, np.pi, FRAMES)) ** 2
     q = np.zeros((FRAMES, 18, 6))
@@ -58,14 +58,14 @@ def trial() -> Watched:
     seen = np.ones(places.shape[:2], dtype=bool)
     times = np.linspace(0.0, 2.0, FRAMES)
     made = MarkerTrial("made", "flexion_extension", times, places, seen, "hanging")
-    return watched(skeleton(), markers(), made, INTERVALS)
+    return sample_trial(skeleton(), markers(), made, INTERVALS)
 
 
-def ask(cost: ForceCost) -> Ask:
+def ask(cost: ForceCost) -> MotionObjective:
     """Both joints turn and nothing else moves."""
     free = np.zeros((18, 6), dtype=bool)
     free[1 : BODIES + 1, 3:] = True
-    return replace(Ask(passive=law(0.5), force_cost=cost), free=free)
+    return replace(MotionObjective(passive=law(0.5), force_cost=cost), free=free)
 
 
 def by_ipopt(cost: ForceCost, folder: Path) -> Reference:
@@ -79,7 +79,7 @@ def by_ipopt(cost: ForceCost, folder: Path) -> Reference:
     return Reference(found["cost"], np.array(found["turns"]).reshape(-1, 2, 3), found["cpu_s"])
 
 
-def _written(seen: Watched, asked: Ask) -> dict[str, Any]:
+def _written(seen: SampledTrial, asked: MotionObjective) -> dict[str, Any]:
     body, steps = seen.skeleton.masses, seen.skeleton.steps[:BODIES]
     assert asked.passive is not None
     sizes = asked.sizes

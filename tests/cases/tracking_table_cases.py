@@ -14,16 +14,13 @@ import pandas as pd
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.motion.skeleton import BODIES, JOINTS
+from spinepipe.motion.skeleton import BODIES, JOINTS, LUMBAR_JOINTS
 from spinepipe.schema import Table
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.accuracy import accuracy_rows
 from spinepipe.studies.tracking.error_metrics import SAGITTAL
-from spinepipe.studies.tracking.forms import FORMS
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, point_rows, verdict
-from spinepipe.studies.tracking.reload_motions import AXIS, IN_ORDER
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.shares import LUMBAR_JOINTS
 from spinepipe.studies.tracking.tables import (
     ACCURACY,
     AGAINST_WANG_2021,
@@ -43,6 +40,8 @@ from spinepipe.studies.tracking.tables import (
     WEIGHTS,
     WINDOWS,
 )
+from spinepipe.studies.tracking.tracked_motions import IN_ORDER
+from spinepipe.studies.tracking.trials import AXIS, FORMS
 from spinepipe.tables import from_rows
 from spinepipe.units import COORDINATES, ROTATIONS
 

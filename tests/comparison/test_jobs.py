@@ -14,7 +14,7 @@ from spinepipe.studies.scoliosis.against_jalalian_2017 import facts
 from spinepipe.studies.scoliosis.kind import KIND, ScoliosisFiles
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import JALALIAN_2017_COHORTS
-from spinepipe.studies.tracking.against_wang_2021 import asked_of as asked_of_tracking
+from spinepipe.studies.tracking.against_wang_2021 import paper_settings as asked_of_tracking
 from spinepipe.studies.tracking.settings import JointLimits, Tracking
 from spinepipe.studies.trunk_loads.against_ghezelbash_2016 import asked_of as asked_of_trunk
 from spinepipe.studies.trunk_loads.ghezelbash_2016 import reproduces as has_the_persons

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spinepipe.motion.c3d_form import DEC, INTEL, MIPS, FormError, reals, taken_apart, words
 from spinepipe.motion.reading import read_motion
+from spinepipe.motion.reading_c3d import DEC, INTEL, MIPS, FormError, parse_c3d
 from spinepipe.problems import InputError, InputProblem
 
 PLACES_MM = np.array(
@@ -114,21 +114,14 @@ def test_all_processors_and_both_forms_of_numbers_are_read(
     np.testing.assert_allclose(found.places, np.where(seen[..., None], expected, 0.0), rtol=1e-12)
 
 
-def test_numbers_of_all_processors() -> None:
-    for processor in (INTEL, DEC, MIPS):
-        data = b"??" + real(-12.5, processor) + real(3.0, processor) + word(258, processor)
-        assert reals(data, 2, 2, processor).tolist() == [-12.5, 3.0]
-        assert words(data, 10, 1, processor).tolist() == [258]
-
-
 def test_parameters_go_by_group_and_name_in_capitals() -> None:
-    parts = taken_apart(Made(trial=((11, 0), (13, 0))).text())
+    parts = parse_c3d(Made(trial=((11, 0), (13, 0))).text())
     assert parts.parameters["POINT", "LABELS"] == ("T1", "L3")
     assert parts.parameters["POINT", "RATE"] == (50.0,)
     assert parts.parameters["TRIAL", "ACTUAL_END_FIELD"] == (13.0, 0.0)
-    assert (parts.header.first, parts.header.last, parts.header.data_block) == (11, 13, 3)
-    assert (parts.header.points, parts.header.analog) == (2, 1)
-    assert (parts.header.scale, parts.header.rate) == (-1.0, 50.0)
+    assert (parts.first, parts.last, parts.start) == (11, 13, 1024)
+    assert (parts.points, parts.analog) == (2, 1)
+    assert (parts.header_scale, parts.header_rate) == (-1.0, 50.0)
 
 
 def entry_of(kind: int, sizes: tuple[int, ...], value: bytes, way: int | None = None) -> bytes:
@@ -156,22 +149,20 @@ def last_entry(text: bytes) -> bytes:
         (-1, (1, 2, 2), b"abcd", ("a", "b", "c", "d")),
         (-1, (0, 3), b"", ()),
         (2, (0,), b"", ()),
+        (1, (1,) * 7, b"\x09", (9.0,)),
     ],
 )
 def test_values_of_all_types(
     kind: int, sizes: tuple[int, ...], value: bytes, expected: tuple[Any, ...]
 ) -> None:
-    found = taken_apart(entry_of(kind, sizes, value)).parameters
+    found = parse_c3d(entry_of(kind, sizes, value)).parameters
     assert found == {("", "A"): expected}
 
 
-def test_a_parameter_that_leads_on_by_nought_is_the_last() -> None:
-    found = taken_apart(entry_of(1, (1,), b"\x07", 0))
+def test_a_parameter_that_leads_on_by_nought_or_ends_the_file_is_the_last() -> None:
+    found = parse_c3d(entry_of(1, (1,), b"\x07", 0))
     assert found.parameters == {("", "A"): (7.0,)}
-
-
-def test_a_way_may_be_the_last_of_a_file() -> None:
-    found = taken_apart(last_entry(b"\x01\xffB\x00\x00"))
+    found = parse_c3d(last_entry(b"\x01\xffB\x00\x00"))
     assert found.parameters == {("B", "A"): (0.0,)}
 
 
@@ -199,12 +190,7 @@ def test_a_way_may_be_the_last_of_a_file() -> None:
 )
 def test_what_does_not_hold_together_is_told(data: bytes, says: str) -> None:
     with pytest.raises(FormError, match=says):
-        taken_apart(data)
-
-
-def test_as_many_sizes_as_seven_are_read() -> None:
-    found = taken_apart(entry_of(1, (1,) * 7, b"\x09")).parameters
-    assert found == {("", "A"): (9.0,)}
+        parse_c3d(data)
 
 
 def problem_of(folder: Path, made: Made | bytes) -> InputProblem:

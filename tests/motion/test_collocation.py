@@ -20,6 +20,6 @@ def test_the_least_cost_is_that_of_collocation(cost: ForceCost, tmp_path: Path) 
     reference = by_ipopt(cost, tmp_path)
     exponents = np.array([40.0, 40.0, 50.0]) * np.abs(reference.turns)
     assert exponents.max() < 5.0  # where the law goes on straight, which the reference does not
-    assert found.costs.total == pytest.approx(reference.cost, rel=1e-3)
+    assert found.cost == pytest.approx(reference.cost, rel=1e-3)
     turns = seen.grid.at_nodes(found.coefficients[0])[0][:, 1 : BODIES + 1, 3:]
     assert np.rad2deg(np.abs(turns - reference.turns)).max() < 0.1

@@ -8,14 +8,25 @@ import pytest
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
-from spinepipe.motion.head_and_arms import ARMS, T1, Arms, carried_parts, elbow_between, hung
-from spinepipe.motion.rigid import RigidPart, joined, seen_from
+from spinepipe.motion.body_segments import (
+    ARMS,
+    T1,
+    Arms,
+    RigidPart,
+    combine,
+    elbow_between,
+    head_and_arm_parts,
+    in_frame,
+    with_head_and_arms,
+)
 from spinepipe.motion.skeleton import Masses, Skeleton, body_poses, skeleton_of
 from spinepipe.muscles.subject import Subject
 
 MAN = Subject("male", 30.0, 1.741, 73.0)
 WOMAN = Subject("female", 30.0, 1.735, 61.9)
 """Persons of the height and mass of de Leva's means."""
+
+TALLER = replace(MAN, height_m=1.2 * MAN.height_m, mass_kg=1.5 * MAN.mass_kg)
 
 ANYWHERE = np.array([-0.05, 1.4, 0.0])
 
@@ -73,35 +84,17 @@ def test_t1_carries_the_sum_of_all_its_points(person: Subject, arms: str) -> Non
     turns, places = body_poses(skeleton, np.zeros((18, 6)))
     given = skeleton.masses
     own = RigidPart("T1", given.kg[T1], given.com[T1], given.about_com[T1])
-    own = seen_from(own, turns[T1].T, -turns[T1].T @ places[T1])
-    clouds = [cloud(part) for part in (own, *carried_parts(arms, person, places[T1]))]
+    own = in_frame(own, turns[T1].T, -turns[T1].T @ places[T1])
+    clouds = [cloud(part) for part in (own, *head_and_arm_parts(arms, person, places[T1]))]
     kg, centre, about = moments(*(np.concatenate(one) for one in zip(*clouds, strict=True)))
-    found = hung(skeleton, arms, person)
+    found = with_head_and_arms(skeleton, arms, person)
+    np.testing.assert_array_equal(found.kg[:T1], given.kg[:T1])
+    np.testing.assert_array_equal(found.com[:T1], given.com[:T1])
+    np.testing.assert_array_equal(found.about_com[:T1], given.about_com[:T1])
     assert found.kg[T1] == pytest.approx(kg, rel=1e-13)
     np.testing.assert_allclose(found.com[T1], turns[T1].T @ (centre - places[T1]), atol=1e-13)
     # some kg m2, summed from squares of distances of up to a metre
     np.testing.assert_allclose(found.about_com[T1], turns[T1].T @ about @ turns[T1], atol=1e-12)
-
-
-def test_other_bodies_carry_what_they_carried() -> None:
-    skeleton = made_up()
-    found = hung(skeleton, "hanging", MAN)
-    np.testing.assert_array_equal(found.kg[:T1], skeleton.masses.kg[:T1])
-    np.testing.assert_array_equal(found.com[:T1], skeleton.masses.com[:T1])
-    np.testing.assert_array_equal(found.about_com[:T1], skeleton.masses.about_com[:T1])
-
-
-def test_inertias_are_those_of_de_leva_s_lengths_and_radii() -> None:
-    parts = {part.name: part for part in carried_parts("hanging", MAN, ANYWHERE)}
-    head = 0.0694 * 73.0 * (0.2429 * np.array([0.303, 0.261, 0.315])) ** 2
-    np.testing.assert_allclose(parts["head"].about_com, np.diag(head), rtol=1e-14)
-    kg, across = 0.0271 * 73.0, (0.285**2 + 0.269**2) / 2
-    upper = kg * 0.2817**2 * np.array([across, 0.158**2, across])
-    np.testing.assert_allclose(parts["left_upper_arm"].about_com, np.diag(upper), rtol=1e-14)
-    woman = {part.name: part for part in carried_parts("hanging", WOMAN, ANYWHERE)}
-    kg, across = 0.0056 * 61.9, (0.244**2 + 0.208**2) / 2
-    hand = kg * 0.1701**2 * np.array([across, 0.154**2, across])
-    np.testing.assert_allclose(woman["right_hand"].about_com, np.diag(hand), rtol=1e-14)
 
 
 DE_LEVA = {
@@ -125,7 +118,7 @@ longitudinal)."""
 @pytest.mark.parametrize("person", [MAN, WOMAN], ids=lambda person: person.sex)
 def test_every_segment_has_the_moments_of_inertia_of_its_row(person: Subject) -> None:
     """Moments do not hang on axes: those of the head are its three, an arm's across are alike."""
-    for part in carried_parts("crossed", person, ANYWHERE):
+    for part in head_and_arm_parts("crossed", person, ANYWHERE):
         row = part.name.removeprefix("right_").removeprefix("left_")
         share, length, sagittal, transverse, along = DE_LEVA[person.sex][row]
         across = (sagittal**2 + transverse**2) / 2.0
@@ -136,13 +129,18 @@ def test_every_segment_has_the_moments_of_inertia_of_its_row(person: Subject) ->
         assert part.kg == pytest.approx(kg, rel=1e-14)
         found = eigh(part.about_com)[0]
         np.testing.assert_allclose(found, kg * length**2 * np.sort(squares), rtol=1e-12)
+        if row == "head":  # forwards, up, to the right
+            axes = kg * (length * np.array([sagittal, along, transverse])) ** 2
+            np.testing.assert_allclose(part.about_com, np.diag(axes), rtol=1e-14)
 
 
 def test_arms_reach_where_lengths_of_the_table_take_them() -> None:
     """Straight pieces from the shoulder: their centres are as far along as the table says."""
     for person, centres in ((MAN, (0.5772, 0.4574)), (WOMAN, (0.5754, 0.4559))):
         table = DE_LEVA[person.sex]
-        parts = {part.name: part.com for part in carried_parts("behind_head", person, ANYWHERE)}
+        parts = {
+            part.name: part.com for part in head_and_arm_parts("behind_head", person, ANYWHERE)
+        }
         tall = person.height_m / 1.730
         shoulder = ANYWHERE + tall * np.array([0.0325, -0.012, 0.17])
         np.testing.assert_allclose(
@@ -156,7 +154,7 @@ def test_arms_reach_where_lengths_of_the_table_take_them() -> None:
 
 
 def test_hanging_arms_hang() -> None:
-    parts = {part.name: part for part in carried_parts("hanging", MAN, ANYWHERE)}
+    parts = {part.name: part for part in head_and_arm_parts("hanging", MAN, ANYWHERE)}
     shoulder = ANYWHERE + 1.741 / 1.730 * np.array([0.0325, -0.012, 0.17])
     below = {
         "right_upper_arm": 0.5772 * 0.2817,
@@ -165,67 +163,52 @@ def test_hanging_arms_hang() -> None:
     }
     for name, depth in below.items():
         np.testing.assert_allclose(parts[name].com, shoulder - [0.0, depth, 0.0], atol=1e-14)
+    kg, across = 0.0271 * 73.0, (0.285**2 + 0.269**2) / 2
+    upper = kg * 0.2817**2 * np.array([across, 0.158**2, across])
+    np.testing.assert_allclose(parts["left_upper_arm"].about_com, np.diag(upper), rtol=1e-14)
 
 
 @pytest.mark.parametrize("arms", ARMS)
 def test_arms_are_mirrored(arms: str) -> None:
-    parts = {part.name: part for part in carried_parts(arms, WOMAN, ANYWHERE)}
+    parts = {part.name: part for part in head_and_arm_parts(arms, WOMAN, ANYWHERE)}
     flip = np.diag([1.0, 1.0, -1.0])
     for segment in ("upper_arm", "forearm", "hand"):
         right, left = parts[f"right_{segment}"], parts[f"left_{segment}"]
         np.testing.assert_allclose(left.com, flip @ right.com, atol=1e-14)
         np.testing.assert_allclose(left.about_com, flip @ right.about_com @ flip, atol=1e-15)
-    whole = joined("all", list(parts.values()))
+    whole = combine("all", list(parts.values()))
     assert whole.com[2] == pytest.approx(0.0, abs=1e-14)
 
 
-def test_hands_are_where_the_task_has_them() -> None:
-    where = {
-        arms: {part.name: part.com for part in carried_parts(arms, MAN, ANYWHERE)} for arms in ARMS
-    }
-    behind, crossed, hanging = (where[arms] for arms in ("behind_head", "crossed", "hanging"))
-    tall = 1.741 / 1.730
-    np.testing.assert_allclose(
-        behind["right_hand"], behind["head"] + tall * np.array([-0.1, 0.0, 0.03]), atol=1e-14
-    )
-    assert behind["right_upper_arm"][2] > hanging["right_upper_arm"][2]
-    assert behind["right_forearm"][1] > hanging["right_forearm"][1]
-    assert crossed["right_hand"][2] < 0.0 < crossed["right_upper_arm"][2]
-    assert crossed["right_hand"][0] > ANYWHERE[0]
-    assert crossed["right_upper_arm"][1] < ANYWHERE[1]
+@pytest.mark.parametrize(
+    ("arms", "towards"), [("behind_head", [0.3, 0.3, 1.0]), ("crossed", [0.3, -1.0, 0.3])]
+)
+def test_hands_and_elbows_are_where_the_task_has_them(arms: Arms, towards: list[float]) -> None:
+    """The hand behind the head, or ahead of the other shoulder, 60 mm, and 30 mm below it.
 
-
-def test_elbows_point_where_the_task_has_them() -> None:
-    """Outwards and a little ahead and up, or down and a little ahead and outwards.
-
-    The hand rests ahead of the other shoulder, 60 mm, and 30 mm below it.
+    The elbow outwards and a little ahead and up, or down and a little ahead and outwards.
     """
-    shoulder = ANYWHERE + 1.741 / 1.730 * np.array([0.0325, -0.012, 0.17])
-    points: dict[Arms, list[float]] = {"behind_head": [0.3, 0.3, 1.0], "crossed": [0.3, -1.0, 0.3]}
-    for arms, towards in points.items():
-        parts = {part.name: part.com for part in carried_parts(arms, MAN, ANYWHERE)}
-        elbow = shoulder + (parts["right_upper_arm"] - shoulder) / 0.5772
-        line = parts["right_hand"] - shoulder
-        across = np.cross(line, towards)
-        assert abs((elbow - shoulder) @ across) < 1e-14
-        off = (elbow - shoulder) - ((elbow - shoulder) @ line) / (line @ line) * line
-        assert off @ towards > 0.0
-    other = shoulder * [1.0, 1.0, -1.0]
-    np.testing.assert_allclose(
-        parts["right_hand"], other + 1.741 / 1.730 * np.array([0.06, -0.03, 0.0]), atol=1e-14
-    )
+    parts = {part.name: part.com for part in head_and_arm_parts(arms, MAN, ANYWHERE)}
+    tall = 1.741 / 1.730
+    shoulder = ANYWHERE + tall * np.array([0.0325, -0.012, 0.17])
+    expected = parts["head"] + tall * np.array([-0.1, 0.0, 0.03])
+    if arms == "crossed":
+        expected = shoulder * [1.0, 1.0, -1.0] + tall * np.array([0.06, -0.03, 0.0])
+    np.testing.assert_allclose(parts["right_hand"], expected, atol=1e-14)
+    elbow = shoulder + (parts["right_upper_arm"] - shoulder) / 0.5772
+    line = parts["right_hand"] - shoulder
+    assert abs((elbow - shoulder) @ np.cross(line, towards)) < 1e-14
+    off = (elbow - shoulder) - ((elbow - shoulder) @ line) / (line @ line) * line
+    assert off @ towards > 0.0
 
 
 @pytest.mark.parametrize("arms", ARMS)
 def test_size_scales_places_by_height_and_inertia_by_mass_and_its_square(arms: str) -> None:
-    small, large = (joined("all", carried_parts(arms, p, np.zeros(3))) for p in (MAN, TALLER))
+    small, large = (combine("all", head_and_arm_parts(arms, p, np.zeros(3))) for p in (MAN, TALLER))
     np.testing.assert_allclose(large.com, 1.2 * small.com, atol=1e-14)
     np.testing.assert_allclose(
         large.about_com, 1.5 * 1.44 * small.about_com, rtol=1e-12, atol=1e-14
     )
-
-
-TALLER = replace(MAN, height_m=1.2 * MAN.height_m, mass_kg=1.5 * MAN.mass_kg)
 
 
 def test_the_elbow_is_at_both_lengths_on_the_side_asked_for() -> None:
@@ -250,4 +233,4 @@ def test_an_arm_that_is_quite_stretched_or_folded_has_no_side_to_bend_to(apart: 
 
 def test_unknown_arms_are_refused() -> None:
     with pytest.raises(ValueError, match="behind_head"):
-        hung(made_up(), "waving", MAN)  # type: ignore[arg-type]
+        with_head_and_arms(made_up(), "waving", MAN)  # type: ignore[arg-type]

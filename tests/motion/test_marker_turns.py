@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from spinepipe.motion.marker_turns import angles, turns
+from spinepipe.motion.marker_groups import rigid_rotations
 
 RNG = np.random.default_rng(11)
 MIDDLE = np.array([3.0, 2.0, 1.0])
@@ -17,7 +17,7 @@ def test_turns_are_those_of_scipy_also_where_markers_are_lost() -> None:
     places = np.array([turn.apply(MODEL) for turn in true]) + RNG.normal(0.0, 0.1, (20, 5, 3))
     seen = np.ones((20, 5), dtype=bool)
     seen[::2, 1] = seen[::3, 4] = False
-    found, told = turns(MODEL, np.where(seen[..., None], places + MIDDLE, 0.0), seen)
+    found, told = rigid_rotations(MODEL, np.where(seen[..., None], places + MIDDLE, 0.0), seen)
     assert told.all()
     for frame in range(20):
         there = seen[frame]
@@ -31,7 +31,7 @@ def test_too_few_markers_and_markers_in_a_line_tell_no_turn() -> None:
     line = np.outer(np.arange(5.0), [1.0, 2.0, 3.0])
     whole, few = np.ones((1, 5), dtype=bool), np.array([[True, True, False, False, False]])
     for model, seen in ((line, whole), (MODEL, few), (MODEL, ~whole)):
-        found, told = turns(model, model[None], seen)
+        found, told = rigid_rotations(model, model[None], seen)
         assert not told.any()
         np.testing.assert_array_equal(found, np.eye(3)[None])
 
@@ -44,24 +44,20 @@ def test_a_group_tells_its_turn_by_its_shape_whatever_its_size(size_m: float) ->
     for square, tells in ((1.1e-6, True), (0.9e-6, False)):
         wide = np.sqrt(square)
         group = size_m * np.array([[1, wide, 0], [1, -wide, 0], [-1, wide, 0], [-1, -wide, 0]])
-        found, told = turns(group, turn.apply(group)[None], seen)
+        found, told = rigid_rotations(group, turn.apply(group)[None], seen)
         assert told[0] == tells
         wanted = turn.as_matrix() if tells else np.eye(3)
         np.testing.assert_allclose(found[0], wanted, atol=1e-6)
 
 
 def test_markers_all_at_one_place_tell_no_turn() -> None:
-    found, told = turns(np.zeros((3, 3)), np.zeros((1, 3, 3)), np.ones((1, 3), dtype=bool))
+    found, told = rigid_rotations(
+        np.zeros((3, 3)), np.zeros((1, 3, 3)), np.ones((1, 3), dtype=bool)
+    )
     assert not told.any()
     np.testing.assert_array_equal(found[0], np.eye(3))
 
 
 def test_a_mirrored_group_is_met_by_a_rotation() -> None:
-    found, _ = turns(MODEL, MODEL[None] * [1.0, 1.0, -1.0], np.ones((1, 5), dtype=bool))
+    found, _ = rigid_rotations(MODEL, MODEL[None] * [1.0, 1.0, -1.0], np.ones((1, 5), dtype=bool))
     assert np.isclose(np.linalg.det(found[0]), 1.0)
-
-
-def test_angles_are_those_of_turns_about_z_then_x_then_y() -> None:
-    wanted = RNG.uniform(-1.4, 1.4, (10, 3))
-    found = angles(Rotation.from_euler("ZXY", wanted).as_matrix())
-    np.testing.assert_allclose(found, wanted, atol=1e-12)

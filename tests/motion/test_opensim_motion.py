@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from moving_spine import everywhere, markers, postures, spine
+from moving_spine import everywhere, markers, postures, spine, trial_at
 
 from spinepipe.model import RefusedModel
 from spinepipe.motion.export import COLUMNS, mot, osim
-from spinepipe.motion.objective import SHAPE, Ask, watched
+from spinepipe.motion.objective import SHAPE, MotionObjective, sample_trial
 from spinepipe.motion.points import COUNT, marker_places
 from spinepipe.motion.posture import postures as fitted
-from spinepipe.motion.rigid_body import bodies_of
-from spinepipe.motion.skeleton import BODIES, MarkerSet, MarkerTrial
+from spinepipe.motion.residual_terms import bodies_of
+from spinepipe.motion.skeleton import BODIES, MarkerSet
 from tests.reference.peers import opensim_motion as peer
 
 REPLAYED_M = 1e-9
@@ -115,9 +115,8 @@ def test_inverse_kinematics_are_opensims(folder: Path) -> None:
     ).reshape(frames, *SHAPE)
     free = np.ones(SHAPE, dtype=bool)
     free[1:, :3] = False
-    everything = np.ones(places.shape[:2], dtype=bool)
-    trial = MarkerTrial("made", "flexion_extension", times, places, everything, "hanging")
-    found = fitted(Ask(free=free, loads=False), watched(spine(), seen, trial, frames - 1))
+    known = sample_trial(spine(), seen, trial_at(places), frames - 1)
+    found = fitted(MotionObjective(free=free, loads=False), known)
     assert found.settled.all()
     assert np.abs(expected[:, 1:, :3]).max() == 0.0
     np.testing.assert_allclose(

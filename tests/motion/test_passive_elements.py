@@ -1,11 +1,13 @@
 """Passive laws: the table again from its sources, what the laws say, a cohort's own rows."""
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from spinepipe.motion.joint_tables import packaged_rows
-from spinepipe.motion.passive_elements import (
+from spinepipe.motion.passive import (
     FILE,
     NUMBERS,
     passive_elements,
@@ -71,11 +73,10 @@ def at_moment(joint: int, coordinate: str, side: int) -> tuple[float, float, flo
     return float(np.log(1.0 + MOMENT_NM / a) / b), float(b * (MOMENT_NM + a)), float(a * b)
 
 
-@pytest.mark.parametrize("coordinate", ROTATIONS)
 @pytest.mark.parametrize("joint", JOINTS)
-def test_rotations_are_what_their_sources_say(joint: str, coordinate: str) -> None:
+def test_rotations_are_what_their_sources_say(joint: str) -> None:
     thoracic = upper_thoracic(joint)
-    for side in (0, 1):
+    for coordinate, side in product(ROTATIONS, (0, 1)):
         angle, there, rest = at_moment(JOINTS.index(joint), coordinate, side)
         if thoracic is None:
             assert rest == pytest.approx(DISC_NM_PER_DEG[coordinate], rel=SIX_DIGITS)
@@ -128,8 +129,9 @@ def test_every_law_is_there_once_and_begins_alike_on_both_sides() -> None:
     slopes = LAWS.a * LAWS.b
     assert np.isfinite(slopes).all()
     np.testing.assert_allclose(slopes[..., 0], slopes[..., 1], rtol=SIX_DIGITS)
-    assert set(LAWS.status.ravel()) == {"derived"}
-    assert all(LAWS.sources)
+    rows = packaged_rows(FILE, NUMBERS)
+    assert set(rows["status"]) == {"derived"}
+    assert rows["source"].all()
 
 
 def rows(**changed: object) -> pd.DataFrame:
@@ -151,8 +153,6 @@ def test_a_cohort_s_own_rows_take_the_place_of_those_that_come_along() -> None:
     np.testing.assert_array_equal(found.a[at], [2.0, 3.0])
     np.testing.assert_allclose(found.b[at], [0.3 * DEG_PER_RAD, 0.2 * DEG_PER_RAD], rtol=1e-15)
     np.testing.assert_array_equal(found.lower[at], 0.5)
-    assert found.source[(*at, 0)] == "own tests"
-    assert found.status[(*at, 0)] == "given"
     others = np.ones(found.a.shape, dtype=bool)
     others[at] = False
     np.testing.assert_array_equal(found.a[others], LAWS.a[others])
@@ -164,22 +164,6 @@ def test_translations_of_a_cohort_are_read_in_mm() -> None:
     own.loc[3, ["coordinate", "a", "b"]] = ["superior", 2.0, 0.05]
     found = passive_elements(own)
     assert found.b[JOINTS.index("L4L5"), COORDINATES.index("superior"), 0] == pytest.approx(50.0)
-
-
-@pytest.mark.parametrize(
-    ("changed", "line", "column", "told"),
-    [
-        ({"a": 0.035, "b": 17.2}, 2, "b", "per degree"),
-        ({"a": 2.5}, 2, "a", "same stiffness at rest"),
-    ],
-)
-def test_faults_of_a_cohort_s_rows_are_told(
-    changed: dict[str, object], line: int, column: str, told: str
-) -> None:
-    with pytest.raises(InputError, match=told) as caught:
-        passive_elements(rows(**changed), "own.csv")
-    first = caught.value.problems[0]
-    assert (first.file, first.row, first.column) == ("own.csv", line, column)
 
 
 @pytest.mark.parametrize(
@@ -201,21 +185,23 @@ def test_rows_at_the_ends_of_what_may_be_are_taken(changed: dict[str, object]) -
 
 
 @pytest.mark.parametrize(
-    ("changed", "found"),
+    ("changed", "column", "found", "told"),
     [
-        ({"b": 2.001}, "2.001"),
-        ({"a": 2.03}, "a b is 0.609 on the positive and 0.6 on the negative side"),
+        ({"b": 2.001}, "b", "2.001", "per degree"),
+        (
+            *({"a": 2.03}, "a", "a b is 0.609 on the positive and 0.6 on the negative side"),
+            "same stiffness at rest",
+        ),
     ],
 )
-def test_rows_beyond_the_ends_are_not(changed: dict[str, object], found: str) -> None:
-    with pytest.raises(InputError) as caught:
+def test_rows_beyond_the_ends_are_told_with_their_place(
+    changed: dict[str, object], column: str, found: str, told: str
+) -> None:
+    with pytest.raises(InputError, match=told) as caught:
         passive_elements(rows(**changed), "own.csv")
     first = caught.value.problems[0]
-    assert (first.row, first.found) == (2, found)
-
-
-def test_what_comes_along_cannot_be_written_over() -> None:
-    assert not any(getattr(LAWS, name).flags.writeable for name in (*NUMBERS, "source", "status"))
+    place = (first.file, first.row, first.column, first.found)
+    assert place == ("own.csv", 2, column, found)
 
 
 def test_one_side_alone_must_fit_the_other_that_comes_along() -> None:

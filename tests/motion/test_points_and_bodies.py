@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from moving_spine import law, markers, postures, spine
+from moving_spine import markers, postures, spine
 
 from spinepipe.frames import rotation_zxy
 from spinepipe.motion.points import COUNT, marker_places, with_slopes
-from spinepipe.motion.rigid_body import bodies_of
+from spinepipe.motion.residual_terms import bodies_of
 from spinepipe.motion.skeleton import BODIES, body_poses
 from spinepipe.units import STANDARD_GRAVITY
 
@@ -29,11 +29,6 @@ def test_bodies_are_where_their_joints_put_them() -> None:
         turn = turn @ step.rotation @ rotation_zxy(*q[body, 3:])
         np.testing.assert_allclose(places[body], place, atol=1e-12)
         np.testing.assert_allclose(turns[body], turn, atol=1e-12)
-
-
-def test_what_bodies_weigh_cannot_be_written_over() -> None:
-    masses = spine().masses
-    assert not any(one.flags.writeable for one in (masses.kg, masses.com, masses.about_com))
 
 
 def test_slopes_of_markers_are_differences() -> None:
@@ -91,38 +86,3 @@ def test_a_body_that_falls_needs_no_load() -> None:
         q, np.zeros((1, COUNT)), np.zeros((1, COUNT))
     )
     np.testing.assert_allclose(weightless, 0.0, atol=1e-12)
-
-
-def test_passive_elements_resist_with_one_slope_at_zero() -> None:
-    """Both sides, and where the exponent has grown to the straight part."""
-    elements = law()
-    q = np.linspace(-0.3, 0.3, 13)[:, None, None] * np.ones((13, 17, 6))
-    force, slope, _ = elements.with_slopes(q)
-    up, down = elements.forces(q + SMALL), elements.forces(q - SMALL)
-    np.testing.assert_allclose(slope, (up - down) / (2.0 * SMALL), rtol=2e-3)
-    assert (force * q >= 0.0).all()
-    at_zero = elements.with_slopes(np.zeros((1, 17, 6)))[1][0]
-    np.testing.assert_allclose(at_zero, elements.a[..., 0] * elements.b[..., 0], rtol=1e-12)
-
-
-def test_slopes_by_size_and_shape_are_differences() -> None:
-    elements, one = law(), np.ones((17, 6))
-    q = postures(8, 4)[:, 1:]
-    force, _, by_shape = elements.with_slopes(q)
-    for size, shape, expected in ((SMALL, 0.0, force), (0.0, SMALL, by_shape)):
-        up = elements.scaled(one * np.exp(size), one * np.exp(shape)).forces(q)
-        down = elements.scaled(one * np.exp(-size), one * np.exp(-shape)).forces(q)
-        np.testing.assert_allclose(expected, (up - down) / (2.0 * SMALL), rtol=1e-5, atol=1e-6)
-
-
-def test_stiffness_at_a_load_is_wangs() -> None:
-    """k = B (F + A), at the force that the law itself makes."""
-    elements = law()
-    q = np.full((1, 17, 6), 0.03)
-    force, slope, _ = elements.with_slopes(q)
-    rotations = slice(3, None)
-    np.testing.assert_allclose(
-        elements.stiffness_at(force[0][..., None])[:, rotations, 0],
-        slope[0][:, rotations],
-        rtol=1e-9,
-    )

@@ -4,13 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_spine import law, markers, postures, spine
+from moving_spine import law, markers, postures, sampled, spine, trial_at
 
-from spinepipe.motion.objective import SHAPE, Ask, ResidualScales, Watched, watched
+from spinepipe.motion.objective import (
+    SHAPE,
+    MotionObjective,
+    ResidualScales,
+    SampledTrial,
+    sample_trial,
+)
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.posture import postures as fitted
-from spinepipe.motion.residual_terms import Markers, MuscleDemand, beyond
-from spinepipe.motion.skeleton import JOINTS, MarkerTrial
+from spinepipe.motion.residual_terms import Markers, MuscleDemand, range_excess
+from spinepipe.motion.skeleton import JOINTS
 
 FRAMES = 6
 SKIN_M = 1e-3
@@ -27,13 +33,12 @@ def test_frames_of_a_trial_are_as_alone() -> None:
     places += np.random.default_rng(22).normal(0.0, SKIN_M, places.shape)
     free = np.ones(SHAPE, dtype=bool)
     free[1:, :3] = False
-    ask = Ask(free=free, loads=False)
+    ask = MotionObjective(free=free, loads=False)
 
     def found(frames: list[int]):
-        seen = np.ones((len(frames), len(markers())), dtype=bool)
-        times = 0.1 * np.arange(len(frames))
-        trial = MarkerTrial("made", "stance", times, places[frames], seen, "hanging")
-        return fitted(ask, watched(spine(), markers(), trial, len(frames) - 1))
+        return fitted(
+            ask, sample_trial(spine(), markers(), trial_at(places[frames]), len(frames) - 1)
+        )
 
     together = found(list(range(FRAMES)))
     assert together.settled.all()
@@ -43,10 +48,10 @@ def test_frames_of_a_trial_are_as_alone() -> None:
         np.testing.assert_allclose(together.q[frame], alone.q[0], rtol=0.0, atol=SAME_RAD)
 
 
-def cost(ask: Ask, seen: Watched, q: np.ndarray) -> np.ndarray:
+def cost(ask: MotionObjective, seen: SampledTrial, q: np.ndarray) -> np.ndarray:
     """(F,) of postures at rest, added up from what each kind of error costs."""
     found = np.sum(Markers(seen, ask).residuals(q) ** 2, axis=1)
-    found += np.sum(beyond(ask, q)[0] ** 2, axis=(1, 2))
+    found += np.sum(range_excess(ask, q)[0] ** 2, axis=(1, 2))
     still = np.zeros_like(q)
     if ask.loads:
         return found + np.sum(
@@ -58,7 +63,7 @@ def cost(ask: Ask, seen: Watched, q: np.ndarray) -> np.ndarray:
     return found
 
 
-def narrow(ask: Ask) -> Ask:
+def narrow(ask: MotionObjective) -> MotionObjective:
     """Ranges that the markers ask to leave: half a degree about another posture."""
     high = np.full(SHAPE, np.inf)
     high[1:, 3:] = 0.01
@@ -69,9 +74,9 @@ ROTATIONS = np.broadcast_to(np.arange(6) > 2, SHAPE).copy()
 ROTATIONS[0] = True
 
 ASKS = {
-    "markers alone, within ranges": narrow(Ask(free=ROTATIONS, loads=False)),
-    "springs": Ask(passive=law(), loads=False),
-    "loads from joint to joint": Ask(passive=law(), force_cost="level_difference"),
+    "markers alone, within ranges": narrow(MotionObjective(free=ROTATIONS, loads=False)),
+    "springs": MotionObjective(passive=law(), loads=False),
+    "loads from joint to joint": MotionObjective(passive=law(), force_cost="level_difference"),
 }
 
 
@@ -80,10 +85,7 @@ def test_a_posture_has_the_least_cost(name: str) -> None:
     """No way that is free leads down: the cost has no slope there, beside that of a step away."""
     ask = ASKS[name]
     q = postures(31, 1, 0.02) * ask.free
-    places = marker_places(spine(), markers(), q)
-    whole = np.ones(places.shape[:2], bool)
-    trial = MarkerTrial("made", "stance", np.zeros(1), places, whole, "hanging")
-    seen = watched(spine(), markers(), trial, 0)
+    seen = sampled(q)
     found = fitted(ask, seen)
     assert found.settled.all()
     assert not found.q[:, ~ask.free].any()
@@ -105,12 +107,8 @@ def test_steps_of_an_articulated_body_are_those_of_the_normal_equations(name: st
     weak markers, one out of sight, far from where they belong, so that no step is short."""
     ask = ASKS[name]
     q = postures(33, 3, 0.1)
-    places = marker_places(spine(), markers(), q)
-    seen = np.ones(places.shape[:2], bool)
-    seen[1, 4] = False
-    heavier = replace(markers(), weight=np.linspace(0.2, 2.0, len(markers())))
-    trial = MarkerTrial("made", "stance", 0.1 * np.arange(3), places, seen, "hanging")
-    known = watched(spine(), heavier, trial, 2)
+    known = sampled(q, replace(markers(), weight=np.linspace(0.2, 2.0, len(markers()))))
+    known.weight[1, 4] = 0.0
     each = np.eye(np.prod(SHAPE))[:, ask.free.ravel()]
     for rounds in (1, 4):
         found, expected = (fitted(ask, known, ratios, most_steps=rounds) for ratios in (None, each))
@@ -128,30 +126,23 @@ def test_ratios_move_all_joints_as_fewer_numbers_say() -> None:
     q = np.zeros((2, *SHAPE))
     q[:, 0] = [[0.1, 0.2, -0.1, 0.2, -0.1, 0.3], [0.0, 0.1, 0.0, -0.2, 0.05, 0.0]]
     q[:, 1:, 3] = [[-0.03], [0.02]]
-    places = marker_places(spine(), markers(), q)
-    seen = np.ones(places.shape[:2], bool)
-    trial = MarkerTrial("made", "stance", np.array([0.0, 0.1]), places, seen, "hanging")
-    found = fitted(Ask(loads=False), watched(spine(), markers(), trial, 1), shares)
+    found = fitted(MotionObjective(loads=False), sampled(q), shares)
     np.testing.assert_allclose(found.q, q, atol=1e-7)
 
 
 def test_what_counts_as_one() -> None:
     """5 mm of a marker; 200 N and 10 N m of muscles; 0.02 rad and 1 mm beyond a range."""
     q = np.zeros((1, *SHAPE))
-    places = marker_places(spine(), markers(), q) + np.array([0.0, 5e-3, 0.0])
-    seen = np.ones(places.shape[:2], bool)
-    one = watched(
-        spine(), markers(), MarkerTrial("made", "stance", np.zeros(1), places, seen, "hanging"), 0
-    )
-    off = Markers(one, Ask()).residuals(q).reshape(-1, 3)
+    one = sampled(q, off=np.array([0.0, 5e-3, 0.0]))
+    off = Markers(one, MotionObjective()).residuals(q).reshape(-1, 3)
     np.testing.assert_allclose(np.abs(off), np.tile([0.0, 1.0, 0.0], (len(off), 1)), atol=1e-12)
-    held = Ask(low=np.zeros(SHAPE), high=np.zeros(SHAPE))
+    held = MotionObjective(low=np.zeros(SHAPE), high=np.zeros(SHAPE))
     bent = np.tile([1e-3, -1e-3, 1e-3, -0.02, 0.02, 0.02], (1, SHAPE[0], 1))
-    np.testing.assert_allclose(np.abs(beyond(held, bent)[0]), 1.0, rtol=1e-14)
-    np.testing.assert_allclose(beyond(held, bent)[0], np.sign(bent), rtol=1e-14)
+    np.testing.assert_allclose(np.abs(range_excess(held, bent)[0]), 1.0, rtol=1e-14)
+    np.testing.assert_allclose(range_excess(held, bent)[0], np.sign(bent), rtol=1e-14)
     still = np.zeros_like(q)
     for loads in (1.0, 4.0, 0.0):
-        ask = Ask(sizes=ResidualScales(loads=loads))
+        ask = MotionObjective(sizes=ResidualScales(loads=loads))
         muscles = MuscleDemand.of(one, ask)
         active = muscles.active(None, (q, still, still))
         rows = muscles.residuals(None, (q, still, still)).reshape(len(JOINTS), 6)

@@ -8,8 +8,8 @@ import pytest
 from c3d_of_ezc3d import RATE, write_c3d
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.reading import axes_of, read_motion
-from spinepipe.motion.recorded import Recorded
+from spinepipe.motion.reading import read_motion
+from spinepipe.motion.recording import MarkerRecording
 from spinepipe.problems import InputError, InputProblem
 
 NAMES = ("LPSI", "RPSI", "T1")
@@ -53,7 +53,7 @@ def problem_of(path: Path, axes: str = "x y z", start_s: float | None = None) ->
     return problem
 
 
-def assert_same(found: Recorded, wanted_mm: Array, within_mm: float = HELD_MM) -> None:
+def assert_same(found: MarkerRecording, wanted_mm: Array, within_mm: float = HELD_MM) -> None:
     assert found.names == NAMES
     assert found.seen.all()
     np.testing.assert_allclose(1e3 * found.places, wanted_mm, rtol=0.0, atol=within_mm)
@@ -123,11 +123,6 @@ def test_units_of_the_file_count(tmp_path: Path, units: str, per_mm: float) -> N
     assert_same(read_motion(write(tmp_path / "m.csv", [header, *rows])), places_mm(), 1e-9)
 
 
-def test_an_unknown_unit_is_named(tmp_path: Path) -> None:
-    problem = problem_of(write(tmp_path / "m.trc", trc(places_mm(), units="inch")))
-    assert (problem.row, problem.column, problem.found) == (3, "Units", "'inch'")
-
-
 @pytest.mark.parametrize("blank", ["\t", "  ", " \t ", "\t\u00a0"])
 def test_tabs_and_spaces_part_cells(tmp_path: Path, blank: str) -> None:
     assert_same(read_motion(write(tmp_path / "m.trc", trc(places_mm(), blank=blank))), places_mm())
@@ -154,16 +149,6 @@ def test_a_cell_that_is_no_number_is_named_with_frame_and_marker(tmp_path: Path)
     lines[8] = "\t".join(cells)
     problem = problem_of(write(tmp_path / "m.trc", lines))
     assert (problem.row, problem.column, problem.found) == (9, "RPSI", "'1,5'")
-
-
-def test_a_rate_that_contradicts_the_times_is_refused(tmp_path: Path) -> None:
-    problem = problem_of(write(tmp_path / "m.trc", trc(places_mm(), rate=100.0)))
-    assert problem.column == "DataRate"
-
-
-def test_a_file_cut_short_is_refused(tmp_path: Path) -> None:
-    problem = problem_of(write(tmp_path / "m.trc", trc(places_mm())[:-1]))
-    assert (problem.column, problem.found) == ("NumFrames", "4 frames")
 
 
 def test_times_come_from_the_rate_where_the_column_is_empty(tmp_path: Path) -> None:
@@ -241,21 +226,6 @@ def test_a_laboratory_with_z_up_is_turned(tmp_path: Path) -> None:
     places = np.tile([1.0, 2.0, 3.0], (2, 1, 1))
     found = read_motion(write(tmp_path / "m.trc", trc(places)), "x z -y")
     np.testing.assert_allclose(1e3 * found.places[0, 0], [1.0, 3.0, -2.0])
-
-
-@pytest.mark.parametrize("text", ["x z", "x x y", "x y -z", "a b c", ""])
-def test_axes_that_are_none_are_refused(text: str) -> None:
-    with pytest.raises(ValueError, match=r"once|left"):
-        axes_of(text)
-
-
-def test_frames_outside_the_crop_are_left_out(tmp_path: Path) -> None:
-    path = write(tmp_path / "m.trc", trc(places_mm()))
-    found = read_motion(path, start_s=0.02, end_s=0.06)
-    np.testing.assert_allclose(found.time_s, [0.02, 0.04, 0.06])
-    np.testing.assert_allclose(1e3 * found.places, places_mm()[1:4], atol=HELD_MM)
-    assert found.first == 2
-    assert problem_of(path, start_s=9.0).found == "no frame from 9 s to an end"
 
 
 def test_subjects_are_cut_off_names_where_each_stays_one(tmp_path: Path) -> None:

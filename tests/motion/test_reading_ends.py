@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from c3d_of_ezc3d import write_c3d
 
-from spinepipe.motion import reading
-from spinepipe.motion import recorded as recordings
+from spinepipe.motion import reading, reading_text
 from spinepipe.motion.reading import axes_of, read_motion
-from spinepipe.motion.recorded import Recorded, quickly, recorded
+from spinepipe.motion.reading_text import parse_floats
+from spinepipe.motion.recording import recording_from
 from spinepipe.problems import InputError, InputProblem
 
 HEADER = "time_s,T1_x_mm,T1_y_mm,T1_z_mm"
@@ -54,11 +54,11 @@ def test_a_hundred_megabytes_are_the_most(tmp_path: Path) -> None:
 
 def test_a_file_is_read_up_to_its_most_cells(tmp_path: Path, monkeypatch) -> None:
     """Eighteen commas, three a line, count as cells; six minutes of 80 markers are fewer."""
-    assert recordings.MOST_CELLS > 6 * 60 * 100 * (2 + 80 * 3)
+    assert reading_text.MOST_CELLS > 6 * 60 * 100 * (2 + 80 * 3)
     path = frames(tmp_path)
-    monkeypatch.setattr(recordings, "MOST_CELLS", 18)
+    monkeypatch.setattr(reading_text, "MOST_CELLS", 18)
     assert len(read_motion(path).time_s) == 5
-    monkeypatch.setattr(recordings, "MOST_CELLS", 17)
+    monkeypatch.setattr(reading_text, "MOST_CELLS", 17)
     problem = problem_of(path)
     assert (problem.found, problem.allowed) == ("18 cells", "at most 17 cells")
 
@@ -101,9 +101,11 @@ def test_a_crop_with_nothing_in_it_tells_what_there_is(tmp_path: Path) -> None:
 def test_signs_of_axes_may_be_written_both_ways() -> None:
     np.testing.assert_array_equal(axes_of("+x +y z"), np.eye(3))
     np.testing.assert_array_equal(axes_of("-y z -x"), [[0, -1, 0], [0, 0, 1], [-1, 0, 0]])
-    for text in ("--x y z", "x y z z", "xx y z"):
+    for text in ("--x y z", "x y z z", "xx y z", "x z", "x x y", "a b c", ""):
         with pytest.raises(ValueError, match="once each"):
             axes_of(text)
+    with pytest.raises(ValueError, match="left of right"):
+        axes_of("x y -z")
 
 
 def test_only_the_last_part_of_a_name_is_the_marker_s(tmp_path: Path) -> None:
@@ -124,13 +126,10 @@ def test_suffixes_may_be_written_large(tmp_path: Path) -> None:
 def test_a_marker_with_one_number_lost_is_not_seen() -> None:
     """Nor one at nought altogether; one nought is a place."""
     raw = np.array([[[1.0, np.nan, 2.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1e-9], [1.0, 2.0, 3.0]]])
-    found = recorded(("a", "b", "c", "d"), np.zeros(1), raw)
+    found = recording_from(("a", "b", "c", "d"), np.zeros(1), raw)
     np.testing.assert_array_equal(found.seen, [[False, False, True, True]])
     assert not found.places[0, :2].any()
     np.testing.assert_array_equal(found.places[0, 2:], raw[0, 2:])
-    assert isinstance(found, Recorded)
-    assert not any(one.flags.writeable for one in (found.places, found.seen, found.time_s))
-    assert found.first == 1
 
 
 @pytest.mark.parametrize(
@@ -147,7 +146,7 @@ def test_a_marker_with_one_number_lost_is_not_seen() -> None:
 def test_cells_are_taken_quickly_where_all_are_plain_numbers(
     cells: list[str], numbers: list[float] | None
 ) -> None:
-    assert quickly(cells) == numbers
+    assert parse_floats(cells) == numbers
 
 
 def counted_c3d(path: Path, count: int) -> Path:

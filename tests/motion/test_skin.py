@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_spine import law, markers, spine
+from moving_spine import law, markers, spine, trial_at
 from scipy.spatial.transform import Rotation
 
-from spinepipe.motion.objective import Ask, ResidualScales, Watched, watched
+from spinepipe.motion.objective import MotionObjective, ResidualScales, SampledTrial, sample_trial
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.residual_terms import Markers, MuscleDemand
-from spinepipe.motion.skeleton import PELVIS, MarkerTrial, body_poses
-from spinepipe.motion.skin import bends, with_sliding_skin
+from spinepipe.motion.skeleton import PELVIS, body_poses
+from spinepipe.motion.skin import trunk_bend, with_sliding_skin
 from spinepipe.motion.spline import KnotGrid
 from spinepipe.motion.trajectory import solve
 
@@ -25,10 +25,8 @@ def bent(largest: float = -0.6) -> np.ndarray:
     return q
 
 
-def seen(places: np.ndarray) -> Watched:
-    times, whole = 0.1 * np.arange(len(places)), np.ones(places.shape[:2], dtype=bool)
-    trial = MarkerTrial("made", "flexion_extension", times, places, whole, "hanging")
-    return watched(spine(), markers(), trial, len(places) - 1)
+def seen(places: np.ndarray) -> SampledTrial:
+    return sample_trial(spine(), markers(), trial_at(places), len(places) - 1)
 
 
 def at(q: np.ndarray) -> np.ndarray:
@@ -40,7 +38,7 @@ def test_a_bend_is_the_turn_of_the_uppermost_body_against_the_pelvis() -> None:
     q[:, 0, 3:] = [0.4, 0.2, -0.3]  # the pelvis tips along, which bends nothing
     turns, _ = body_poses(spine(), q)
     rest, _ = body_poses(spine(), np.zeros((1, 18, 6)))
-    for frame, found in enumerate(bends(seen(at(q)), turns)):
+    for frame, found in enumerate(trunk_bend(seen(at(q)), turns)):
         now = Rotation.from_matrix(turns[frame, PELVIS].T @ turns[frame, -1])
         before = Rotation.from_matrix(rest[0, PELVIS].T @ rest[0, -1])
         assert found == pytest.approx((now * before.inv()).magnitude(), abs=1e-7)
@@ -57,9 +55,9 @@ def test_errors_that_hang_together_are_made_independent() -> None:
     slid = with_sliding_skin(trial, q, sizes)
     off = np.random.default_rng(3).normal(0.0, 5e-3, (1, len(body), 3))
     told = replace(slid.at(np.array([frame])), places=at(q)[[frame]] - off)
-    found = np.sum(Markers(told, Ask(sizes=sizes)).residuals(q[[frame]]) ** 2)
+    found = np.sum(Markers(told, MotionObjective(sizes=sizes)).residuals(q[[frame]]) ** 2)
     turns, _ = body_poses(spine(), q)
-    bend = bends(trial, turns)[frame] / np.deg2rad(60.0)
+    bend = trunk_bend(trial, turns)[frame] / np.deg2rad(60.0)
     up = bend * turns[frame, body][:, :, 1] * np.where(body == PELVIS, 0.3, 1.0)[:, None]
     kept = weight[frame] > 0.0
     covariance = np.zeros((3 * kept.sum(),) * 2)
@@ -75,7 +73,7 @@ def test_errors_that_hang_together_are_made_independent() -> None:
 
 def test_without_a_bend_or_without_sliding_markers_are_weighed_alike() -> None:
     q = np.zeros((FRAMES, 18, 6))
-    trial, off = seen(at(q) + 1e-3), Ask()
+    trial, off = seen(at(q) + 1e-3), MotionObjective()
     plain = Markers(trial, off).residuals(q)
     np.testing.assert_allclose(
         Markers(with_sliding_skin(trial, q, ResidualScales()), off).residuals(q), plain, atol=1e-12
@@ -97,12 +95,12 @@ def test_vertebrae_are_not_dragged_down_with_their_markers() -> None:
     """Skin slides 15 mm down all vertebrae; half of what it drags them is left at most."""
     q = bent()
     turns, _ = body_poses(spine(), q)
-    share = bends(seen(at(q)), turns)[:, None] / np.deg2rad(60.0)
+    share = trunk_bend(seen(at(q)), turns)[:, None] / np.deg2rad(60.0)
     on = np.where(markers().body == PELVIS, 0.0, 0.015)
     places = at(q) - (share * on)[..., None] * turns[:, markers().body][..., 1]
     top = []
     for sizes in (ResidualScales(own_skin_m=0.0, shared_skin_m=0.0), ResidualScales()):
-        ask = Ask(passive=law(), force_cost="level_difference", sizes=sizes)
+        ask = MotionObjective(passive=law(), force_cost="level_difference", sizes=sizes)
         known = with_sliding_skin(seen(places), q, sizes)
         found = solve(ask, [known], [KnotGrid(0.0, 0.1, FRAMES - 1).through(q)])
         now = known.grid.at_nodes(found.coefficients[0])[0]
@@ -116,7 +114,7 @@ def test_a_spine_that_is_pressed_together_as_a_whole_costs_its_mean_force() -> N
     """All joints pressed alike: differences cost nothing, the mean over its size does."""
     q = np.zeros((1, 18, 6))
     q[:, 1:, 1] = -1e-3
-    soft = replace(Ask(passive=law()), force_cost="level_difference")
+    soft = replace(MotionObjective(passive=law()), force_cost="level_difference")
     rest = np.zeros_like(q)
     loads = MuscleDemand.of(seen(at(np.repeat(q, 2, axis=0))), soft)
     active = loads.active(soft.passive, (q, rest, rest))

@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from moving_spine import law, markers, spine
+from moving_spine import law, markers, spine, trial_at
 from scipy.spatial.transform import Rotation
 
-from spinepipe.motion.objective import Ask, ForceCost, Watched, watched
+from spinepipe.motion.objective import ForceCost, MotionObjective, SampledTrial, sample_trial
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.skeleton import MarkerSet, MarkerTrial
+from spinepipe.motion.skeleton import MarkerSet
 from spinepipe.motion.trajectory import solve
 
 FRAMES, STEP_S = 101, 0.04
@@ -39,19 +39,18 @@ def seen() -> np.ndarray:
     return marker_places(spine(), markers(), moved()) + off
 
 
-def at_nodes(places: np.ndarray, on: MarkerSet, intervals: int) -> Watched:
-    times = STEP_S * np.arange(FRAMES)
-    whole = np.ones(places.shape[:2], dtype=bool)
-    trial = MarkerTrial("made", "flexion_extension", times, places, whole, "hanging")
-    return watched(spine(), on, trial, intervals)
+def at_nodes(places: np.ndarray, on: MarkerSet, intervals: int) -> SampledTrial:
+    return sample_trial(spine(), on, trial_at(places, STEP_S), intervals)
 
 
-def joints(cost: ForceCost, trial: Watched, pelvis: np.ndarray, begin: float = 0.0) -> np.ndarray:
+def joints(
+    cost: ForceCost, trial: SampledTrial, pelvis: np.ndarray, begin: float = 0.0
+) -> np.ndarray:
     """(N + 1, 17, 6) from joints that are all at an angle, the pelvis where it is said to be."""
     q = np.zeros((trial.grid.intervals + 1, 18, 6))
     q[:, 0] = pelvis
     q[:, 1:, 3:] = begin
-    found = solve(Ask(passive=law(), force_cost=cost), [trial], [trial.grid.through(q)])
+    found = solve(MotionObjective(passive=law(), force_cost=cost), [trial], [trial.grid.through(q)])
     return trial.grid.at_nodes(found.coefficients[0])[0][:, 1:]
 
 

@@ -13,13 +13,13 @@ from spinepipe.cohort.columns import TABLES
 from spinepipe.cohort.supports import FREE, HELD, MEASURED, PRESCRIBED
 from spinepipe.documents.form import InputColumn, Rule, TableForm, read_forms
 from spinepipe.documents.rules import Listed, TableCheck
-from spinepipe.motion.head_and_arms import ARMS
+from spinepipe.motion.body_segments import ARMS
 from spinepipe.motion.joint_tables import SIDES
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.muscles import regressions
 from spinepipe.problems import InputProblem
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, FILMS, NEEDED
-from spinepipe.studies.tracking.forms import FORMS, MOVING, STANCE, TRIALS
+from spinepipe.studies.tracking.trials import FORMS, MOVING, STANCE, TRIALS
 from spinepipe.studies.trunk_loads.checks_of_muscles import CARRIERS
 from spinepipe.studies.trunk_loads.forms import BODY_FRAMES, FORCE, HANDS, TASKS, UPRIGHT
 from spinepipe.units import COORDINATES

@@ -24,7 +24,7 @@ from spinepipe.report.page import space
 from spinepipe.report.page.document import origin
 from spinepipe.report.style import picture, style
 from spinepipe.studies.registry import kind_names, kind_of
-from spinepipe.studies.tracking import in_space_still as tracking_still
+from spinepipe.studies.tracking import in_space as tracking_space
 from spinepipe.studies.trunk_loads import in_space as trunk_space
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,7 +35,7 @@ SHORT = "<script>&\"'-->]]></svg>"
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the library, five megabytes that are the same in every page, and without stills."""
     monkeypatch.setattr(page, "get_plotlyjs", lambda: "/* drawing library */")
-    for module in (space, tracking_still, trunk_space):
+    for module in (space, tracking_space, trunk_space):
         monkeypatch.setattr(module, "picture", lambda figure, kind: SVG.encode())
 
 

@@ -27,8 +27,8 @@ from spinepipe.studies.registry import kind_of
 from spinepipe.studies.study_files import StudyFiles
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.checks import check_tracking
-from spinepipe.studies.tracking.forms import FORMS
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.trials import FORMS
 from spinepipe.studies.trunk_loads.checks import check_trunk
 
 DOCUMENT = YamlDocument("s.yaml", {}, {})

@@ -14,8 +14,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from spinepipe.motion.passive import PassiveLaw
-from spinepipe.motion.passive_elements import passive_elements
+from spinepipe.motion.passive import PassiveLaw, passive_elements
 from tests.generators.tracking.engine import built
 from tests.generators.tracking.laws import KNOTS_RAD, curves, plain_curves, resisted, stiffness
 from tests.generators.tracking.moved import Filmed, Motion, moved

@@ -17,21 +17,31 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import read
-from spinepipe.motion.passive import PassiveLaw
-from spinepipe.motion.passive_elements import passive_elements
+from spinepipe.motion.passive import PassiveLaw, passive_elements
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.trajectory import solve
 from spinepipe.progress import Progress
 from spinepipe.statistics.outcome import mean_of
-from spinepipe.studies.tracking.approaches import asked_of, begun, fitting, found_by, seen_in
-from spinepipe.studies.tracking.approaches_of_trials import BOTH
-from spinepipe.studies.tracking.error_metrics import Bones, errors_of
+from spinepipe.studies.tracking.approaches import (
+    calibration_objective,
+    find_motion,
+    first_guess,
+    objective_of,
+    sample_at_nodes,
+)
+from spinepipe.studies.tracking.error_metrics import Truth, errors_of, truths
 from spinepipe.studies.tracking.kind import KIND
-from spinepipe.studies.tracking.persons import TrackedPerson, person_of, ratio_sets
-from spinepipe.studies.tracking.profile import PROFILED, REGIONS, held_in, profiled, verdict
-from spinepipe.studies.tracking.reload_motions import ReloadedMotions
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of, ratios_of
+from spinepipe.studies.tracking.profile import (
+    PROFILED,
+    REGIONS,
+    held_parameters,
+    profile_costs,
+    verdict,
+)
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.truth import Truth, truths
+from spinepipe.studies.tracking.tracked_motions import TrackedMotion
+from spinepipe.studies.tracking.trials import BOTH
 from spinepipe.units import COORDINATES
 from tests.generators.tracking.seen import EXACT, Errors
 from tests.generators.tracking.write import Subject, Wanted, write
@@ -79,7 +89,7 @@ class Made:
         write(one.wanted, [one], folder)
         self.cohort = read(folder, KIND.forms)
         self.person: TrackedPerson = person_of(self.cohort, one.name, folder)
-        self.bones = Bones(self.person.skeleton, self.person.centres)
+        self.bones = self.person.skeleton, self.person.centres
         self.truths: dict[str, Truth] = {
             truth.trial: truth for truth in truths(dict(self.cohort.further))
         }
@@ -87,9 +97,9 @@ class Made:
 
     def calibrated(self) -> PassiveLaw:
         """Passive elements from both motions together."""
-        ask = fitting(SETTINGS, self.person)
+        ask = calibration_objective(SETTINGS, self.person)
         trials = [one for one in self.person.trials if one.kind in BOTH]
-        known = [begun(ask, seen_in(SETTINGS, self.person, one)) for one in trials]
+        known = [first_guess(ask, sample_at_nodes(SETTINGS, self.person, one)) for one in trials]
         law = solve(ask, [seen for seen, _ in known], [start for _, start in known]).law
         assert law is not None
         return law
@@ -99,13 +109,13 @@ class Made:
         for trial in self.person.trials:
             if trial.kind == "stance" and approach == "ik_smooth":
                 continue
-            ask = asked_of(SETTINGS, self.person, approach, law)
-            seen = seen_in(SETTINGS, self.person, trial)
-            found = found_by(approach, ask, seen, ratio_sets(self.cohort))
-            moved = ReloadedMotions("", trial.name, approach, found.watched.grid.times_s, found.q)
-            for off in errors_of(moved, self.truths[trial.name], self.bones):
-                if off.told.any():
-                    mean = float(off.size[off.told].mean())
+            ask = objective_of(SETTINGS, self.person, approach, law)
+            seen = sample_at_nodes(SETTINGS, self.person, trial)
+            found = find_motion(approach, ask, seen, ratios_of(self.cohort))
+            moved = TrackedMotion("", trial.name, approach, found.watched.grid.times_s, found.q)
+            for off in errors_of(moved, self.truths[trial.name], *self.bones):
+                if off.known.any():
+                    mean = float(off.size[off.known].mean())
                     named = {"motion": trial.kind, "approach": approach, "measure": off.measure}
                     yield {**named, "error": mean, "status": found.status.value}
 
@@ -192,9 +202,11 @@ def profiles() -> pd.DataFrame:
 
 def _profile(made: Made, truth: pd.DataFrame, region: str, coordinate: str) -> Row:
     coarse = SETTINGS.model_copy(update={"intervals": SETTINGS.profiles.intervals})
-    ask = fitting(coarse, made.person)
-    seen = [seen_in(coarse, made.person, one) for one in made.person.trials if one.kind in BOTH]
-    costs = profiled(ask, seen, held_in(ask, region, coordinate), RATIOS)
+    ask = calibration_objective(coarse, made.person)
+    seen = [
+        sample_at_nodes(coarse, made.person, one) for one in made.person.trials if one.kind in BOTH
+    ]
+    costs = profile_costs(ask, seen, held_parameters(ask, region, coordinate), RATIOS)
     told, settled = verdict(RATIOS, costs), np.isfinite(costs)
     ratio = _true_ratio(made, truth, region, coordinate)
     at, over = np.log(RATIOS[settled]), costs[settled] - costs[settled].min()

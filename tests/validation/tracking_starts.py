@@ -10,10 +10,14 @@ import pandas as pd
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.trajectory import SMALL, OptimalMotions, solve
 from spinepipe.progress import Progress
-from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
-from spinepipe.studies.tracking.approaches_of_trials import trials_of_law
+from spinepipe.studies.tracking.approaches import (
+    calibration_objective,
+    first_guess,
+    sample_at_nodes,
+)
 from spinepipe.studies.tracking.persons import person_of
 from spinepipe.studies.tracking.settings import LEARNT, Tracking
+from spinepipe.studies.tracking.trials import trials_of_law
 
 STUDY = "tracking_phantom"
 DRAWN = 2
@@ -33,9 +37,9 @@ def table() -> pd.DataFrame:
     rows = []
     for who, law in Progress(lambda line: print(line, flush=True)).through(cases, "calibrations"):
         person = person_of(cohort, who, cohort.folder, study.scaling)
-        ask, names = fitting(study, person), trials_of_law(cohort, who, law)
+        ask, names = calibration_objective(study, person), trials_of_law(cohort, who, law)
         trials = [one for one in person.trials if one.name in names]
-        known = [begun(ask, seen_in(study, person, one)) for one in trials]
+        known = [first_guess(ask, sample_at_nodes(study, person, one)) for one in trials]
         seen, begin = [one for one, _ in known], [start for _, start in known]
         first = solve(ask, seen, begin)
         again = solve(ask, seen, first.coefficients, first.parameters)
@@ -57,10 +61,10 @@ def _row(first: OptimalMotions, again: OptimalMotions, others: list[OptimalMotio
         "starts": len(found),
         "converged": len(ended),
         "optima": len(optima),
-        "cost": first.costs.total,
-        "least_cost": min(one.costs.total for one in ended),
-        "largest_cost": max(one.costs.total for one in ended),
-        "gained_again": first.costs.total - again.costs.total,
+        "cost": first.cost,
+        "least_cost": min(one.cost for one in ended),
+        "largest_cost": max(one.cost for one in ended),
+        "gained_again": first.cost - again.cost,
         "stiffness_again": float(np.exp(np.abs(again.parameters - first.parameters).max())),
         "steps": first.steps,
     }
@@ -69,7 +73,7 @@ def _row(first: OptimalMotions, again: OptimalMotions, others: list[OptimalMotio
 def _apart(found: list[OptimalMotions]) -> Iterator[OptimalMotions]:
     """One of each optimum, the lowest first."""
     known: list[OptimalMotions] = []
-    for one in sorted(found, key=lambda one: one.costs.total):
+    for one in sorted(found, key=lambda one: one.cost):
         if all(np.abs(one.parameters - other.parameters).max() > SAME for other in known):
             known.append(one)
             yield one

@@ -28,7 +28,6 @@ from spinepipe.studies.cohort_stiffness.nuisances import (
 )
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
-    BUSHING,
     SpecimenTests,
     base_effects,
     calibration_problem,
@@ -45,6 +44,7 @@ from spinepipe.studies.cohort_stiffness.stiffening import (
     status_with_growth,
 )
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, NUISANCES, STIFFNESS
+from spinepipe.studies.problem import BUSHING
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES
 

@@ -9,11 +9,11 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs.against import write_against
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.joint_tables import SIDES
-from spinepipe.motion.passive_elements import passive_elements
+from spinepipe.motion.passive import passive_elements
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.studies.tracking.forms import PASSIVE
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import AGAINST_WANG_2021
+from spinepipe.studies.tracking.trials import PASSIVE
 from spinepipe.tables import read_frames
 from spinepipe.units import COORDINATES
 
@@ -22,7 +22,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     """Write ``against_wang_2021.parquet``."""
     settings, cohort = study_of_kind(Tracking, root, study)
     frames = {**read_frames(tables), **facts(cohort)}
-    write_against(AGAINST_WANG_2021, frames, asked_of(settings), settings, cohort, output)
+    write_against(AGAINST_WANG_2021, frames, paper_settings(settings), settings, cohort, output)
 
 
 def facts(cohort: Cohort) -> dict[str, pd.DataFrame]:
@@ -40,13 +40,11 @@ def facts(cohort: Cohort) -> dict[str, pd.DataFrame]:
     return {**{name: cohort.further[name] for name in names}, "generic": generic}
 
 
-def asked_of(settings: Tracking) -> dict[str, Any]:
+def paper_settings(settings: Tracking) -> dict[str, Any]:
     """Settings that the paper has numbers for."""
-    percent = settings.bounds.increased_by_percent
-    added = settings.bounds.means == "added"
     return {
-        "rom_bound_increase": percent,
-        "times_the_range": percent / 100.0 + (1.0 if added else 0.0),
+        "rom_bound_increase": settings.bounds.increased_by_percent,
+        "times_the_range": settings.bounds.times,
         "max_marker_deviation": settings.largest_deviation_mm,
         "intervals": settings.intervals,
     }

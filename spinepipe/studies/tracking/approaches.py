@@ -6,28 +6,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.objective import SHAPE, Ask, ResidualScales, Watched, watched
+from spinepipe.motion.objective import (
+    SHAPE,
+    MotionObjective,
+    ResidualScales,
+    SampledTrial,
+    sample_trial,
+)
 from spinepipe.motion.passive import PassiveLaw
-from spinepipe.motion.passive_elements import PassiveElements
 from spinepipe.motion.points import COUNT
 from spinepipe.motion.posture import postures
-from spinepipe.motion.ratios import RatioSet
 from spinepipe.motion.skeleton import PELVIS, MarkerTrial
 from spinepipe.motion.skin import with_sliding_skin
 from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
-from spinepipe.studies.tracking.persons import TrackedPerson, carrying
-from spinepipe.studies.tracking.settings import (
-    CONSTRAINED,
-    LEARNT,
-    OWN,
-    Approach,
-    Scales,
-    Tracking,
-)
+from spinepipe.studies.tracking.persons import TrackedPerson, skeleton_in_trial
+from spinepipe.studies.tracking.settings import CONSTRAINED, Approach, Scales, Tracking
+from spinepipe.studies.tracking.trials import STANCE
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, ROTATIONS, TRANSLATIONS
-
-_LENGTHS = len(TRANSLATIONS)
 
 _NEAR_ENOUGH = 25
 """Steps to a first guess of a posture."""
@@ -44,8 +40,8 @@ class ApproachMotion:
     unknowns : how many numbers were searched for. steps : of the search.
     """
 
-    ask: Ask
-    watched: Watched
+    ask: MotionObjective
+    watched: SampledTrial
     motion: tuple[Array, Array, Array]
     status: Status
     message: str
@@ -58,17 +54,7 @@ class ApproachMotion:
         return self.motion[0]
 
 
-def learns(approach: str) -> bool:
-    """Whether an approach takes over passive elements that were calibrated on trials."""
-    return approach in LEARNT or approach == OWN
-
-
-def source_of(approach: str, kind: str) -> str:
-    """From which trials the passive elements of an approach are, in a trial of a kind."""
-    return LEARNT.get(approach, kind)
-
-
-def sizes_of(scales: Scales) -> ResidualScales:
+def residual_scales(scales: Scales) -> ResidualScales:
     """The study's scales in SI."""
     return ResidualScales(
         marker_m=scales.marker_mm / MM_PER_M,
@@ -86,31 +72,24 @@ def sizes_of(scales: Scales) -> ResidualScales:
     )
 
 
-def seen_in(settings: Tracking, person: TrackedPerson, trial: MarkerTrial) -> Watched:
+def sample_at_nodes(settings: Tracking, person: TrackedPerson, trial: MarkerTrial) -> SampledTrial:
     """What is seen of a trial at nodes; one posture, the mean, of a trial that stands."""
-    skeleton = carrying(person, trial)
-    if trial.kind == "stance":
-        return watched(skeleton, person.markers, still(trial), settings.intervals)
-    return watched(skeleton, person.markers, trial, settings.intervals)
+    if trial.kind == STANCE:
+        trial = mean_frame(trial)
+    skeleton = skeleton_in_trial(person, trial)
+    return sample_trial(skeleton, person.markers, trial, settings.intervals)
 
 
-def still(trial: MarkerTrial) -> MarkerTrial:
+def mean_frame(trial: MarkerTrial) -> MarkerTrial:
     """The mean of a trial as its only frame."""
+    # of each marker over the frames that see it
     count = trial.seen.sum(axis=0)
     places = np.where(trial.seen[..., None], trial.places, 0.0).sum(axis=0)
     mean = places / np.maximum(count, 1)[:, None]
     return replace(trial, time_s=trial.time_s[:1], places=mean[None], seen=(count > 0)[None])
 
 
-def law_of(elements: PassiveElements, approach: str, learnt: PassiveLaw | None) -> PassiveLaw:
-    """Passive elements that an approach starts with or keeps."""
-    if learnt is not None:
-        return learnt
-    ends = {"optk_generic_lower": elements.lower, "optk_generic_upper": elements.upper}
-    return PassiveLaw(elements.a * ends.get(approach, 1.0), elements.b)
-
-
-def unloaded(settings: Tracking, person: TrackedPerson) -> Array:
+def unloaded_posture(settings: Tracking, person: TrackedPerson) -> Array:
     """(17, 6) m and rad, where passive elements are at rest.
 
     Raises
@@ -125,70 +104,66 @@ def unloaded(settings: Tracking, person: TrackedPerson) -> Array:
         raise ValueError("there is no static trial in whose posture joints could be unloaded")
     low, high = _ranges(settings, person)
     law = PassiveLaw(person.passive.a, person.passive.b)
-    ask = Ask(low=low, high=high, passive=law, loads=False, sizes=sizes_of(settings.scales))
-    seen = watched(carrying(person, static), person.markers, still(static), settings.intervals)
+    scales = residual_scales(settings.scales)
+    ask = MotionObjective(low=low, high=high, passive=law, loads=False, sizes=scales)
+    skeleton = skeleton_in_trial(person, static)
+    seen = sample_trial(skeleton, person.markers, mean_frame(static), settings.intervals)
     found: Array = postures(ask, seen).q[0, PELVIS + 1 :]
     return found
 
 
-def asked_of(
+def objective_of(
     settings: Tracking, person: TrackedPerson, approach: Approach, learnt: PassiveLaw | None = None
-) -> Ask:
+) -> MotionObjective:
     """What an approach asks; learnt : passive elements that it takes over."""
-    sizes = sizes_of(settings.scales)
+    scales = residual_scales(settings.scales)
     if approach.startswith("ik") and approach != "ik_springs":
-        return Ask(
-            free=_rotations_alone(), loads=False, smooth=approach == "ik_smooth", sizes=sizes
-        )
+        # joints turn and do not slide
+        free = np.ones(SHAPE, dtype=bool)
+        free[PELVIS + 1 :, : len(TRANSLATIONS)] = False
+        smooth = approach == "ik_smooth"
+        return MotionObjective(free=free, loads=False, smooth=smooth, sizes=scales)
     low, high = _ranges(settings, person)
-    law = law_of(person.passive, approach, learnt)
-    return Ask(
+    generic = person.passive
+    ends = {"optk_generic_lower": generic.lower, "optk_generic_upper": generic.upper}
+    law = learnt or PassiveLaw(generic.a * ends.get(approach, 1.0), generic.b)
+    rest = unloaded_posture(settings, person) if approach != "optk_zero" else None
+    return MotionObjective(
         low=low,
         high=high,
-        passive=None if approach == "optk_zero" else replace(law, rest=unloaded(settings, person)),
+        passive=None if rest is None else replace(law, rest=rest),
         loads=approach != "ik_springs",
         force_cost=settings.force_cost,
-        sizes=sizes,
+        sizes=scales,
     )
 
 
-def fitting(settings: Tracking, person: TrackedPerson) -> Ask:
+def calibration_objective(settings: Tracking, person: TrackedPerson) -> MotionObjective:
     """Elements of all rotations are fitted; those along axes, which no marker tells, stay."""
-    ask = asked_of(settings, person, "optk_generic")
+    ask = objective_of(settings, person, "optk_generic")
     fitted = np.zeros_like(ask.fitted)
     fitted[:, [COORDINATES.index(name) for name in ROTATIONS]] = True
     return replace(ask, fitted=fitted)
 
 
-def _rotations_alone() -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    free = np.ones(SHAPE, dtype=bool)
-    free[PELVIS + 1 :, :_LENGTHS] = False
-    return free
-
-
 def _ranges(settings: Tracking, person: TrackedPerson) -> tuple[Array, Array]:
     """(18, 6) m and rad, the ends of how far coordinates may go; those of the pelvis anywhere."""
-    limits = person.limits.widened(settings.bounds.times)
+    limits = settings.bounds.times * person.limits
     low, high = np.full(SHAPE, -np.inf), np.full(SHAPE, np.inf)
     low[PELVIS + 1 :], high[PELVIS + 1 :] = limits[..., 0], limits[..., 1]
     return low, high
 
 
-def found_by(
-    approach: Approach, ask: Ask, seen: Watched, ratios: Mapping[str, RatioSet]
+def find_motion(
+    approach: Approach, ask: MotionObjective, seen: SampledTrial, ratios: Mapping[str, Array]
 ) -> ApproachMotion:
     """The motion that an approach finds."""
     if approach.startswith(CONSTRAINED):
-        chosen = ratios[approach.removeprefix(CONSTRAINED)]
-        return _frames(ask, seen, _whole(chosen))
+        return _frame_by_frame(ask, seen, _driven(ratios[approach.removeprefix(CONSTRAINED)]))
     if approach in ("ik", "ik_springs") or seen.grid.intervals == 0:
-        return _frames(ask, seen)
-    return trajectory(ask, seen)
-
-
-def trajectory(ask: Ask, seen: Watched) -> ApproachMotion:
-    """The motion over all its time."""
-    seen, begin = begun(ask, seen)
+        return _frame_by_frame(ask, seen)
+    # the motion over all its time
+    seen, begin = first_guess(ask, seen)
     solved = solve(ask, [seen], [begin])
     return ApproachMotion(
         *(ask, seen, seen.grid.at_nodes(solved.coefficients[0]), solved.status, solved.message),
@@ -196,7 +171,7 @@ def trajectory(ask: Ask, seen: Watched) -> ApproachMotion:
     )
 
 
-def begun(ask: Ask, seen: Watched) -> tuple[Watched, Array]:
+def first_guess(ask: MotionObjective, seen: SampledTrial) -> tuple[SampledTrial, Array]:
     """A trial with markers weighed as skin slides, and coefficients (N + 3, 18, 6) to begin with.
 
     Both are from postures of each frame by itself, near enough. Without dynamics markers are
@@ -208,17 +183,27 @@ def begun(ask: Ask, seen: Watched) -> tuple[Watched, Array]:
     return known, seen.grid.through(found)
 
 
-def _whole(ratios: RatioSet) -> Array:
-    """(108, 9) what the pelvis and three driving rotations make of all coordinates."""
-    found = np.zeros((COUNT, len(SHAPE) + 7))
+def _driven(ratios: Array) -> Array:
+    """(108, 9) what the pelvis and three driving rotations make of all coordinates.
+
+    Parameters
+    ----------
+    ratios : (17, 3) shares of joints in extension, right bending and left rotation.
+    """
+    # the pelvis moves by its own six; each joint by its share of the three sums
     pelvis = SHAPE[1]
+    found = np.zeros((COUNT, pelvis + len(ROTATIONS)))
     found[:pelvis, :pelvis] = np.eye(pelvis)
-    found[pelvis:, pelvis:] = ratios.mapping.reshape(-1, 3)
+    for k, name in enumerate(ROTATIONS):
+        found[pelvis + COORDINATES.index(name) :: pelvis, pelvis + k] = ratios[:, k]
     return found
 
 
-def _frames(ask: Ask, seen: Watched, ratios: Array | None = None) -> ApproachMotion:
+def _frame_by_frame(
+    ask: MotionObjective, seen: SampledTrial, ratios: Array | None = None
+) -> ApproachMotion:
     """Each frame by itself; how fast it went follows from the curve through the frames."""
+    # a natural spline through the frames tells speed and acceleration; one posture has neither
     found = postures(ask, seen, ratios)
     grid = seen.grid
     rest = np.zeros_like(found.q)

@@ -6,25 +6,46 @@ Tables are checked whenever the study is read; files of motion, which take longe
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from spinepipe.cohort import Cohort
+from spinepipe.documents.inside import outside
 from spinepipe.documents.yaml_text import YamlDocument
-from spinepipe.motion.passive_elements import passive_elements
-from spinepipe.motion.skeleton import BODIES
-from spinepipe.problems import InputError, InputProblem, one_of
+from spinepipe.motion.passive import passive_elements
+from spinepipe.motion.points import marker_places
+from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
+from spinepipe.motion.recording import MarkerRecording
+from spinepipe.motion.skeleton import BODIES, MarkerSet
+from spinepipe.problems import InputError, InputProblem, Spelling, one_of
 from spinepipe.studies.places import at, unknown_names
 from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
-from spinepipe.studies.tracking.checks_of_trials import (
-    recording_problems,
-    row_problems,
-)
-from spinepipe.studies.tracking.forms import MARKER_SET, PASSIVE, RATIOS, TRIALS
+from spinepipe.studies.tracking.checks_of_markers import LoadedTrial
+from spinepipe.studies.tracking.checks_of_motion import motion_problems
 from spinepipe.studies.tracking.persons import (
-    ratio_sets,
+    Row,
+    marker_set,
+    ratios_of,
+    read_recording,
     skeleton_in,
+    static_trial,
+    trial_of,
+    trial_rows,
 )
 from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Tracking
+from spinepipe.studies.tracking.trials import (
+    MARKER_SET,
+    PASSIVE,
+    RATIOS,
+    STANCE,
+    TRIALS,
+    source_kinds,
+)
+from spinepipe.units import COORDINATES
 
 NEEDED = (SUBJECTS, TRIALS, MARKER_SET)
+
+LISTED = 4
+"""So many names are written out."""
 
 SLICES_SHARE = (0.25, 0.60)
 """Pelvis and slices of the trunk over body mass: 0.42 to 0.45 in the sources; head and arms, which
@@ -38,17 +59,20 @@ def check_tracking(
     yield from _tables(document, cohort)
     if cohort.vertebrae == BODIES:  # rows of joints are those of the whole trunk
         yield from _approaches(document, study, cohort)
-        yield from _own_laws(cohort)
+        try:
+            passive_elements(cohort.further.get(PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}")
+        except InputError as error:
+            yield from error.problems
     names = cohort.specimen_names
     yield from unknown_names(
         document, "profiles.specimens", "specimen", study.profiles.specimens, names
     )
-    yield from _recorded(cohort)
+    yield from _persons_and_trials(cohort)
     if not list(_tables(document, cohort)):
         yield from _bodies(cohort)
 
 
-def _recorded(cohort: Cohort) -> Iterator[InputProblem]:
+def _persons_and_trials(cohort: Cohort) -> Iterator[InputProblem]:
     """Persons, trials and markers."""
     further = cohort.further
     if SUBJECTS.stem in further:
@@ -61,7 +85,9 @@ def check_recordings(
     document: YamlDocument, _study: Tracking, cohort: Cohort, _root: Path
 ) -> Iterator[InputProblem]:
     """Everything that is wrong with files of motion; nothing where tables cannot be relied on."""
-    if not any((*_tables(document, cohort), *_recorded(cohort))) and not any(_bodies(cohort)):
+    if not any((*_tables(document, cohort), *_persons_and_trials(cohort))) and not any(
+        _bodies(cohort)
+    ):
         yield from recording_problems(cohort)
 
 
@@ -87,7 +113,7 @@ def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
 def _approaches(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[InputProblem]:
     """Approaches whose ratios nobody has, or that learn from trials nobody did."""
     try:
-        sets = ratio_sets(cohort)
+        sets = ratios_of(cohort)
     except InputError as error:
         yield from error.problems
         return
@@ -100,20 +126,10 @@ def _approaches(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iter
             found = f"'{approach}', and no ratios '{name}'"
             remedy = f"leave it out, or add the set '{name}' to {cohort.name}/{RATIOS.file}"
             yield InputProblem(*place, found, f"ratios of {', '.join(sets)}", remedy)
-        kind = LEARNT.get(approach)
-        wanted = ("flexion_extension", "lateral_bending") if kind == "both" else (kind,)
-        for lacking in [one for one in wanted if one is not None and one not in kinds]:
-            if trials is not None:
-                found = f"'{approach}', and no trial of {lacking}"
-                yield InputProblem(*place, found, one_of(kinds), "leave it out, or add such trials")
-
-
-def _own_laws(cohort: Cohort) -> Iterator[InputProblem]:
-    """Faults of the passive elements that the cohort brings."""
-    try:
-        passive_elements(cohort.further.get(PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}")
-    except InputError as error:
-        yield from error.problems
+        wanted = source_kinds(approach) if approach in LEARNT and trials is not None else ()
+        for lacking in [one for one in wanted if one not in kinds]:
+            found = f"'{approach}', and no trial of {lacking}"
+            yield InputProblem(*place, found, one_of(kinds), "leave it out, or add such trials")
 
 
 def _bodies(cohort: Cohort) -> Iterator[InputProblem]:
@@ -137,3 +153,79 @@ def _bodies(cohort: Cohort) -> Iterator[InputProblem]:
         if not SLICES_SHARE[0] <= share <= SLICES_SHARE[1]:
             found = f"{kg:.1f} kg of '{specimen}' in all, {share:.0%} of the body's mass"
             yield InputProblem(file, None, "mass_kg", found, allowed, "correct the masses")
+
+
+def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
+    """Files and axes in `trials.csv`, and persons without a trial that tells their size."""
+    file = f"{cohort.name}/{TRIALS.file}"
+    for specimen in cohort.specimen_names:
+        for row in trial_rows(cohort, specimen):
+            yield from _file_and_axes(file, row)
+            # a file outside the cohort's folder
+            name = str(row["file"])
+            place = (file, row["line"], "file")
+            if (led_out := outside(cohort.folder / name, cohort.folder, place, name)) is not None:
+                yield led_out
+        if static_trial(cohort, specimen) is None:
+            found = f"no static trial of '{specimen}'"
+            allowed = f"a trial of kind {STANCE}, or one marked static"
+            remedy = "add it: without it nobody's size is known"
+            yield InputProblem(file, None, "kind", found, allowed, remedy)
+
+
+def _file_and_axes(file: str, row: Row) -> Iterator[InputProblem]:
+    if Path(row["file"]).suffix.lower() not in READERS:
+        found, allowed = f"'{row['file']}'", f"a file of motion: {', '.join(READERS)}"
+        yield InputProblem(file, row["line"], "file", found, allowed, "export it as one of these")
+    if isinstance(row["axes"], str):
+        try:
+            axes_of(row["axes"])
+        except ValueError as error:
+            allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
+            remedy = "name each axis once, a minus where it points the other way"
+            yield InputProblem(file, row["line"], "axes", str(error), allowed, remedy)
+
+
+def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
+    """Everything that is wrong with files of motion; tables are sound."""
+    for specimen in cohort.specimen_names:
+        markers = marker_set(cohort, specimen)
+        skeleton = skeleton_in(cohort, specimen, subject_of(cohort, specimen))
+        rest = np.zeros((1, len(BODIES), len(COORDINATES)))
+        neutral = marker_places(skeleton, markers, rest)[0]
+        for row in trial_rows(cohort, specimen):
+            try:
+                read = read_recording(row, cohort.name, cohort.folder)
+            except InputError as error:
+                yield from error.problems
+                continue
+            file = f"{cohort.name}/{row['file']}"
+            yield from _missing_markers(file, markers, read)
+            # the trial is looked at with the markers that its file has
+            kept = np.flatnonzero([name in read.names for name in markers.names])
+            if not len(kept):
+                continue
+            part = MarkerSet(
+                tuple(markers.names[k] for k in kept),
+                markers.body[kept],
+                markers.at[kept],
+                markers.weight[kept],
+                tuple(markers.cluster[k] for k in kept),
+            )
+            axes = row["axes"] if isinstance(row["axes"], str) else DEFAULT_AXES
+            places = (file, f"{cohort.name}/{TRIALS.file}", row["line"], read.first)
+            trial = trial_of(row, part, read)
+            yield from motion_problems(LoadedTrial(trial, part, neutral[kept], axes, *places))
+
+
+def _missing_markers(
+    file: str, markers: MarkerSet, read: MarkerRecording
+) -> Iterator[InputProblem]:
+    """Markers of the set that the file lacks; further ones in the file are a remark."""
+    spare = [name for name in read.names if name not in markers.names]
+    spelling = Spelling(spare, "rename it in the file, or delete it from the set")
+    listed = ", ".join(spare[:LISTED]) + (" ..." if len(spare) > LISTED else "") or "none"
+    allowed = f"all markers of {MARKER_SET.file}; further ones are {listed}"
+    for name in markers.names:
+        if name not in read.names:
+            yield InputProblem(file, None, name, "no such marker", allowed, spelling.remedy(name))

@@ -4,15 +4,17 @@ Nothing of this is repaired: which of two names is wrong is for the one to say w
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.skeleton import PELVIS
+from spinepipe.motion.marker_groups import rigid_rotations, runs
+from spinepipe.motion.skeleton import PELVIS, MarkerSet, MarkerTrial
 from spinepipe.problems import InputProblem
-from spinepipe.studies.tracking.trial_preview import LoadedTrial, runs
 from spinepipe.units import MM_PER_M
 
 LONGEST_GAP_S = 0.5
@@ -43,6 +45,52 @@ RIGID_MM = 5.0
 or by hand is worse."""
 
 SWAY_MM = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedTrial:
+    """A trial as it is checked.
+
+    Attributes
+    ----------
+    trial : markers in the order of the set. markers : the set. neutral : (K, 3) m, its markers in
+        ground while all coordinates are zero.
+    axes : what forwards, up and right are in the axes of the file.
+    file : of the motion. trials : name of the table of trials, line : of the trial in it.
+    first : number of the trial's first frame in the file.
+    """
+
+    trial: MarkerTrial
+    markers: MarkerSet
+    neutral: Array
+    axes: str
+    file: str
+    trials: str
+    line: int
+    first: int
+
+    @cached_property
+    def turned(self) -> tuple[Array, NDArray[np.bool_]]:
+        """(F, 3, 3) how all markers together are turned against rest, and where they tell it."""
+        return rigid_rotations(self.neutral, self.trial.places, self.trial.seen)
+
+    def frames(self, begin: int, end: int) -> str:
+        """Frames from one to another, both of the trial and included, as a user finds them."""
+        times = self.trial.time_s
+        if begin == end:
+            return f"frame {self.first + begin} ({times[begin]:.3f} s)"
+        return (
+            f"frames {self.first + begin} to {self.first + end} "
+            f"({times[begin]:.3f} to {times[end]:.3f} s)"
+        )
+
+    def in_motion(self, marker: str | None, found: str, allowed: str, remedy: str) -> InputProblem:
+        """A problem of the file of motion."""
+        return InputProblem(self.file, None, marker, found, allowed, remedy)
+
+    def in_table(self, column: str, found: str, allowed: str, remedy: str) -> InputProblem:
+        """A problem of the trial's row."""
+        return InputProblem(self.trials, self.line, column, found, allowed, remedy)
 
 
 def marker_problems(look: LoadedTrial) -> Iterator[InputProblem]:
@@ -116,6 +164,8 @@ def _rightwards(look: LoadedTrial) -> Array | None:
     groups = (front, back, top)
     if not all(group.any() for group in groups) or np.ptp(look.markers.at[on_pelvis, 0]) < DEEP_M:
         return None
+    # forwards from the markers behind to those ahead, up to the highest body: means of groups that
+    # are whole, so that no marker's loss moves them
     whole = np.all([seen[:, group].all(axis=1) for group in groups], axis=0)
     first, last, highest = (at[:, group].mean(axis=1) for group in groups)
     forwards, up = first - last, highest - (first + last) / 2.0
@@ -133,7 +183,10 @@ def _exchanged(look: LoadedTrial) -> Iterator[InputProblem]:
     rotations, told = look.turned
     if not told.any():
         return
-    frame = int(np.argmax(np.where(told, look.trial.seen.sum(axis=1), 0)[: _early(look)]))
+    # of the first tenth, the frame that sees the most
+    early = max(1, len(look.trial.time_s) // 10)
+    frame = int(np.argmax(np.where(told, look.trial.seen.sum(axis=1), 0)[:early]))
+    # the worst pair is put right before the next is looked for: an exchange bends other lines too
     places = look.trial.places[frame].copy()
     model = look.neutral @ rotations[frame].T
     there = look.trial.seen[frame]
@@ -141,17 +194,13 @@ def _exchanged(look: LoadedTrial) -> Iterator[InputProblem]:
         pair = _worst_pair(places, model, there)
         if pair is None:
             return
-        yield _told_exchange(look, pair, f"from {look.frames(frame, frame)} on")
+        yield _exchange(look, pair, f"from {look.frames(frame, frame)} on")
         places[list(pair)] = places[list(pair[::-1])]
-
-
-def _early(look: LoadedTrial) -> int:
-    """Frames in which a motion begins, a tenth."""
-    return max(1, len(look.trial.time_s) // 10)
 
 
 def _worst_pair(places: Array, model: Array, there: NDArray[np.bool_]) -> tuple[int, int] | None:
     """Which two markers stand backwards the most; None: no two do."""
+    # cosine of the angle between each line of two markers and that of the set, times both lengths
     lines, wanted = (at[:, None] - at[None, :] for at in (places, model))
     lengths, asked = (np.linalg.norm(line, axis=-1) for line in (lines, wanted))
     along = np.einsum("abi,abi->ab", lines, wanted)
@@ -164,7 +213,7 @@ def _worst_pair(places: Array, model: Array, there: NDArray[np.bool_]) -> tuple[
     return min(first, second), max(first, second)
 
 
-def _told_exchange(look: LoadedTrial, pair: tuple[int, int], when: str) -> InputProblem:
+def _exchange(look: LoadedTrial, pair: tuple[int, int], when: str) -> InputProblem:
     first, second = (look.markers.names[k] for k in pair)
     allowed = "each marker where the set has it"
     remedy = "exchange the two names there"
@@ -174,12 +223,16 @@ def _told_exchange(look: LoadedTrial, pair: tuple[int, int], when: str) -> Input
 def _exchanged_later(look: LoadedTrial) -> Iterator[InputProblem]:
     """Markers that land on each other's former place, or farther than anybody moves."""
     times, places = look.trial.time_s, look.trial.places
-    before = _seen_before(look.trial.seen)
+    # the last frame before each in which a marker was seen; -1: in none
+    frames = np.where(look.trial.seen, np.arange(len(times))[:, None], -1)
+    ever = np.maximum.accumulate(frames, axis=0)
+    before = np.concatenate([np.full((1, places.shape[1]), -1), ever[:-1]])
     since = np.where(before < 0, np.inf, times[:, None] - times[before])
     recent = look.trial.seen & (since < LONGEST_GAP_S)
     markers = np.arange(places.shape[1])
     steps = np.linalg.norm(places - places[before, markers], axis=-1)
     steps[~recent] = 0.0
+    # two that jump in one frame are exchanged if each lands where the other was
     for frame in np.flatnonzero((steps > JUMP_M).any(axis=1)).tolist():
         step, last = steps[frame], places[before[frame], markers]
         jumped = np.flatnonzero(step > JUMP_M).tolist()
@@ -188,21 +241,13 @@ def _exchanged_later(look: LoadedTrial) -> Iterator[InputProblem]:
             crossed = np.linalg.norm(places[frame, [one, other]] - last[[other, one]], axis=1)
             if crossed.sum() < LANDED * (step[one] + step[other]):
                 partners |= {one, other}
-                pair = (one, other)
-                yield _told_exchange(look, pair, f"at {look.frames(frame, frame)}")
+                yield _exchange(look, (one, other), f"at {look.frames(frame, frame)}")
         for k in jumped:
             if k not in partners and step[k] > FASTEST_M_PER_S * since[frame, k]:
                 found = f"jumps {step[k] * MM_PER_M:.0f} mm at {look.frames(frame, frame)}"
                 allowed = f"at most {FASTEST_M_PER_S:g} m/s"
                 remedy = "correct the name or delete the place"
                 yield look.in_motion(look.markers.names[k], found, allowed, remedy)
-
-
-def _seen_before(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(F, K) the last frame before each in which a marker was seen; -1: in none."""
-    frames = np.where(seen, np.arange(len(seen))[:, None], -1)
-    ever = np.maximum.accumulate(frames, axis=0)
-    return np.concatenate([np.full((1, seen.shape[1]), -1), ever[:-1]])
 
 
 def _clusters(look: LoadedTrial) -> Iterator[InputProblem]:

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.marker_turns import angles, turns
+from spinepipe.frames import zxy_angles
+from spinepipe.motion.marker_groups import rigid_rotations
 from spinepipe.motion.reading import axes_of
 from spinepipe.problems import InputProblem
-from spinepipe.studies.tracking.checks_of_markers import marker_problems
-from spinepipe.studies.tracking.forms import MOVING, STANCE
-from spinepipe.studies.tracking.trial_preview import LoadedTrial
+from spinepipe.studies.tracking.checks_of_markers import LoadedTrial, marker_problems
+from spinepipe.studies.tracking.trials import MOVING, STANCE
 from spinepipe.units import DEG_PER_RAD
 
 LIKE_THE_SET = (0.4, 2.5)
@@ -47,7 +47,7 @@ def motion_problems(look: LoadedTrial) -> Iterator[InputProblem]:
     found = list(marker_problems(look))
     yield from found
     if look.trial.kind != STANCE and not any("swapped" in p.found for p in found):
-        yield from _moved(look)
+        yield from _cut_off_or_misnamed(look)
 
 
 def _size(look: LoadedTrial) -> float | None:
@@ -89,6 +89,7 @@ def _upright(look: LoadedTrial) -> InputProblem | None:
 
 def _better_axes(axes: str, turn: Array) -> str:
     """Axes with which the markers would stand as in the set, to the nearest right angle."""
+    # a signed permutation: the largest entry left, then none of its row and column
     nearest = np.zeros((3, 3))
     left = np.abs(turn)
     for _ in range(3):
@@ -101,9 +102,9 @@ def _better_axes(axes: str, turn: Array) -> str:
     return " ".join(sign + letter for sign, letter in zip(signs, _LETTERS[places], strict=True))
 
 
-def _moved(look: LoadedTrial) -> Iterator[InputProblem]:
+def _cut_off_or_misnamed(look: LoadedTrial) -> Iterator[InputProblem]:
     """A motion that is cut off, or has another's name."""
-    ranges = turned_deg(look)
+    ranges = trunk_rotation_deg(look)
     if ranges is None:
         return
     farthest = int(np.argmax(ranges))
@@ -122,7 +123,7 @@ def _moved(look: LoadedTrial) -> Iterator[InputProblem]:
         yield look.in_table("kind", found, allowed, f"did you mean '{MOVING[farthest]}'?")
 
 
-def turned_deg(look: LoadedTrial) -> Array | None:
+def trunk_rotation_deg(look: LoadedTrial) -> Array | None:
     """(3,) deg, how far the top turns against the bottom, in the order of `MOVING`.
 
     None where markers do not tell how either is turned.
@@ -131,14 +132,14 @@ def turned_deg(look: LoadedTrial) -> Array | None:
     if bottom is None or top is None:
         return None
     (low, low_told), (high, high_told) = (
-        turns(look.neutral[group], look.trial.places[:, group], look.trial.seen[:, group])
+        rigid_rotations(look.neutral[group], look.trial.places[:, group], look.trial.seen[:, group])
         for group in (bottom, top)
     )
     told = low_told & high_told
     if not told.any():
         return None
     against = np.einsum("fji,fjk->fik", low[told], high[told])
-    found: Array = DEG_PER_RAD * np.ptp(angles(against), axis=0)
+    found: Array = DEG_PER_RAD * np.ptp(zxy_angles(against), axis=0)
     return found
 
 

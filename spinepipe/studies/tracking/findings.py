@@ -6,22 +6,32 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import ResultTables, judged
-from spinepipe.report.words import capital, count, listed, number, percent, plain, tick
+from spinepipe.report.words import capital, count, fixed, listed, number, percent, plain, tick
 from spinepipe.status import Status
 from spinepipe.studies.tracking.findings_of_errors import (
+    FEWEST,
     beside_kinematics,
-    calibrated,
+    calibration_errors,
     close_to_markers,
-    nearest,
+    nearest_approach,
 )
-from spinepipe.studies.tracking.findings_of_sharing import likeness, shares
 from spinepipe.studies.tracking.findings_of_stiffness import calibrations, profiles, weights
-from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.tables import MARKER_OFF
-from spinepipe.studies.tracking.words import in_order, told
+from spinepipe.studies.tracking.settings import CONSTRAINED, Tracking
+from spinepipe.studies.tracking.tables import (
+    DONE,
+    MARKER_OFF,
+    TOO_FEW,
+    TOO_SMALL,
+    UNDEFINED,
+    WINDOW,
+)
+from spinepipe.studies.tracking.words import phrase, sort_approaches
 
 _MOST_PLACES = 4
 VIBRATES = "acceleration_rms_deg_per_s2"
+
+PREFERRED = ("optk_generic", "optk_from_both", "optk_calibrated")
+"""Whose shares are told: of the first that there is, else of the first approach of the table."""
 
 Finding = Callable[[Tracking, Cohort, ResultTables], Iterator[str]]
 
@@ -32,7 +42,7 @@ def findings(study: Tracking, cohort: Cohort, results: ResultTables) -> list[str
     return [sentence.replace(" %", "\u00a0%") for sentence in found]
 
 
-def ended(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
+def unsettled_fits(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Fits that did not settle."""
     fits = results.table("fits")
     if fits.empty:
@@ -54,7 +64,7 @@ def ended(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[st
 def places(rows: pd.DataFrame) -> str:
     """Fits by person, trial and approach, the first of many."""
     names = [
-        f"{plain(str(row['trial']))} of {row['specimen']} by {told(str(row['approach']))}"
+        f"{plain(str(row['trial']))} of {row['specimen']} by {phrase(str(row['approach']))}"
         for row in rows.to_dict("records")
     ]
     return listed(names, _MOST_PLACES)
@@ -83,7 +93,7 @@ def markers_off(study: Tracking, cohort: Cohort, results: ResultTables) -> Itera
     )
 
 
-def vibrating(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
+def vibrating_motions(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Approaches whose motions vibrate: joints accelerate more than the study calls one."""
     fits = results.table("fits")
     known = fits.dropna(subset=[VIBRATES]) if len(fits) else fits
@@ -98,10 +108,11 @@ def vibrating(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterato
         yield f"No motion vibrates: joints accelerate by {most} deg/s² at most, below {above}."
         return
     parts = []
-    for name in in_order(wild):
+    for name in sort_approaches(wild):
         own = known[known["approach"] == name]
         size = number(float(own[VIBRATES].median()))
-        parts.append(f"{told(name)} ({wild[name]} of {count(len(own), 'motion')}, median {size})")
+        some = f"{wild[name]} of {count(len(own), 'motion')}"
+        parts.append(f"{phrase(name)} ({some}, median {size})")
     rest = ""
     if len(calm):
         rest = f" All others stay below {number(float(calm[VIBRATES].max()))} deg/s²."
@@ -191,9 +202,100 @@ def beside_the_paper(study: Tracking, cohort: Cohort, results: ResultTables) -> 
         yield capital(said)
 
 
+def shares(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
+    """The joint that does most in each trial, and whether persons agree."""
+    rows = results.table("sharing")
+    rows = rows[rows["window"] == WINDOW] if len(rows) else rows
+    if rows.empty:
+        return
+    small = rows[rows["status"] == TOO_SMALL].drop_duplicates(["specimen", "trial", "approach"])
+    for trial, own in rows.groupby("trial", sort=False, observed=True):
+        known = own.dropna(subset=["share"])
+        if len(known):
+            there = [str(name) for name in dict.fromkeys(known["approach"])]
+            name = next((name for name in PREFERRED if name in there), there[0])
+            yield _most(str(trial), name, known[known["approach"] == name])
+    if len(small):
+        yield (
+            f"In {count(len(small), 'motion')} the lumbar spine turns too little to be shared out: "
+            "they have no share."
+        )
+    # approaches in which joints turn against the motion
+    known = rows.dropna(subset=["share"])
+    out = known[(known["share"] < 0.0) | (known["share"] > 1.0)]
+    if out.empty:
+        yield "No joint turns against the motion of the lumbar spine, whatever the approach."
+        return
+    every = known.groupby("approach", observed=True).size()
+    some = out.groupby("approach", observed=True).size()
+    parts = [
+        f"{phrase(name)} {int(some[name])} of {int(every[name])}"
+        for name in sorted(sort_approaches(some.index), key=lambda name: -some[name] / every[name])
+    ]
+    yield (
+        f"Shares below 0 or above 100 %, where joints turn against each other: {listed(parts, 4)}."
+    )
+
+
+def _most(trial: str, approach: str, rows: pd.DataFrame) -> str:
+    wide = rows.pivot_table(index="specimen", columns="joint", values="share", observed=True)
+    joint = str(wide.mean().idxmax())
+    agree = int((wide.idxmax(axis="columns") == joint).sum())
+    n = len(wide)
+    values = 100.0 * wide[joint]
+    said = (
+        f"{capital(plain(trial))}, by {phrase(approach)}: {joint} does most of the lumbar "
+        f"rotation, {fixed(float(values.mean()), 0)} %"
+    )
+    if n < 2:
+        return f"{said}, in the one person there is."
+    said += f" ({fixed(float(values.min()), 0)} to {fixed(float(values.max()), 0)} %)"
+    if agree == n:
+        return f"{said}, in each of {count(n, 'person')}."
+    return f"{said} on average, but in {n - agree} of {count(n, 'person')} another joint does most."
+
+
+def likeness(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
+    """How alike persons share a motion; where that is not defined it is said."""
+    rows = results.table("similarity")
+    rows = rows[rows["window"] == WINDOW] if len(rows) else rows
+    if rows.empty:
+        return
+    for trial, own in rows.groupby("trial", sort=False, observed=True):
+        free = own[~own["approach"].astype(str).str.startswith(CONSTRAINED)]
+        parts = [*_defined(free[free["status"] == DONE])]
+        lost = free[free["status"] == UNDEFINED]
+        if len(lost):
+            names = listed([phrase(str(name)) for name in lost["approach"]])
+            parts.append(f"not defined for {names}, as persons differ more than the curve varies")
+        if (free["status"] == TOO_FEW).all() and len(free):
+            parts = ["fewer than two persons have a curve"]
+        if parts:
+            yield (
+                f"How alike persons share {plain(str(trial))} (coefficient of multiple "
+                f"correlation, 1: all alike): {'; '.join(parts)}."
+            )
+    fixed_ones = rows["approach"].astype(str).str.startswith(CONSTRAINED)
+    if fixed_ones.any():
+        yield "With fixed ratios persons are alike because the ratios are, whatever they did."
+
+
+def _defined(rows: pd.DataFrame) -> Iterator[str]:
+    if rows.empty:
+        return
+    n = int(rows["n_specimens"].min())
+    values = rows.set_index("approach")["cmc"].astype(float).sort_values()
+    few = "" if n >= FEWEST else f", of {count(n, 'person')} alone"
+    if len(values) == 1:
+        yield f"{fixed(float(values.iloc[0]))} for {phrase(str(values.index[0]))}{few}"
+        return
+    ends = [f"{fixed(float(values.iloc[k]))} ({phrase(str(values.index[k]))})" for k in (0, -1)]
+    yield f"{ends[0]} to {ends[1]}{few}"
+
+
 MAKERS: tuple[Finding, ...] = (
-    *(ended, nearest, beside_kinematics, calibrated, close_to_markers),
-    *(profiles, calibrations, vibrating, markers_off, shares, likeness, rigid),
+    *(unsettled_fits, nearest_approach, beside_kinematics, calibration_errors, close_to_markers),
+    *(profiles, calibrations, vibrating_motions, markers_off, shares, likeness, rigid),
     *(weights, sizes, remarks, beside_the_paper),
 )
 """What makes findings, in the order of the page."""

@@ -16,11 +16,10 @@ from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import capital, count, listed, number
 from spinepipe.statistics.outcome import Mean, corrected, mean_of
 from spinepipe.status import Status
-from spinepipe.studies.tracking.forms import STANCE
-from spinepipe.studies.tracking.reload_motions import kinds_of_trials
 from spinepipe.studies.tracking.settings import LEARNT, Tracking
 from spinepipe.studies.tracking.tables import MARKER_OFF, MEASURES
-from spinepipe.studies.tracking.words import in_order, short_of, sized, told
+from spinepipe.studies.tracking.trials import STANCE, kinds_of_trials
+from spinepipe.studies.tracking.words import error_text, phrase, short_of, sort_approaches
 
 FEWEST = 3
 """Persons that a verdict needs."""
@@ -34,16 +33,18 @@ CALIBRATED = ("optk_calibrated", *LEARNT)
 MOVING_WORDS, STANCE_WORDS = "in motion", "in stance"
 
 _SAME = 1e-9
+"""Of the errors: differences that rounding makes."""
+
 _MOST_NAMES = 4
 
 
 @dataclass(frozen=True)
-class Paired:
+class PairedDifference:
     """How much larger the error of one approach is than that of another, within persons.
 
     Attributes
     ----------
-    mean : of the differences, with its interval.
+    mean : of the differences, with its interval. scale : the largest error of both.
     """
 
     mean: Mean
@@ -86,23 +87,18 @@ class ApproachRanking:
         """Number of persons."""
         return len(self.values)
 
-    def mean(self, approach: str) -> Mean:
-        """Mean over persons and its interval."""
-        return mean_of(self.values[approach].to_numpy(float))
-
-    def sized(self, approach: str) -> str:
+    def error_text(self, approach: str) -> str:
         """Mean error with its unit."""
-        return sized(float(self.values[approach].mean()), self.measure)
+        return error_text(float(self.values[approach].mean()), self.measure)
 
-    def paired(self, one: str, other: str) -> Paired:
+    def paired(self, one: str, other: str) -> PairedDifference:
         """The error of one approach less that of another, within persons."""
         apart = (self.values[one] - self.values[other]).to_numpy(float)
-        return Paired(
-            mean_of(apart), float(np.abs(self.values[[one, other]].to_numpy(float)).max())
-        )
+        scale = float(np.abs(self.values[[one, other]].to_numpy(float)).max())
+        return PairedDifference(mean_of(apart), scale)
 
     @property
-    def alike(self) -> list[str]:
+    def ties(self) -> list[str]:
         """Approaches whose error is not told from the least, corrected for how many there are."""
         best, *others = self.approaches
         ps = [self.paired(name, best).mean.p for name in others]
@@ -110,7 +106,7 @@ class ApproachRanking:
         return [name for name, p in held if p is None or p >= SIGNIFICANT]
 
 
-def standings(cohort: Cohort, results: ResultTables, measure: str) -> list[ApproachRanking]:
+def rankings(cohort: Cohort, results: ResultTables, measure: str) -> list[ApproachRanking]:
     """Of motions, then of stances, where a truth is known."""
     errors = results.table("errors")
     if errors.empty:
@@ -119,64 +115,60 @@ def standings(cohort: Cohort, results: ResultTables, measure: str) -> list[Appro
     keys = zip(errors["specimen"], errors["trial"], strict=True)
     stands = np.array([kinds.get((str(a), str(b))) == STANCE for a, b in keys])
     own = errors["measure"] == measure
-    found = [
-        _standing(measure, words, errors[own & chosen])
-        for words, chosen in ((MOVING_WORDS, ~stands), (STANCE_WORDS, stands))
-    ]
-    return [one for one in found if one is not None]
+    groups = ((MOVING_WORDS, errors[own & ~stands]), (STANCE_WORDS, errors[own & stands]))
+    return [one for words, rows in groups for one in _ranking(measure, words, rows)]
 
 
-def _standing(measure: str, words: str, rows: pd.DataFrame) -> ApproachRanking | None:
+def _ranking(measure: str, words: str, rows: pd.DataFrame) -> Iterator[ApproachRanking]:
+    """Of approaches that have all motions; none where no approach has."""
     if rows.empty:
-        return None
+        return
     keys = ["specimen", "trial", "approach"]
     wide = rows.groupby(keys, observed=True)["mean"].mean().unstack("approach")
     whole = wide.dropna(axis="columns")
-    if whole.empty or not len(whole.columns):
-        return None
+    if whole.empty:
+        return
+    # a person counts once: the mean over levels, then over trials
     values = whole.groupby(level="specimen").mean()
     means = {
-        name: float(values[name].to_numpy(float).mean()) for name in in_order(map(str, values))
+        name: float(values[name].to_numpy(float).mean())
+        for name in sort_approaches(map(str, values))
     }
     order = sorted(means, key=lambda name: means[name])
-    lacking = tuple(in_order(set(wide.columns) - set(whole.columns)))
-    return ApproachRanking(
-        measure, words, tuple(dict.fromkeys(rows["trial"])), values[order], lacking
-    )
+    lacking = tuple(sort_approaches(set(wide.columns) - set(whole.columns)))
+    trials = tuple(dict.fromkeys(rows["trial"]))
+    yield ApproachRanking(measure, words, trials, values[order], lacking)
 
 
-def nearest(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
+def nearest_approach(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """The least error of each measure, and what cannot be told from it."""
     for measure in SAID:
-        for one in standings(cohort, results, measure):
+        for one in rankings(cohort, results, measure):
             said = f"{capital(one.words)}, {MEASURES[measure][1]}: {_least(one)}"
-            yield f"{said}{_lost(one)}{_unsettled(one, results.table('fits'))}"
+            if one.lacking:
+                names = listed(map(phrase, one.lacking))
+                said += f" Left out, as not all motions were found: {names}."
+            yield said + _unsettled(one, results.table("fits"))
 
 
 def _least(one: ApproachRanking) -> str:
     best = one.approaches[0]
-    said = f"the least error has {told(best)}, {one.sized(best)}{between(one, best)}"
+    said = f"the least error has {phrase(best)}, {one.error_text(best)}{interval_text(one, best)}"
     if len(one.approaches) < 2:
         return f"{said}; nothing is there to compare it with."
     worst = one.approaches[-1]
-    said += f", the largest {told(worst)}, {one.sized(worst)}"
+    said += f", the largest {phrase(worst)}, {one.error_text(worst)}"
     if one.n < FEWEST:
         return f"{said}. {too_few(one.n)}"
     others = one.approaches[1:]
-    alike = one.alike
+    ties = one.ties
     held = f"over {one.n} persons, corrected for {count(len(others), 'comparison')}"
-    if not alike:
+    if not ties:
         return f"{said}. It is smaller than that of all others ({held})."
-    if len(alike) == len(others):
+    if len(ties) == len(others):
         return f"{said}. No other can be told from it ({held}), so none is shown to be the best."
-    names = listed([told(name) for name in alike], _MOST_NAMES)
+    names = listed([phrase(name) for name in ties], _MOST_NAMES)
     return f"{said}. Not told from the least ({held}): {names}."
-
-
-def _lost(one: ApproachRanking) -> str:
-    if not one.lacking:
-        return ""
-    return f" Left out, as not all motions were found: {listed(map(told, one.lacking))}."
 
 
 def _unsettled(one: ApproachRanking, fits: pd.DataFrame) -> str:
@@ -190,13 +182,13 @@ def _unsettled(one: ApproachRanking, fits: pd.DataFrame) -> str:
     return f" Of the fits behind the least error {len(lost)} of {len(own)} did not settle."
 
 
-def between(one: ApproachRanking, approach: str) -> str:
+def interval_text(one: ApproachRanking, approach: str) -> str:
     """Interval of a mean error; errors are not negative, whatever Student's interval says."""
-    ends = one.mean(approach).interval
+    ends = mean_of(one.values[approach].to_numpy(float)).interval
     if ends is None or one.n < FEWEST:
         return ""
     low, high = (max(end, 0.0) for end in ends)
-    return f" (95 % interval {number(low, 2)} to {sized(high, one.measure)})"
+    return f" (95 % interval {number(low, 2)} to {error_text(high, one.measure)})"
 
 
 def too_few(n: int) -> str:
@@ -208,16 +200,15 @@ def beside_kinematics(study: Tracking, cohort: Cohort, results: ResultTables) ->
     """Whether dynamics are better than inverse kinematics, without passive elements and with."""
     for first in (ZERO, GENERIC):
         for measure in SAID:
-            every = standings(cohort, results, measure)
+            every = rankings(cohort, results, measure)
             there = [one for one in every if {first, IK} <= set(one.approaches)]
             if there:
-                told_ = "; ".join(compared(one, first, IK) for one in there)
-                yield (
-                    f"{capital(told(first))} beside {told(IK)}, {MEASURES[measure][1]}: {told_}."
-                )
+                both = f"{capital(phrase(first))} beside {phrase(IK)}"
+                compared = "; ".join(comparison_text(one, first, IK) for one in there)
+                yield f"{both}, {MEASURES[measure][1]}: {compared}."
 
 
-def compared(one: ApproachRanking, first: str, other: str) -> str:
+def comparison_text(one: ApproachRanking, first: str, other: str) -> str:
     """Errors of two approaches, and whether persons tell them apart."""
     verdicts = {
         "smaller": "better",
@@ -227,7 +218,8 @@ def compared(one: ApproachRanking, first: str, other: str) -> str:
         "too_few": f"{count(one.n, 'person')} cannot tell them apart",
     }
     found = one.paired(first, other)
-    said = f"{one.words} {one.sized(first)} against {one.sized(other)}, {verdicts[found.verdict]}"
+    sizes = f"{one.error_text(first)} against {one.error_text(other)}"
+    said = f"{one.words} {sizes}, {verdicts[found.verdict]}"
     if found.verdict == "too_few" or found.mean.interval is None or found.mean.value is None:
         return said
     low, high = (number(end, 2) for end in found.mean.interval)
@@ -235,10 +227,10 @@ def compared(one: ApproachRanking, first: str, other: str) -> str:
     return f"{said} (difference {value}, 95 % interval {low} to {high}, {one.n} persons)"
 
 
-def calibrated(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
+def calibration_errors(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Whether calibrated passive elements are better or worse than generic ones."""
     for measure in SAID:
-        for one in standings(cohort, results, measure):
+        for one in rankings(cohort, results, measure):
             there = [name for name in CALIBRATED if name in one.approaches]
             if there and GENERIC in one.approaches:
                 yield _beside_generic(one, there)
@@ -246,10 +238,10 @@ def calibrated(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterat
 
 def _beside_generic(one: ApproachRanking, there: list[str]) -> str:
     names = {name: short_of(name).removeprefix("dynamics, ") for name in there}
-    values = [f"{names[name]} {one.sized(name)}" for name in there]
+    values = [f"{names[name]} {one.error_text(name)}" for name in there]
     said = (
         f"Calibrated passive elements, {MEASURES[one.measure][1]} {one.words}: "
-        f"{listed(values, len(values))}, against {one.sized(GENERIC)} with generic ones. "
+        f"{listed(values, len(values))}, against {one.error_text(GENERIC)} with generic ones. "
         f"{worse_words(one, there)}"
     )
     sure = {name: one.paired(name, GENERIC).verdict for name in there}
@@ -286,7 +278,7 @@ def worse_words(one: ApproachRanking, there: list[str]) -> str:
 def close_to_markers(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Whether the approach that is closest to the markers is nearest the truth as well."""
     fits = results.table("fits")
-    for one in standings(cohort, results, SAID[0])[:1]:
+    for one in rankings(cohort, results, SAID[0])[:1]:
         if fits.empty or len(one.approaches) < 2:
             return
         own = fits[fits["trial"].isin(one.trials) & fits["approach"].isin(one.approaches)]
@@ -295,14 +287,15 @@ def close_to_markers(study: Tracking, cohort: Cohort, results: ResultTables) -> 
         if best not in off:
             return
         closest = str(off.idxmin())
-        here = f"{capital(one.words)}, closest to the markers is {told(closest)}"
-        here += f" ({sized(float(off[closest]), SAID[0])}, root mean square)"
+        here = f"{capital(one.words)}, closest to the markers is {phrase(closest)}"
+        here += f" ({error_text(float(off[closest]), SAID[0])}, root mean square)"
         if closest == best:
             yield f"{here}, which has the least error of {MEASURES[one.measure][1]} too."
             return
         place = one.approaches.index(closest) + 1
         yield (
             f"{here}, but in errors of {MEASURES[one.measure][1]} it is number {place} of "
-            f"{len(one.approaches)}; {told(best)} leaves markers {sized(float(off[best]), SAID[0])}"
-            " off. How closely markers are met does not show which posture is right."
+            f"{len(one.approaches)}; {phrase(best)} leaves markers "
+            f"{error_text(float(off[best]), SAID[0])} off. How closely markers are met does not "
+            "show which posture is right."
         )

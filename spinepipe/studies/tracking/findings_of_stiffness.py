@@ -16,7 +16,7 @@ from spinepipe.report.words import AXIS, capital, count, listed, number, percent
 from spinepipe.status import Status
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import VERDICTS
-from spinepipe.studies.tracking.words import short_of, sized
+from spinepipe.studies.tracking.words import error_text, short_of
 
 Row = dict[Any, Any]
 
@@ -38,7 +38,7 @@ def profiles(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator
     for verdict in VERDICTS:
         own = rows[settled & ~falling & (rows["verdict"] == verdict)]
         if len(own):
-            yield _SAY[verdict](own, rows)
+            yield _verdict(verdict, own, len(rows))
     if not settled.all():
         lost = rows[~settled]
         yield (
@@ -59,7 +59,7 @@ def profiles(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator
         yield f"Profiles with fits that did not settle: {_places(lost)}."
 
 
-def closed(results: ResultTables) -> tuple[int, int]:
+def closed_profiles(results: ResultTables) -> tuple[int, int]:
     """How many profiles tell a stiffness, of how many of which some fit settled."""
     rows = results.table("profiles")
     if rows.empty:
@@ -67,42 +67,32 @@ def closed(results: ResultTables) -> tuple[int, int]:
     return int((rows["verdict"] == "told").sum()), int(rows["best_ratio"].notna().sum())
 
 
-def profiled(results: ResultTables) -> list[str]:
+def persons_with_profiles(results: ResultTables) -> list[str]:
     """Persons whose markers were asked."""
     return [str(name) for name in dict.fromkeys(results.table("profiles")["specimen"])]
 
 
-def _told(own: pd.DataFrame, rows: pd.DataFrame) -> str:
-    ends = [
-        f"{_place(row)} {number(row['low'], 2)} to {number(row['high'], 2)} times generic"
-        for row in own.to_dict("records")
-    ]
+def _verdict(verdict: str, own: pd.DataFrame, every: int) -> str:
+    """Profiles of a verdict, with their ends."""
+    if verdict == "not_told":
+        return (
+            f"In {len(own)} of {count(every, 'profile')} markers tell nothing of stiffness: "
+            f"whatever was tried fits as well ({_places(own)})."
+        )
+    ends = []
+    for row in own.to_dict("records"):
+        low, high = (number(row[end], 2) if pd.notna(row[end]) else "" for end in ("low", "high"))
+        between = (
+            f"{low} to {high}" if low and high else f"below {high}" if high else f"above {low}"
+        )
+        ends.append(f"{_place(row)} {between} times generic")
     told = listed(ends, _MOST_PLACES)
-    return f"Markers tell stiffness between two ends (95 %): {told}. {_THIS_MODEL}"
-
-
-def _one_sided(own: pd.DataFrame, rows: pd.DataFrame) -> str:
-    ends = [f"{_place(row)} {_only(row)} times generic" for row in own.to_dict("records")]
+    if verdict == "told":
+        return f"Markers tell stiffness between two ends (95 %): {told}. {_THIS_MODEL}"
     return (
         f"Markers tell one end of stiffness alone, so they do not tell how stiff it is (95 %): "
-        f"{listed(ends, _MOST_PLACES)}. {_THIS_MODEL}"
+        f"{told}. {_THIS_MODEL}"
     )
-
-
-def _only(row: Row) -> str:
-    if pd.notna(row["high"]):
-        return f"below {number(row['high'], 2)}"
-    return f"above {number(row['low'], 2)}"
-
-
-def _not_told(own: pd.DataFrame, rows: pd.DataFrame) -> str:
-    return (
-        f"In {len(own)} of {count(len(rows), 'profile')} markers tell nothing of stiffness: "
-        f"whatever was tried fits as well ({_places(own)})."
-    )
-
-
-_SAY = {"told": _told, "one_sided": _one_sided, "not_told": _not_told}
 
 
 def _place(row: Row) -> str:
@@ -151,14 +141,15 @@ def calibrations(study: Tracking, cohort: Cohort, results: ResultTables) -> Iter
 
 def _worth(results: ResultTables) -> str:
     """Whether such a number is knowledge."""
-    sure, asked = closed(results)
+    sure, asked = closed_profiles(results)
     if not asked:
         return f"No profile says whether markers tell stiffness: each is {NOT_KNOWN}."
     if sure == asked:
         persons = set(results.table("stiffness")["specimen"].astype(str))
-        others = len(persons - set(profiled(results)))
+        asked_of = persons_with_profiles(results)
+        others = len(persons - set(asked_of))
         more = f"; of {count(others, 'other person')} it was not asked" if others else ""
-        return f"All profiles of {listed(profiled(results))} are closed at both ends{more}."
+        return f"All profiles of {listed(asked_of)} are closed at both ends{more}."
     if not sure:
         return f"No profile is closed at both ends: each is {NOT_KNOWN}."
     return (
@@ -188,24 +179,22 @@ def weights(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[
     if rows.empty:
         return
     for trial, own in rows.groupby("trial", sort=False, observed=True):
-        best = {
-            name: own.iloc[int(np.nanargmin(own[column].to_numpy(float)))]
-            for name, column in (("centres", "centre_mm"), ("sagittal angles", "angle_deg"))
-            if own[column].notna().any()
-        }
+        measures = (("centres", "centre_mm"), ("sagittal angles", "angle_deg"))
+        best = [_best(*one, own) for one in measures if own[one[1]].notna().any()]
         if best:
             yield (
                 f"{capital(plain(str(trial)))} of {own['specimen'].iloc[0]}, weight of loads: "
-                f"{'; '.join(_best(name, row, own) for name, row in best.items())}."
+                f"{'; '.join(best)}."
             )
 
 
-def _best(name: str, row: "pd.Series[Any]", own: pd.DataFrame) -> str:
-    column = "centre_mm" if name == "centres" else "angle_deg"
+def _best(name: str, column: str, own: pd.DataFrame) -> str:
+    """The weight of the least error, and whether it is an end of what was tried."""
+    row = own.iloc[int(np.nanargmin(own[column].to_numpy(float)))]
     ratio = float(row["ratio"])
     ends = (float(own["ratio"].min()), float(own["ratio"].max()))
     edge = ", an end of what was tried" if ratio in ends else ""
     at_one = own.loc[own["ratio"] == 1.0, column].dropna()
-    now = f" (now {sized(float(at_one.iloc[0]), column)})" if len(at_one) else ""
-    least = sized(float(row[column]), column)
+    now = f" (now {error_text(float(at_one.iloc[0]), column)})" if len(at_one) else ""
+    least = error_text(float(row[column]), column)
     return f"errors of {name} are least, {least}{now}, at {tick(ratio)} times the study's{edge}"

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
@@ -11,21 +12,16 @@ from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
-from spinepipe.studies.tracking.approaches_of_trials import calibrated_in, tried
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
-from spinepipe.studies.tracking.extra_inputs import (
-    marks_of_export,
-    marks_of_motion,
-    marks_of_tracking,
-)
-from spinepipe.studies.tracking.forms import FORMS
+from spinepipe.studies.tracking.persons import motion_digests
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS, profiled_persons
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.trials import FORMS, approaches_on_trials, calibration_of
 
 _ANALYSES = (
     Job("ranges", "", ("tracked",), ("ranges",)),
     Job("sharing", "", ("tracked",), ("sharing",)),
-    Job("similarity", "", ("tracked",), ("similarity",)),
+    Job("similarity", "sharing:similarity", ("tracked",), ("similarity",)),
     Job("errors", "", ("tracked", "sizes"), ("errors",)),
     Job("accuracy", "", ("errors",), ("accuracy",)),
     Job(
@@ -48,6 +44,13 @@ FULL = ("weights",)
 """Motions anew with loads counting more and less."""
 
 
+def _figure(
+    name: str, title: str, *reads: str, file: str = "", also: tuple[str, ...] = ()
+) -> Figure:
+    """A figure whose function has its name, in the file of its name or another."""
+    return Figure(name, title, f"figures.{file or name}:{name}_figure", reads, also)
+
+
 @dataclass(frozen=True)
 class TrackingFiles(StudyFiles):
     """The result files of one study of tracked motions.
@@ -60,43 +63,20 @@ class TrackingFiles(StudyFiles):
     full = FULL
     joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, *_OF_RECORDINGS, "weights")
     drawings = (
-        Figure(
-            "error_by_level",
-            "How far vertebrae are from the truth",
-            "figures.error_by_level:error_by_level_figure",
-            ("errors",),
+        _figure("error_by_level", "How far vertebrae are from the truth", "errors"),
+        _figure("kinematics", "How lumbar joints turn", "tracked"),
+        _figure("motion_sharing", "How lumbar joints share a motion", "sharing"),
+        _figure(
+            *("stiffness_profiles", "Whether markers tell stiffness"),
+            *("profile_points", "profiles"),
+            file="stiffness",
         ),
-        Figure(
-            "kinematics",
-            "How lumbar joints turn",
-            "figures.kinematics:kinematics_figure",
-            ("tracked",),
+        _figure(
+            *("stiffness_by_level", "What calibration makes of stiffness", "stiffness"),
+            file="stiffness",
+            also=("profiles",),
         ),
-        Figure(
-            "motion_sharing",
-            "How lumbar joints share a motion",
-            "figures.motion_sharing:motion_sharing_figure",
-            ("sharing",),
-        ),
-        Figure(
-            "stiffness_profiles",
-            "Whether markers tell stiffness",
-            "figures.stiffness_profiles:stiffness_profiles_figure",
-            ("profile_points", "profiles"),
-        ),
-        Figure(
-            "stiffness_by_level",
-            "What calibration makes of stiffness",
-            "figures.stiffness_by_level:stiffness_by_level_figure",
-            ("stiffness",),
-            ("profiles",),
-        ),
-        Figure(
-            "trade_off",
-            "Markers against loads",
-            "figures.trade_off:trade_off_figure",
-            ("weights",),
-        ),
+        _figure("trade_off", "Markers against loads", "weights"),
     )
 
     study: Tracking
@@ -107,9 +87,9 @@ class TrackingFiles(StudyFiles):
         """The files of a study of a cohort."""
         names = cohort.specimen_names
         taken: dict[tuple[str, str, str], str | None] = {
-            (name, trial, approach): calibrated_in(cohort, name, trial, approach)
+            (name, trial, approach): calibration_of(cohort, name, trial, approach)
             for name in names
-            for trial, approach in tried(study, cohort, name)
+            for trial, approach in approaches_on_trials(study, cohort, name)
         }
         return cls(study, names, taken)
 
@@ -181,6 +161,25 @@ class TrackingFiles(StudyFiles):
             yield ""
 
 
+def _digests_of_motion(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Of the recorded motion of a person, as declared jobs are asked for it."""
+    return motion_digests(expected.cohort, place["specimen"])
+
+
+def _digests_of_tracking(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Of motion, and of the calibration that the approach takes over."""
+    found = _digests_of_motion(expected, place)
+    law = calibration_of(expected.cohort, place["specimen"], place["trial"], place["approach"])
+    if law is None:
+        return found
+    return [*found, expected.of_job("calibrate", {"specimen": place["specimen"], "law": law})]
+
+
+def _digests_of_export(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """Of the tracked motion that is written for another program."""
+    return [expected.of_job("track", place)]
+
+
 _COUNTED = ignoring("approaches", "profiles", "trade_off", "drawn_approaches")
 _ASKED = tuple(
     name for name in Tracking.model_fields if name not in {*Study.model_fields, "kind", "scaling"}
@@ -195,30 +194,30 @@ KIND = Kind(
     checks_at_start=(check_recordings,),
     tables=all_declared(__file__),
     jobs=(
-        Job("calibrate", ignores=_COUNTED, also=marks_of_motion),
+        Job("calibrate", ignores=_COUNTED, also=_digests_of_motion),
         Job(
             "track",
             many=True,
             ignores=ignoring("approaches", "profiles", "trade_off"),
-            also=marks_of_tracking,
+            also=_digests_of_tracking,
         ),
         Job(
             "profile",
             ignores=ignoring("approaches", "trade_off", "drawn_approaches", "intervals"),
-            also=marks_of_motion,
+            also=_digests_of_motion,
         ),
         Job(
             "weigh",
             ignores=ignoring("approaches", "profiles", "drawn_approaches"),
-            also=marks_of_motion,
+            also=_digests_of_motion,
         ),
-        Job("examine", ignores=ignoring(*_ASKED, "scaling"), also=marks_of_motion),
+        Job("examine", ignores=ignoring(*_ASKED, "scaling"), also=_digests_of_motion),
         Job(
             "skeleton",
             "opensim:skeleton",
             ignores=ignoring(*_ASKED),
             makes=("opensim/{specimen}.osim",),
-            also=marks_of_motion,
+            also=_digests_of_motion,
         ),
         Job(
             "motion",
@@ -226,7 +225,7 @@ KIND = Kind(
             many=True,
             ignores=ignoring(*_ASKED, "scaling"),
             makes=("opensim/{specimen}/{trial}/{approach}.mot",),
-            also=marks_of_export,
+            also=_digests_of_export,
         ),
         *_ANALYSES,
     ),

@@ -11,14 +11,13 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import KEY, write_marked
-from spinepipe.motion.export import mot, osim, usable
+from spinepipe.motion.export import mot, opensim_names, osim
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.studies.exports import refuse
 from spinepipe.studies.kind import WantedFiles
-from spinepipe.studies.tracking.extra_inputs import marks_of
-from spinepipe.studies.tracking.persons import TrackedPerson, person_of
-from spinepipe.studies.tracking.reload_motions import motions
+from spinepipe.studies.tracking.persons import TrackedPerson, motion_digests, person_of
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.tracked_motions import motions
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
 
@@ -27,7 +26,7 @@ def skeleton(root: str, study: str, specimen: str, output: str) -> None:
     """Write the model of a person."""
     settings, cohort = study_of_kind(Tracking, root, study)
     person = person_of(cohort, specimen, cohort.folder, settings.scaling)
-    made_by = provenance("skeleton", settings, cohort, [specimen], marks_of(cohort, specimen))
+    made_by = provenance("skeleton", settings, cohort, [specimen], motion_digests(cohort, specimen))
     write_marked(document(person), output, made_by[KEY])
 
 
@@ -37,21 +36,17 @@ def motion(
     """Write the motion of a tracked file; without frames where the fit found no posture."""
     settings, cohort = study_of_kind(Tracking, root, study)
     made_by = provenance("motion", settings, cohort, [specimen], [mark_of(tracked)])
-    name = "_".join(usable((specimen, trial, approach)))
-    write_marked(motion_text(name, tracked), output, made_by[KEY])
-
-
-def motion_text(name: str, tracked: str) -> str:
-    """OpenSim's motion file of a file of table `tracked` that holds one motion."""
-    for moved in motions(read_frame(tracked)):
-        return mot(name, moved.time_s, moved.q)
-    return mot(name, np.zeros(0), np.zeros((0, len(BODIES), len(COORDINATES))))
+    name = "_".join(opensim_names((specimen, trial, approach)))
+    time_s, q = np.zeros(0), np.zeros((0, len(BODIES), len(COORDINATES)))
+    for one in motions(read_frame(tracked)):
+        time_s, q = one.time_s, one.q
+    write_marked(mot(name, time_s, q), output, made_by[KEY])
 
 
 def document(person: TrackedPerson) -> str:
     """OpenSim's model of a person."""
-    markers = replace(person.markers, names=usable(person.markers.names))
-    (name,) = usable((person.name,))
+    markers = replace(person.markers, names=opensim_names(person.markers.names))
+    (name,) = opensim_names((person.name,))
     return osim(person.skeleton, markers, name)
 
 

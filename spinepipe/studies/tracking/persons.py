@@ -1,13 +1,14 @@
 """From a cohort to persons: skeleton, markers, trials, and what the study takes for their joints.
 
-Bodies are slices of the trunk, without head and arms; `carrying` hangs those on T1 as a trial has
-them. Where `bodies.csv` tells nothing of a body, its mass is that of Pearsall's slices (pelvis: de
-Leva's lower trunk), where it tells no inertia, that of an elliptic cylinder of the mass. A cohort
-without `bodies.csv` says `gravity: false`, which here is about the file alone: persons have weight.
+Bodies are slices of the trunk, without head and arms; `skeleton_in_trial` hangs those on T1. Where
+`bodies.csv` tells nothing of a body, its mass is that of Pearsall's slices (pelvis: de Leva's lower
+trunk), where it tells no inertia, that of an elliptic cylinder of the mass. A cohort without
+`bodies.csv` says `gravity: false`, which here is about the file alone: persons have weight.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +20,12 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.motion import bounds as ranges
-from spinepipe.motion import passive_elements as laws
-from spinepipe.motion import ratios
-from spinepipe.motion.bounds import Bounds
-from spinepipe.motion.head_and_arms import ARMS, hung
-from spinepipe.motion.passive_elements import PassiveElements
-from spinepipe.motion.ratios import RatioSet
+from spinepipe.motion.body_segments import ARMS, slice_inertias, with_head_and_arms
+from spinepipe.motion.joint_tables import bounds, ratio_sets
+from spinepipe.motion.passive import PassiveElements, passive_elements
 from spinepipe.motion.reading import DEFAULT_AXES, NoFrameError, read_motion
-from spinepipe.motion.recorded import Recorded
-from spinepipe.motion.scaling import by_body, scaled
+from spinepipe.motion.recording import MarkerRecording
+from spinepipe.motion.scaling import ScalingFit, body_factors, fit_scaling, scale_skeleton
 from spinepipe.motion.skeleton import (
     BODIES,
     PELVIS,
@@ -38,14 +35,21 @@ from spinepipe.motion.skeleton import (
     Skeleton,
     skeleton_of,
 )
-from spinepipe.motion.slices import slice_inertias
 from spinepipe.muscles.masses import ahead_cm, slice_percents
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.tracking.forms import BOUNDS, PASSIVE, RATIOS, STANCE, TRIALS
-from spinepipe.studies.tracking.scaled_persons import ScaledPerson, sized_by
 from spinepipe.studies.tracking.settings import Scaling
+from spinepipe.studies.tracking.tables import NO_STATIC, NOT_TOLD, TOLD
+from spinepipe.studies.tracking.trials import (
+    BOUNDS,
+    CENTRES,
+    MARKER_SET,
+    PASSIVE,
+    RATIOS,
+    STANCE,
+    TRIALS,
+)
 from spinepipe.units import MM_PER_M
 
 PELVIS_BELOW_M = 0.05
@@ -56,6 +60,7 @@ _POINT = ["x_mm", "y_mm", "z_mm"]
 _COM = [f"com_{name}" for name in _POINT]
 _INERTIA = [f"i{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
 
+AS_IT_IS = "the cohort's skeleton is taken as it is"
 
 Row = Mapping[Any, Any]
 """Cells of a row by their columns."""
@@ -70,7 +75,7 @@ class TrackedPerson:
     name : of the specimen. subject : sex, age, height and mass.
     skeleton : slices of the trunk, without head and arms. markers : of the person's set.
     trials : in the order of the file, markers in the order of the set.
-    passive, limits : what comes along, the cohort's own rows in place.
+    passive, limits : what comes along, the cohort's own rows in place; limits (17, 6, 2) m and rad.
     centres : (18, 3) m, the point of each body that counts as its centre, in its frame.
     static : name of the trial that tells how the person stands; None without one.
     """
@@ -81,9 +86,24 @@ class TrackedPerson:
     markers: MarkerSet
     trials: tuple[MarkerTrial, ...]
     passive: PassiveElements
-    limits: Bounds
+    limits: Array
     centres: Array
     static: str | None
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledPerson:
+    """What markers say of the size.
+
+    Attributes
+    ----------
+    fit : factors and what they leave; None where markers do not tell the size, status and message
+        say why.
+    """
+
+    fit: ScalingFit | None
+    status: str
+    message: str = ""
 
 
 def person_of(
@@ -102,55 +122,54 @@ def person_of(
     InputError
         Of motion that cannot be read, and of joint tables that are unsound.
     """
-    told = _as_told(cohort, specimen, folder)
-    fit = size_of(told).fit if scaling == "markers" else None
-    return told if fit is None else as_large(told, fit.factors)
-
-
-def size_of(person: TrackedPerson) -> ScaledPerson:
-    """How large a person is beside the skeleton, by the static trial."""
-    trial = next((trial for trial in person.trials if trial.name == person.static), None)
-    return sized_by(person.skeleton, person.markers, trial)
-
-
-def as_large(person: TrackedPerson, factors: Array) -> TrackedPerson:
-    """A person, parts (3,) of the skeleton so many times as large; what bodies weigh stays."""
-    kg = float(person.skeleton.masses.kg.sum())
-    skeleton, markers = scaled(person.skeleton, person.markers, factors, kg)
-    centres = by_body(factors)[:, None] * person.centres
-    return replace(person, skeleton=skeleton, markers=markers, centres=centres)
-
-
-def _as_told(cohort: Cohort, specimen: str, folder: Path) -> TrackedPerson:
-    """The same as large as the cohort has it."""
-    subject = subject_of(cohort, specimen)
+    subject, markers = subject_of(cohort, specimen), marker_set(cohort, specimen)
     skeleton = skeleton_in(cohort, specimen, subject)
-    markers = marker_set(cohort, specimen)
-    return TrackedPerson(
+    person = TrackedPerson(
         specimen,
         subject,
         skeleton,
         markers,
         tuple(
-            trial_of(row, markers, recording(row, cohort.name, folder))
+            trial_of(row, markers, read_recording(row, cohort.name, folder))
             for row in trial_rows(cohort, specimen)
         ),
-        laws.passive_elements(cohort.further.get(PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}"),
-        ranges.bounds(cohort.further.get(BOUNDS.stem)),
+        passive_elements(cohort.further.get(PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}"),
+        bounds(cohort.further.get(BOUNDS.stem)),
         centres_of(cohort, specimen, skeleton),
         static_trial(cohort, specimen),
     )
+    fit = size_of(person).fit if scaling == "markers" else None
+    if fit is None:
+        return person
+    # parts of the skeleton as large as markers say; what bodies weigh together stays
+    kg = float(skeleton.masses.kg.sum())
+    skeleton, markers = scale_skeleton(skeleton, markers, fit.factors, kg)
+    centres = body_factors(fit.factors)[:, None] * person.centres
+    return replace(person, skeleton=skeleton, markers=markers, centres=centres)
 
 
-def carrying(person: TrackedPerson, trial: MarkerTrial) -> Skeleton:
+def size_of(person: TrackedPerson) -> ScaledPerson:
+    """How large a person is beside the skeleton, by the static trial."""
+    static = next((trial for trial in person.trials if trial.name == person.static), None)
+    if static is None:
+        return ScaledPerson(None, NO_STATIC, f"no trial tells the size; {AS_IT_IS}")
+    try:
+        return ScaledPerson(fit_scaling(person.skeleton, person.markers, static), TOLD)
+    except ValueError as why:
+        return ScaledPerson(None, NOT_TOLD, f"{why}; {AS_IT_IS}")
+
+
+def skeleton_in_trial(person: TrackedPerson, trial: MarkerTrial) -> Skeleton:
     """The skeleton, head and arms hung on T1 where the trial has them."""
     arms = next(name for name in ARMS if name == trial.arms)
-    return Skeleton(person.skeleton.steps, hung(person.skeleton, arms, person.subject))
+    return Skeleton(
+        person.skeleton.steps, with_head_and_arms(person.skeleton, arms, person.subject)
+    )
 
 
-def ratio_sets(cohort: Cohort) -> Mapping[str, RatioSet]:
+def ratios_of(cohort: Cohort) -> Mapping[str, Array]:
     """Sets of ratios that come along, and the cohort's own."""
-    return ratios.ratio_sets(cohort.further.get(RATIOS.stem), f"{cohort.name}/{RATIOS.file}")
+    return ratio_sets(cohort.further.get(RATIOS.stem), f"{cohort.name}/{RATIOS.file}")
 
 
 def of_specimen(table: pd.DataFrame, specimen: str) -> pd.DataFrame:
@@ -160,26 +179,31 @@ def of_specimen(table: pd.DataFrame, specimen: str) -> pd.DataFrame:
 
 def trial_rows(cohort: Cohort, specimen: str) -> tuple[Row, ...]:
     """Rows of `trials.csv`, with the line of each as `line`."""
-    rows = of_specimen(cohort.further["trials"], specimen)
+    rows = of_specimen(cohort.further[TRIALS.stem], specimen)
     return tuple(rows.assign(line=rows.index).to_dict("records"))
 
 
 def motion_files(cohort: Cohort, specimen: str) -> tuple[Path, ...]:
     """Files of motion of a person, each once: what a job of the person reads besides tables."""
-    names = of_specimen(cohort.further["trials"], specimen)["file"]
+    names = of_specimen(cohort.further[TRIALS.stem], specimen)["file"]
     return tuple(cohort.folder / name for name in dict.fromkeys(names))
+
+
+def motion_digests(cohort: Cohort, specimen: str) -> list[str]:
+    """Digests of the files of motion of a person, on which results hang besides tables."""
+    return [sha256(path.read_bytes()).hexdigest() for path in motion_files(cohort, specimen)]
 
 
 def static_trial(cohort: Cohort, specimen: str) -> str | None:
     """Name of the trial that tells the size: the one marked static, else the first stance."""
-    rows = of_specimen(cohort.further["trials"], specimen)
+    rows = of_specimen(cohort.further[TRIALS.stem], specimen)
     for chosen in (rows["static"] == "yes", rows["kind"] == STANCE):
         if chosen.any():
             return str(rows["trial"][chosen].iloc[0])
     return None
 
 
-def recording(row: Row, cohort: str, folder: Path) -> Recorded:
+def read_recording(row: Row, cohort: str, folder: Path) -> MarkerRecording:
     """The motion that a row of `trials.csv` names, all markers of the file.
 
     Raises
@@ -201,8 +225,9 @@ def recording(row: Row, cohort: str, folder: Path) -> Recorded:
         raise InputError([InputProblem(*at, found, problem.allowed, problem.remedy)]) from error
 
 
-def trial_of(row: Row, markers: MarkerSet, recorded: Recorded) -> MarkerTrial:
+def trial_of(row: Row, markers: MarkerSet, recorded: MarkerRecording) -> MarkerTrial:
     """The trial of a row; markers of the set that the file lacks are never seen."""
+    # markers in the order of the set
     n = len(recorded.time_s)
     places, seen = np.zeros((n, len(markers), 3)), np.zeros((n, len(markers)), dtype=bool)
     for k, name in enumerate(markers.names):
@@ -215,7 +240,7 @@ def trial_of(row: Row, markers: MarkerSet, recorded: Recorded) -> MarkerTrial:
 
 def marker_set(cohort: Cohort, specimen: str) -> MarkerSet:
     """Markers of a person, in the order of the file."""
-    rows = of_specimen(cohort.further["marker_set"], specimen)
+    rows = of_specimen(cohort.further[MARKER_SET.stem], specimen)
     return MarkerSet(
         tuple(rows["marker"]),
         np.array([BODIES.index(name) for name in rows["vertebra"]], dtype=np.int64),
@@ -229,15 +254,19 @@ def skeleton_in(cohort: Cohort, specimen: str, subject: Subject) -> Skeleton:
     """Joints of the cohort, and bodies as slices of the trunk."""
     joints = joint_frames(cohort, specimen)
     frames = (Pose(np.eye(3), joints[0].origin), *joints)
-    kg, com = _usual(frames, subject)
+    kg, com = _usual_masses(frames, subject)
     about = np.full((len(BODIES), 3, 3), np.nan)
     if cohort.bodies is not None:
         for row in of_specimen(cohort.bodies, specimen).to_dict("records"):
             k = BODIES.index(row["vertebra"])
             turn = frames[k].rotation
             kg[k] = row["mass_kg"]
-            com[k] = turn.T @ (_numbers(row, _COM) / MM_PER_M - frames[k].origin)
-            about[k] = turn.T @ _symmetric(_numbers(row, _INERTIA)) @ turn
+            at = np.array([row[name] for name in _COM], dtype=float) / MM_PER_M
+            com[k] = turn.T @ (at - frames[k].origin)
+            xx, yy, zz, xy, xz, yz = (float(row[name]) for name in _INERTIA)
+            whole = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            about[k] = turn.T @ whole @ turn
+    # bodies.csv is in ground axes, seen from the body here; inertias that none tells are made up
     steps = skeleton_of(joints, Masses(kg.copy(), com.copy(), np.zeros_like(about))).steps
     told = np.isfinite(about).all(axis=(1, 2))[:, None, None]
     if not told.all():
@@ -245,35 +274,20 @@ def skeleton_in(cohort: Cohort, specimen: str, subject: Subject) -> Skeleton:
     return Skeleton(steps, Masses(kg, com, about))
 
 
-def _numbers(row: Row, names: list[str]) -> Array:
-    return np.array([row[name] for name in names], dtype=float)
-
-
-def _symmetric(six: Array) -> Array:
-    """(3, 3) of xx, yy, zz, xy, xz, yz."""
-    xx, yy, zz, xy, xz, yz = six
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _usual(frames: tuple[Pose, ...], subject: Subject) -> tuple[Array, Array]:
+def _usual_masses(frames: tuple[Pose, ...], subject: Subject) -> tuple[Array, Array]:
     """Masses (18,) and centres (18, 3) m in bodies, where a cohort tells none."""
     tall = subject.height_m / REFERENCE.height_m
     percents = (MASS_PERCENT[f"lower_trunk {subject.sex}"], *reversed(slice_percents()))
-    com = half_way(tuple(frame.origin for frame in frames[1:]))
+    # half way from each body's joint below to that above; T1, above which no joint is told, is as
+    # high as T2
+    joints = [frame.origin for frame in frames[1:]]
+    above = [*joints[1:], 2.0 * joints[-1] - joints[-2]]
+    middles = [(low + high) / 2.0 for low, high in zip(joints, above, strict=True)]
+    com = np.array([joints[0], *middles])
     com[PELVIS] = frames[PELVIS].origin - [0.0, tall * PELVIS_BELOW_M, 0.0]
     com[1:, 0] += tall * np.array(ahead_cm()[::-1]) / 100.0
     own = [frame.rotation.T @ (at - frame.origin) for frame, at in zip(frames, com, strict=True)]
     return np.array(percents) / 100.0 * subject.mass_kg, np.array(own)
-
-
-def half_way(joints: tuple[Array, ...]) -> Array:
-    """(18, 3) m in ground: half way from each body's joint below to that above.
-
-    T1, above which no joint is told, is as high as T2; the pelvis' own is L5S1.
-    """
-    above = (*joints[1:], 2.0 * joints[-1] - joints[-2])
-    middles = [(low + high) / 2.0 for low, high in zip(joints, above, strict=True)]
-    return np.array([joints[0], *middles])
 
 
 def centres_of(cohort: Cohort, specimen: str, skeleton: Skeleton) -> Array:
@@ -282,7 +296,7 @@ def centres_of(cohort: Cohort, specimen: str, skeleton: Skeleton) -> Array:
     found = np.zeros((len(BODIES), 3))
     found[1:-1] = [step.origin / 2.0 for step in steps[1:]]
     found[-1] = steps[-1].rotation.T @ found[-2]
-    table = cohort.further.get("centres")
+    table = cohort.further.get(CENTRES.stem)
     if table is not None:
         rows = of_specimen(table, specimen)
         places = [BODIES.index(name) for name in rows["vertebra"]]

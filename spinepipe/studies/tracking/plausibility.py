@@ -10,8 +10,8 @@ from spinepipe.plausibility.score import suspect, usual
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
 from spinepipe.problems import InputError
 from spinepipe.studies.implausible_subjects import subject_doubts
-from spinepipe.studies.tracking.forms import MARKER_SET, STANCE, TRIALS
-from spinepipe.studies.tracking.persons import recording, trial_rows
+from spinepipe.studies.tracking.persons import read_recording, trial_rows
+from spinepipe.studies.tracking.trials import MARKER_SET, STANCE, TRIALS
 
 MOST_BYTES = 5_000_000
 """Larger files of motion are read when the study starts, not by `check`."""
@@ -51,7 +51,7 @@ def _times(cohort: Cohort) -> Iterator[PlausibilityWarning]:
             if not path.is_file() or path.stat().st_size > MOST_BYTES:
                 continue
             try:
-                times = recording(row, cohort.name, cohort.folder).time_s
+                times = read_recording(row, cohort.name, cohort.folder).time_s
             except (InputError, ValueError):
                 continue  # told when the study is read
             if len(times) < 2:

@@ -14,15 +14,18 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.objective import Ask, Watched
+from spinepipe.motion.objective import MotionObjective, SampledTrial
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.trajectory import solve
-from spinepipe.studies.tracking.approaches import begun, fitting, seen_in
-from spinepipe.studies.tracking.approaches_of_trials import BOTH
-from spinepipe.studies.tracking.extra_inputs import marks_of
-from spinepipe.studies.tracking.persons import TrackedPerson, person_of
+from spinepipe.studies.tracking.approaches import (
+    calibration_objective,
+    first_guess,
+    sample_at_nodes,
+)
+from spinepipe.studies.tracking.persons import motion_digests, person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import LIMIT, PROFILE_POINTS, PROFILES
+from spinepipe.studies.tracking.trials import BOTH
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES
 
@@ -50,29 +53,22 @@ def run(
     """Write the rows of a region and coordinate, a file for each table."""
     settings, cohort = study_of_kind(Tracking, root, study)
     person = person_of(cohort, specimen, cohort.folder, settings.scaling)
-    made_by = provenance("profile", settings, cohort, [specimen], marks_of(cohort, specimen))
+    made_by = provenance("profile", settings, cohort, [specimen], motion_digests(cohort, specimen))
     known: Row = {"specimen": specimen, "region": region, "coordinate": coordinate}
     ratios = np.array(sorted(settings.profiles.ratios))
-    costs, message = _costs(settings, person, region, coordinate, ratios)
+    message, coarse = "", settings.model_copy(update={"intervals": settings.profiles.intervals})
+    ask = calibration_objective(coarse, person)
+    try:
+        seen = [sample_at_nodes(coarse, person, one) for one in person.trials if one.kind in BOTH]
+        costs = profile_costs(ask, seen, held_parameters(ask, region, coordinate), ratios)
+    except (ValueError, np.linalg.LinAlgError) as why:
+        costs, message = np.full(len(ratios), np.inf), str(why)
     points = [known | row for row in point_rows(ratios, costs)]
     write(from_rows(PROFILE_POINTS, points), profile_points, made_by)
     write(from_rows(PROFILES, [known | verdict(ratios, costs, message)]), profiles, made_by)
 
 
-def _costs(
-    settings: Tracking, person: TrackedPerson, region: str, coordinate: str, ratios: Array
-) -> tuple[Array, str]:
-    """(R,) least cost with each ratio, infinite where the fit did not settle."""
-    coarse = settings.model_copy(update={"intervals": settings.profiles.intervals})
-    ask = fitting(coarse, person)
-    try:
-        seen = [seen_in(coarse, person, one) for one in person.trials if one.kind in BOTH]
-        return profiled(ask, seen, held_in(ask, region, coordinate), ratios), ""
-    except (ValueError, np.linalg.LinAlgError) as why:
-        return np.full(len(ratios), np.inf), str(why)
-
-
-def held_in(ask: Ask, region: str, coordinate: str) -> Array:
+def held_parameters(ask: MotionObjective, region: str, coordinate: str) -> Array:
     """(P,) which parameters are held: the sizes of a region's elements."""
     wanted = np.zeros_like(ask.fitted)
     wanted[REGIONS[region], COORDINATES.index(coordinate)] = True
@@ -80,17 +76,23 @@ def held_in(ask: Ask, region: str, coordinate: str) -> Array:
     return np.concatenate([sizes, np.zeros_like(sizes)])
 
 
-def profiled(ask: Ask, seen: Sequence[Watched], held: Array, ratios: Array) -> Array:
-    """(R,) least costs; each fit begins where that of the ratio next to it, nearer to 1, ended."""
+def profile_costs(
+    ask: MotionObjective, seen: Sequence[SampledTrial], held: Array, ratios: Array
+) -> Array:
+    """(R,) least costs, infinite where a fit did not settle.
+
+    Each fit begins where that of the ratio next to it, nearer to 1, ended.
+    """
     found = np.full(len(ratios), np.inf)
     middle = int(np.argmin(np.abs(np.log(ratios))))
-    known = [begun(ask, one) for one in seen]
+    known = [first_guess(ask, one) for one in seen]
     seen, begin = [one for one, _ in known], [start for _, start in known]
     first = begin, np.zeros(ask.parameters)
     # from the middle upwards, then from where the middle ended downwards
     for order in (range(middle, len(ratios)), range(middle - 1, -1, -1)):
         starts, parameters = first
         for k in order:
+            # parameters are logarithms over the generic elements: those held are the ratio's own
             parameters = np.where(held, np.log(ratios[k]), parameters)
             solved = solve(ask, seen, starts, parameters, held)
             if not solved.status.usable:
@@ -98,8 +100,9 @@ def profiled(ask: Ask, seen: Sequence[Watched], held: Array, ratios: Array) -> A
             starts, parameters = list(solved.coefficients), solved.parameters
             if k == middle:
                 first = starts, parameters
+            # the prior of what is held does not count, else it would close what markers leave open
             prior = float(np.sum((parameters[held] / ask.sizes.size) ** 2))
-            found[k] = solved.costs.total - prior
+            found[k] = solved.cost - prior
     return found
 
 
@@ -125,8 +128,8 @@ def verdict(ratios: Array, costs: Array, message: str = "") -> Row:
     """
     settled = np.isfinite(costs)
     if not settled.any():
-        text = message or "no fit settled"
-        return _told(None, None, None, text)
+        return _verdict_row(None, None, None, message or "no fit settled")
+    # costs are sums of squares over variance: twice the fall of the log likelihood
     at, over = np.log(ratios[settled]), costs[settled] - costs[settled].min()
     best = int(np.argmin(over))
     lost = int((~settled).sum())
@@ -134,9 +137,9 @@ def verdict(ratios: Array, costs: Array, message: str = "") -> Row:
     if best in (0, len(at) - 1):
         edge = "softest" if best == 0 else "stiffest"
         falls = f"the cost falls to the end of what was tried, the {edge}"
-        return _told(float(np.exp(at[best])), None, None, f"{falls}; {text}".strip("; "))
+        return _verdict_row(float(np.exp(at[best])), None, None, f"{falls}; {text}".strip("; "))
     low, high = _crossing(at, over, -1), _crossing(at, over, 1)
-    return _told(float(np.exp(at[best])), low, high, text)
+    return _verdict_row(float(np.exp(at[best])), low, high, text)
 
 
 def _crossing(at: Array, over: Array, way: int) -> float | None:
@@ -150,7 +153,7 @@ def _crossing(at: Array, over: Array, way: int) -> float | None:
     return float(np.exp(at[edge] + share * (at[beyond] - at[edge])))
 
 
-def _told(best: float | None, low: float | None, high: float | None, message: str) -> Row:
+def _verdict_row(best: float | None, low: float | None, high: float | None, message: str) -> Row:
     closed = (low is not None) + (high is not None)
     return {
         "best_ratio": best,

@@ -9,9 +9,9 @@ import pandas as pd
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.skeleton import JOINTS, PELVIS
-from spinepipe.studies.tracking.reload_motions import motions
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import RANGES
+from spinepipe.studies.tracking.tracked_motions import motions
 from spinepipe.tables import from_rows, read_frames, write
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, DISPLAY_PER_SI
 
@@ -25,18 +25,12 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 
 def range_rows(tracked: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """Rows by motion, joint and coordinate; one frame has no range, and the pelvis is no joint."""
-    for moved in motions(tracked):
-        if len(moved.q) < 2:
+    for motion in motions(tracked):
+        if len(motion.q) < 2:
             continue
-        reach = np.ptp(moved.q[:, PELVIS + 1 :], axis=0) * DISPLAY_PER_SI
+        reach = np.ptp(motion.q[:, PELVIS + 1 :], axis=0) * DISPLAY_PER_SI
         for joint, of_joint in zip(JOINTS, reach.tolist(), strict=True):
             for coordinate, value in zip(COORDINATES, of_joint, strict=True):
-                yield {
-                    "specimen": moved.specimen,
-                    "trial": moved.trial,
-                    "approach": moved.approach,
-                    "joint": joint,
-                    "coordinate": coordinate,
-                    "range": value,
-                    "unit": COORDINATE_UNITS[coordinate],
-                }
+                unit = COORDINATE_UNITS[coordinate]
+                place = {"joint": joint, "coordinate": coordinate}
+                yield motion.names | place | {"range": value, "unit": unit}

@@ -10,10 +10,10 @@ from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
 
 CONSTRAINED = "ik_constrained_"
+"""What the names of approaches with ratios begin with; the rest names the set."""
 
 OWN = "optk_calibrated"
 """The approach that calibrates passive elements on the motion itself."""
-"""What the names of approaches with ratios begin with; the rest names the set."""
 
 APPROACHES = (
     "ik",

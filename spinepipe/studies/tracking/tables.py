@@ -42,6 +42,9 @@ WINDOWS = {
 }
 """Parts of a motion's cycle in which sharing is looked at (Wang 2021)."""
 
+INSTANTS = 101
+"""Of a motion's cycle, one per percent, ends included."""
+
 MEASURES = {
     "centre_mm": ("mm", "vertebral centres"),
     "angle_deg": ("deg", "sagittal angles"),

@@ -9,15 +9,18 @@ import numpy as np
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.skeleton import MarkerTrial
-from spinepipe.studies.tracking.approaches import ApproachMotion, asked_of, found_by, seen_in
-from spinepipe.studies.tracking.error_metrics import Bones, errors_of
-from spinepipe.studies.tracking.extra_inputs import marks_of
-from spinepipe.studies.tracking.persons import TrackedPerson, person_of
-from spinepipe.studies.tracking.reload_motions import ReloadedMotions
-from spinepipe.studies.tracking.rows import Row, failed_row, fit_row
+from spinepipe.studies.tracking.approaches import (
+    ApproachMotion,
+    find_motion,
+    objective_of,
+    sample_at_nodes,
+)
+from spinepipe.studies.tracking.error_metrics import Truth, errors_of, truths
+from spinepipe.studies.tracking.fit_rows import Row, failed_row, fit_row
+from spinepipe.studies.tracking.persons import TrackedPerson, motion_digests, person_of
 from spinepipe.studies.tracking.settings import Approach, Tracking
 from spinepipe.studies.tracking.tables import WEIGHTS
-from spinepipe.studies.tracking.truth import Truth, truths
+from spinepipe.studies.tracking.tracked_motions import TrackedMotion
 from spinepipe.tables import from_rows, write
 
 APPROACH: Approach = "optk_generic"
@@ -36,22 +39,24 @@ def run(root: str, study: str, specimen: str, output: str) -> None:
     rows = [
         {"specimen": specimen, "trial": trial.name} | row
         for trial in person.trials
-        for row in weighed(settings, person, trial, known.get(trial.name))
+        for row in weight_rows(settings, person, trial, known.get(trial.name))
     ]
-    made_by = provenance("weigh", settings, cohort, [specimen], marks_of(cohort, specimen))
+    made_by = provenance("weigh", settings, cohort, [specimen], motion_digests(cohort, specimen))
     write(from_rows(WEIGHTS, rows), output, made_by)
 
 
-def weighed(
+def weight_rows(
     settings: Tracking, person: TrackedPerson, trial: MarkerTrial, truth: Truth | None
 ) -> Iterator[Row]:
     """Rows of a trial by ratio."""
-    seen, ask = seen_in(settings, person, trial), asked_of(settings, person, APPROACH)
+    seen = sample_at_nodes(settings, person, trial)
+    ask = objective_of(settings, person, APPROACH)
+    # loads count so many times as much as the study has them, all else stays
     for ratio in sorted(settings.trade_off):
         heavier = replace(ask, sizes=replace(ask.sizes, loads=ratio * ask.sizes.loads))
         begun = time.process_time()
         try:
-            found = found_by(APPROACH, heavier, seen, {})
+            found = find_motion(APPROACH, heavier, seen, {})
             fit = fit_row(settings, found, time.process_time() - begun)
             off = _errors(person, trial.name, found, truth)
         except (ValueError, np.linalg.LinAlgError) as why:
@@ -67,8 +72,8 @@ def _errors(
     sizes: dict[str, float | None] = dict.fromkeys(MEASURED)
     if truth is None:
         return sizes
-    moved = ReloadedMotions(person.name, trial, APPROACH, found.watched.grid.times_s, found.q)
-    for off in errors_of(moved, truth, Bones(person.skeleton, person.centres)):
-        if off.measure in MEASURED and off.told.any():
-            sizes[off.measure] = float(off.size[off.told].mean())
+    motion = TrackedMotion(person.name, trial, APPROACH, found.watched.grid.times_s, found.q)
+    for off in errors_of(motion, truth, person.skeleton, person.centres):
+        if off.measure in MEASURED and off.known.any():
+            sizes[off.measure] = float(off.size[off.known].mean())
     return sizes

@@ -6,7 +6,7 @@ from spinepipe.report.words import capital, number, plain
 from spinepipe.studies.tracking.settings import APPROACHES, CONSTRAINED
 from spinepipe.studies.tracking.tables import MEASURES
 
-IN_WORDS = {
+SHORT = {
     "ik": "inverse kinematics",
     "ik_smooth": "smooth, no dynamics",
     "ik_springs": "springs, frame by frame",
@@ -21,7 +21,7 @@ IN_WORDS = {
 }
 """Approaches, short enough to stand beside an axis."""
 
-TOLD = {
+PHRASES = {
     "ik": "inverse kinematics",
     "ik_smooth": "smooth curves without dynamics",
     "ik_springs": "inverse kinematics with springs",
@@ -58,17 +58,17 @@ def short_of(approach: str) -> str:
     """An approach beside an axis."""
     if approach.startswith(CONSTRAINED):
         return f"ratios of {_ratios(approach)}"
-    return IN_WORDS.get(approach, plain(approach))
+    return SHORT.get(approach, plain(approach))
 
 
-def told(approach: str) -> str:
+def phrase(approach: str) -> str:
     """An approach inside a sentence."""
     if approach.startswith(CONSTRAINED):
         return f"inverse kinematics with the ratios of {_ratios(approach)}"
-    return TOLD.get(approach, plain(approach))
+    return PHRASES.get(approach, plain(approach))
 
 
-def in_order(approaches: Iterable[str]) -> list[str]:
+def sort_approaches(approaches: Iterable[str]) -> list[str]:
     """Approaches in the order of the settings; a cohort's own ratios follow the others."""
     place = {name: k for k, name in enumerate(APPROACHES)}
     last = max(k for k, name in enumerate(APPROACHES) if name.startswith(CONSTRAINED))
@@ -77,7 +77,7 @@ def in_order(approaches: Iterable[str]) -> list[str]:
     )
 
 
-def sized(value: float, measure: str) -> str:
+def error_text(value: float, measure: str) -> str:
     """An error with its unit."""
     unit = MEASURES[measure][0]
     return f"{number(value)}{'°' if unit == 'deg' else ' mm'}"

@@ -10,10 +10,10 @@ from tracked_study import Run
 
 from spinepipe.cli import main
 from spinepipe.marks import read_mark
-from spinepipe.motion.export import COLUMNS, usable
+from spinepipe.motion.export import COLUMNS, opensim_names
 from spinepipe.motion.points import marker_places
 from spinepipe.studies.tracking.persons import person_of
-from spinepipe.studies.tracking.reload_motions import motions
+from spinepipe.studies.tracking.tracked_motions import motions
 from spinepipe.tables import read_frame
 from tests.reference.peers import opensim_motion as peer
 
@@ -61,7 +61,7 @@ def test_opensim_replays_the_motions_of_a_study(run: Run) -> None:
     cohort = run.expected.cohort
     person = person_of(cohort, "a", cohort.folder, "markers")
     names = [model.model.getMarkerSet().get(k).getName() for k in range(len(person.markers))]
-    assert tuple(names) == usable(person.markers.names)
+    assert tuple(names) == opensim_names(person.markers.names)
     assert "SA_CR" in names
     for place, file in run.jobs_of("tracked"):
         (moved,) = motions(read_frame(file))
@@ -90,4 +90,11 @@ def test_the_command_writes_the_same_model(
 
 
 def test_names_are_told_apart() -> None:
-    assert usable(("a b", "a_b", "a:b", "c", "", "ä")) == ("a_b_2", "a_b", "a_b_3", "c", "_", "__2")
+    assert opensim_names(("a b", "a_b", "a:b", "c", "", "ä")) == (
+        "a_b_2",
+        "a_b",
+        "a_b_3",
+        "c",
+        "_",
+        "__2",
+    )

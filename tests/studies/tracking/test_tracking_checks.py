@@ -1,24 +1,24 @@
 """Whatever is wrong with tracked persons is told with file, row or marker, found and remedy."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from cohort_cases import Change, Files, add, both, cell, line, swap, text, without
 from pydantic import ValidationError
-from tracked_cohort import BODIES, NAME, RATE, Motion, Spoil, write
+from tracked_cohort import NAME, RATE, Motion, Spoil, write
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
-from spinepipe.studies.tracking.forms import FORMS
+from spinepipe.studies.tracking.examine import repairs_of, warnings_of
 from spinepipe.studies.tracking.persons import person_of
-from spinepipe.studies.tracking.remarks import Remark, repairs_of, warnings_of
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.trials import FORMS
 
 DOCUMENT = YamlDocument("s.yaml", {}, {})
 TRIALS, MARKERS, PEOPLE = "trials.csv", "marker_set.csv", "subjects.csv"
@@ -60,28 +60,16 @@ def test_a_sound_cohort_has_no_problem(tmp_path: Path) -> None:
     assert told(tmp_path) == []
 
 
-@dataclass(frozen=True)
-class Case:
-    """One fault of a table, where it is told, what of it, and a piece of the remedy."""
-
-    about: str
-    change: Change
-    file: str
-    row: int | None
-    column: str | None
-    found: str
-    remedy: str
-
-
 def trial(column: str, new: str, row: int = FLEXION) -> Change:
     return cell(TRIALS, row, column, new)
 
 
-TABLES = [
-    Case("no trials", without(TRIALS), "s.yaml", None, "cohort", "without trials.csv", "add"),
-    Case("no set", without(MARKERS), "s.yaml", None, "cohort", "without marker_set.csv", "add"),
-    Case("nobody", without(PEOPLE), "s.yaml", None, "cohort", "without subjects.csv", "add"),
-    Case(
+# about, change, file, row and column where it is told, what of it, and a piece of the remedy
+TABLES: list[tuple[str, Change, str, int | None, str | None, str, str]] = [
+    ("no trials", without(TRIALS), "s.yaml", None, "cohort", "without trials.csv", "add"),
+    ("no set", without(MARKERS), "s.yaml", None, "cohort", "without marker_set.csv", "add"),
+    ("nobody", without(PEOPLE), "s.yaml", None, "cohort", "without subjects.csv", "add"),
+    (
         "short chain",
         both(
             swap("cohort.yaml", ", T1]", "]"),
@@ -91,78 +79,78 @@ TABLES = [
         ),
         *("cohort.yaml", None, "vertebrae", "S1 to T2, 17 in all", "list them all"),
     ),
-    Case("kind", trial("kind", "flexion"), TRIALS, 3, "kind", "'flexion'", "flexion_extension"),
-    Case("arms", trial("arms", "behind"), TRIALS, 3, "arms", "'behind'", "behind_head"),
-    Case("static", trial("static", "true"), TRIALS, 3, "static", "'true'", "write one"),
-    Case("axes", trial("axes", "x z z"), TRIALS, 3, "axes", "x, y and z once", "each axis once"),
-    Case("left hand", trial("axes", "x z y"), TRIALS, 3, "axes", "makes left of right", "minus"),
-    Case("file", trial("file", "m.mot"), TRIALS, 3, "file", "'m.mot'", "export"),
-    Case(
+    ("kind", trial("kind", "flexion"), TRIALS, 3, "kind", "'flexion'", "flexion_extension"),
+    ("arms", trial("arms", "behind"), TRIALS, 3, "arms", "'behind'", "behind_head"),
+    ("static", trial("static", "true"), TRIALS, 3, "static", "'true'", "write one"),
+    ("axes", trial("axes", "x z z"), TRIALS, 3, "axes", "x, y and z once", "each axis once"),
+    ("left hand", trial("axes", "x z y"), TRIALS, 3, "axes", "makes left of right", "minus"),
+    ("file", trial("file", "m.mot"), TRIALS, 3, "file", "'m.mot'", "export"),
+    (
         "crop",
         both(trial("start_s", "2"), trial("end_s", "1")),
         *(TRIALS, 3, "start_s", "2 s, and end_s 1 s", "correct"),
     ),
-    Case("no stance", line(TRIALS, STANCE, None), TRIALS, None, "kind", "no static", "add it"),
-    Case(
+    ("no stance", line(TRIALS, STANCE, None), TRIALS, None, "kind", "no static", "add it"),
+    (
         "two statics",
         both(trial("static", "yes", STANCE), trial("static", "yes", FLEXION)),
         *(TRIALS, 3, "static", "a second static trial of 'a'", "one of them"),
     ),
-    Case("mass", cell(PEOPLE, 2, "mass_kg", "745"), PEOPLE, 2, "mass_kg", "745 kg", "in N?"),
-    Case("nought", cell(PEOPLE, 2, "mass_kg", "0"), PEOPLE, 2, "mass_kg", "0", ""),
-    Case("height", cell(PEOPLE, 2, "height_cm", "1.75"), PEOPLE, 2, "height_cm", "1.75", "175"),
-    Case("no mass", cell("bodies.csv", 5, "mass_kg", "0"), "bodies.csv", 5, "mass_kg", "0", ""),
-    Case(
+    ("mass", cell(PEOPLE, 2, "mass_kg", "745"), PEOPLE, 2, "mass_kg", "745 kg", "in N?"),
+    ("nought", cell(PEOPLE, 2, "mass_kg", "0"), PEOPLE, 2, "mass_kg", "0", ""),
+    ("height", cell(PEOPLE, 2, "height_cm", "1.75"), PEOPLE, 2, "height_cm", "1.75", "175"),
+    ("no mass", cell("bodies.csv", 5, "mass_kg", "0"), "bodies.csv", 5, "mass_kg", "0", ""),
+    (
         "head on T1",
         cell("bodies.csv", 19, "mass_kg", "16"),
         *("bodies.csv", None, "mass_kg", "48.4 kg of 'a' in all, 64%", "correct"),
     ),
-    Case(
+    (
         "placeless",
         cell(MARKERS, 2, "vertebra", "C7"),
         *(MARKERS, 2, "vertebra", "unknown vertebra 'C7'", ""),
     ),
-    Case(
+    (
         "no pelvis",
         both(*(cell(MARKERS, row, "vertebra", "L5") for row in (24, 25, 26))),
         *(MARKERS, None, "vertebra", "2 markers of 'a' on S1", "add"),
     ),
-    Case(
+    (
         "twice",
         add(MARKERS, "a,T1_a,T1,0,0,0,1,"),
         *(MARKERS, 29, None, "", ""),
     ),
-    Case(
+    (
         "passive",
         text("passive.csv", f"{PASSIVE}L4L5,extension,positive,1,0.1,0.5,2,mine\n"),
         *("passive.csv", 2, "a", "a b is", "both sides"),
     ),
-    Case(
+    (
         "side",
         text("passive.csv", f"{PASSIVE}L4L5,extension,up,1,0.1,0.5,2,mine\n"),
         *("passive.csv", 2, "side", "'up'", "name one"),
     ),
-    Case(
+    (
         "ratios",
         text("ratios.csv", f"{RATIOS}own,L4L5,extension,0.5,mine\n"),
         *("ratios.csv", 2, "ratio", "sum to 0.5", "divide"),
     ),
-    Case(
+    (
         "bounds",
         text("bounds.csv", f"{BOUNDS}L4L5,extension,0,0,mine\n"),
         *("bounds.csv", 2, "low", "0 to 0", "correct both"),
     ),
-    Case(
+    (
         "status",
         text("bounds.csv", BOUNDS.replace("\n", ",status\nL4L5,extension,-5,5,mine,sure\n")),
         *("bounds.csv", 2, "status", "'sure'", "leave it empty"),
     ),
-    Case(
+    (
         "truth",
         text("truth_centres.csv", f"{TRUTH}a,bending,0,L4,0,0,0,,,\n"),
         *("truth_centres.csv", 2, "trial", "no trial 'bending' of 'a'", "lateral_bending"),
     ),
-    Case(
+    (
         "half a turn",
         text("truth_centres.csv", f"{TRUTH}a,stance,0,L4,0,0,0,1,,\n"),
         *("truth_centres.csv", 2, "right_bending_deg", "no right_bending_deg", "complete"),
@@ -170,15 +158,16 @@ TABLES = [
 ]
 
 
-@pytest.mark.parametrize("case", TABLES, ids=lambda case: case.about)
-def test_faults_of_tables_are_named(case: Case, tmp_path: Path) -> None:
-    problems = told(tmp_path, case.change)
-    file = case.file if case.file == "s.yaml" else f"{NAME}/{case.file}"
+@pytest.mark.parametrize("case", TABLES, ids=lambda case: case[0])
+def test_faults_of_tables_are_named(case: tuple[Any, ...], tmp_path: Path) -> None:
+    _, change, name, row, column, found, remedy = case
+    problems = told(tmp_path, change)
+    place = (name if name == "s.yaml" else f"{NAME}/{name}", row, column)
     places = [(p.file, p.row, p.column) for p in problems]
-    assert (file, case.row, case.column) in places, problems
-    told_there = problems[places.index((file, case.row, case.column))]
-    assert case.found in told_there.found
-    assert case.remedy in told_there.remedy
+    assert place in places, problems
+    told_there = problems[places.index(place)]
+    assert found in told_there.found
+    assert remedy in told_there.remedy
 
 
 def test_ratios_that_nobody_has_are_refused_unless_the_cohort_has_them(tmp_path: Path) -> None:
@@ -203,17 +192,6 @@ def test_approaches_that_learn_from_trials_nobody_did_are_refused(tmp_path: Path
     (problem,) = told(tmp_path, line(TRIALS, BENDING, None))
     assert problem.column == "approaches.2"
     assert "no trial of lateral_bending" in problem.found
-
-
-@dataclass(frozen=True)
-class Spoilt:
-    """One fault of a file of motion, the marker that must be named, and what is found."""
-
-    about: str
-    spoil: Spoil
-    marker: str | None
-    found: str
-    remedy: str = ""
 
 
 def on(trial: str, action: object) -> Spoil:
@@ -264,46 +242,48 @@ def swayed(marker: str, mm: float) -> Spoil:
     return on("flexion_extension", sway)
 
 
-MOTIONS = [
-    Spoilt("gap", lost("T5", 11, 25), "T5", "frames 11 to 25 (0.500 to 1.200 s)", "fill"),
-    Spoilt("never", lost("T9", 1, 41), "T9", "never in sight", "crop"),
-    Spoilt("lacking", renamed("T12", "T12x"), "T12", "no such marker", "mean 'T12x'"),
-    Spoilt("front", exchanged("LASI", "RASI"), "LASI and RASI", "swapped in frames 1 to 41"),
-    Spoilt("back", exchanged("LPSI", "RPSI"), "LPSI and RPSI", "swapped in frames 1 to 41"),
-    Spoilt(
+# about, what is done, the marker that must be named, what is found, and a piece of the remedy
+MOTIONS: list[tuple[str, Spoil, str | None, str] | tuple[str, Spoil, str | None, str, str]] = [
+    ("gap", lost("T5", 11, 25), "T5", "frames 11 to 25 (0.500 to 1.200 s)", "fill"),
+    ("never", lost("T9", 1, 41), "T9", "never in sight", "crop"),
+    ("lacking", renamed("T12", "T12x"), "T12", "no such marker", "mean 'T12x'"),
+    ("front", exchanged("LASI", "RASI"), "LASI and RASI", "swapped in frames 1 to 41"),
+    ("back", exchanged("LPSI", "RPSI"), "LPSI and RPSI", "swapped in frames 1 to 41"),
+    (
         "for a while",
         exchanged("LPSI", "RPSI", 9, 20),
         *("LPSI and RPSI", "swapped in frames 10 to 20", "exchange"),
     ),
-    Spoilt(
+    (
         "mirrored",
         on("flexion_extension", mirrored),
         *("LASI and RASI", "swapped in frames 1 to 41"),
     ),
-    Spoilt("cluster", exchanged("T7_b", "T7_c"), "T7_b and T7_c", "exchanged from frame 1"),
-    Spoilt("top", exchanged("L4_a", "L4_c"), "L4_a and L4_c", "exchanged from frame 1"),
-    Spoilt(
+    ("cluster", exchanged("T7_b", "T7_c"), "T7_b and T7_c", "exchanged from frame 1"),
+    ("top", exchanged("L4_a", "L4_c"), "L4_a and L4_c", "exchanged from frame 1"),
+    (
         "later",
         exchanged("T3_a", "T3_b", 19),
         *("T3_a and T3_b", "exchanged at frame 20 (0.950 s)", "two names"),
     ),
-    Spoilt("levels", exchanged("T5", "T12"), "T5 and T12", "exchanged from frame 1"),
-    Spoilt("ghost", shifted("T9", (0, 0, 900), 20, 20), "T9", "jumps 900 mm at frame 20"),
-    Spoilt(
+    ("levels", exchanged("T5", "T12"), "T5 and T12", "exchanged from frame 1"),
+    ("ghost", shifted("T9", (0, 0, 900), 20, 20), "T9", "jumps 900 mm at frame 20"),
+    (
         "apart",
         shifted("L2_b", (0, 0, 12), 1, 41),
         *("L2_b and L2_c", "48.7 mm apart, and 36.9 mm in the set", "cluster L2"),
     ),
-    Spoilt("soft", swayed("L2_b", 4.0), "L2_b and L2_c", "an SD of 2.8 mm", "single"),
+    ("soft", swayed("L2_b", 4.0), "L2_b and L2_c", "an SD of 2.8 mm", "single"),
 ]
 
 
-@pytest.mark.parametrize("case", MOTIONS, ids=lambda case: case.about)
-def test_faults_of_markers_are_named(case: Spoilt, tmp_path: Path) -> None:
-    problems = told(tmp_path, spoilt=(case.spoil,))
+@pytest.mark.parametrize("case", MOTIONS, ids=lambda case: case[0])
+def test_faults_of_markers_are_named(case: tuple[Any, ...], tmp_path: Path) -> None:
+    _, spoil, marker, found, *remedy = case
+    problems = told(tmp_path, spoilt=(spoil,))
     assert {p.file for p in problems} == {f"{NAME}/flexion_extension.trc"}
-    named = [p for p in problems if p.column == case.marker]
-    assert any(case.found in p.found and case.remedy in p.remedy for p in named), problems
+    named = [p for p in problems if p.column == marker]
+    assert any(found in p.found and "".join(remedy) in p.remedy for p in named), problems
 
 
 @pytest.mark.parametrize(
@@ -342,18 +322,21 @@ def test_bending_that_is_called_flexion_is_named(tmp_path: Path) -> None:
     assert "did you mean 'lateral_bending'?" in problem.remedy
 
 
-def test_a_missing_file_and_a_crop_without_frames_are_named(tmp_path: Path) -> None:
-    problems = told(tmp_path, trial("file", "no.trc"), trial("start_s", "50", BENDING))
-    found = {(p.file, p.column, p.found) for p in problems}
-    assert (f"{NAME}/no.trc", None, "no such file") in found
-    crop = "no frame from 50 s to an end in lateral_bending.trc"
-    assert (f"{NAME}/trials.csv", "start_s", crop) in found
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    (problem,) = told(tmp_path, trial("file", "no.trc"))
+    assert (problem.file, problem.found) == (f"{NAME}/no.trc", "no such file")
 
 
-@pytest.mark.parametrize(("column", "value"), [("start_s", "1e6"), ("end_s", "-1e6")])
-def test_a_crop_without_frames_is_told_at_its_cell(column: str, value: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("column", "value", "crop"),
+    [("start_s", "50", "from 50 s to an end"), ("end_s", "-1e6", "from an end to -1e+06 s")],
+)
+def test_a_crop_without_frames_is_told_at_its_cell(
+    column: str, value: str, crop: str, tmp_path: Path
+) -> None:
     (problem,) = told(tmp_path, trial(column, value, BENDING))
     assert (problem.file, problem.row, problem.column) == (f"{NAME}/trials.csv", BENDING, column)
+    assert problem.found == f"no frame {crop} in lateral_bending.trc"
 
 
 def test_several_faults_are_told_at_once(tmp_path: Path) -> None:
@@ -397,11 +380,10 @@ def test_levels_without_markers_are_a_warning(tmp_path: Path) -> None:
     folder = write(tmp_path, drop, spoilt=(lost("T9", 5, 6),))
     cohort = cohorts.read(folder, (SUBJECTS, *FORMS))
     assert not list(check_recordings(DOCUMENT, asked(), cohort, tmp_path))
-    warnings = warnings_of(person_of(cohort, "a", folder))
-    assert warnings[0].text.startswith("6 levels from T7 to T1 without a marker")
-    assert warnings[0].trial == ""
-    assert warnings[1].trial == "flexion_extension"
-    assert warnings[1].text.startswith("1 short gaps, most of T9")
+    about, gaps = warnings_of(person_of(cohort, "a", folder))
+    assert about[0] == ""
+    assert about[1].startswith("6 levels from T7 to T1 without a marker")
+    assert gaps[0] == "flexion_extension"
+    assert gaps[1].startswith("1 short gaps, most of T9")
     spare = "not in the set and ignored: T3_a, T3_b, T3_c, T5"
-    assert repairs_of(cohort, "a")[0] == Remark("stance", spare)
-    assert BODIES.index("T1") - BODIES.index("T7") == 6
+    assert next(iter(repairs_of(cohort, "a"))) == ("stance", spare)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from drawn import caption, drawings, faults_of_layout
+from drawn import drawings, faults_of_layout
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tracking_table_cases import BEND_DEG, ERROR, Size, cohort_of, study_of, tables_of
@@ -19,10 +19,9 @@ from tracking_table_cases import BEND_DEG, ERROR, Size, cohort_of, study_of, tab
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.report.style import style
 from spinepipe.studies.tracking.figures.kinematics import courses_of, ends_of
-from spinepipe.studies.tracking.figures.line_styles import chosen, looks_of_approaches
-from spinepipe.studies.tracking.figures.stiffness_by_level import told_by
-from spinepipe.studies.tracking.in_space_motions import motions_of
-from spinepipe.studies.tracking.in_space_still import farthest, still_figure
+from spinepipe.studies.tracking.figures.line_styles import choose_approaches, styles_of_approaches
+from spinepipe.studies.tracking.figures.stiffness import closed_elements
+from spinepipe.studies.tracking.in_space import farthest, motions_of, still_figure
 
 NAMES = (
     *("kinematics", "motion_sharing", "error_by_level", "stiffness_profiles"),
@@ -69,15 +68,6 @@ def panel(figure: Figure, title: str) -> Axes:
     return next(axis for axis in figure.axes if axis.get_title("left")[1:].strip() == title)
 
 
-def test_all_figures_are_declared() -> None:
-    assert set(REAL) == set(NAMES)
-
-
-def test_every_figure_has_a_caption() -> None:
-    short = [n for n in NAMES if len(caption("tracking", n).read_text(encoding="utf-8")) <= 200]
-    assert not short
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("which", SIZES)
 def test_no_words_leave_the_page_or_stand_on_each_other(which: str) -> None:
@@ -100,12 +90,6 @@ def test_what_is_not_there_is_said() -> None:
     empty = {name: rows.iloc[:0] for name, rows in tables_of(Size(1)).items()}
     for name in NAMES:
         assert "Nothing can be shown" in words(draw(name, Size(1), **empty)), name
-
-
-def test_one_person_has_no_spread() -> None:
-    for name in ("kinematics", "motion_sharing", "error_by_level"):
-        assert "One person: no spread." in words(draw(name, Size(1)))
-        assert "3 persons." in words(draw(name, Size()))
 
 
 def test_courses_are_those_of_the_table() -> None:
@@ -140,9 +124,9 @@ def test_errors_are_means_over_persons() -> None:
     figure = draw("error_by_level", Size())
     axis = panel(figure, "Flexion–extension: vertebral centres")
     assert [label.get_text() for label in axis.get_yticklabels()] == list(BODIES[1:])
-    names = chosen(study_of(Size()), ERROR, 4)
+    names = choose_approaches(study_of(Size()), ERROR, 4)
     assert names == ["ik", "optk_zero", "optk_generic", "optk_from_both"]
-    look = looks_of_approaches(names)["optk_generic"]
+    look = styles_of_approaches(names)["optk_generic"]
     line = next(one for one in axis.lines if one.get_color() == look.color)
     assert np.mean(np.asarray(line.get_xdata(), dtype=float)) == pytest.approx(
         1.1 * ERROR["optk_generic"]
@@ -150,9 +134,12 @@ def test_errors_are_means_over_persons() -> None:
 
 
 def test_an_approach_looks_the_same_in_all_figures() -> None:
-    one, other = looks_of_approaches(["ik", "optk_generic"]), looks_of_approaches(["optk_generic"])
+    one, other = (
+        styles_of_approaches(["ik", "optk_generic"]),
+        styles_of_approaches(["optk_generic"]),
+    )
     assert one["optk_generic"] == other["optk_generic"]
-    many = looks_of_approaches(["ik_springs", "ik_smooth", "ik"])
+    many = styles_of_approaches(["ik_springs", "ik_smooth", "ik"])
     assert len({look.color for look in many.values()}) == 3
 
 
@@ -179,9 +166,9 @@ def test_stiffness_is_filled_only_where_it_is_told() -> None:
     assert filled("told") == {True}
     assert filled("one_sided") == {False}
     assert filled("not_told") == {False}
-    assert told_by(tables_of(Size(1, verdict="one_sided"))["profiles"]) == set()
+    assert closed_elements(tables_of(Size(1, verdict="one_sided"))["profiles"]) == set()
     without = tables_of(Size(1))["profiles"].iloc[:0]
-    assert told_by(without) == set()
+    assert closed_elements(without) == set()
 
 
 def test_weights_that_did_not_settle_are_hollow() -> None:

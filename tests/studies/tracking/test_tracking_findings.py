@@ -10,8 +10,8 @@ from tracking_table_cases import ERROR, Size, cohort_of, study_of, tables_of
 
 from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.studies.tracking.findings import findings
-from spinepipe.studies.tracking.findings_of_errors import standings
-from spinepipe.studies.tracking.headline import headline
+from spinepipe.studies.tracking.findings_of_errors import rankings
+from spinepipe.studies.tracking.page import headline
 
 THREE = Size()
 LEAST = "optk_generic"
@@ -19,16 +19,14 @@ LEAST = "optk_generic"
 
 def answer(size: Size, **changed: pd.DataFrame) -> Headline:
     """The headline of made-up results."""
-    return headline(
-        study_of(size), cohort_of(size), ResultTables(tables_of(size, **changed), {}, {})
-    )
+    results = ResultTables(tables_of(size, **changed), {}, {})
+    return headline(study_of(size), cohort_of(size), results)
 
 
 def told(size: Size, **changed: pd.DataFrame) -> str:
     """All findings, with plain spaces."""
-    found = findings(
-        study_of(size), cohort_of(size), ResultTables(tables_of(size, **changed), {}, {})
-    )
+    results = ResultTables(tables_of(size, **changed), {}, {})
+    found = findings(study_of(size), cohort_of(size), results)
     return "\n".join(found).replace("\u00a0", " ").replace("\u2009", " ").replace("\u2212", "-")
 
 
@@ -96,14 +94,11 @@ def test_without_a_posture_there_is_no_answer() -> None:
 
 def test_an_approach_that_lacks_a_motion_is_left_out_and_named() -> None:
     rows = tables_of(THREE)["errors"]
-    gone = (
-        (rows["approach"] == LEAST)
-        & (rows["specimen"] == "s02")
-        & (rows["trial"] == "lateral_bending")
-    )
-    found = told(THREE, errors=rows[~gone])
+    lost = "approach == @LEAST and specimen == 's02' and trial == 'lateral_bending'"
+    left = rows.drop(rows.query(lost).index)
+    found = told(THREE, errors=left)
     assert "Left out, as not all motions were found: dynamics with generic" in found
-    one = standings(cohort_of(THREE), ResultTables({"errors": rows[~gone]}, {}, {}), "centre_mm")[0]
+    one = rankings(cohort_of(THREE), ResultTables({"errors": left}, {}, {}), "centre_mm")[0]
     assert LEAST not in one.approaches
     assert one.approaches[0] == "optk_calibrated"
 
@@ -112,7 +107,7 @@ def test_a_person_counts_once_whatever_was_known_of_them() -> None:
     rows = tables_of(THREE)["errors"]
     fewer = rows[(rows["specimen"] != "s01") | rows["level"].isin(["L5", "T1", "L4L5", "T7T8"])]
     for table in (rows, fewer):
-        one = standings(cohort_of(THREE), ResultTables({"errors": table}, {}, {}), "centre_mm")[0]
+        one = rankings(cohort_of(THREE), ResultTables({"errors": table}, {}, {}), "centre_mm")[0]
         assert one.words == "in motion"
         assert one.values[LEAST].to_numpy() == pytest.approx([5.0, 5.5, 6.0])
 
@@ -139,9 +134,8 @@ def test_that_calibration_makes_it_worse_is_said() -> None:
         "centres in motion (2 of 2 beyond chance) and sagittal angles in motion (2 of 2 beyond "
         "chance)."
     )
-    better = errors_by(
-        THREE, {"optk_calibrated": (1.0, 1.1, 1.2), "optk_from_both": (1.0, 1.1, 1.2)}
-    )
+    both = ("optk_calibrated", "optk_from_both")
+    better = errors_by(THREE, dict.fromkeys(both, (1.0, 1.1, 1.2)))
     found = told(THREE, errors=better)
     assert "On average calibration does not make it worse. Better, with an interval" in found
     assert "Calibrating passive" not in " ".join(answer(THREE, errors=better).warnings)
@@ -150,9 +144,8 @@ def test_that_calibration_makes_it_worse_is_said() -> None:
 
 
 def test_worse_on_average_is_not_called_worse_beyond_chance() -> None:
-    unlike = errors_by(
-        THREE, {"optk_calibrated": (1.0, 4.0, 30.0), "optk_from_both": (1.0, 4.0, 30.0)}
-    )
+    both = ("optk_calibrated", "optk_from_both")
+    unlike = errors_by(THREE, dict.fromkeys(both, (1.0, 4.0, 30.0)))
     assert "none of these differences is larger than its interval" in told(THREE, errors=unlike)
     assert "(not beyond chance)" in answer(THREE, errors=unlike).warnings[-1]
 
@@ -309,11 +302,7 @@ def test_sizes_and_remarks_are_counted() -> None:
     assert "0.980 to 1.03 times as large" in found
     assert "tracked with the skeleton as it is" in found
     assert "1 remark on the input of 1 person" in found
+    assert "that are evidence ours are inside the paper's range for 0" in found
     rows = tables_of(THREE)["sizes"]
     rows["factor"] = np.nan
     assert "Markers do not tell the size of any of 1 person." in told(THREE, sizes=rows)
-
-
-def test_the_paper_stands_beside() -> None:
-    words = "Of 1 published quantities that are evidence ours are inside the paper's range for 0"
-    assert words in told(THREE)

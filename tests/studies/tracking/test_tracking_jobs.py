@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cohort_cases import Change, both, line
-from tracked_cohort import Spoil, known_truth, lost, project, told_smaller, two_persons
+from tracked_cohort import Spoil, known_truth, lost, project, told_smaller
 from tracked_study import Run
 
 from spinepipe.motion.skeleton import BODIES, JOINTS
@@ -252,17 +252,6 @@ def test_a_size_that_markers_do_not_tell_is_a_status(tmp_path: Path) -> None:
     run.write("tracked")
     run.join("fits")
     assert len(run.table("fits")) == 3
-
-
-def test_two_persons_are_alike_where_they_move_alike(tmp_path: Path) -> None:
-    run = run_of(tmp_path, QUICK, two_persons)
-    run.write("tracked")
-    run.join("tracked")
-    run.analyse("similarity")
-    rows = run.table("similarity")
-    assert set(rows["n_specimens"]) == {2}
-    whole = rows[(rows["trial"] == "lateral_bending") & (rows["window"] == "20-80")]
-    assert whole["cmc"].item() == pytest.approx(1.0)
 
 
 def test_every_declared_table_is_one_that_a_study_can_have(whole: Run) -> None:

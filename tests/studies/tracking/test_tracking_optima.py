@@ -10,13 +10,18 @@ import pytest
 
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.motion.objective import Ask, Watched
+from spinepipe.motion.objective import MotionObjective, SampledTrial
 from spinepipe.motion.posture import postures
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.spline import KnotGrid
 from spinepipe.motion.trajectory import SMALL, OptimalMotions, solve
 from spinepipe.status import Status
-from spinepipe.studies.tracking.approaches import asked_of, begun, fitting, seen_in
+from spinepipe.studies.tracking.approaches import (
+    calibration_objective,
+    first_guess,
+    objective_of,
+    sample_at_nodes,
+)
 from spinepipe.studies.tracking.persons import TrackedPerson, person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.units import COORDINATES
@@ -30,21 +35,21 @@ The criterion allows 0.03 SD; of the prior, which is wider than what is told, th
 
 
 @cache
-def flexion(intervals: int = 50) -> tuple[Tracking, TrackedPerson, Watched]:
+def flexion(intervals: int = 50) -> tuple[Tracking, TrackedPerson, SampledTrial]:
     """Of s01 in `tracking_phantom`."""
     study, cohort = study_of_kind(Tracking, ROOT, "tracking_phantom")
     study = study.model_copy(update={"intervals": intervals})
     person = person_of(cohort, "s01", cohort.folder, study.scaling)
     trial = next(one for one in person.trials if one.kind == "flexion_extension")
-    return study, person, seen_in(study, person, trial)
+    return study, person, sample_at_nodes(study, person, trial)
 
 
 @cache
-def calibrated() -> tuple[Ask, Watched, Array, OptimalMotions]:
+def calibrated() -> tuple[MotionObjective, SampledTrial, Array, OptimalMotions]:
     """What was asked, the coefficients to begin with and the answer."""
     study, person, seen = flexion()
-    ask = fitting(study, person)
-    seen, start = begun(ask, seen)
+    ask = calibration_objective(study, person)
+    seen, start = first_guess(ask, seen)
     return ask, seen, start, solve(ask, [seen], [start])
 
 
@@ -55,7 +60,7 @@ def degrees_apart(one: Array, other: Array) -> float:
 
 def alike(found: OptimalMotions, expected: OptimalMotions) -> None:
     assert found.status is expected.status is Status.CONVERGED
-    assert abs(found.costs.total - expected.costs.total) < SMALL
+    assert abs(found.cost - expected.cost) < SMALL
     np.testing.assert_allclose(found.parameters, expected.parameters, rtol=0.0, atol=LEFT)
     assert degrees_apart(found.coefficients[0], expected.coefficients[0]) < LEFT_DEG
 
@@ -64,7 +69,7 @@ def test_a_calibration_ends_where_it_costs_least() -> None:
     """It was called converged at 199.26, T10T11 with 0.7 times the stiffness, angles 2 deg off."""
     *_, solved = calibrated()
     assert solved.status is Status.CONVERGED
-    assert solved.costs.total < 197.27
+    assert solved.cost < 197.27
 
 
 def test_begun_at_its_own_answer_it_stays() -> None:
@@ -80,7 +85,7 @@ def test_begun_from_stiffer_elements_it_ends_there_too() -> None:
     alike(solve(ask, [seen], [start], stiffer), solved)
 
 
-def reversed_in_time(seen: Watched) -> Watched:
+def reversed_in_time(seen: SampledTrial) -> SampledTrial:
     shares = None if seen.shares is None else seen.shares[::-1]
     return replace(seen, places=seen.places[::-1], weight=seen.weight[::-1], shares=shares)
 
@@ -88,8 +93,8 @@ def reversed_in_time(seen: Watched) -> Watched:
 def test_backwards_in_time_the_answer_is_backwards() -> None:
     """Accelerations are the same, speeds count squared."""
     study, person, seen = flexion(10)
-    ask = fitting(study, person)
-    seen, start = begun(ask, seen)
+    ask = calibration_objective(study, person)
+    seen, start = first_guess(ask, seen)
     there, back = (
         solve(ask, [trial], [begin])
         for trial, begin in ((seen, start), (reversed_in_time(seen), start[::-1]))
@@ -100,16 +105,16 @@ def test_backwards_in_time_the_answer_is_backwards() -> None:
 def test_a_trial_of_two_frames_is_calibrated() -> None:
     """No motion to speak of: the answer stays, and stiffness is hardly told."""
     study, person, seen = flexion(10)
-    ask, grid = fitting(study, person), KnotGrid(0.0, 0.2, 1)
+    ask, grid = calibration_objective(study, person), KnotGrid(0.0, 0.2, 1)
     seen = replace(seen, grid=grid, places=seen.places[4:6], weight=seen.weight[4:6])
-    seen, start = begun(ask, seen)
+    seen, start = first_guess(ask, seen)
     solved = solve(ask, [seen], [start])
     alike(solve(ask, [seen], solved.coefficients, solved.parameters), solved)
 
 
-def springs() -> Ask:
+def springs() -> MotionObjective:
     study, person, _ = flexion()
-    return asked_of(study, person, "ik_springs")
+    return objective_of(study, person, "ik_springs")
 
 
 def bends_deg(frames: list[int]) -> Array:

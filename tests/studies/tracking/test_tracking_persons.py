@@ -20,20 +20,20 @@ from tracked_cohort import (
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.motion.passive_elements import passive_elements
+from spinepipe.motion.passive import passive_elements
 from spinepipe.motion.points import marker_places as model_places
 from spinepipe.motion.skeleton import JOINTS, body_poses
 from spinepipe.muscles.subject import Subject
 from spinepipe.studies.subjects import SUBJECTS
-from spinepipe.studies.tracking.forms import FORMS
 from spinepipe.studies.tracking.persons import (
     TrackedPerson,
-    carrying,
     motion_files,
     person_of,
-    ratio_sets,
+    ratios_of,
+    skeleton_in_trial,
     static_trial,
 )
+from spinepipe.studies.tracking.trials import FORMS
 
 REST = np.zeros((1, 18, 6))
 DE_LEVA_MEN = {"head": 6.94, "upper_arm": 2.71, "forearm": 1.62, "hand": 0.61}
@@ -133,11 +133,11 @@ def test_head_and_arms_are_hung_on_t1(tmp_path: Path) -> None:
     share = DE_LEVA_MEN["head"] + 2.0 * sum(
         DE_LEVA_MEN[name] for name in ("upper_arm", "forearm", "hand")
     )
-    held = carrying(person, person.trials[0])
+    held = skeleton_in_trial(person, person.trials[0])
     more = held.masses.kg - person.skeleton.masses.kg
     np.testing.assert_allclose(more[:-1], 0.0)
     assert more[-1] == pytest.approx(share / 100.0 * 76.0)
-    up = carrying(person, replace(person.trials[0], arms="behind_head"))
+    up = skeleton_in_trial(person, replace(person.trials[0], arms="behind_head"))
     assert up.masses.com[-1, 1] > held.masses.com[-1, 1]
 
 
@@ -170,13 +170,13 @@ def test_rows_of_the_cohort_replace_those_that_come_along(tmp_path: Path) -> Non
     joint, extension = JOINTS.index("L4L5"), 3
     np.testing.assert_allclose(person.passive.a[joint, extension], 2.0)
     np.testing.assert_allclose(person.passive.b[joint, extension], 0.3 * 180.0 / np.pi)
-    np.testing.assert_allclose(np.rad2deg(person.limits.limits[joint, extension]), [-7.0, 9.0])
+    np.testing.assert_allclose(np.rad2deg(person.limits[joint, extension]), [-7.0, 9.0])
     others = np.arange(17) != joint
     shipped = passive_elements()
     np.testing.assert_array_equal(person.passive.a[others], shipped.a[others])
-    sets = ratio_sets(cohort)
+    sets = ratios_of(cohort)
     assert {"own", "christophy_2012", "white_panjabi_1990"} == set(sets)
-    np.testing.assert_allclose(sets["own"].shares[:2, 0], [0.6, 0.4])
+    np.testing.assert_allclose(sets["own"][:2, 0], [0.6, 0.4])
 
 
 def test_the_static_trial_is_the_marked_one_else_the_stance(tmp_path: Path) -> None:

@@ -10,10 +10,10 @@ from tracked_cohort import write
 from spinepipe.cohort import read
 from spinepipe.motion.points import marker_places
 from spinepipe.studies.subjects import SUBJECTS
-from spinepipe.studies.tracking.approaches import asked_of, unloaded
-from spinepipe.studies.tracking.forms import FORMS
-from spinepipe.studies.tracking.persons import TrackedPerson, carrying, person_of
+from spinepipe.studies.tracking.approaches import objective_of, unloaded_posture
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of, skeleton_in_trial
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.tracking.trials import FORMS
 
 
 def asked(unloaded_posture: str) -> Tracking:
@@ -30,7 +30,7 @@ def bent_where_they_stand(folder: Path) -> tuple[TrackedPerson, np.ndarray]:
     trials = []
     for trial in person.trials:
         if trial.name == person.static:
-            places = marker_places(carrying(person, trial), person.markers, q)
+            places = marker_places(skeleton_in_trial(person, trial), person.markers, q)
             whole = np.ones(places.shape[:2], dtype=bool)
             trial = replace(trial, time_s=trial.time_s[:1], places=places, seen=whole)
         trials.append(trial)
@@ -39,7 +39,7 @@ def bent_where_they_stand(folder: Path) -> tuple[TrackedPerson, np.ndarray]:
 
 def test_joints_are_unloaded_in_the_neutral_pose(tmp_path: Path) -> None:
     person, _ = bent_where_they_stand(tmp_path)
-    law = asked_of(asked("neutral"), person, "optk_generic").passive
+    law = objective_of(asked("neutral"), person, "optk_generic").passive
     assert law is not None
     np.testing.assert_array_equal(law.rest, np.zeros((17, 6)))
 
@@ -47,7 +47,7 @@ def test_joints_are_unloaded_in_the_neutral_pose(tmp_path: Path) -> None:
 def test_joints_are_unloaded_as_the_person_stands(tmp_path: Path) -> None:
     """Springs share a bend out, so that the lumbar bend in all is what markers tell."""
     person, q = bent_where_they_stand(tmp_path)
-    law = asked_of(asked("standing"), person, "optk_generic").passive
+    law = objective_of(asked("standing"), person, "optk_generic").passive
     assert law is not None
     lumbar = np.rad2deg(law.rest[:6, 3].sum())
     assert lumbar == pytest.approx(np.rad2deg(q[:6, 3].sum()), abs=2.0)
@@ -57,4 +57,4 @@ def test_joints_are_unloaded_as_the_person_stands(tmp_path: Path) -> None:
 def test_without_a_static_trial_nobody_stands(tmp_path: Path) -> None:
     person, _ = bent_where_they_stand(tmp_path)
     with pytest.raises(ValueError, match="no static trial"):
-        unloaded(asked("standing"), replace(person, static=None))
+        unloaded_posture(asked("standing"), replace(person, static=None))

@@ -11,15 +11,14 @@ from spinepipe.motion.skeleton import BODIES, JOINTS
 from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
 from spinepipe.report.style import blank, saying
-from spinepipe.report.words import capital
+from spinepipe.report.words import capital, plain
 from spinepipe.studies.tracking.error_metrics import SAGITTAL
 from spinepipe.studies.tracking.figures.line_styles import (
-    chosen,
+    choose_approaches,
     key_of,
-    looks_of_approaches,
     persons_words,
-    says,
-    trial_words,
+    say_empty,
+    styles_of_approaches,
     trials_of,
 )
 from spinepipe.studies.tracking.settings import Tracking
@@ -49,9 +48,9 @@ def error_by_level_figure(
     rows = rows[rows["measure"].isin(list(LEVELS))] if len(rows) else rows
     if rows.empty:
         return saying(NO_TRUTH)
-    names = chosen(study, rows["approach"].unique(), 4)
+    names = choose_approaches(study, rows["approach"].unique(), 4)
     rows = rows[rows["approach"].isin(names)]
-    looks = looks_of_approaches(names)
+    looks = styles_of_approaches(names)
     trials = trials_of(rows)
     shown = trials[:MOST_TRIALS]
     figure = blank(len(shown) * _ROW_MM + _KEY_MM)
@@ -59,16 +58,13 @@ def error_by_level_figure(
     for k, (line, trial) in enumerate(zip(lines, shown, strict=True)):
         for axis, measure in zip(line, LEVELS, strict=True):
             index = 2 * k + list(LEVELS).index(measure)
-            head(axis, index, f"{capital(trial_words(trial))}: {LABELS[measure][0]}")
+            head(axis, index, f"{capital(plain(trial))}: {LABELS[measure][0]}")
             own = rows[rows["measure"] == measure]
-            _panel(axis, own[own["trial"] == trial], measure, looks, _ends(own))
+            # panels of a measure share their axis: errors of all trials
+            ends = float(own["mean"].min()), float(own["mean"].max())
+            _panel(axis, own[own["trial"] == trial], measure, looks, ends)
     _explain(figure, looks, rows, len(trials) - len(shown))
     return figure
-
-
-def _ends(rows: pd.DataFrame) -> tuple[float, float]:
-    """Least and largest error of all trials: panels of a measure share their axis."""
-    return float(rows["mean"].min()), float(rows["mean"].max())
 
 
 def _panel(
@@ -80,7 +76,7 @@ def _panel(
 ) -> None:
     levels = LEVELS[measure]
     if rows.empty:
-        says(axis, "no truth is known")
+        say_empty(axis, "no truth is known")
         return
     for name, look in looks.items():
         own = rows[rows["approach"] == name]

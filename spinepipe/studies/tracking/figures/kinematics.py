@@ -12,37 +12,33 @@ from matplotlib.lines import Line2D
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
-from spinepipe.motion.measures import between_neighbours
-from spinepipe.motion.skeleton import JOINTS, PELVIS, body_poses
+from spinepipe.motion.skeleton import JOINTS, LUMBAR_JOINTS, PELVIS, body_poses
 from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, lettered
 from spinepipe.report.style import BLACK, blank, saying
-from spinepipe.report.words import capital, listed
-from spinepipe.studies.tracking.error_metrics import bones_of
+from spinepipe.report.words import capital, listed, plain
+from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.tracking.error_metrics import Truth, joint_rotations, truths
 from spinepipe.studies.tracking.figures.line_styles import (
-    about,
-    chosen,
+    choose_approaches,
     key_of,
-    looks_of_approaches,
     persons_words,
-    scale,
-    trial_words,
-    turns_about,
+    show_ticks,
+    styles_of_approaches,
     zero_line,
 )
-from spinepipe.studies.tracking.reload_motions import (
-    AXIS,
-    ReloadedMotions,
-    kinds_of_trials,
-    motions,
-)
+from spinepipe.studies.tracking.persons import skeleton_in
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.shares import INSTANTS, LUMBAR_JOINTS
-from spinepipe.studies.tracking.truth import Truth, truths
+from spinepipe.studies.tracking.tables import INSTANTS
+from spinepipe.studies.tracking.tracked_motions import TrackedMotion, motions
+from spinepipe.studies.tracking.trials import AXIS, kinds_of_trials
 from spinepipe.studies.tracking.words import short_of
 from spinepipe.units import DEG_PER_RAD
 
 MOST_TRIALS = 2
+COUNTED = ("extension positive", "bending to the right positive", "rotation to the left positive")
+"""How rotations that motions are about are counted, in the order of `trials.AXIS`."""
+
 NO_MOTION = "Nothing can be shown: no approach found a motion of more than one frame."
 
 _CYCLE = np.linspace(0.0, 1.0, INSTANTS)
@@ -69,6 +65,7 @@ class Courses:
     @property
     def calm(self) -> list[str]:
         """Approaches that stay on the axis."""
+        # what goes far beyond the calmest approach would flatten all other curves
         reach = {name: float(np.abs(persons).max()) for name, persons in self.found.items()}
         most = max(_TIMES * min(reach.values()), _LEAST_DEG)
         return [name for name, size in reach.items() if size <= most]
@@ -79,11 +76,11 @@ def kinematics_figure(
 ) -> Figure:
     """A block of panels for each trial, a panel for each lumbar joint."""
     tracked = tables["tracked"]
-    names = chosen(study, tracked["approach"].unique()) if len(tracked) else []
+    names = choose_approaches(study, tracked["approach"].unique()) if len(tracked) else []
     courses = courses_of(cohort, tracked[tracked["approach"].isin(names)]) if names else {}
     if not courses:
         return saying(NO_MOTION)
-    looks = looks_of_approaches(names)
+    looks = styles_of_approaches(names)
     shown = dict(list(courses.items())[:MOST_TRIALS])
     down = 2 * len(shown)
     figure = blank(down * _ROW_MM + len(shown) * _HEAD_MM + _KEY_MM)
@@ -98,14 +95,14 @@ def _block(
     block: SubFigure, index: int, trial: str, one: Courses, looks: dict[str, LineStyle]
 ) -> None:
     block.suptitle(
-        lettered(index, f"{capital(trial_words(trial))}, {about(one.kind)}"),
+        lettered(index, f"{capital(plain(trial))}, {COUNTED[AXIS[one.kind]]}"),
         **{"x": 0.01, "ha": "left", "fontsize": 7.5, "fontweight": "bold"},
     )
     panels = block.subplots(2, _ACROSS, sharex=True, sharey=True).ravel()
     for k, (axis, joint) in enumerate(zip(panels, LUMBAR_JOINTS, strict=True)):
         axis.set_title(joint, fontweight="normal", loc="center")
         zero_line(axis)
-        scale(axis)
+        show_ticks(axis)
         for name, persons in one.found.items():
             _course(axis, persons[:, :, k], looks[name], name in one.calm)
         if len(one.true):
@@ -146,30 +143,31 @@ def courses_of(cohort: Cohort, tracked: pd.DataFrame) -> dict[str, Courses]:
     known = {(truth.specimen, truth.trial): truth for truth in truths(dict(cohort.further))}
     found = {}
     for trial in dict.fromkeys(one.trial for one in every):
-        kind = turns_about(tracked, trial, kinds)
-        if kind is not None:
-            own = [one for one in every if one.trial == trial]
-            found[trial] = Courses(kind, _by_approach(own, kind), _true(cohort, own, known, kind))
+        persons = tracked.loc[tracked["trial"] == trial, "specimen"].unique()
+        of_persons = [kinds.get((str(who), trial)) for who in persons]
+        kind = next((kind for kind in of_persons if kind in AXIS), None)
+        if kind is None:
+            continue
+        own = [one for one in every if one.trial == trial]
+        by_approach: dict[str, list[Array]] = {}
+        for one in own:
+            # lumbar joints about the axis of the motion
+            turned = one.at(_times(one.time_s))[:, PELVIS + 1 :, 3 + AXIS[kind]]
+            degrees = DEG_PER_RAD * turned[:, : len(LUMBAR_JOINTS)]
+            by_approach.setdefault(one.approach, []).append(degrees)
+        curves = {name: np.array(persons) for name, persons in by_approach.items()}
+        found[trial] = Courses(kind, curves, _true(cohort, own, known, kind))
     return found
 
 
-def _by_approach(own: list[ReloadedMotions], kind: str) -> dict[str, Array]:
-    names = dict.fromkeys(one.approach for one in own)
-    return {
-        name: np.array([_turned(one, kind) for one in own if one.approach == name])
-        for name in names
-    }
-
-
-def _turned(one: ReloadedMotions, kind: str) -> Array:
-    """(101, 6) deg, lumbar joints about the axis of the motion."""
-    times = one.time_s[0] + _CYCLE * (one.time_s[-1] - one.time_s[0])
-    lumbar = one.at(times)[:, PELVIS + 1 : PELVIS + 1 + len(LUMBAR_JOINTS), 3 + AXIS[kind]]
-    return DEG_PER_RAD * np.asarray(lumbar, dtype=float)
+def _times(time_s: Array) -> Array:
+    """(101,) s over the cycle of a motion with frames (F,)."""
+    found: Array = time_s[0] + _CYCLE * (time_s[-1] - time_s[0])
+    return found
 
 
 def _true(
-    cohort: Cohort, own: list[ReloadedMotions], known: Mapping[tuple[str, str], Truth], kind: str
+    cohort: Cohort, own: list[TrackedMotion], known: Mapping[tuple[str, str], Truth], kind: str
 ) -> Array:
     """(P, 101, 6) deg of persons whose lumbar joints are known at two instants or more."""
     spans = {one.specimen: one for one in own}
@@ -183,13 +181,13 @@ def _true(
 
 def _of_truth(cohort: Cohort, truth: Truth, time_s: Array, kind: str) -> Iterator[Array]:
     """(101,) deg of each lumbar joint; the neutral pose is that of the model."""
-    skeleton = bones_of(cohort, truth.specimen).skeleton
-    neutral = between_neighbours(body_poses(skeleton, np.zeros((1, len(JOINTS) + 1, 6)))[0])
-    turned = np.swapaxes(neutral, -1, -2) @ between_neighbours(truth.turns)
+    skeleton = skeleton_in(cohort, truth.specimen, subject_of(cohort, truth.specimen))
+    neutral = joint_rotations(body_poses(skeleton, np.zeros((1, len(JOINTS) + 1, 6)))[0])
+    # rotation of the joint from the neutral pose, as its coordinates have it
+    turned = np.swapaxes(neutral, -1, -2) @ joint_rotations(truth.turns)
     angles = DEG_PER_RAD * zxy_angles(turned)[..., AXIS[kind]]
-    times = time_s[0] + _CYCLE * (time_s[-1] - time_s[0])
     for k in range(len(LUMBAR_JOINTS)):
-        yield np.interp(times, truth.time_s, angles[:, k])
+        yield np.interp(_times(time_s), truth.time_s, angles[:, k])
 
 
 def _explain(

@@ -9,23 +9,22 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
+from spinepipe.motion.skeleton import LUMBAR_JOINTS
 from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
 from spinepipe.report.style import GREY, blank, saying
-from spinepipe.report.words import capital
+from spinepipe.report.words import capital, plain
 from spinepipe.studies.tracking.figures.line_styles import (
-    chosen,
+    choose_approaches,
     key_of,
-    looks_of_approaches,
     persons_words,
-    says,
-    scale,
-    trial_words,
+    say_empty,
+    show_ticks,
+    styles_of_approaches,
     trials_of,
     zero_line,
 )
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.shares import LUMBAR_JOINTS
 from spinepipe.studies.tracking.tables import WINDOW
 
 MOST_TRIALS = 4
@@ -43,16 +42,16 @@ def motion_sharing_figure(
     rows = every[every["window"] == WINDOW] if len(every) else every
     if rows.empty:
         return saying("Nothing can be shown: no trial turns the lumbar spine.")
-    names = chosen(study, rows["approach"].unique(), 4)
+    names = choose_approaches(study, rows["approach"].unique(), 4)
     rows = rows[rows["approach"].isin(names)]
     trials = trials_of(rows)
-    looks = looks_of_approaches(names)
+    looks = styles_of_approaches(names)
     shown = trials[:MOST_TRIALS]
     across = across_of(len(shown), 2)
     figure = blank(-(-len(shown) // across) * _HEIGHT_MM + _KEY_MM)
     axes = side_by_side(figure, len(shown), across)
     for index, (axis, trial) in enumerate(zip(axes, shown, strict=True)):
-        head(axis, index, capital(trial_words(trial)))
+        head(axis, index, capital(plain(trial)))
         _trial(axis, rows[rows["trial"] == trial], looks)
     _explain(figure, looks, rows, len(trials) - len(shown))
     return figure
@@ -61,7 +60,7 @@ def motion_sharing_figure(
 def _trial(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, LineStyle]) -> None:
     known = rows.dropna(subset=["share"])
     if known.empty:
-        says(axis, "the lumbar spine turns too little to be shared out")
+        say_empty(axis, "the lumbar spine turns too little to be shared out")
         return
     step = _WIDE / len(looks)
     for number, (name, look) in enumerate(looks.items()):
@@ -74,11 +73,15 @@ def _trial(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, LineStyle]) -> No
     even = 100.0 / len(LUMBAR_JOINTS)
     axis.axhline(even, color=GREY, lw=0.7, ls=(0, (4, 2)), zorder=1)
     zero_line(axis)
-    scale(axis)
+    show_ticks(axis)
     axis.set_xticks(range(len(LUMBAR_JOINTS)), LUMBAR_JOINTS)
     axis.set_xlim(-0.5, len(LUMBAR_JOINTS) - 0.5)
     axis.set_ylabel("share of the lumbar rotation (%)")
-    _ends(axis, 100.0 * known["share"].to_numpy(float))
+    # all shares that are not beyond the edges, zero, and up to 40 % at least
+    all_of_them = 100.0 * known["share"].to_numpy(float)
+    low, high = max(_FARTHEST[0], all_of_them.min()), min(_FARTHEST[1], all_of_them.max())
+    bottom = max(min(low - _MARGIN, -_MARGIN), _FARTHEST[0])
+    axis.set_ylim(bottom, min(max(high + _MARGIN, 40.0), _FARTHEST[1]))
 
 
 def _mark(axis: Axes, x: float, shares: Array, look: LineStyle) -> None:
@@ -95,15 +98,6 @@ def _mark(axis: Axes, x: float, shares: Array, look: LineStyle) -> None:
     else:
         edge, marker = (low, "v") if mean <= low else (high, "^")
         axis.plot([x], [edge], marker=marker, color=look.color, ms=4.0, clip_on=False, zorder=4)
-
-
-def _ends(axis: Axes, shares: Array) -> None:
-    low, high = max(_FARTHEST[0], shares.min()), min(_FARTHEST[1], shares.max())
-    axis.set_ylim(min(low - _MARGIN, -_MARGIN), max(high + _MARGIN, 40.0))
-    if axis.get_ylim()[0] < _FARTHEST[0]:
-        axis.set_ylim(bottom=_FARTHEST[0])
-    if axis.get_ylim()[1] > _FARTHEST[1]:
-        axis.set_ylim(top=_FARTHEST[1])
 
 
 def _explain(figure: Figure, looks: dict[str, LineStyle], rows: pd.DataFrame, more: int) -> None:

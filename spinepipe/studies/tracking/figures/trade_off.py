@@ -13,13 +13,12 @@ from spinepipe.effects.contract import Array
 from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, SMALL_PT, WHITE, blank, saying
-from spinepipe.report.words import tick
+from spinepipe.report.words import plain, tick
+from spinepipe.status import Status
 from spinepipe.studies.tracking.figures.line_styles import (
-    looks_of,
-    says,
-    scale,
-    settled,
-    trial_words,
+    say_empty,
+    show_ticks,
+    styles_of,
     trials_of,
 )
 from spinepipe.studies.tracking.settings import Tracking
@@ -36,7 +35,7 @@ def trade_off_figure(study: Tracking, cohort: Cohort, tables: Mapping[str, pd.Da
     if rows.empty:
         return saying("Nothing can be shown: no weight was tried, or no fit found a posture.")
     trials = trials_of(rows)
-    looks = looks_of(trials[:MOST_TRIALS])
+    looks = styles_of(trials[:MOST_TRIALS])
     figure = blank(_HEIGHT_MM + _KEY_MM)
     axes = side_by_side(figure, 1 + len(ERRORS), 1 + len(ERRORS))
     _against(axes[0], rows, looks)
@@ -60,7 +59,7 @@ def _against(axis: Axes, rows: pd.DataFrame, looks: Mapping[str, LineStyle]) -> 
     axis.set_ylabel("markers off, RMS (mm)")
     axis.set_xlim(0.0, 1.15 * float(rows["load_rms_nm"].max()))
     axis.set_ylim(0.0, 1.12 * float(rows["marker_rmse_mm"].max()))
-    scale(axis)
+    show_ticks(axis)
 
 
 def _errors(
@@ -69,7 +68,7 @@ def _errors(
     title, unit = ERRORS[column]
     known = rows.dropna(subset=[column])
     if known.empty:
-        says(axis, f"{title.lower()}:\nno truth is known")
+        say_empty(axis, f"{title.lower()}:\nno truth is known")
         return
     head(axis, index, title)
     for name, look in looks.items():
@@ -82,13 +81,13 @@ def _errors(
     axis.set_xlabel("weight of loads over that of the study (–)")
     axis.set_ylabel(f"mean error ({unit})")
     axis.set_ylim(0.0, 1.12 * float(known[column].max()))
-    scale(axis)
+    show_ticks(axis)
 
 
 def _course(axis: Axes, rows: pd.DataFrame, x: Array, y: Array, look: LineStyle) -> None:
     """A line through the weights, hollow where a fit did not settle, a ring at the study's own."""
     axis.plot(x, y, **look.line(marker="", zorder=2))
-    places = zip(x, y, rows["ratio"], settled(rows), strict=True)
+    places = zip(x, y, rows["ratio"], rows["status"] == Status.CONVERGED.value, strict=True)
     for at, height, ratio, sound in places:
         axis.plot([at], [height], **look.line(not sound, ls="", zorder=3))
         if ratio == 1.0:
@@ -98,12 +97,10 @@ def _course(axis: Axes, rows: pd.DataFrame, x: Array, y: Array, look: LineStyle)
 def _explain(
     figure: Figure, rows: pd.DataFrame, looks: Mapping[str, LineStyle], trials: int
 ) -> None:
-    handles = [
-        Line2D([], [], **look.line(), label=trial_words(name)) for name, look in looks.items()
-    ]
+    handles = [Line2D([], [], **look.line(), label=plain(name)) for name, look in looks.items()]
     ring: dict[str, Any] = {"marker": "o", "ls": "", "mfc": "none", "mec": BLACK, "ms": 6.0}
     handles.append(Line2D([], [], **ring, label="the study's weight"))
-    if not settled(rows).all():
+    if (rows["status"] != Status.CONVERGED.value).any():
         ring |= {"mfc": WHITE, "ms": 3.4}
         handles.append(Line2D([], [], **ring, label="not settled"))
     words = f"Person: {rows['specimen'].iloc[0]}, dynamics with generic passive elements."

@@ -1,4 +1,4 @@
-"""Tracked motions as arrays again, from rows of the table; and what a motion is about."""
+"""Tracked motions as arrays again, from rows of the table."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.motion.skeleton import BODIES, JOINTS
 from spinepipe.studies.tracking.tables import PELVIS
@@ -15,12 +14,9 @@ from spinepipe.units import COORDINATE_COLUMNS, DISPLAY_PER_SI
 IN_ORDER = (PELVIS, *JOINTS)
 """Of the rows of a frame, as bodies are in a posture."""
 
-AXIS = {"flexion_extension": 0, "lateral_bending": 1, "axial_rotation": 2}
-"""Rotation that a kind of motion is about, among extension, right bending and left rotation."""
-
 
 @dataclass(frozen=True, eq=False)
-class ReloadedMotions:
+class TrackedMotion:
     """A motion as an approach found it.
 
     Attributes
@@ -34,6 +30,11 @@ class ReloadedMotions:
     time_s: Array
     q: Array
 
+    @property
+    def names(self) -> dict[str, str]:
+        """Of what, as rows of tables have it."""
+        return {"specimen": self.specimen, "trial": self.trial, "approach": self.approach}
+
     def at(self, time_s: Array) -> Array:
         """(N, 18, 6) between frames, straight; one frame alone holds for all times."""
         flat = self.q.reshape(len(self.q), -1)
@@ -41,21 +42,14 @@ class ReloadedMotions:
         return found.T.reshape(len(time_s), *self.q.shape[1:])
 
 
-def motions(tracked: pd.DataFrame) -> Iterator[ReloadedMotions]:
+def motions(tracked: pd.DataFrame) -> Iterator[TrackedMotion]:
     """All motions of table `tracked`, in its order."""
     number = {name: k for k, name in enumerate(IN_ORDER)}
     for key, rows in tracked.groupby(["specimen", "trial", "approach"], sort=False, observed=True):
         specimen, trial, approach = (str(part) for part in key)
+        # rows by frame, then bodies from below
         order = np.lexsort((rows["joint"].map(number).to_numpy(), rows["frame"].to_numpy()))
-        q = rows[list(COORDINATE_COLUMNS)].to_numpy(float)[order] / DISPLAY_PER_SI
+        flat = rows[list(COORDINATE_COLUMNS)].to_numpy(float)[order] / DISPLAY_PER_SI
         times = rows["time_s"].to_numpy(float)[order][:: len(BODIES)]
-        yield ReloadedMotions(
-            specimen, trial, approach, times, q.reshape(-1, len(BODIES), len(q.T))
-        )
-
-
-def kinds_of_trials(cohort: Cohort) -> dict[tuple[str, str], str]:
-    """Kind of motion by specimen and trial."""
-    rows = cohort.further["trials"]
-    named = zip(rows["specimen"], rows["trial"], rows["kind"], strict=True)
-    return {(str(who), str(trial)): str(kind) for who, trial, kind in named}
+        q = flat.reshape(-1, len(BODIES), len(COORDINATE_COLUMNS))
+        yield TrackedMotion(specimen, trial, approach, times, q)

@@ -1,0 +1,82 @@
+"""Trials of a cohort: their files and kinds, and which approaches a study tries on which.
+
+The forms of all files that a study of tracked motions reads are in `forms.yaml`.
+"""
+
+from pathlib import Path
+
+from spinepipe.cohort import Cohort
+from spinepipe.documents.form import read_forms
+from spinepipe.studies.tracking.settings import LEARNT, OWN, Approach, Tracking
+
+STANCE = "stance"
+MOVING = ("flexion_extension", "lateral_bending", "axial_rotation")
+"""Kinds of trials that move, in the order of the rotation that they are about."""
+
+AXIS = {kind: axis for axis, kind in enumerate(MOVING)}
+"""Rotation that a kind of motion is about, among extension, right bending and left rotation."""
+
+FORMS = tuple(read_forms(Path(__file__).with_name("forms.yaml")).values())
+TRIALS, MARKER_SET, PASSIVE, RATIOS, BOUNDS, CENTRES, TRUTH_CENTRES = FORMS
+
+SMOOTH: Approach = "ik_smooth"
+"""The approach that differs from inverse kinematics by time alone."""
+
+BOTH = ("flexion_extension", "lateral_bending")
+"""Kinds of trials that one calibration is made of."""
+
+_CALIBRATED_ON: dict[str, str] = {kind: name for name, kind in LEARNT.items() if kind != "both"}
+"""Name of the calibration on trials of a kind alone, where it has one of its own."""
+
+
+def kinds_of_trials(cohort: Cohort) -> dict[tuple[str, str], str]:
+    """Kind of motion by specimen and trial."""
+    rows = cohort.further[TRIALS.stem]
+    named = zip(rows["specimen"], rows["trial"], rows["kind"], strict=True)
+    return {(str(who), str(trial)): str(kind) for who, trial, kind in named}
+
+
+def kinds_of(cohort: Cohort, specimen: str) -> dict[str, str]:
+    """Kind of each trial of a person, by its name."""
+    every = kinds_of_trials(cohort).items()
+    return {trial: kind for (who, trial), kind in every if who == specimen}
+
+
+def source_kinds(law: str) -> tuple[str, ...]:
+    """Kinds of the trials of which passive elements are: `axial_rotation` has its own name."""
+    kind = LEARNT.get(law, law)
+    return BOTH if kind == "both" else (kind,)
+
+
+def trials_of_law(cohort: Cohort, specimen: str, law: str) -> tuple[str, ...]:
+    """Names of the trials of which passive elements are."""
+    wanted = source_kinds(law)
+    return tuple(name for name, kind in kinds_of(cohort, specimen).items() if kind in wanted)
+
+
+def calibration_of(cohort: Cohort, specimen: str, trial: str, approach: str) -> str | None:
+    """Name of the calibration that an approach takes over; None where it takes none."""
+    if approach == OWN:
+        kind = kinds_of(cohort, specimen)[trial]
+        return _CALIBRATED_ON.get(kind, kind)
+    return approach if approach in LEARNT else None
+
+
+def approaches_on_trials(
+    study: Tracking, cohort: Cohort, specimen: str
+) -> tuple[tuple[str, Approach], ...]:
+    """(trial, approach) of a person.
+
+    One posture has no motion to calibrate on or to be smooth in; passive elements of a kind of
+    motion that the person did not make cannot be taken over.
+    """
+    kinds = kinds_of(cohort, specimen)
+    found = []
+    for trial, kind in kinds.items():
+        for approach in study.approaches:
+            if kind == STANCE and approach in (OWN, SMOOTH):
+                continue
+            law = calibration_of(cohort, specimen, trial, approach)
+            if law is None or set(source_kinds(law)) <= set(kinds.values()):
+                found.append((trial, approach))
+    return tuple(found)
