@@ -6,15 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.facts import number
 from spinepipe.muscles.masses import Load, arm_loads
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import BodyPoses, cross
+from spinepipe.muscles.scaling import DIAPHRAGM_AHEAD_M
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import BODIES, SLICES, THORAX, body_of
-
-AHEAD_M = number(__name__, "diaphragm_ahead")
-"""How far ahead of T11 the diaphragm's force acts."""
 
 _SACRUM = 0
 
@@ -100,4 +97,4 @@ def diaphragm_load(pressure_pa: float, area_m2: float, t11: Array, turned: Array
     turned : (3, 3) rotation of the thorax: its columns are forwards, up and right of T11.
     """
     lift: Array = pressure_pa * area_m2 * turned[:, 1]
-    return Load("diaphragm", THORAX, lift, t11 + AHEAD_M * turned[:, 0])
+    return Load("diaphragm", THORAX, lift, t11 + DIAPHRAGM_AHEAD_M * turned[:, 0])

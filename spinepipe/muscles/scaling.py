@@ -29,6 +29,9 @@ DIAPHRAGM_M2 = number(__name__, "diaphragm_area")
 """Of a person of reference size. The paper prints none, and values differ twofold (`facts.csv`):
 the one whose source was read is taken."""
 
+DIAPHRAGM_AHEAD_M = number(__name__, "diaphragm_ahead")
+"""How far ahead of T11 its force acts, whatever the person's size."""
+
 RIBS = number(__name__, "bending_with_ribs")
 
 

@@ -3,9 +3,9 @@
 doi 10.1007/s10237-016-0792-3.
 """
 
-from spinepipe.facts import number
 from spinepipe.jobs.against import write_against
 from spinepipe.jobs.inputs import study_of_kind
+from spinepipe.muscles.scaling import DIAPHRAGM_AHEAD_M
 from spinepipe.muscles.subject import CM_PER_M, REFERENCE
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.tables import AGAINST_GHEZELBASH_2016
@@ -29,8 +29,7 @@ def asked_of(settings: TrunkLoads) -> dict[str, float]:
         "t11t12_bending_percent": 100.0 * (settings.passive.t11t12_bending_factor - 1.0),
         "joints_behind_mm": settings.passive.joints_behind_mm,
         "change_percent": 100.0 * settings.solving.change,
-        "pressure_ahead_cm": CM_PER_M
-        * number("spinepipe.muscles.applied_loads", "diaphragm_ahead"),
+        "pressure_ahead_cm": CM_PER_M * DIAPHRAGM_AHEAD_M,
         "reference_male": float(REFERENCE.sex == "male"),
         "reference_age_years": REFERENCE.age_years,
         "reference_height_cm": CM_PER_M * REFERENCE.height_m,

@@ -48,7 +48,7 @@ from spinepipe.studies.trunk_loads.tables import (
 from spinepipe.tables import from_rows, write
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-HELD = (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS)
+PER_PERSON = (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS)
 """Tables that this job makes."""
 
 NO_TONE = "no tone that can be held makes it stable; shown without"
@@ -60,7 +60,7 @@ def run(root: str, study: str, specimen: str, **paths: str) -> None:
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
     rows = rows_of(settings, cohort, specimen, progress)
     made_by = provenance("hold", settings, cohort, [specimen], extra_inputs(settings, cohort))
-    for table in HELD:
+    for table in PER_PERSON:
         whole = [{c.name: row.get(c.name) for c in table.columns} for row in rows[table.name]]
         write(from_rows(table, whole), paths[table.name], made_by)
 
@@ -73,7 +73,7 @@ def rows_of(
     person, known = stands.person, {"specimen": specimen}
     ratios = applied_ratios(stands.source, stands.subject, REFERENCE, stands.regressions)
     remarks = source_of(settings, cohort).remarks
-    found: dict[str, list[Row]] = {table.name: [] for table in HELD}
+    found: dict[str, list[Row]] = {table.name: [] for table in PER_PERSON}
     found["upright"] = [known | row for row in _upright_rows(stands.upright)]
     found["masses"] = [known | row for row in _mass_rows(person)]
     found["scaling"] = [known | dict(vars(ratio)) for ratio in ratios]

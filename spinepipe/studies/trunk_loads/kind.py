@@ -16,7 +16,7 @@ from spinepipe.studies.trunk_loads.persons import extra_inputs
 from spinepipe.studies.trunk_loads.sampling import batches, sampled_specimens
 from spinepipe.studies.trunk_loads.settings import TrunkLoads, reproduces
 
-HELD = (
+PER_PERSON = (
     *("tasks", "levels", "muscles", "paths", "iterations"),
     *("upright", "masses", "scaling", "remarks"),
 )
@@ -47,7 +47,7 @@ class TrunkFiles(StudyFiles):
     """
 
     full = FULL
-    joined = (*HELD, "simplified", "responses")
+    joined = (*PER_PERSON, "simplified", "responses")
     drawings = (
         Figure(
             "pressure_against_measured",
@@ -108,7 +108,7 @@ class TrunkFiles(StudyFiles):
         tuned = TUNED if self.study.volunteer else ()
         samples = ("design", "responses", *_SPREAD.writes) if self.study.uncertain.tasks else ()
         against = _AGAINST.writes if self.rebuilt else ()
-        return (*HELD, "simplified", *tuned, *samples, *against)
+        return (*PER_PERSON, "simplified", *tuned, *samples, *against)
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
