@@ -13,24 +13,17 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.forces import Demand, least_stress
-from spinepipe.muscles.muscle_equilibrium import angles_of, held
+from spinepipe.muscles.muscle_equilibrium import angles_of, solve_task
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.pose import posed, rotations_of
+from spinepipe.muscles.pose import place_bodies, rotations_of
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS
-from spinepipe.muscles.upright import Upright
 from spinepipe.studies.study import COHORTS
-from spinepipe.studies.subjects import SUBJECTS, subject_of
+from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.forms import TASKS
-from spinepipe.studies.trunk_loads.persons import (
-    NOMINAL,
-    changed_task,
-    regressions_of,
-    source_of,
-    standing,
-)
+from spinepipe.studies.trunk_loads.persons import UprightPerson, vary_task
 from spinepipe.studies.trunk_loads.postures import read_tasks
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.settings import NOMINAL, TrunkLoads
 from tests.reference.peers import opensim_static, opensim_trunk
 
 STUDY = TrunkLoads(study="trunk", kind="trunk_loads", cohort="trunk_volunteers")
@@ -45,9 +38,9 @@ _PROGRAM = """
 from benchmarks import trunk
 
 everyone = trunk.Everyone.read()
-person = everyone.person()
+person = everyone.first().person
 for task in everyone.twelve():
-    trunk.held(person, task)
+    trunk.solve_task(person, task)
 """
 
 
@@ -64,24 +57,9 @@ class Everyone:
         cohort = cohorts.read(ROOT / COHORTS / STUDY.cohort, (SUBJECTS, TASKS))
         return cls(cohort, read_tasks(cohort, STUDY.trunk_angle))
 
-    def person(
-        self,
-        wrapping: bool = True,
-        stood: Upright | None = None,
-        values: Mapping[str, float] = NOMINAL,
-    ) -> Person:
-        """The first person, standing as given or as is found."""
-        subject = subject_of(self.cohort, self.cohort.specimen_names[0])
-        source = source_of(STUDY, self.cohort).trunk
-        regressions = regressions_of(STUDY, self.cohort.folder)
-        return standing(STUDY, source, subject, regressions, values, wrapping, stood).person
-
-    def stood(self) -> Upright:
-        """How the first person stands."""
-        subject = subject_of(self.cohort, self.cohort.specimen_names[0])
-        source = source_of(STUDY, self.cohort).trunk
-        regressions = regressions_of(STUDY, self.cohort.folder)
-        return standing(STUDY, source, subject, regressions).upright
+    def first(self) -> UprightPerson:
+        """The first person, standing as is found."""
+        return UprightPerson.of_cohort(STUDY, self.cohort, self.cohort.specimen_names[0])
 
     def twelve(self) -> list[Task]:
         """One task of each number of Ghezelbash 2016 Table 1."""
@@ -128,32 +106,32 @@ class Beside:
 def tasks() -> Iterator[OneTask]:
     """The twelve tasks of a person, one by one, warm."""
     everyone = Everyone.read()
-    person = everyone.person()
+    person = everyone.first().person
     for task in everyone.twelve():
-        found = held(person, task)
-        took = cpu_seconds(lambda one=task: held(person, one), REPEATS).median
+        found = solve_task(person, task)
+        took = cpu_seconds(lambda one=task: solve_task(person, one), REPEATS).median
         yield OneTask(task.name, found.status.value, len(found.rounds), took)
 
 
 def standing_s() -> float:
     """CPU seconds until a person stands upright at their size."""
     everyone = Everyone.read()
-    return cpu_seconds(everyone.person, REPEATS).median
+    return cpu_seconds(everyone.first, REPEATS).median
 
 
 def samples() -> Sampled:
     """As many samples of a person in twelve tasks as a minute of CPU takes."""
     everyone, rng = Everyone.read(), np.random.default_rng(1)
-    spreads, stood = STUDY.uncertain.factors, everyone.stood()
+    spreads, first = STUDY.uncertain.factors, everyone.first()
     start, done, runs, far = time.process_time(), 0, 0, 0
     while time.process_time() - start < BUDGET_S:
         values: dict[str, float] = {
             name: NOMINAL[name] + rng.normal(0.0, spread.sd) for name, spread in spreads.items()
         }
-        person = everyone.person(stood=stood, values=values)
+        person = first.varied(values)
         for task in everyone.twelve():
             try:
-                held(person, changed_task(task, values))
+                solve_task(person, vary_task(task, values))
                 runs += 1
             except ValueError:
                 far += 1
@@ -172,15 +150,16 @@ def beside_opensim() -> Beside:
     OpenSim's time is that of one frame more: of many frames less that of few.
     """
     everyone = Everyone.read()
-    person, task = everyone.person(wrapping=False), everyone.tasks[POSTURE]
+    first, task = everyone.first(), everyone.tasks[POSTURE]
+    person, whole = first.varied({}, wrapping=False), first.person
     bends = np.diff(angles_of(person, task), axis=0)
     demand = _demand(person, task, bends)
     few, _ = _theirs(person, bends, demand, FEW)
     many, theirs = _theirs(person, bends, demand, MANY)
-    ours, whole = least_stress(demand).forces, everyone.person()
+    ours = least_stress(demand).forces
     return Beside(
         cpu_seconds(lambda: _ours(person, task, bends, demand), 4 * REPEATS).median,
-        cpu_seconds(lambda: held(whole, task), REPEATS).median,
+        cpu_seconds(lambda: solve_task(whole, task), REPEATS).median,
         (many - few) / (MANY - FEW),
         float(np.abs(theirs - ours).max()),
         float(ours.max()),
@@ -198,7 +177,7 @@ def _demand(person: Person, task: Task, bends: Array) -> Demand:
     many = len(muscles)
     arms = opensim_trunk.lever_arms(_peer(person), bends).reshape(many, -1).T
     wanted = np.zeros((len(LEVELS), 3))
-    wanted[:, 0] = held(person, task).demand.required.reshape(-1, 3)[:, 2]
+    wanted[:, 0] = solve_task(person, task).demand.required.reshape(-1, 3)[:, 2]
     demand = Demand(
         np.ascontiguousarray(arms),
         wanted.ravel(),
@@ -213,7 +192,7 @@ def _demand(person: Person, task: Task, bends: Array) -> Demand:
 def _ours(person: Person, task: Task, bends: Array, demand: Demand) -> None:
     """Lines of action and forces, once; the spine does not move."""
     rotations = rotations_of(person.chain, angles_of(person, task))
-    person.lines.pulls(posed(person.chain, rotations, np.zeros_like(bends)))
+    person.lines.pulls(place_bodies(person.chain, rotations, np.zeros_like(bends)))
     least_stress(demand)
 
 

@@ -20,14 +20,13 @@ from spinepipe.motion.skeleton import BODIES as TRACKED
 from spinepipe.motion.skeleton import MarkerSet, MarkerTrial, Masses, Skeleton
 from spinepipe.motion.trajectory import solve
 from spinepipe.muscles import pose
-from spinepipe.muscles.diaphragm import AREA_M2
-from spinepipe.muscles.joint_laws import AXIAL_N_PER_M, CURVES, JointLaws
 from spinepipe.muscles.masses import masses_of
-from spinepipe.muscles.muscle_equilibrium import held
+from spinepipe.muscles.muscle_equilibrium import solve_task
 from spinepipe.muscles.myo_sim import source_of_myo_sim
-from spinepipe.muscles.passive_muscle import PassiveMuscle
+from spinepipe.muscles.passive_tissue import AXIAL_N_PER_M, CURVES, JointLaws, PassiveMuscle
 from spinepipe.muscles.paths import Lines, Standoff
 from spinepipe.muscles.person import Person
+from spinepipe.muscles.scaling import DIAPHRAGM_M2
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import BODIES, LEVELS
@@ -99,11 +98,11 @@ def hold_a_trunk_upright() -> None:
     chain, lines = pose.JointCentres.of(trunk, 0.004), Lines.of(trunk, Standoff())
     person = Person(
         *(REFERENCE, chain, lines, laws, PassiveMuscle(), masses_of(trunk, REFERENCE)),
-        *(AREA_M2, unknown, *np.ones((2, len(trunk.muscles)))),
+        *(DIAPHRAGM_M2, unknown, *np.ones((2, len(trunk.muscles)))),
     )
     stood = upright(person, unknown[:, 0], np.radians(5.0))
     task = Task("standing", None, unknown, from_upright=True)
-    held(person.standing(stood.turned), task)
+    solve_task(person.with_upright(stood.turned), task)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects.contract import Array
 from spinepipe.facts import number, numbers, several
 from spinepipe.units import DEG_PER_RAD
 
@@ -48,31 +47,7 @@ class DiscPressure:
     @property
     def inside(self) -> bool:
         """Whether compression and flexion are in the range to which Eq 6 was fitted."""
-        return not self.outside
-
-    @property
-    def outside(self) -> str:
-        """What is out of range, in words; empty if nothing."""
-        found = []
-        if not 0.0 <= self.nominal_pa <= LARGEST_PA:
-            found.append(
-                f"compression / area {self.nominal_pa / PA_PER_MPA:.2f} MPa, fitted for 0 to "
-                f"{LARGEST_PA / PA_PER_MPA:.2f}"
-            )
-        if not 0.0 <= self.flexion <= LARGEST_FLEXION:
-            found.append(
-                f"flexion {self.flexion * DEG_PER_RAD:.1f} deg, fitted for 0 to "
-                f"{LARGEST_FLEXION * DEG_PER_RAD:.0f}"
-            )
-        return "; ".join(found)
-
-
-def eq6(nominal_pa: Array | float, flexion: Array | float) -> Array:
-    """Pressure in the disc, Pa, of compression over area, Pa, and flexion, rad; broadcasts."""
-    p = np.asarray(nominal_pa, dtype=float) / PA_PER_MPA
-    theta = np.asarray(flexion, dtype=float) * DEG_PER_RAD
-    found: Array = _ONE + _P * p + _T * theta + _PP * p**2 + _PT * p * theta + _TT * theta**2
-    return PA_PER_MPA * found
+        return 0.0 <= self.nominal_pa <= LARGEST_PA and 0.0 <= self.flexion <= LARGEST_FLEXION
 
 
 def disc_pressure(compression: float, area: float, flexion: float) -> DiscPressure:
@@ -84,4 +59,7 @@ def disc_pressure(compression: float, area: float, flexion: float) -> DiscPressu
     flexion : rad of the joint from the unloaded geometry, flexion positive.
     """
     nominal = compression / area
-    return DiscPressure(float(eq6(nominal, flexion)), nominal / DREISCHARF, nominal, flexion)
+    p = np.asarray(nominal, dtype=float) / PA_PER_MPA
+    theta = np.asarray(flexion, dtype=float) * DEG_PER_RAD
+    eq6 = _ONE + _P * p + _T * theta + _PP * p**2 + _PT * p * theta + _TT * theta**2
+    return DiscPressure(float(PA_PER_MPA * eq6), nominal / DREISCHARF, nominal, flexion)

@@ -19,8 +19,7 @@ import pandas as pd
 from spinepipe.effects.contract import Array
 from spinepipe.facts import number, several
 from spinepipe.frames import Pose, rotation_zxy
-from spinepipe.muscles import discs
-from spinepipe.muscles.fascicles import Fascicle, Source, muscles_of, on_their_sides, sheath_of
+from spinepipe.muscles import trunk_source
 from spinepipe.muscles.trunk import (
     BODIES,
     LEVELS,
@@ -32,6 +31,7 @@ from spinepipe.muscles.trunk import (
     Trunk,
     body_of,
 )
+from spinepipe.muscles.trunk_source import Fascicle, Source
 
 SHEATH = "Abdomen"
 OBLIQUES = ("external_oblique", "internal_oblique")
@@ -93,12 +93,14 @@ def source_of_folder(name: str, tables: SpecimenTables, stress_pa: float | None 
     ValueError
         In a sentence, when joints, bodies or cross-sections are missing.
     """
-    poses = _joint_poses(tables.joints)
+    poses = {str(row["joint"]): _pose(row) for _, row in tables.joints.iterrows()}
+    if missing := [joint for joint in _CHAIN if joint not in poses]:
+        raise ValueError(f"joints of a trunk are missing: {', '.join(missing)}")
     l5s1 = poses["L5S1"].origin
     fascicles, left_out = _fascicles(tables, l5s1, stress_pa)
-    fascicles, remarks = on_their_sides(fascicles)
-    muscles = muscles_of(fascicles)
-    remarks = (*remarks, *left_out, discs.REMARK)
+    fascicles, remarks = trunk_source.mirror_wrong_sides(fascicles)
+    muscles = trunk_source.muscles_of(fascicles)
+    remarks = (*remarks, *left_out, trunk_source.DISC_REMARK)
     return Source(_trunk(name, poses, muscles), remarks)
 
 
@@ -113,13 +115,6 @@ def in_ground(frames: pd.DataFrame, names: list[str], points: Array) -> Array:
     return _Bodies.of(frames).in_ground(names, points)
 
 
-def _joint_poses(joints: pd.DataFrame) -> dict[str, Pose]:
-    poses = {str(row["joint"]): _pose(row) for _, row in joints.iterrows()}
-    if missing := [joint for joint in _CHAIN if joint not in poses]:
-        raise ValueError(f"joints of a trunk are missing: {', '.join(missing)}")
-    return poses
-
-
 def _pose(row: "pd.Series") -> Pose:
     angles = np.radians(row[_ANGLES].to_numpy(float))
     return Pose(rotation_zxy(*angles), row[_POINT].to_numpy(float) * _MM)
@@ -130,23 +125,23 @@ def _fascicles(
 ) -> tuple[list[Fascicle], tuple[str, ...]]:
     """Those that are of use, and a sentence for each reason why others are not."""
     bodies = _Bodies.of(tables.frames)
-    told = {str(row["muscle"]): row for _, row in tables.parameters.iterrows()}
-    kept: list[Fascicle] = []
+    parameters = {str(row["muscle"]): row for _, row in tables.parameters.iterrows()}
+    found: list[Fascicle] = []
     why: dict[str, int] = {}
     in_order = tables.muscles.sort_values("point", kind="stable")
     for name, rows in in_order.groupby("muscle", sort=False):
-        if name not in told:
+        if name not in parameters:
             raise ValueError(f"{name} has points and no row in muscle_parameters")
-        row = told[str(name)]
+        row = parameters[str(name)]
         names = rows["body"].tolist()
         places = bodies.in_ground(names, rows[_POINT].to_numpy(float) * _MM) - l5s1
         reason = _reason_against(str(row["group"]), names, bodies)
         if reason:
             why[reason] = why.get(reason, 0) + 1
         else:
-            kept.append(_fascicle(str(name), row, names, places, bodies, stress_pa))
-    total = sum(why.values()) + len(kept)
-    return kept, tuple(
+            found.append(_fascicle(str(name), row, names, places, bodies, stress_pa))
+    total = sum(why.values()) + len(found)
+    return found, tuple(
         f"{count} of {total} muscles are left out: {text}" for text, count in why.items()
     )
 
@@ -205,22 +200,25 @@ def _fascicle(
     bodies: _Bodies,
     stress_pa: float | None,
 ) -> Fascicle:
+    """A muscle of the table of parameters, through places (P, 3) m of the bodies so named."""
     group, side = str(row["group"]), str(row["side"])
     if side not in SIDES:
         raise ValueError(f"{name} is on the side {side}; allowed: {', '.join(SIDES)}")
     in_sheath = SHEATH in names and group in OBLIQUES
-    if in_sheath:
-        order = [k for k, one in enumerate(names) if one != SHEATH] + [names.index(SHEATH)]
-        body: tuple[int, ...] = (bodies.index(names[order[0]]), THORAX)
-    else:
-        order = [k for k, one in enumerate(names) if one != SHEATH]
-        body = tuple(bodies.index(names[k]) for k in order)
+    order = [k for k, one in enumerate(names) if one != SHEATH]
+    body = tuple(bodies.index(names[k]) for k in order)
+    if in_sheath:  # one end hangs there, written down with the body of the ribs
+        order, body = [*order, names.index(SHEATH)], (*body[:1], THORAX)
     if len(body) < 2:
         raise ValueError(f"{name} has fewer than two points on bodies")
+    # iliocostalis lumborum that reaches ribs is its thoracic part
+    group = _GROUPS.get(group, group)
+    if group == "iliocostalis_lumborum" and max(body) >= BODIES.index("T12"):
+        group = "iliocostalis_thoracis"
     fibre = row.get("optimal_fibre_length_mm")
     return Fascicle(
         name=name,
-        group=_group(group, body),
+        group=group,
         side=side,
         pcsa=_pcsa(name, row, stress_pa),
         fibre=0.0 if fibre is None or pd.isna(fibre) else float(fibre) * _MM,
@@ -228,14 +226,6 @@ def _fascicle(
         point=places[order],
         in_sheath=in_sheath,
     )
-
-
-def _group(group: str, body: tuple[int, ...]) -> str:
-    """As spinepipe calls it; iliocostalis lumborum that reaches ribs is its thoracic part."""
-    found = _GROUPS.get(group, group)
-    if found == "iliocostalis_lumborum" and max(body) >= BODIES.index("T12"):
-        return "iliocostalis_thoracis"
-    return found
 
 
 def _pcsa(name: str, row: "pd.Series", stress_pa: float | None) -> float:
@@ -262,21 +252,18 @@ def _trunk(name: str, poses: Mapping[str, Pose], muscles: Muscles) -> Trunk:
     ends = np.vstack([chain, chain[-1] + top])
     size = chain[-1, 1] / _REFERENCE_LENGTH_M
     shoulder = chain[-1] + size * _SHOULDER_M
+    frames = [poses[level].rotation for level in LEVELS]
     return Trunk(
         source=name,
         joints=chain[: len(LEVELS)],
-        disc_tilt=np.array([_extension(poses[level]) for level in LEVELS]),
-        disc_height=discs.disc_heights(),
-        disc_area=discs.disc_areas(),
-        vertebrae=discs.vertebra_centres(ends),
+        # extension about +z of the joint frames
+        disc_tilt=np.array([float(np.arctan2(-r[0, 1], r[1, 1])) for r in frames]),
+        disc_height=trunk_source.disc_heights(),
+        disc_area=trunk_source.disc_areas(),
+        vertebrae=trunk_source.vertebra_centres(ends),
         head=chain[-1] + size * _HEAD_M,
         shoulders=np.array([shoulder, shoulder * [1.0, 1.0, -1.0]]),
         arm_length=size * _ARM_LENGTH_M,
-        sheath=sheath_of(muscles, RECTUS),
+        sheath=trunk_source.sheath_of(muscles),
         muscles=muscles,
     )
-
-
-def _extension(pose: Pose) -> float:
-    """Rad about +z of a joint frame."""
-    return float(np.arctan2(-pose.rotation[0, 1], pose.rotation[1, 1]))

@@ -9,7 +9,7 @@ best of those that leave no more: nothing is infeasible in silence.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, linprog, milp
+from scipy.optimize import Bounds, LinearConstraint, milp
 
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.least_norm import least_norm
@@ -61,9 +61,12 @@ def least_stress(demand: Demand, nearby: Forces | None = None) -> Forces:
     found, multipliers = _quadratic(demand, demand.required, start=start)
     if found is not None:
         return Forces(found, demand.required - demand.arms @ found, True, multipliers)
-    found, _ = _quadratic(demand, demand.required - least_slack(demand), tolerance=1e-5)
+    slackest = least_slack_forces(demand)
+    slack = demand.required - demand.arms @ slackest
+    # 1e-5 N m more may be left over: the linear programme meets its rows to its own tolerance
+    found, _ = _quadratic(demand, demand.required - slack, tolerance=1e-5)
     if found is None:
-        found = _least_slack_forces(demand)
+        found = slackest
     return Forces(found, demand.required - demand.arms @ found, False)
 
 
@@ -74,6 +77,7 @@ def _quadratic(
 
     What may be left over, up to the tolerance, counts as forces that cost next to nothing.
     """
+    # unknowns are stresses; rows of the sheath are in 100 N, so that they are as large as moments
     unit, rows = demand.pcsa * STRESS_PA, len(required)
     of_rows = np.concatenate([required, np.zeros(2)])
     columns = np.hstack([demand.arms.T * unit[:, None], demand.sheath.T * unit[:, None] / 1e2])
@@ -82,19 +86,16 @@ def _quadratic(
         columns = np.vstack([columns, np.eye(rows, len(of_rows))])
         least = np.concatenate([least, np.full(rows, -tolerance)])
         most = np.concatenate([most, np.full(rows, tolerance)])
-    first = np.zeros(len(of_rows)) if start is None else start
-    x, multipliers, met = least_norm(columns, of_rows, rows, least, most, first)
+    start = np.zeros(len(of_rows)) if start is None else start
+    x, multipliers, met = least_norm(columns, of_rows, rows, least, most, start)
     found = np.clip(x[: len(unit)] * unit, demand.least, demand.most) if met else None
     return found, multipliers
 
 
-def least_slack(demand: Demand) -> Array:
-    """(L,) N m, left over by the forces that leave least over in sum."""
-    return demand.required - demand.arms @ _least_slack_forces(demand)
+def least_slack_forces(demand: Demand) -> Array:
+    """(M,) N, that leave least over in sum.
 
-
-def _least_slack_forces(demand: Demand) -> Array:
-    """(M,) N; a linear programme by HiGHS, asked through `milp`, which adds least of its own.
+    A linear programme by HiGHS, asked through `milp`, which adds least of its own.
 
     So small a programme is solved before it is simplified.
     """
@@ -116,22 +117,3 @@ def _least_slack_forces(demand: Demand) -> Array:
         raise ValueError(f"the linear programme of the least slack failed: {solved.message}")
     found: Array = np.asarray(solved.x[:many])
     return found
-
-
-def most_along(demand: Demand, direction: Array, start: Array) -> float | None:
-    """Largest t with which forces can make `start` + t `direction`, (L,) N m; None: not even none.
-
-    With the demand itself as the direction and nought as the start it is the factor by which the
-    demand may grow; with a single row it is the moment left there.
-    """
-    many = len(demand.pcsa)
-    solved = linprog(
-        np.concatenate([np.zeros(many), [-1.0]]),
-        A_eq=np.column_stack([demand.arms, -direction]),
-        b_eq=start,
-        A_ub=np.column_stack([-demand.sheath, np.zeros(2)]),
-        b_ub=np.zeros(2),
-        bounds=[*zip(demand.least, demand.most, strict=True), (0.0, 1e4)],
-        method="highs",
-    )
-    return float(solved.x[-1]) if solved.status == 0 and solved.x is not None else None

@@ -1,4 +1,4 @@
-"""The smallest x within bounds that meets a few linear rows, by Newton's method on their dual.
+"""The smallest x within bounds that meets a few linear rows, by semismooth Newton on the dual.
 
 Least |x|^2 / 2 subject to rows @ x = required, the last rows >= required, and least <= x <= most.
 With multipliers y of the rows, x = clip(rows.T @ y, least, most), and the dual is a convex function
@@ -38,7 +38,7 @@ def least_norm(
     many, rows = columns.shape
     x, z, along = np.zeros(many), np.zeros(many), np.zeros(many)
     y, centre, left, slope = start.copy(), start.copy(), np.zeros(rows), np.zeros(rows)
-    anew = not np.any(start)
+    anew = not np.any(start)  # nothing is free at y = 0: the first curvature is that of all x
     free = np.ones(rows, dtype=np.bool_)
     weight = _PROXIMAL * np.max(np.square(columns))
     for rounds in range(MOST_ROUNDS):
@@ -64,6 +64,7 @@ def least_norm(
             return x, y, True
         if gain < -_MET * size:
             return x, y, False
+        # an outer step of the method of multipliers
         if inner < _CENTRED * off:
             centre[:] = y
             slope[:] = left
@@ -75,7 +76,8 @@ def least_norm(
             step = _newton(curved, slope, free, weight)
         for j in range(many):
             along[j] = _dot(columns[j], step)
-        t = _lowest(z, along, least, most, _dot(slope, step), weight * _dot(step, step))
+        t = _line_search(z, along, least, most, _dot(slope, step), weight * _dot(step, step))
+        # multipliers of inequalities stay at or above nought: the step ends where one comes to it
         stopped = -1
         for r in range(equal, rows):
             if step[r] < 0.0 and y[r] + t * step[r] <= 0.0:
@@ -88,6 +90,7 @@ def least_norm(
 
 @njit(cache=True)
 def _dot(a: Array, b: Array) -> float:
+    """Of two vectors of few numbers, for which a call of BLAS takes longer."""
     found = 0.0
     for k in range(len(a)):
         found += a[k] * b[k]
@@ -121,7 +124,7 @@ def _newton(curved: Array, slope: Array, free: NDArray[np.bool_], weight: float)
                 c = curved[r, q] - _dot(factor[r, :q], factor[q, :q])
                 factor[r, q] = c / factor[q, q]
         pivot = curved[r, r] + weight - _dot(factor[r, :r], factor[r, :r])
-        factor[r, r] = np.sqrt(max(pivot, weight))
+        factor[r, r] = np.sqrt(max(pivot, weight))  # rounding may leave less
         step[r] = (s - _dot(factor[r, :r], step[:r])) / factor[r, r]
     for r in range(rows - 1, -1, -1):
         if free[r]:
@@ -132,13 +135,16 @@ def _newton(curved: Array, slope: Array, free: NDArray[np.bool_], weight: float)
 
 
 @njit(cache=True)
-def _lowest(z: Array, along: Array, least: Array, most: Array, slope: float, floor: float) -> float:
+def _line_search(
+    z: Array, along: Array, least: Array, most: Array, slope: float, floor: float
+) -> float:
     """How far along the step the dual is lowest, from its slope and least curvature along it.
 
     Its slope is broken where an x comes to a bound or leaves it: through the breaks in order.
     """
     at, by = np.zeros(2 * len(z)), np.zeros(2 * len(z))
     n, curved = 0, floor
+    # curvature where the step begins, and where along it each x becomes free or bound
     for j in range(len(z)):
         if along[j] == 0.0:
             continue
@@ -154,6 +160,7 @@ def _lowest(z: Array, along: Array, least: Array, most: Array, slope: float, flo
             curved += square
         at[n], by[n] = leave, -square
         n += 1
+    # through the breaks until the slope turns upwards
     t = 0.0
     for k in np.argsort(at[:n]):
         there = slope + max(curved, floor) * (at[k] - t)

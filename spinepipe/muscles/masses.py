@@ -5,7 +5,6 @@ L5, their centres lie up to 5 cm ahead of the vertebrae, most in the lower thora
 distance run between the printed values is a straight line here. Sources: `facts.csv`.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -72,6 +71,7 @@ def masses_of(trunk: Trunk, subject: Subject, ahead_times: float = 1.0) -> tuple
     """
     tall = subject.height_m / REFERENCE.height_m
     slices = zip(SLICES, slice_percents(), trunk.vertebrae, ahead_cm(), strict=True)
+    head_kg = MASS_PERCENT[f"head {subject.sex}"] / 100.0 * subject.mass_kg
     return (
         *(
             Mass(
@@ -82,12 +82,7 @@ def masses_of(trunk: Trunk, subject: Subject, ahead_times: float = 1.0) -> tuple
             )
             for name, percent, centre, ahead in slices
         ),
-        Mass(
-            "head",
-            THORAX,
-            MASS_PERCENT[f"head {subject.sex}"] / 100.0 * subject.mass_kg,
-            trunk.head,
-        ),
+        Mass("head", THORAX, head_kg, trunk.head),
     )
 
 
@@ -98,15 +93,11 @@ def slice_percents() -> tuple[float, ...]:
 
 def ahead_cm() -> tuple[float, ...]:
     """How far each slice lies ahead of its vertebra, T1 to L5, cm at the reference height."""
-    at = [_position(name) for name in AHEAD_AT]
+    # a level lies half way between its two vertebrae
+    places = {name: float(k) for k, name in enumerate(SLICES)}
+    places |= {"".join(pair): k + 0.5 for k, pair in enumerate(pairwise(SLICES))}
+    at = [places[name] for name in AHEAD_AT]
     return tuple(np.interp(range(len(SLICES)), at, list(AHEAD_AT.values())).tolist())
-
-
-def _position(name: str) -> float:
-    """Place in `SLICES` of a vertebra, or half way between the two of a level."""
-    if name in SLICES:
-        return float(SLICES.index(name))
-    return next(k + 0.5 for k, pair in enumerate(pairwise(SLICES)) if "".join(pair) == name)
 
 
 def shares(subject: Subject) -> tuple[MassShare, ...]:
@@ -145,14 +136,16 @@ def arm_loads(
     ValueError
         If a hand is farther from its shoulder than the arm is long.
     """
-    loads: list[Load] = []
+    carried: list[Mass] = []
     for side, shoulder in zip(SIDES, shoulders, strict=True):
         hand = _hand(side, shoulder, hands, arm_length)
-        loads += _weights(arm_masses(side, shoulder, hand, subject))
+        carried += arm_masses(side, shoulder, hand, subject)
         if hands.kg > 0.0 and hands.holding in ("both", side):
-            held = hands.kg * (0.5 if hands.holding == "both" else 1.0)
-            loads += _weights([Mass(f"{side}_hand_load", THORAX, held, hand)])
-    return tuple(loads)
+            kg = hands.kg * (0.5 if hands.holding == "both" else 1.0)
+            carried.append(Mass(f"{side}_hand_load", THORAX, kg, hand))
+    return tuple(
+        Load(mass.name, mass.body, mass.kg * STANDARD_GRAVITY, mass.at) for mass in carried
+    )
 
 
 def arm_masses(side: str, shoulder: Array, hand: Array, subject: Subject) -> tuple[Mass, ...]:
@@ -183,6 +176,7 @@ def centre_shares(sex: Sex) -> tuple[float, ...]:
 
 
 def _hand(side: str, shoulder: Array, hands: Hands, arm_length: float) -> Array:
+    """(3,) m, where the hand of a side is."""
     if hands.at is None or hands.holding not in ("both", side):
         return shoulder - np.array([0.0, arm_length, 0.0])
     outwards = {"right": 1.0, "left": -1.0}[side] if hands.holding == "both" else 0.0
@@ -194,8 +188,3 @@ def _hand(side: str, shoulder: Array, hands: Hands, arm_length: float) -> Array:
             f"long ({1e3 * arm_length:.0f} mm)"
         )
     return hand
-
-
-def _weights(masses: tuple[Mass, ...] | list[Mass]) -> Iterator[Load]:
-    for mass in masses:
-        yield Load(mass.name, mass.body, mass.kg * STANDARD_GRAVITY, mass.at)

@@ -2,27 +2,34 @@
 
 Rotations are given; the joints' forces follow by adding up what is above each joint, and with them
 how far the vertebrae have moved on each other and how stiff the joints have become. That moves the
-fascicles, which changes the forces: the round is repeated until forces and spine agree.
+fascicles, which changes the forces: a fixed point in the joints' forces, found by relaxed rounds
+whose step follows Aitken's rule (Irons and Tuck 1969, Int J Numer Methods Eng 1:275).
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.applied import Applied, applied
+from spinepipe.muscles.applied_loads import AppliedLoads, applied_loads
 from spinepipe.muscles.forces import Demand, Forces, least_stress
 from spinepipe.muscles.paths import Pulls
 from spinepipe.muscles.person import Person, above
-from spinepipe.muscles.pose import BodyPoses, posed, rotations_of
+from spinepipe.muscles.pose import BodyPoses, place_bodies, rotations_of
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.status import Balanced
 
 L4L5 = LEVELS.index("L4L5")
+
 _SHORTEST, _LONGEST = 0.1, 5.0
+"""Least and largest step of a round: Aitken's rule overshoots where two rounds are nearly alike."""
+
 _HEAVY_N = 3000.0
+"""Compression of all joints that the second search starts from: a heavy load."""
+
 _LOWEST = 3
+"""Rows of L5S1 in a demand."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +67,7 @@ class SolverRound:
 
 @dataclass(frozen=True, eq=False)
 class SolvedTask:
-    """A task, held.
+    """A task with the muscle forces that were found for it.
 
     Attributes
     ----------
@@ -77,14 +84,14 @@ class SolvedTask:
     message: str
     poses: BodyPoses
     pulls: Pulls
-    applied: Applied
+    applied: AppliedLoads
     demand: Demand
     found: Forces
     stretched: Array
     pushes: Array
     joint_moments: Array
     stiffening: Array
-    rounds: tuple[SolverRound, ...] = field(default=())
+    rounds: tuple[SolverRound, ...] = ()
 
     @property
     def compression(self) -> Array:
@@ -124,12 +131,15 @@ class TurnedPose:
     def of(cls, person: Person, task: Task) -> "TurnedPose":
         """Of a person in a task."""
         rotations = rotations_of(person.chain, angles_of(person, task))
-        poses = posed(person.chain, rotations, np.zeros((len(LEVELS), 3)))
+        poses = place_bodies(person.chain, rotations, np.zeros((len(LEVELS), 3)))
         return cls(poses, person.laws.moments(poses.turned, np.zeros(len(LEVELS))))
 
 
-def held(
-    person: Person, task: Task, how: SolverOptions = SolverOptions(), tone: float | None = None
+def solve_task(
+    person: Person,
+    task: Task,
+    options: SolverOptions = SolverOptions(),
+    tone: float | None = None,
 ) -> SolvedTask:
     """Muscle forces of a task.
 
@@ -143,29 +153,29 @@ def held(
         For a load that the arms do not reach.
     """
     least = task.tone_share if tone is None and task.tone == "stated" else tone or 0.0
-    first = _rounds(person, task, how, least, np.zeros(len(LEVELS)))
-    if not (how.twice and how.feedback) or first.status is not Balanced.CONVERGED:
+    first = _iterate(person, task, options, least, np.zeros(len(LEVELS)))
+    if not (options.twice and options.feedback) or first.status is not Balanced.CONVERGED:
         return first
-    again = _rounds(person, task, how, least, np.full(len(LEVELS), _HEAVY_N))
+    again = _iterate(person, task, options, least, np.full(len(LEVELS), _HEAVY_N))
     apart = _change(again.found.forces, first.found.forces)
-    if apart > 2.0 * how.change:
-        told = f"another start ends {100.0 * apart:.1f} % away"
-        return replace(first, status=Balanced.TWO_ANSWERS, message=told)
+    if apart > 2.0 * options.change:
+        message = f"another start ends {100.0 * apart:.1f} % away"
+        return replace(first, status=Balanced.TWO_ANSWERS, message=message)
     return first
 
 
-def acted_on(person: Person, task: Task, forces: Array, rounds: int = 20) -> SolvedTask:
+def solve_with_forces(person: Person, task: Task, forces: Array, rounds: int = 20) -> SolvedTask:
     """The task with given muscle forces (M,) N, where the spine has moved to under them."""
     turned = TurnedPose.of(person, task)
-    pushes, how = np.zeros((len(LEVELS), 3)), SolverOptions()
+    pushes, options = np.zeros((len(LEVELS), 3)), SolverOptions()
     for _ in range(rounds):
-        now = _at(person, task, how, 0.0, turned, pushes, given=forces)
+        now = _solve_round(person, task, options, 0.0, turned, pushes, given=forces)
         pushes = now.pushes
     return now
 
 
-def _rounds(
-    person: Person, task: Task, how: SolverOptions, tone: float, start: Array
+def _iterate(
+    person: Person, task: Task, options: SolverOptions, tone: float, start: Array
 ) -> SolvedTask:
     """Rounds from a spine pressed by `start` (7,) N."""
     turned = TurnedPose.of(person, task)
@@ -175,26 +185,26 @@ def _rounds(
     trail: list[Array] = []
     step, last, found = 1.0, np.zeros_like(pushes), None
     while True:
-        now = _at(person, task, how, tone, turned, pushes, nearby=found)
+        now = _solve_round(person, task, options, tone, turned, pushes, nearby=found)
         found = now.found
-        before = trail[-1] if trail else np.zeros_like(now.found.forces)
-        change = _change(now.found.forces, before) if trail else None
-        residual = _residual(now, before, how)
-        trail.append(now.found.forces)
+        before = trail[-1] if trail else np.zeros_like(found.forces)
+        change = _change(found.forces, before) if trail else None
+        residual = _residual(now, before, options)
+        trail.append(found.forces)
         rounds.append(
             SolverRound(change, residual if change is not None else 0.0, now.compression[L4L5])
         )
-        settled = change is not None and change < how.change and residual < how.residual_nm
-        if settled or not how.feedback or len(rounds) >= how.most:
-            done = settled or not how.feedback
-            status, message = _ended(now, how, rounds, trail, done)
+        settled = change is not None and change < options.change and residual < options.residual_nm
+        if settled or not options.feedback or len(rounds) >= options.most:
+            done = settled or not options.feedback
+            status, message = _outcome(now, options, rounds, trail, done)
             return replace(now, status=status, message=message, rounds=tuple(rounds))
         off = now.pushes - pushes
-        step, last = (_step(step, off, last) if len(rounds) > 1 else step), off
+        step, last = (_aitken_step(step, off, last) if len(rounds) > 1 else step), off
         pushes = pushes + step * off
 
 
-def _step(step: float, off: Array, last: Array) -> float:
+def _aitken_step(step: float, off: Array, last: Array) -> float:
     """How far to go towards what a round found: Aitken's rule, shorter where rounds swing, longer
     where they creep."""
     by = (off - last).ravel()
@@ -203,7 +213,7 @@ def _step(step: float, off: Array, last: Array) -> float:
     return min(max(wanted, _SHORTEST), _LONGEST)
 
 
-def _residual(now: SolvedTask, before: Array, how: SolverOptions) -> float:
+def _residual(now: SolvedTask, before: Array, options: SolverOptions) -> float:
     """N m by which the forces of the round before miss what this one asks of them.
 
     Beyond strength they are held against those of this round, which miss it, too.
@@ -211,39 +221,38 @@ def _residual(now: SolvedTask, before: Array, how: SolverOptions) -> float:
     off = now.demand.required - now.demand.arms @ before
     if not now.found.enough:
         off = now.demand.arms @ (now.found.forces - before)
-    return float(np.abs(off[: _LOWEST if how.lowest_alone else None]).max())
+    return float(np.abs(off[: _LOWEST if options.lowest_alone else None]).max())
 
 
-def _ended(
+def _outcome(
     now: SolvedTask,
-    how: SolverOptions,
+    options: SolverOptions,
     rounds: list[SolverRound],
     trail: list[Array],
     settled: bool,
 ) -> tuple[Balanced, str]:
+    """Status and message of the last round; `trail` are the forces of all."""
     if not settled:
-        last = rounds[-1]
+        change = rounds[-1].change or 0.0
+        message = f"after {len(rounds)} rounds forces still change by {100.0 * change:.1f} %"
+        # back at the forces of the last round but one: two rounds feed each other
         back = _change(trail[-1], trail[-3]) if len(trail) > 2 else np.inf
-        told = (
-            f"after {len(rounds)} rounds forces still change by {100.0 * (last.change or 0):.1f} %"
-        )
-        if back < 0.1 * (last.change or 0.0):
-            return Balanced.CYCLING, f"{told}, to and fro"
-        return Balanced.NOT_CONVERGED, told
+        if back < 0.1 * change:
+            return Balanced.CYCLING, f"{message}, to and fro"
+        return Balanced.NOT_CONVERGED, message
     if not now.found.enough:
-        slack = now.found.slack.reshape(-1, 3)
-        worst = int(np.argmax(np.abs(slack).max(axis=1)))
-        short, level = float(np.abs(slack).max()), LEVELS[worst]
-        if short > how.slack_nm:
+        slack = np.abs(now.found.slack.reshape(-1, 3))
+        short, level = float(slack.max()), LEVELS[int(np.argmax(slack.max(axis=1)))]
+        if short > options.slack_nm:
             return Balanced.BEYOND_STRENGTH, f"{short:.1f} N m too much for the muscles at {level}"
         return Balanced.CONVERGED, f"{short:.2f} N m left over at {level}"
     return Balanced.CONVERGED, ""
 
 
-def _at(
+def _solve_round(
     person: Person,
     task: Task,
-    how: SolverOptions,
+    options: SolverOptions,
     tone: float,
     turned: TurnedPose,
     pushes: Array,
@@ -251,14 +260,15 @@ def _at(
     nearby: Forces | None = None,
 ) -> SolvedTask:
     """Forces, or what given ones do, where the joints' forces were `pushes` (7, 3) N."""
-    moves = how.feedback and how.translates
+    # where the joints' compliance puts the vertebrae, and how stiff compression makes them
+    moves = options.feedback and options.translates
     translations = person.laws.translations(pushes) if moves else np.zeros_like(pushes)
-    poses = turned.poses.moved(translations)
+    poses = turned.poses.translated(translations)
     pulls = person.lines.pulls(poses)
-    loads = applied(person, task, poses)
-    pressed = -pushes[:, 1]
-    stiffening = person.laws.stiffening(pressed)
+    loads = applied_loads(person, task, poses)
+    stiffening = person.laws.stiffening(-pushes[:, 1])
     joint = stiffening[:, None] * turned.unpressed
+    # what loads and joints leave to the muscles, and what these can make
     weights, turning = above(loads.forces, loads.moments, poses.centres)
     required = -(turning + np.einsum("kij,kj->ki", poses.discs, joint))
     drawn, arms = above(pulls.forces, pulls.moments, poses.centres)
@@ -273,35 +283,26 @@ def _at(
         muscles.pcsa,
         pulls.along_sheath,
     )
-    if given is None:
-        found = least_stress(_lowest(demand) if how.lowest_alone else demand, nearby)
-        slack = demand.required - demand.arms @ found.forces
-        found = replace(found, slack=slack)
-    else:
+    if given is not None:
         found = Forces(given, demand.required - demand.arms @ given, True)
+    else:
+        asked = demand
+        if options.lowest_alone:
+            rows = {"arms": demand.arms[:_LOWEST], "required": demand.required[:_LOWEST]}
+            asked = replace(demand, **rows)
+        found = least_stress(asked, nearby)
+        found = replace(found, slack=demand.required - demand.arms @ found.forces)
+    # what is above a joint is carried by it: weights, and all fascicles that cross it
     on_joints = weights + np.einsum("mki,m->ki", drawn, found.forces)
-    told = np.einsum("kji,kj->ki", poses.discs, on_joints)
+    on_discs = np.einsum("kji,kj->ki", poses.discs, on_joints)
     return SolvedTask(
-        Balanced.CONVERGED,
-        "",
-        poses,
-        pulls,
-        loads,
-        demand,
-        found,
-        stretched,
-        told,
-        joint,
-        stiffening,
+        *(Balanced.CONVERGED, "", poses, pulls, loads, demand, found),
+        *(stretched, on_discs, joint, stiffening),
     )
 
 
-def _lowest(demand: Demand) -> Demand:
-    """The same demand at L5S1 alone."""
-    return replace(demand, arms=demand.arms[:_LOWEST], required=demand.required[:_LOWEST])
-
-
 def _change(now: Array, before: Array) -> float:
+    """Size of what changed over the size of what is; nought where there is nothing."""
     size = float(np.sqrt(now @ now))
     apart = now - before
     return float(np.sqrt(apart @ apart)) / size if size > 0.0 else 0.0

@@ -19,7 +19,11 @@ Discs
 Sheath
     Obliques that end on the body `Abdomen` hang in the rectus sheath.
 What is added
-    Multifidus of T12 and T11, which the source lacks (`spinepipe.muscles.repeated`).
+    The thorax is one body, so nothing there joins T11 to T12, and multifidus ends at L1. The trunk
+    here bends at T11T12 and T12L1 and needs what bends them: real multifidus goes on upwards level
+    by level. The fascicles of L1 are repeated for T12 and T11, each point as it lies on its
+    vertebra, one and two levels up. Those that run on to the sacrum cannot go up with the others:
+    their cross-section goes to the longest that can, so that every level has as much of it as L1.
 Not carried
     The cylinders and ellipsoids that muscles wrap there. Fibre lengths, which its fitted lengths
     do not give.
@@ -27,8 +31,8 @@ Not carried
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -38,11 +42,10 @@ from scipy.spatial.transform import Rotation
 
 from spinepipe.effects.contract import Array
 from spinepipe.facts import number
-from spinepipe.frames import Pose
-from spinepipe.muscles import discs
-from spinepipe.muscles.fascicles import Fascicle, Source, muscles_of, on_their_sides, sheath_of
-from spinepipe.muscles.repeated import multifidus_above_l1
-from spinepipe.muscles.trunk import BODIES, LEVELS, THORAX, Trunk
+from spinepipe.frames import Pose, rotation_zxy
+from spinepipe.muscles import trunk_source
+from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, THORAX, Trunk
+from spinepipe.muscles.trunk_source import Fascicle, Source
 
 PACKAGE = "myo-sim"
 VERSION = "0.2.4"
@@ -73,7 +76,8 @@ _GROUPS = {
     "IO": "internal_oblique",
 }
 
-_BODY = {"sacrum": 0, **{f"lumbar{n}": BODIES.index(f"L{n}") for n in range(1, 6)}}
+_SACRUM, _L1 = 0, BODIES.index("L1")
+_BODY = {"sacrum": _SACRUM, **{f"lumbar{n}": BODIES.index(f"L{n}") for n in range(1, 6)}}
 _SHEATH = "Abdomen"
 _NAMED_FOR_T12 = re.compile(r"(T12|R12|-12\.\d)_[rl]$")
 
@@ -147,11 +151,6 @@ def origin_of_myo_sim() -> SourceFiles:
     return SourceFiles(PACKAGE, VERSION, digest.hexdigest())
 
 
-def trunk_of_myo_sim() -> Trunk:
-    """The trunk alone; see `source_of_myo_sim`."""
-    return source_of_myo_sim().trunk
-
-
 def source_of_myo_sim() -> Source:
     """The trunk and the remarks on it.
 
@@ -162,14 +161,14 @@ def source_of_myo_sim() -> Source:
     """
     roots = {name: ET.fromstring(text) for name, text in _texts().items()}
     places = _places_of(roots)
-    places_on_trunk = _Placed(places, places["body", "lumbar5"].pose.origin)
+    places_on_trunk = _GroundPlaces(places, places["body", "lumbar5"].pose.origin)
     given = list(_fascicles(roots, places_on_trunk))
-    fascicles, remarks = on_their_sides(given)
+    fascicles, remarks = trunk_source.mirror_wrong_sides(given)
     ends = places_on_trunk.points(_CHAIN)
-    more, remark = multifidus_above_l1(fascicles, ends[: len(LEVELS)], discs.tilts(ends))
+    more, remark = multifidus_above_l1(fascicles, ends[: len(LEVELS)], trunk_source.tilts(ends))
     trunk = _trunk(places_on_trunk, [*fascicles, *more], roots["head"])
     fibres = _on_fibres(roots["muscles"], given)
-    return Source(trunk, (*remarks, remark, fibres, discs.REMARK))
+    return Source(trunk, (*remarks, remark, fibres, trunk_source.DISC_REMARK))
 
 
 def _texts() -> dict[str, bytes]:
@@ -225,7 +224,7 @@ def _numbers(element: ET.Element, name: str) -> Array:
 
 
 @dataclass(frozen=True)
-class _Placed:
+class _GroundPlaces:
     """Places in ground, whose origin is the centre of L5S1."""
 
     places: Mapping[Key, _SourcePose]
@@ -245,7 +244,7 @@ class _Placed:
         return self.places["site", site].body
 
 
-def _fascicles(roots: Mapping[str, ET.Element], placed: _Placed) -> Iterator[Fascicle]:
+def _fascicles(roots: Mapping[str, ET.Element], placed: _GroundPlaces) -> Iterator[Fascicle]:
     actuators = roots["muscles"].iter("general")
     forces = {one.get("tendon", ""): float(_numbers(one, "gainprm")[2]) for one in actuators}
     for tendon in roots["tendons"].iter("spatial"):
@@ -255,22 +254,66 @@ def _fascicles(roots: Mapping[str, ET.Element], placed: _Placed) -> Iterator[Fas
         in_sheath = any(placed.body(site) == _SHEATH for site in sites)
         if in_sheath:
             sites.sort(key=lambda site: placed.body(site) == _SHEATH)
+        thorax = BODIES.index("T12") if _NAMED_FOR_T12.search(name) else THORAX
         yield Fascicle(
             name=name,
             group=next(group for start, group in _GROUPS.items() if name.startswith(start)),
             side="right" if name.endswith("_r") else "left",
             pcsa=forces[called] / STRESS_PA,
             fibre=0.0,
-            body=tuple(_index(name, placed.body(site)) for site in sites),
+            # what lies on the thorax is T12's where the fascicle is named for it or its rib
+            body=tuple(_BODY.get(placed.body(site), thorax) for site in sites),
             point=placed.points(tuple(("site", site) for site in sites)),
             in_sheath=in_sheath,
         )
 
 
-def _index(fascicle: str, body: str) -> int:
-    if body in _BODY:
-        return _BODY[body]
-    return BODIES.index("T12") if _NAMED_FOR_T12.search(fascicle) else THORAX
+def multifidus_above_l1(
+    fascicles: Sequence[Fascicle], joints: Array, tilts: Array
+) -> tuple[list[Fascicle], str]:
+    """The repeated fascicles, and a remark that says how many and how large.
+
+    Parameters
+    ----------
+    joints : (7, 3) m, centres from L5S1 up. tilts : (7,) rad, extension of the vertebrae L5 to T11.
+    """
+    mine = [one for one in fascicles if one.group == "multifidus" and max(one.body) == _L1]
+    found = []
+    for body in range(_L1 + 1, len(BODIES)):
+        for side in SIDES:
+            of_side = [one for one in mine if one.side == side]
+            found += _raise_levels(of_side, body - _L1, joints, tilts)
+    area = 1e6 * sum(one.pcsa for one in found)
+    remark = (
+        f"the source's multifidus ends at L1 and nothing short spans T11T12: {len(found)} "
+        f"fascicles of L1 are repeated for T12 and T11, {area:.0f} mm2 in all"
+    )
+    return found, remark
+
+
+def _raise_levels(mine: list[Fascicle], by: int, joints: Array, tilts: Array) -> list[Fascicle]:
+    """Fascicles of one side, so many levels up; what ends on the sacrum is added to the longest."""
+
+    def place(body: int, point: Array) -> Array:
+        """A point of a vertebra where it lies on the one so many levels up, joint on joint."""
+        at, to = body - 1, body + by - 1
+        turn = rotation_zxy(tilts[to] - tilts[at], 0.0, 0.0)
+        found: Array = joints[to] + turn @ (point - joints[at])
+        return found
+
+    short = [one for one in mine if min(one.body) > _SACRUM]
+    longest = min(short, key=lambda one: min(one.body))
+    rest = sum(one.pcsa for one in mine if min(one.body) == _SACRUM)
+    return [
+        replace(
+            one,
+            name=f"{one.name[:-2]}_at_{BODIES[_L1 + by]}{one.name[-2:]}",
+            pcsa=one.pcsa + (rest if one is longest else 0.0),
+            body=tuple(body + by for body in one.body),
+            point=np.array([place(*at) for at in zip(one.body, one.point, strict=True)]),
+        )
+        for one in short
+    ]
 
 
 def _on_fibres(muscles: ET.Element, fascicles: list[Fascicle]) -> str:
@@ -286,28 +329,28 @@ def _on_fibres(muscles: ET.Element, fascicles: list[Fascicle]) -> str:
     )
 
 
-def _trunk(placed: _Placed, fascicles: list[Fascicle], head: ET.Element) -> Trunk:
+def _trunk(placed: _GroundPlaces, fascicles: list[Fascicle], head: ET.Element) -> Trunk:
     ends = placed.points(_CHAIN)
-    leaning = discs.tilts(ends)
-    muscles = muscles_of(fascicles)
+    leaning = trunk_source.tilts(ends)
+    muscles = trunk_source.muscles_of(fascicles)
     shoulder = placed.point("body", _ARM[0])
     arm = placed.points(tuple(("body", name) for name in _ARM))
     return Trunk(
         source=f"{PACKAGE} {VERSION}",
         joints=ends[: len(LEVELS)],
-        disc_tilt=discs.disc_tilts(leaning)[: len(LEVELS)],
-        disc_height=discs.disc_heights(),
-        disc_area=discs.disc_areas(),
-        vertebrae=discs.vertebra_centres(ends),
+        disc_tilt=trunk_source.disc_tilts(leaning)[: len(LEVELS)],
+        disc_height=trunk_source.disc_heights(),
+        disc_area=trunk_source.disc_areas(),
+        vertebrae=trunk_source.vertebra_centres(ends),
         head=_head(placed, head),
         shoulders=np.array([shoulder, shoulder * [1.0, 1.0, -1.0]]),
         arm_length=float(np.linalg.norm(np.diff(arm, axis=0), axis=1).sum()),
-        sheath=sheath_of(muscles),
+        sheath=trunk_source.sheath_of(muscles),
         muscles=muscles,
     )
 
 
-def _head(placed: _Placed, head: ET.Element) -> Array:
+def _head(placed: _GroundPlaces, head: ET.Element) -> Array:
     """(3,) m, midway from the joint above T1 to the top of the ellipsoid round the skull."""
     skull = next(one for one in head.iter("geom") if one.get("name") == "hat_skull_coll")
     vertex = placed.point("geom", "hat_skull_coll")

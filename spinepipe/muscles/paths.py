@@ -17,17 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.pose import BodyPoses, crossed
-from spinepipe.muscles.trunk import (
-    BODIES,
-    NO_BODY,
-    SIDES,
-    SLICES,
-    THORAX,
-    Trunk,
-    body_of,
-)
-from spinepipe.muscles.wrapping import wrap_path
+from spinepipe.muscles.pose import BodyPoses, cross
+from spinepipe.muscles.trunk import BODIES, NO_BODY, SIDES, SLICES, THORAX, Trunk, body_of
+from spinepipe.muscles.wrapping import wrap_paths
 
 _SACRUM = 0
 
@@ -104,7 +96,7 @@ class Lines:
         muscles, bars = self.trunk.muscles, self.bars
         points = self._points(poses)
         turned = poses.rotations[bars.body]
-        lengths, forces, moments, contacts, pushes, trace, traced, on = wrap_path(
+        lengths, forces, moments, contacts, pushes, trace, traced, on = wrap_paths(
             points,
             muscles.body,
             bars.first,
@@ -148,15 +140,17 @@ class Lines:
             poses.of(np.full(2, body), self.trunk.sheath[:, end])
             for end, body in ((0, _SACRUM), (1, THORAX))
         )
+        # the part of each pull along the sheath draws the sheath's end at the ribs
         up, ends = _unit(high - low)[side], points[hung, :2]
         line = _unit(ends[:, 1] - ends[:, 0])
         pull = np.einsum("ki,ki->k", line, up)
         along[side, hung] = pull
         down = pull[:, None] * up
+        # an external oblique pulls its own end at the ribs too; the pelvis bears the opposite
         on_ribs = np.where((muscles.body[hung, 0] == THORAX)[:, None], line, 0.0)
         forces[hung], moments[hung] = 0.0, 0.0
         forces[hung, THORAX] = on_ribs - down
-        moments[hung, THORAX] = crossed(ends[:, 0], on_ribs) - crossed(high[side], down)
+        moments[hung, THORAX] = cross(ends[:, 0], on_ribs) - cross(high[side], down)
         forces[hung, _SACRUM] = -forces[hung, THORAX]
         moments[hung, _SACRUM] = -moments[hung, THORAX]
         return along
@@ -175,21 +169,23 @@ def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
     behind the centre across the spine. Vertebrae that an end is fixed to are not passed, but those
     of the thorax, of which there are several, are where they lie below its point.
     """
+    # legs (rows): whose they are, and where each starts, runs and ends
     muscles = trunk.muscles
-    legs = chosen[:, None] & (muscles.body[:, 1:] != NO_BODY)
-    owner, leg = np.nonzero(legs)
+    owner, leg = np.nonzero(chosen[:, None] & (muscles.body[:, 1:] != NO_BODY))
     ends, start = muscles.body[owner, leg], muscles.point[owner, leg]
     others, way = muscles.body[owner, leg + 1], muscles.point[owner, leg + 1] - start
     low, high = np.minimum(ends, others)[:, None], np.maximum(ends, others)[:, None]
+    # all legs against all vertebrae (columns): how far up a leg each centre lies
     of = np.array([body_of(name) for name in SLICES])
-    # all legs (rows) against all vertebrae (columns): how far up a leg each centre lies
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (trunk.vertebrae[:, 1] - start[:, 1:2]) / way[:, 1:2]
     between = (low < of) & (of < high) | (of == high) & (of == THORAX) & (low != THORAX)
     row, number = np.nonzero(between & (share > 0.0) & (share < 1.0))
+    # in order along each muscle
     share = share[row, number]
-    order = np.lexsort((share, row))  # along each muscle
+    order = np.lexsort((share, row))
     row, number, share = row[order], number[order], share[order]
+    # as far behind the centre as the rule says of how far the string is
     string = start[row] + share[:, None] * way[row]
     centre, back = trunk.vertebrae[number], -_forwards(trunk)[number]
     distance = np.einsum("bi,bi->b", string - centre, back)

@@ -8,10 +8,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.joint_laws import JointLaws
-from spinepipe.muscles.passive_muscle import PassiveMuscle, fibres_of
+from spinepipe.muscles.passive_tissue import JointLaws, PassiveMuscle
 from spinepipe.muscles.paths import Lines
-from spinepipe.muscles.pose import JointCentres, posed, rotations_of
+from spinepipe.muscles.pose import JointCentres, place_bodies, rotations_of
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import LEVELS, Mass
 from spinepipe.units import STANDARD_GRAVITY
@@ -51,11 +50,14 @@ class Person:
         at = np.array([mass.at for mass in self.masses]).reshape(-1, 3)
         return bodies, at, kg[:, None] * STANDARD_GRAVITY
 
-    def standing(self, upright: Array) -> "Person":
+    def with_upright(self, upright: Array) -> "Person":
         """The same person with an upright posture (8, 3) rad, in which muscles are at rest."""
-        poses = posed(self.chain, rotations_of(self.chain, upright), np.zeros((len(LEVELS), 3)))
+        still = np.zeros((len(LEVELS), 3))
+        poses = place_bodies(self.chain, rotations_of(self.chain, upright), still)
         rest = self.lines.pulls(poses).lengths
-        fibres = fibres_of(self.lines.trunk.muscles, rest, self.passive.fibre_share)
+        # the source's fibres, and where it has none a share of the path
+        own = self.lines.trunk.muscles.fibre
+        fibres = np.where(own > 0.0, own, self.passive.fibre_share * rest)
         return replace(self, upright=upright, rest=rest, fibres=fibres)
 
 

@@ -11,6 +11,7 @@ from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import Trunk
 
 _SMALL = 1e-9
+"""Angles, rad, whose square is below rounding: limits stand for quotients there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +36,7 @@ class JointCentres:
     @property
     def origins(self) -> Array:
         """(8, 3) m, the point of each body that its pose is told of: the joint below it."""
-        found: Array = np.vstack([self.centres[:1], self.centres])
-        return found
+        return np.vstack([self.centres[:1], self.centres])
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +63,10 @@ class BodyPoses:
     def of(self, body: NDArray[np.int64], points: Array) -> Array:
         """(..., 3) m, points (..., 3) of bodies (...) where they are now."""
         where = (self.rotations, self.places, self.origins)
-        found: Array = _carried(*where, body.ravel(), points.reshape(-1, 3))
+        found: Array = _transform(*where, body.ravel(), points.reshape(-1, 3))
         return found.reshape(points.shape)
 
-    def moved(self, translations: Array) -> "BodyPoses":
+    def translated(self, translations: Array) -> "BodyPoses":
         """The same, not moved so far, with translations (7, 3) m of the joints."""
         steps = np.einsum("kij,kj->ki", self.discs, translations)
         shift = np.cumsum(steps, axis=0)
@@ -76,7 +76,7 @@ class BodyPoses:
         return replace(self, places=places, centres=centres)
 
 
-def crossed(arms: Array, forces: Array) -> Array:
+def cross(arms: Array, forces: Array) -> Array:
     """(..., 3) cross products of (..., 3) each: `numpy.cross` takes longer for so few."""
     after, last = [1, 2, 0], [2, 0, 1]
     found: Array = arms[..., after] * forces[..., last] - arms[..., last] * forces[..., after]
@@ -84,7 +84,7 @@ def crossed(arms: Array, forces: Array) -> Array:
 
 
 @njit(cache=True)
-def _carried(
+def _transform(
     rotations: Array, places: Array, origins: Array, body: NDArray[np.int64], points: Array
 ) -> Array:
     """(N, 3) m, points (N, 3) of bodies (N,) where they are now."""
@@ -113,7 +113,7 @@ def rotations_of(chain: JointCentres, angles: Array) -> Array:
     return np.array(found)
 
 
-def posed(chain: JointCentres, rotations: Array, translations: Array) -> BodyPoses:
+def place_bodies(chain: JointCentres, rotations: Array, translations: Array) -> BodyPoses:
     """The bodies with given rotations.
 
     Parameters
@@ -127,11 +127,14 @@ def posed(chain: JointCentres, rotations: Array, translations: Array) -> BodyPos
     arms = np.einsum("kij,kj->ki", rotations[:-1], chain.centres - origins[:-1])
     places = np.cumsum(np.vstack([origins[:1], arms]), axis=0)
     turned = np.einsum("kji,kj->ki", chain.discs, vectors)
-    return BodyPoses(rotations, places, origins, places[1:], discs, turned).moved(translations)
+    return BodyPoses(rotations, places, origins, places[1:], discs, turned).translated(translations)
 
 
 def rotation_vector(rotation: Array) -> Array:
-    """(..., 3) rad, axis times angle of rotations (..., 3, 3) by less than half a turn."""
+    """(..., 3) rad, axis times angle of rotations (..., 3, 3) by less than half a turn.
+
+    The antisymmetric part is the axis times the sine, the trace 1 + 2 cosines.
+    """
     over, under = rotation[..., [2, 0, 1], [1, 2, 0]], rotation[..., [1, 2, 0], [2, 0, 1]]
     twice_sine: Array = over - under
     sine = 0.5 * np.sqrt(np.einsum("...i,...i->...", twice_sine, twice_sine))

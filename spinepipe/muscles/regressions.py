@@ -12,12 +12,12 @@ persons counts, so a quantity may have any unit. Forms, with u = intercept + sex
 named level. Each quantity needs a row for all muscles and levels.
 """
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from math import exp, isfinite
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from spinepipe.documents.csv_table import read_table
 from spinepipe.documents.form import read_forms
@@ -37,6 +37,7 @@ REGRESSION_LEVELS = (*SLICES, "S1")
 
 ALL = "*"
 COEFFICIENTS = ("intercept", "sex", "age", "height", "weight")
+WORDS = ("muscle", "level", "quantity", "form", "source")
 
 PACKAGED: Mapping[str, str] = {
     "ct_trends": "regressions.csv",
@@ -156,16 +157,10 @@ def read_regressions(path: Path, file: str) -> Regressions:
             problems.append(InputProblem(*place, found, "*, * for rib_cage_area", "it has one row"))
     if problems:
         raise InputError(problems)
-    return Regressions(file, tuple(_row(cells) for cells in table.to_dict("records")))
-
-
-def _row(cells: Mapping[Hashable, Any]) -> Regression:
-    intercept, sex, age, height, weight = (float(cells[name]) for name in COEFFICIENTS)
-    return Regression(
-        cells["muscle"],
-        cells["level"],
-        cells["quantity"],
-        cells["form"],
-        (intercept, sex, age, height, weight),
-        cells["source"],
-    )
+    rows = []
+    for cells in table.to_dict("records"):
+        intercept, sex, age, height, weight = (float(cells[name]) for name in COEFFICIENTS)
+        numbers = (intercept, sex, age, height, weight)
+        muscle, level, quantity, form, source = (cells[name] for name in WORDS)
+        rows.append(Regression(muscle, level, quantity, form, numbers, source))
+    return Regressions(file, tuple(rows))

@@ -3,7 +3,11 @@
 Bones, discs, head, shoulders and arms grow with body height about the centre of L5S1; so do the
 heights of muscle points and the fibres. How far a muscle point lies ahead of the line of vertebrae
 and beside it, and the cross-section of a fascicle, follow regressions of that muscle at that
-level. Disc areas follow the area of the rib cage.
+level. Areas of discs and of the diaphragm follow that of the rib cage.
+
+A joint is as stiff as its disc as a short beam: E A / h along it and E I / h in rotation, with the
+same modulus E. The disc's height h grows with body height, its area A with the area of the rib
+cage, and its area moment I with the square of A.
 """
 
 from collections.abc import Iterator
@@ -13,22 +17,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.muscles.beam import stiffening
-from spinepipe.muscles.regressions import (
-    REGRESSION_LEVELS,
-    Quantity,
-    Regression,
-    Regressions,
-)
+from spinepipe.facts import number
+from spinepipe.muscles.regressions import REGRESSION_LEVELS, Quantity, Regression, Regressions
 from spinepipe.muscles.subject import Subject
-from spinepipe.muscles.trunk import NO_BODY, RECTUS, Trunk
+from spinepipe.muscles.trunk import LEVELS, NO_BODY, RECTUS, Trunk
 
 _L5S1 = 0
 _X, _Y, _Z = range(3)
 
+DIAPHRAGM_M2 = number(__name__, "diaphragm_area")
+"""Of a person of reference size. The paper prints none, and values differ twofold (`facts.csv`):
+the one whose source was read is taken."""
+
+DIAPHRAGM_AHEAD_M = number(__name__, "diaphragm_ahead")
+"""How far ahead of T11 its force acts, whatever the person's size."""
+
+RIBS = number(__name__, "bending_with_ribs")
+
 
 @dataclass(frozen=True)
-class Choices:
+class ScaleFactors:
     """What is multiplied beside the rules of scaling.
 
     Attributes
@@ -42,15 +50,12 @@ class Choices:
     disc_area_times: float = 1.0
 
 
-AS_SCALED = Choices()
-
-
-def scaled(
+def scale_trunk(
     trunk: Trunk,
     subject: Subject,
     reference: Subject,
     regressions: Regressions,
-    choices: Choices = AS_SCALED,
+    factors: ScaleFactors = ScaleFactors(),
 ) -> Trunk:
     """The trunk of a person, from that of the reference person.
 
@@ -59,33 +64,33 @@ def scaled(
     trunk : of the reference person, in the source's pose.
     subject, reference : the person, and whom the trunk is of.
     regressions : of muscles and the rib cage.
-    choices : what is multiplied beside them.
+    factors : what is multiplied beside them.
 
     Raises
     ------
     ValueError
         If a regression is not positive for the person.
     """
-    size = _Size(trunk, subject, reference, regressions)
-    tall = size.height
-    muscles = trunk.muscles
+    size = _SizeRatios(trunk, subject, reference, regressions)
+    tall, muscles = size.height, trunk.muscles
+    area = size.of_row(regressions.row("rib_cage_area"))
     return replace(
         trunk,
         joints=tall * trunk.joints,
         disc_height=tall * trunk.disc_height,
-        disc_area=choices.disc_area_times * size.rib_cage_area * trunk.disc_area,
+        disc_area=factors.disc_area_times * area * trunk.disc_area,
         vertebrae=tall * trunk.vertebrae,
         head=tall * trunk.head,
         shoulders=tall * trunk.shoulders,
         arm_length=tall * trunk.arm_length,
-        sheath=size.moved(trunk.sheath, np.full(trunk.sheath.shape[:-1], RECTUS)),
+        sheath=size.place(trunk.sheath, np.full(trunk.sheath.shape[:-1], RECTUS)),
         muscles=replace(
             muscles,
-            pcsa=choices.pcsa_times * size.pcsa() * muscles.pcsa,
+            pcsa=factors.pcsa_times * size.pcsa() * muscles.pcsa,
             fibre=tall * muscles.fibre,
             point=np.where(
                 (muscles.body != NO_BODY)[..., None],
-                size.moved(muscles.point, point_muscles(trunk)),
+                size.place(muscles.point, size.movers),
                 muscles.point,
             ),
         ),
@@ -102,28 +107,75 @@ class Ratio:
     source: str
 
 
-PAPER = "Ghezelbash 2016, section 2.7"
-DISCS_AS_RIBS = f"{PAPER}: as the rib cage. "
-
-
 def applied_ratios(
-    trunk: Trunk,
-    subject: Subject,
-    reference: Subject,
-    regressions: Regressions,
+    trunk: Trunk, subject: Subject, reference: Subject, regressions: Regressions
 ) -> tuple[Ratio, ...]:
     """Every ratio that makes the person differ from the reference person, each once."""
-    size = _Size(trunk, subject, reference, regressions)
-    found = [Ratio("lengths and disc heights", "all", size.height, f"{PAPER}: body height")]
+    paper = "Ghezelbash 2016, section 2.7"
+    size = _SizeRatios(trunk, subject, reference, regressions)
+    found = [Ratio("lengths and disc heights", "all", size.height, f"{paper}: body height")]
     found += [Ratio(row.quantity, row.of, size.of_row(row), row.source) for row in size.rows()]
-    joints = stiffening(subject, reference, regressions)
+    joints = beam_ratios(subject, reference, regressions)
     area = regressions.row("rib_cage_area")
     found += [
-        Ratio("disc_area", "all", joints.area, DISCS_AS_RIBS + area.source),
-        Ratio("axial_stiffness", "all", joints.axial, f"{PAPER}: beam, area / height"),
-        Ratio("angular_stiffness", "all", joints.angular, f"{PAPER}: beam, area^2 / height"),
+        Ratio("disc_area", "all", joints.area, f"{paper}: as the rib cage. {area.source}"),
+        Ratio("axial_stiffness", "all", joints.axial, f"{paper}: beam, area / height"),
+        Ratio("angular_stiffness", "all", joints.angular, f"{paper}: beam, area^2 / height"),
     ]
     return tuple(found)
+
+
+@dataclass(frozen=True)
+class BeamRatios:
+    """One disc beside another.
+
+    Attributes
+    ----------
+    area, height : ratios of the discs.
+    bending_times : what else multiplies bending forwards, backwards and sideways (ribs).
+    """
+
+    area: float
+    height: float
+    bending_times: float = 1.0
+
+    @property
+    def axial(self) -> float:
+        """Ratio of stiffness in compression and in shear, A / h."""
+        return self.area / self.height
+
+    @property
+    def torsion(self) -> float:
+        """Ratio of stiffness in axial rotation, A^2 / h."""
+        return self.area**2 / self.height
+
+    @property
+    def angular(self) -> float:
+        """Ratio of stiffness in bending, A^2 / h, and what ribs add."""
+        return self.bending_times * self.torsion
+
+
+def beam_ratios(subject: Subject, reference: Subject, regressions: Regressions) -> BeamRatios:
+    """A person's joints beside the reference person's; the same at every level."""
+    return BeamRatios(
+        regressions.row("rib_cage_area").ratio(subject, reference),
+        subject.height_m / reference.height_m,
+    )
+
+
+def t11t12_over_t12l1(trunk: Trunk, bending_times: float = RIBS) -> BeamRatios:
+    """Joint T11T12 beside T12L1 by the discs' area and height; ribs resist bending too."""
+    upper, lower = LEVELS.index("T11T12"), LEVELS.index("T12L1")
+    return BeamRatios(
+        float(trunk.disc_area[upper] / trunk.disc_area[lower]),
+        float(trunk.disc_height[upper] / trunk.disc_height[lower]),
+        bending_times,
+    )
+
+
+def diaphragm_area(subject: Subject, reference: Subject, regressions: Regressions) -> float:
+    """A person's diaphragm, m2."""
+    return DIAPHRAGM_M2 * regressions.row("rib_cage_area").ratio(subject, reference)
 
 
 def nearest_vertebra(trunk: Trunk, height: Array) -> NDArray[np.int64]:
@@ -146,16 +198,14 @@ def line_of_vertebrae(trunk: Trunk, height: Array) -> Array:
     return np.stack([ahead, np.asarray(height, dtype=float), aside], axis=-1)
 
 
-def point_muscles(trunk: Trunk) -> NDArray[np.str_]:
-    """(M, P) the muscle whose regressions move each point."""
-    muscles = trunk.muscles
-    names = np.array(muscles.groups, dtype=object)[:, None].repeat(muscles.body.shape[1], axis=1)
-    names[muscles.in_sheath, 1] = RECTUS
-    return names.astype(str)
+class _SizeRatios:
+    """A person's size beside the reference person's, each ratio worked out once.
 
-
-class _Size:
-    """A person's size beside the reference person's, each ratio worked out once."""
+    Attributes
+    ----------
+    height : ratio of body heights.
+    groups : (M,) muscle of each fascicle. movers : (M, P) muscle whose regressions move each point.
+    """
 
     def __init__(
         self, trunk: Trunk, subject: Subject, reference: Subject, regressions: Regressions
@@ -164,57 +214,54 @@ class _Size:
         self._subject, self._reference = subject, reference
         self._of_row: dict[int, float] = {}
         self.height = subject.height_m / reference.height_m
-
-    @property
-    def rib_cage_area(self) -> float:
-        return self.of_row(self._regressions.row("rib_cage_area"))
+        self.groups = np.array(trunk.muscles.groups, dtype=str)
+        movers = self.groups.astype(object)[:, None].repeat(trunk.muscles.body.shape[1], axis=1)
+        movers[trunk.muscles.in_sheath, 1] = RECTUS
+        self.movers = movers.astype(str)
 
     def of_row(self, row: Regression) -> float:
+        """Ratio by a row of regressions."""
         found = self._of_row.get(id(row))  # a row's own hash is of all its text
         if found is None:
             found = self._of_row[id(row)] = row.ratio(self._subject, self._reference)
         return found
 
-    def moved(self, points: Array, muscles: NDArray[np.str_]) -> Array:
+    def place(self, points: Array, muscles: NDArray[np.str_]) -> Array:
         """Points (..., 3) m of muscles (...), at the person's size."""
         line = line_of_vertebrae(self._trunk, points[..., _Y])
         level = nearest_vertebra(self._trunk, points[..., _Y])
         stretch = np.stack(
             [
-                self._ratios("ap_distance", muscles, level),
+                self._of_places("ap_distance", muscles, level),
                 np.full(level.shape, self.height),
-                self._ratios("ml_distance", muscles, level),
+                self._of_places("ml_distance", muscles, level),
             ],
             axis=-1,
         )
-        # Height moves all of it, the rest what lies off the line: nothing moves at ratios of 1.
+        # height moves all of it, the rest what lies off the line: nothing moves at ratios of 1
         found: Array = self.height * points + (stretch - self.height) * (points - line)
         return found
 
     def pcsa(self) -> Array:
         """(M,) ratios of cross-sections."""
-        return self._ratios("pcsa", self._groups, self._fascicle_levels())
+        return self._of_places("pcsa", self.groups, self._fascicle_levels())
 
     def rows(self) -> Iterator[Regression]:
         """The rows of muscles that apply to this trunk, each once."""
         muscles = self._trunk.muscles
         real = muscles.body != NO_BODY
-        points = point_muscles(self._trunk)[real]
+        points = self.movers[real]
         levels = nearest_vertebra(self._trunk, muscles.point[..., _Y][real])
         places: tuple[tuple[Quantity, NDArray[np.str_], NDArray[np.int64]], ...] = (
             ("ap_distance", points, levels),
             ("ml_distance", points, levels),
-            ("pcsa", self._groups, self._fascicle_levels()),
+            ("pcsa", self.groups, self._fascicle_levels()),
         )
         for quantity, names, at in places:
             pairs = sorted(set(zip(names.tolist(), at.tolist(), strict=True)))
             yield from dict.fromkeys(
                 self._regressions.row(quantity, m, REGRESSION_LEVELS[k]) for m, k in pairs
             )
-
-    @property
-    def _groups(self) -> NDArray[np.str_]:
-        return np.array(self._trunk.muscles.groups, dtype=str)
 
     def _fascicle_levels(self) -> NDArray[np.int64]:
         """(M,) vertebra nearest to the middle of each fascicle's height."""
@@ -224,7 +271,7 @@ class _Size:
         high = np.where(real, height, -np.inf).max(axis=1)
         return nearest_vertebra(self._trunk, 0.5 * (low + high))
 
-    def _ratios(
+    def _of_places(
         self, quantity: Quantity, muscles: NDArray[np.str_], level: NDArray[np.int64]
     ) -> Array:
         """Ratios of muscles (...) at vertebrae (...)."""

@@ -29,6 +29,9 @@ NO_BODY = -1
 RECTUS = "rectus_abdominis"
 """The rectus sheath, and what ends in it, moves as this muscle does."""
 
+GLOBAL_EXTENSORS = ("longissimus_thoracis", "iliocostalis_thoracis")
+"""Groups that run from the pelvis or the lumbar spine to the thorax and lie on what they pass."""
+
 SIDES = ("right", "left")
 
 

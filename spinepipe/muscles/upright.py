@@ -15,7 +15,6 @@ from scipy.optimize import linprog
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.masses import arm_masses
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.pose import JointCentres
 from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES
 from spinepipe.units import STANDARD_GRAVITY
 
@@ -24,7 +23,11 @@ BEGINNINGS = 12
 """Places where the search begins: the start, and others drawn from the range, always the same."""
 
 _STEP_RAD = 1e-6
+"""Of the slopes by forward differences: half the digits of an angle."""
+
 _SMALL_NM = 1e-6
+"""A sum of moments as small as this is nought, and a gain as small none."""
+
 _SAME_NM = 1e-3
 """Sums that differ by less are the same: then the earlier beginning counts."""
 _EXTENSION = 2
@@ -50,16 +53,12 @@ class Upright:
 
     @property
     def turned(self) -> Array:
-        """(8, 3) rad, as tasks have it."""
-        return turned(self.angles)
+        """(8, 3) rad, as tasks have it: extension alone."""
+        still = np.zeros(len(BODIES))
+        return np.stack([self.angles, still, still], axis=1)
 
 
-def turned(angles: Array) -> Array:
-    """(8, 3) rad of extensions (8,)."""
-    return np.stack([angles, np.zeros(len(BODIES)), np.zeros(len(BODIES))], axis=1)
-
-
-def lacking(person: Person, angles: Array) -> Array:
+def moment_deficit(person: Person, angles: Array) -> Array:
     """(..., 7) N m that L5 to T11 lack for their own equilibrium, no muscle pulling.
 
     What acts on the vertebra itself, the joints' moments on it, and the force of the joint above,
@@ -71,48 +70,41 @@ def lacking(person: Person, angles: Array) -> Array:
     ----------
     angles : (..., 8) rad, extension of the bodies from the source's pose.
     """
-    weights, bodies, at = _hanging(person)
-    chain, turns = person.chain, _turns(angles)
-    discs = _turns(0.5 * (angles[..., 1:] + angles[..., :-1])) @ chain.discs[:, :2, :2]
-    carried = np.cumsum(np.bincount(bodies, weights, len(BODIES))[:0:-1])[::-1]
-    pushes = np.zeros((*angles.shape[:-1], len(LEVELS), 3))
-    pushes[..., :2] = -carried[:, None] * discs[..., 1, :]
-    moved = np.einsum("...ij,...j->...i", discs, person.laws.translations(pushes)[..., :2])
-    legs = np.einsum("...ij,...j->...i", turns[..., :-1, :, :], _legs(chain))
-    centres = chain.origins[0, :2] + np.cumsum(legs, axis=-2)
-    centres[..., 1:, :] += np.cumsum(moved, axis=-2)[..., :-1, :]
-    places = np.concatenate([centres[..., :1, :], centres + moved], axis=-2)
-    arms = at - chain.origins[bodies, :2]
-    forwards = places[..., bodies, 0] + np.einsum("...j,...j->...", turns[..., bodies, 0, :], arms)
-    above = bodies > np.arange(len(LEVELS))[:, None]
-    turning = carried * centres[..., 0] - (weights * forwards) @ above.T
-    bent = np.zeros_like(pushes)
-    bent[..., _EXTENSION] = np.diff(angles, axis=-1)
-    total = turning + person.laws.moments(bent, -pushes[..., 1])[..., _EXTENSION]
-    own = total.copy()
-    own[..., :-1] -= total[..., 1:]
-    return -own
-
-
-def _hanging(person: Person) -> tuple[Array, NDArray[np.int64], Array]:
-    """Weights (K,) N, the bodies (K,) that carry them, and where (K, 2) m, forwards and up."""
+    # weights (K,) N, the bodies (K,) that carry them, and where (K, 2) m, forwards and up
     arms = (
         one
         for side, shoulder in zip(SIDES, person.lines.trunk.shoulders, strict=True)
         for one in arm_masses(side, shoulder, shoulder, person.subject)
     )
     masses = (*person.masses, *arms)
-    return (
-        -STANDARD_GRAVITY[1] * np.array([mass.kg for mass in masses]),
-        np.array([mass.body for mass in masses]),
-        np.array([mass.at[:2] for mass in masses]),
-    )
-
-
-def _legs(chain: JointCentres) -> Array:
-    """(7, 2) m, from the point that a body's pose is told of to the joint above it."""
-    found: Array = (chain.centres - chain.origins[:-1])[:, :2]
-    return found
+    weights = -STANDARD_GRAVITY[1] * np.array([mass.kg for mass in masses])
+    bodies = np.array([mass.body for mass in masses])
+    at = np.array([mass.at[:2] for mass in masses])
+    # what each joint carries moves the vertebra above it on the axes of the disc
+    chain, turns = person.chain, _turns(angles)
+    discs = _turns(0.5 * (angles[..., 1:] + angles[..., :-1])) @ chain.discs[:, :2, :2]
+    carried = np.cumsum(np.bincount(bodies, weights, len(BODIES))[:0:-1])[::-1]
+    pushes = np.zeros((*angles.shape[:-1], len(LEVELS), 3))
+    pushes[..., :2] = -carried[:, None] * discs[..., 1, :]
+    moved = np.einsum("...ij,...j->...i", discs, person.laws.translations(pushes)[..., :2])
+    # forward kinematics: joints and bodies from the pelvis upwards
+    up = (chain.centres - chain.origins[:-1])[:, :2]
+    legs = np.einsum("...ij,...j->...i", turns[..., :-1, :, :], up)
+    centres = chain.origins[0, :2] + np.cumsum(legs, axis=-2)
+    centres[..., 1:, :] += np.cumsum(moved, axis=-2)[..., :-1, :]
+    places = np.concatenate([centres[..., :1, :], centres + moved], axis=-2)
+    # moments of all weights above each joint about it, and of the joint itself
+    off = at - chain.origins[bodies, :2]
+    forwards = places[..., bodies, 0] + np.einsum("...j,...j->...", turns[..., bodies, 0, :], off)
+    above = bodies > np.arange(len(LEVELS))[:, None]
+    turning = carried * centres[..., 0] - (weights * forwards) @ above.T
+    bent = np.zeros_like(pushes)
+    bent[..., _EXTENSION] = np.diff(angles, axis=-1)
+    total = turning + person.laws.moments(bent, -pushes[..., 1])[..., _EXTENSION]
+    # of each vertebra alone: less what all above the joint above it lacks
+    own = total.copy()
+    own[..., :-1] -= total[..., 1:]
+    return -own
 
 
 def _turns(angles: Array) -> Array:
@@ -126,25 +118,31 @@ def upright(person: Person, start: Array, reach_rad: float) -> Upright:
     """The posture within `reach_rad` of the start (8,) rad."""
     drawn = np.random.default_rng(0).uniform(-reach_rad, reach_rad, (BEGINNINGS - 1, len(BODIES)))
     found = [
-        _descended(person, start, reach_rad, first)
+        _descend(person, start, reach_rad, first)
         for first in np.vstack([start[None], start + drawn])
     ]
     angles, at = min(found, key=lambda one: round(float(np.abs(one[1]).sum()) / _SAME_NM))
     at_bound = np.abs(angles - start) > reach_rad - 1e-9
-    return Upright(angles, start, at_bound, lacking(person, start), at)
+    return Upright(angles, start, at_bound, moment_deficit(person, start), at)
 
 
-def _descended(person: Person, start: Array, reach_rad: float, first: Array) -> tuple[Array, Array]:
-    """A hollow: angles (8,) rad and what lacks there (7,) N m, from a first posture (8,) rad."""
+def _descend(person: Person, start: Array, reach_rad: float, first: Array) -> tuple[Array, Array]:
+    """A hollow: angles (8,) rad and what lacks there (7,) N m, from a first posture (8,) rad.
+
+    Successive linear programming (Griffith and Stewart 1961, Manage Sci 7:379) within a trust
+    region that shrinks where the sum does not fall.
+    """
     angles = first.copy()
-    at, slope = _with_slope(person, angles)
+    at, slope = _deficit_and_slope(person, angles)
     least, trust = float(np.abs(at).sum()), reach_rad
     for _ in range(MOST_ROUNDS):
-        step = _least_sum(at, slope, start - reach_rad - angles, start + reach_rad - angles, trust)
-        size = float(np.abs(lacking(person, angles + step)).sum())
+        step = _linear_step(
+            at, slope, start - reach_rad - angles, start + reach_rad - angles, trust
+        )
+        size = float(np.abs(moment_deficit(person, angles + step)).sum())
         if size < least - _SMALL_NM:
             angles, least = angles + step, size
-            at, slope = _with_slope(person, angles)
+            at, slope = _deficit_and_slope(person, angles)
         else:
             trust *= 0.25
         if trust < 1e-7 or least < _SMALL_NM:
@@ -152,18 +150,19 @@ def _descended(person: Person, start: Array, reach_rad: float, first: Array) -> 
     return angles, at
 
 
-def _with_slope(person: Person, angles: Array) -> tuple[Array, Array]:
+def _deficit_and_slope(person: Person, angles: Array) -> tuple[Array, Array]:
     """(7,) N m lacking, and (7, 8) N m/rad, how fast that grows with each angle."""
     steps = np.vstack([np.zeros(len(BODIES)), _STEP_RAD * np.eye(len(BODIES))])
-    found = lacking(person, angles + steps)
+    found = moment_deficit(person, angles + steps)
     return found[0], (found[1:] - found[0]).T / _STEP_RAD
 
 
-def _least_sum(at: Array, slope: Array, low: Array, high: Array, trust: float) -> Array:
+def _linear_step(at: Array, slope: Array, low: Array, high: Array, trust: float) -> Array:
     """(8,) step with the least sum of sizes of the linearised moments; HiGHS.
 
     Of the steps that do equally well the smallest is wanted: turning costs next to nothing.
     """
+    # unknowns, none below nought: turns up and turns down, and a bound on the size of each moment
     rows, columns = slope.shape
     one = np.eye(rows)
     wide = np.hstack([slope, -slope])

@@ -15,7 +15,7 @@ from example_effects import loaded, spine
 from trunk_person import tasks, volunteer
 
 import spinepipe
-from spinepipe.muscles.muscle_equilibrium import SolverOptions, held
+from spinepipe.muscles.muscle_equilibrium import SolverOptions, solve_task
 from spinepipe.muscles.stability import stiffness
 from spinepipe.statics import Course
 from spinepipe.statics.batched import Stack, settle
@@ -48,4 +48,4 @@ def of_muscles() -> None:
     """Compile what looks at trunks, unless it is there."""
     with _one_at_a_time():
         person = volunteer()
-        stiffness(person, held(person, tasks()["standing"], _AT_ONCE), gain=5.0)
+        stiffness(person, solve_task(person, tasks()["standing"], _AT_ONCE), gain=5.0)

@@ -7,14 +7,14 @@ from pathlib import Path
 from trunk_cases import made_up_trunk
 
 from spinepipe.cohort import Cohort, read
-from spinepipe.muscles.muscle_equilibrium import SolvedTask, SolverOptions, held
+from spinepipe.muscles.muscle_equilibrium import SolvedTask, SolverOptions, solve_task
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.subject import REFERENCE
+from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import Trunk
-from spinepipe.studies.subjects import SUBJECTS, subject_of
+from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.forms import TASKS
-from spinepipe.studies.trunk_loads.persons import regressions_of, source_of, standing
+from spinepipe.studies.trunk_loads.persons import UprightPerson, regressions_of
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
@@ -38,18 +38,20 @@ def tasks() -> Mapping[str, Task]:
 
 
 @cache
-def volunteer() -> Person:
+def standing() -> UprightPerson:
     """The volunteer, standing upright, with the muscles of the package."""
-    cohort = volunteers()
-    regressions = regressions_of(SETTINGS, cohort.folder)
-    source, who = source_of(SETTINGS, cohort).trunk, subject_of(cohort, "volunteer")
-    return standing(SETTINGS, source, who, regressions).person
+    return UprightPerson.of_cohort(SETTINGS, volunteers(), "volunteer")
 
 
-def person_of(trunk: Trunk, settings: TrunkLoads = SETTINGS) -> Person:
-    """The reference person with another trunk."""
-    regressions = regressions_of(settings, FOLDER)
-    return standing(settings, trunk, REFERENCE, regressions).person
+def volunteer() -> Person:
+    """The volunteer."""
+    return standing().person
+
+
+def person_of(trunk: Trunk, subject: Subject = REFERENCE) -> Person:
+    """The reference person, or another, with another trunk."""
+    regressions = regressions_of(SETTINGS, FOLDER)
+    return UprightPerson.of(SETTINGS, trunk, subject, regressions).person
 
 
 @cache
@@ -61,4 +63,4 @@ def made_up() -> Person:
 @cache
 def held_task(name: str) -> SolvedTask:
     """A task of the volunteer, settled closely."""
-    return held(volunteer(), tasks()[name], CLOSELY)
+    return solve_task(volunteer(), tasks()[name], CLOSELY)

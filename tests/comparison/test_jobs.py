@@ -17,8 +17,8 @@ from spinepipe.studies.scoliosis.tables import JALALIAN_2017_COHORTS
 from spinepipe.studies.tracking.against_wang_2021 import paper_settings as asked_of_tracking
 from spinepipe.studies.tracking.settings import JointLimits, Tracking
 from spinepipe.studies.trunk_loads.against_ghezelbash_2016 import asked_of as asked_of_trunk
-from spinepipe.studies.trunk_loads.ghezelbash_2016 import reproduces as has_the_persons
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.settings import reproduces as has_the_persons
 from spinepipe.tables import read, read_frame
 from tests.comparison.made_up import ASKED, ROOT
 

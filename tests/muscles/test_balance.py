@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from trunk_person import held_task, tasks, volunteer
 
-from spinepipe.muscles.muscle_equilibrium import SolvedTask, held
+from spinepipe.muscles.muscle_equilibrium import SolvedTask, solve_task
 from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS, THORAX
@@ -140,7 +140,7 @@ def test_equilibrium_of_vertebrae_is_that_of_cuts(task: str) -> None:
 
 def test_no_weight_and_no_load_give_no_force() -> None:
     nobody = replace(volunteer(), masses=(), subject=Subject("male", 45.0, 1.739, 1e-12))
-    nobody = nobody.standing(np.zeros((8, 3)))
-    found = held(nobody, Task("nothing", None, np.zeros((8, 3)), from_upright=False))
+    nobody = nobody.with_upright(np.zeros((8, 3)))
+    found = solve_task(nobody, Task("nothing", None, np.zeros((8, 3)), from_upright=False))
     assert np.abs(found.found.forces).max() < 1e-6
     assert np.abs(found.pushes).max() < 1e-6

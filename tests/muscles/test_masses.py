@@ -16,7 +16,7 @@ from spinepipe.muscles.masses import (
     shares,
 )
 from spinepipe.muscles.regressions import packaged
-from spinepipe.muscles.scaling import scaled
+from spinepipe.muscles.scaling import scale_trunk
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.task import Hands
 from spinepipe.muscles.trunk import BODIES, SLICES, THORAX
@@ -49,7 +49,7 @@ def test_slices_lie_ahead_as_published_and_grow_with_height() -> None:
     assert at["L3"] == pytest.approx(1.0 + 0.5 * 4.0 / 4.5)
     trunk = made_up_trunk()
     tall = Subject("male", 41.8, 1.2 * 1.730, 75.1)
-    taller = scaled(trunk, tall, REFERENCE, packaged())
+    taller = scale_trunk(trunk, tall, REFERENCE, packaged())
     masses = masses_of(taller, tall, ahead_times=1.5)
     gaps = [m.at - v for m, v in zip(masses, taller.vertebrae, strict=False)]
     np.testing.assert_allclose(
@@ -127,14 +127,10 @@ def test_one_hand_carries_and_the_other_hangs() -> None:
     mirrored = replace(hands, at=at * [1, 1, -1], holding="left")
     other = {load.name: load for load in arm_loads(REFERENCE, SHOULDERS, mirrored, 0.65)}
     for name, load in loads.items():
-        twin = other[_swapped(name)]
+        side, rest = name.split("_", 1)
+        twin = other[f"{'left' if side == 'right' else 'right'}_{rest}"]
         np.testing.assert_allclose(twin.at, load.at * [1, 1, -1], atol=1e-15)
         np.testing.assert_array_equal(twin.force, load.force)
-
-
-def _swapped(name: str) -> str:
-    side, rest = name.split("_", 1)
-    return f"{'left' if side == 'right' else 'right'}_{rest}"
 
 
 def test_empty_hands_go_where_they_are_put() -> None:
@@ -144,13 +140,10 @@ def test_empty_hands_go_where_they_are_put() -> None:
     assert "right_hand_load" not in loads
 
 
-def test_a_hand_at_full_reach_is_within_it() -> None:
+def test_a_hand_at_full_reach_is_within_it_and_one_beyond_is_told_with_its_distance() -> None:
     hands = Hands(kg=5.0, at=np.array([0.65, 0.45, 0.18]), holding="right")
     loads = {load.name: load for load in arm_loads(REFERENCE, SHOULDERS, hands, arm_length=0.65)}
     np.testing.assert_array_equal(loads["right_hand_load"].at, hands.at)
-
-
-def test_a_hand_out_of_reach_is_told_with_its_distance() -> None:
-    hands = Hands(kg=5.0, at=np.array([0.8, 0.45, 0.18]), holding="right")
+    far = replace(hands, at=np.array([0.8, 0.45, 0.18]))
     with pytest.raises(ValueError, match="right hand is 150 mm farther"):
-        arm_loads(REFERENCE, SHOULDERS, hands, arm_length=0.65)
+        arm_loads(REFERENCE, SHOULDERS, far, arm_length=0.65)

@@ -9,7 +9,7 @@ from trunk_person import made_up, tasks, volunteer
 from spinepipe.muscles.pose import (
     BodyPoses,
     JointCentres,
-    posed,
+    place_bodies,
     rotation_of_vector,
     rotation_vector,
     rotations_of,
@@ -65,7 +65,7 @@ def test_a_turn_about_one_axis_of_leaning_discs_stays_on_it(axis: int) -> None:
     assert np.ptp(made_up_trunk().disc_tilt) > 0.5
     angles = np.zeros((len(BODIES), 3))
     angles[:, axis] = np.deg2rad(np.linspace(2.0, 20.0, len(BODIES)))
-    turned = posed(CHAIN, rotations_of(CHAIN, angles), STILL).turned
+    turned = place_bodies(CHAIN, rotations_of(CHAIN, angles), STILL).turned
     expected = np.zeros((len(LEVELS), 3))
     expected[:, axis - 1] = np.deg2rad(18.0 / 7.0)
     np.testing.assert_allclose(turned, expected, rtol=0.0, atol=ROUND_OFF)
@@ -73,14 +73,14 @@ def test_a_turn_about_one_axis_of_leaning_discs_stays_on_it(axis: int) -> None:
 
 def test_joints_turn_by_the_difference_of_their_bodies_angles() -> None:
     angles = random_angles(3, 20.0)
-    turned = posed(CHAIN, rotations_of(CHAIN, angles), STILL).turned
+    turned = place_bodies(CHAIN, rotations_of(CHAIN, angles), STILL).turned
     extension, bending, rotation = np.diff(angles, axis=0).T
     expected = np.column_stack([bending, rotation, extension])
     np.testing.assert_allclose(turned, expected, rtol=0.0, atol=1e-13)
 
 
 def test_discs_lie_halfway_between_their_vertebrae() -> None:
-    poses = posed(CHAIN, rotations_of(CHAIN, random_angles(4)), STILL)
+    poses = place_bodies(CHAIN, rotations_of(CHAIN, random_angles(4)), STILL)
     for level, disc in enumerate(poses.discs):
         ends = Rotation.from_matrix(poses.rotations[level : level + 2])
         halfway = Slerp([0.0, 1.0], ends)(0.5).as_matrix()
@@ -89,7 +89,7 @@ def test_discs_lie_halfway_between_their_vertebrae() -> None:
 
 def test_joints_move_the_vertebra_above_along_the_axes_of_the_disc() -> None:
     moves = random_moves(5)
-    poses = posed(CHAIN, rotations_of(CHAIN, random_angles(5)), moves)
+    poses = place_bodies(CHAIN, rotations_of(CHAIN, random_angles(5)), moves)
     for level in range(len(LEVELS)):
         joint = CHAIN.centres[level][None]
         below, above = (poses.of(np.array([body]), joint)[0] for body in (level, level + 1))
@@ -100,7 +100,7 @@ def test_joints_move_the_vertebra_above_along_the_axes_of_the_disc() -> None:
 
 def test_moves_add_up_towards_the_thorax_and_leave_the_pelvis() -> None:
     rotations, moves = rotations_of(CHAIN, random_angles(6)), random_moves(6)
-    still, moved = (posed(CHAIN, rotations, by) for by in (STILL, moves))
+    still, moved = (place_bodies(CHAIN, rotations, by) for by in (STILL, moves))
     steps = np.einsum("kij,kj->ki", moved.discs, moves)
     for body in range(len(BODIES)):
         np.testing.assert_allclose(
@@ -112,7 +112,7 @@ def test_moves_add_up_towards_the_thorax_and_leave_the_pelvis() -> None:
 
 
 def test_nothing_turned_leaves_every_point_where_it_was() -> None:
-    poses = posed(CHAIN, rotations_of(CHAIN, np.zeros((len(BODIES), 3))), STILL)
+    poses = place_bodies(CHAIN, rotations_of(CHAIN, np.zeros((len(BODIES), 3))), STILL)
     points = np.random.default_rng(7).uniform(-0.3, 0.3, (len(BODIES), 3))
     there = poses.of(np.arange(len(BODIES)), points)
     np.testing.assert_allclose(there, points, rtol=0.0, atol=ROUND_OFF)
@@ -141,7 +141,9 @@ def turned_as_one(poses: BodyPoses, turn: np.ndarray) -> BodyPoses:
 def test_a_trunk_turned_as_one_keeps_its_lengths_and_turns_its_pulls() -> None:
     """Of all fascicles: those on bars, and those that hang in the sheath."""
     person = volunteer()
-    poses = posed(person.chain, rotations_of(person.chain, tasks()["forward_60"].turned), STILL)
+    poses = place_bodies(
+        person.chain, rotations_of(person.chain, tasks()["forward_60"].turned), STILL
+    )
     turn = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()
     here, there = (person.lines.pulls(one) for one in (poses, turned_as_one(poses, turn)))
     assert here.contacts.sum() > 10
@@ -157,7 +159,7 @@ def test_a_trunk_turned_as_one_keeps_its_lengths_and_turns_its_pulls() -> None:
 def test_standing_muscles_are_at_rest(make) -> None:
     """Upright and unloaded no path is longer than at rest, so nothing is stretched."""
     person = make()
-    poses = posed(person.chain, rotations_of(person.chain, person.upright), STILL)
+    poses = place_bodies(person.chain, rotations_of(person.chain, person.upright), STILL)
     lengths, ones = person.lines.pulls(poses).lengths, np.ones(len(person.rest))
     np.testing.assert_array_equal(lengths, person.rest)
     assert not person.passive.forces(lengths, person.rest, person.fibres, ones).any()

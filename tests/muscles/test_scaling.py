@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 from trunk_to_scale import made_up_trunk
 
-from spinepipe.muscles.beam import (
-    stiffening,
-    t11t12_beside_t12l1,
-)
 from spinepipe.muscles.regressions import PACKAGED, Regressions, packaged, read_regressions
 from spinepipe.muscles.scaling import (
-    Choices,
+    ScaleFactors,
     applied_ratios,
+    beam_ratios,
     line_of_vertebrae,
     nearest_vertebra,
-    scaled,
+    scale_trunk,
+    t11t12_over_t12l1,
 )
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.trunk import NO_BODY, SLICES, Trunk
@@ -38,6 +36,8 @@ STILL = "".join(
 )
 """Regressions that give everybody the same."""
 
+NO_RIBS = "".join(line for line in STILL.splitlines(keepends=True) if "rib_cage" not in line)
+
 
 def table(tmp_path: Path, *rows: str, base: str = STILL) -> Regressions:
     path = tmp_path / "regressions.csv"
@@ -54,13 +54,13 @@ def arrays(trunk: Trunk) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("name", PACKAGED)
 def test_the_reference_person_has_the_reference_trunk_to_the_last_bit(name: str) -> None:
     trunk = made_up_trunk()
-    found = arrays(scaled(trunk, REFERENCE, REFERENCE, packaged(name)))
+    found = arrays(scale_trunk(trunk, REFERENCE, REFERENCE, packaged(name)))
     assert all(np.array_equal(found[k], value) for k, value in arrays(trunk).items())
 
 
 def test_bones_discs_head_arms_and_fibres_grow_with_height(tmp_path: Path) -> None:
     trunk = made_up_trunk()
-    found = scaled(trunk, TALL, REFERENCE, table(tmp_path))
+    found = scale_trunk(trunk, TALL, REFERENCE, table(tmp_path))
     for name in ("joints", "disc_height", "vertebrae", "head", "shoulders", "arm_length"):
         np.testing.assert_allclose(
             getattr(found, name), 1.25 * np.asarray(getattr(trunk, name)), rtol=EXACT, atol=0
@@ -75,7 +75,7 @@ def test_muscle_points_rise_with_height_and_keep_their_distance_from_the_vertebr
     tmp_path: Path,
 ) -> None:
     trunk = made_up_trunk()
-    found = scaled(trunk, TALL, REFERENCE, table(tmp_path))
+    found = scale_trunk(trunk, TALL, REFERENCE, table(tmp_path))
     real = trunk.muscles.body != NO_BODY
     before, after = trunk.muscles.point[real], found.muscles.point[real]
     np.testing.assert_allclose(after[:, 1], 1.25 * before[:, 1], rtol=0, atol=EXACT)
@@ -85,12 +85,7 @@ def test_muscle_points_rise_with_height_and_keep_their_distance_from_the_vertebr
         rtol=0,
         atol=EXACT,
     )
-
-
-def test_points_past_the_end_of_a_path_stay_nought(tmp_path: Path) -> None:
-    trunk = made_up_trunk()
-    found = scaled(trunk, TALL, REFERENCE, table(tmp_path))
-    assert not found.muscles.point[trunk.muscles.body == NO_BODY].any()
+    assert not found.muscles.point[~real].any(), "past the end of a path"
 
 
 def test_each_direction_follows_its_own_regression_of_that_muscle_at_that_level(
@@ -104,7 +99,7 @@ def test_each_direction_follows_its_own_regression_of_that_muscle_at_that_level(
         "*,T12,ap_distance,linear,0,0,1,0,0",
     )
     heavy = replace(REFERENCE, mass_kg=1.5 * REFERENCE.mass_kg)
-    found = scaled(trunk, heavy, REFERENCE, known)
+    found = scale_trunk(trunk, heavy, REFERENCE, known)
     at = trunk.muscles.names.index("longissimus_r")
     before, after = trunk.muscles.point[at], found.muscles.point[at]
     line = line_of_vertebrae(trunk, before[:, 1])
@@ -123,8 +118,8 @@ def test_cross_sections_follow_their_muscle_and_stated_factors_come_on_top(
     trunk = made_up_trunk()
     known = table(tmp_path, "rectus_abdominis,*,pcsa,exponential,3,0,-0.01,0,0")
     old = replace(REFERENCE, age_years=REFERENCE.age_years + 10.0)
-    choices = Choices(pcsa_times=2.0, disc_area_times=1.5)
-    found = scaled(trunk, old, REFERENCE, known, choices)
+    factors = ScaleFactors(pcsa_times=2.0, disc_area_times=1.5)
+    found = scale_trunk(trunk, old, REFERENCE, known, factors)
     expected = 2.0 * np.array([1, 1, exp(-0.1), 1, 1]) * trunk.muscles.pcsa
     np.testing.assert_allclose(found.muscles.pcsa, expected, rtol=1e-14)
     np.testing.assert_array_equal(found.disc_area, 1.5 * trunk.disc_area)
@@ -135,7 +130,7 @@ def test_a_cross_section_follows_the_vertebra_nearest_to_its_middle(tmp_path: Pa
     trunk = made_up_trunk()
     heavy = replace(REFERENCE, mass_kg=1.5 * REFERENCE.mass_kg)
     rows = [f"*,{level},pcsa,power,0,0,0,0,{k}" for k, level in ((1, "L5"), (2, "L1"), (3, "T11"))]
-    found = scaled(trunk, heavy, REFERENCE, table(tmp_path, *rows))
+    found = scale_trunk(trunk, heavy, REFERENCE, table(tmp_path, *rows))
     times = dict(zip(trunk.muscles.names, found.muscles.pcsa / trunk.muscles.pcsa, strict=True))
     expected = {"multifidus_r": 1.5, "longissimus_r": 1.5**2, "oblique_r": 1.5**3}
     assert {name: times[name] for name in expected} == pytest.approx(expected)
@@ -151,7 +146,7 @@ def test_what_ends_in_the_rectus_sheath_moves_with_the_sheath(tmp_path: Path) ->
         "external_oblique,*,ap_distance,power,0,0,0,0,3",
     )
     heavy = replace(REFERENCE, mass_kg=1.2 * REFERENCE.mass_kg)
-    found = scaled(replace(trunk, sheath=sheath), heavy, REFERENCE, known)
+    found = scale_trunk(replace(trunk, sheath=sheath), heavy, REFERENCE, known)
     np.testing.assert_array_equal(found.muscles.point[3, 1], found.sheath[0, 1])
     assert found.muscles.point[3, 0, 0] != trunk.muscles.point[3, 0, 0]
 
@@ -163,7 +158,7 @@ def test_a_mirrored_trunk_scales_to_the_mirrored_trunk() -> None:
     other = replace(trunk, muscles=replace(trunk.muscles, point=mirror * trunk.muscles.point))
     woman = Subject("female", 60.0, 1.62, 80.0)
     found, mirrored = (
-        scaled(t, woman, REFERENCE, packaged()).muscles.point for t in (trunk, other)
+        scale_trunk(t, woman, REFERENCE, packaged()).muscles.point for t in (trunk, other)
     )
     np.testing.assert_array_equal(mirrored, mirror * found)
 
@@ -175,7 +170,7 @@ def test_every_ratio_that_is_used_is_told(tmp_path: Path) -> None:
         "multifidus,*,pcsa,linear,0,0,0,0,1",
         "psoas,*,pcsa,linear,0,0,0,0,3",
         "*,*,rib_cage_area,linear,0,0,0,0,1",
-        base=STILL.replace("*,*,rib_cage_area,linear,7,0,0,0,0,made up\n", ""),
+        base=NO_RIBS,
     )
     heavy = Subject("male", 41.8, 1.25 * 1.730, 1.5 * 75.1)
     found = {(r.quantity, r.of): r.ratio for r in applied_ratios(trunk, heavy, REFERENCE, known)}
@@ -192,13 +187,9 @@ def test_every_ratio_that_is_used_is_told(tmp_path: Path) -> None:
 
 
 def test_joints_are_beams(tmp_path: Path) -> None:
-    known = table(
-        tmp_path,
-        "*,*,rib_cage_area,power,0,0,0,0,1",
-        base=STILL.replace("*,*,rib_cage_area,linear,7,0,0,0,0,made up\n", ""),
-    )
+    known = table(tmp_path, "*,*,rib_cage_area,power,0,0,0,0,1", base=NO_RIBS)
     other = Subject("male", 41.8, 2 * 1.730, 3 * 75.1)
-    found = stiffening(other, REFERENCE, known)
+    found = beam_ratios(other, REFERENCE, known)
     assert (found.area, found.height) == (pytest.approx(3.0), pytest.approx(2.0))
     assert (found.axial, found.angular) == (pytest.approx(1.5), pytest.approx(4.5))
 
@@ -210,11 +201,11 @@ def test_t11t12_is_t12l1_by_area_and_height_and_stiffer_in_bending_alone() -> No
         disc_area=np.array([9, 9, 9, 9, 9, 4, 3]) * 1e-4,
         disc_height=np.array([9, 9, 9, 9, 9, 8, 5]) * 1e-3,
     )
-    found = t11t12_beside_t12l1(trunk)
+    found = t11t12_over_t12l1(trunk)
     assert found.axial == pytest.approx(0.75 / 0.625)
     assert found.torsion == pytest.approx(0.5625 / 0.625)
     assert found.angular == pytest.approx(1.2 * 0.5625 / 0.625)
-    assert t11t12_beside_t12l1(trunk, 1.0).angular == found.torsion
+    assert t11t12_over_t12l1(trunk, 1.0).angular == found.torsion
 
 
 def test_packaged_trends_are_the_published_ones() -> None:
@@ -302,7 +293,7 @@ def test_a_person_beyond_a_linear_regression_is_told(tmp_path: Path) -> None:
     known = table(tmp_path, "multifidus,*,pcsa,linear,-80,0,0,0,1.1")
     light = replace(REFERENCE, mass_kg=45.0)
     with pytest.raises(ValueError, match=r"pcsa for multifidus is -30\.5 .* 45\.0 kg"):
-        scaled(made_up_trunk(), light, REFERENCE, known)
+        scale_trunk(made_up_trunk(), light, REFERENCE, known)
 
 
 @pytest.mark.parametrize(

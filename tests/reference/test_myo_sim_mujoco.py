@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from trunk_posture import lengths, lever_arms, random_bends
 
-from spinepipe.muscles.myo_sim import trunk_of_myo_sim
+from spinepipe.muscles.myo_sim import source_of_myo_sim
 
 ROUND_OFF_M = 1e-12
 """Lengths of half a metre, summed from nine differences of coordinates."""
@@ -61,7 +61,7 @@ def stripped(element: ET.Element) -> None:
 @pytest.fixture(scope="module")
 def trunk():
     """Without the multifidus that is repeated above L1, which the file has not."""
-    whole = trunk_of_myo_sim()
+    whole = source_of_myo_sim().trunk
     own = np.array(["_at_" not in name for name in whole.muscles.names])
     return replace(whole, muscles=whole.muscles.of(own))
 

@@ -10,7 +10,7 @@ import pytest
 from trunk_cases import made_up_trunk
 from trunk_posture import lengths, lever_arms, random_bends
 
-from spinepipe.muscles.myo_sim import trunk_of_myo_sim
+from spinepipe.muscles.myo_sim import source_of_myo_sim
 from tests.reference.peers import opensim_trunk as peers
 
 ROUND_OFF_M = 1e-12
@@ -25,7 +25,7 @@ POSTURES = (np.zeros((7, 3)), random_bends(5))
 @pytest.fixture(scope="module", params=["made up", "myo-sim"])
 def both(request: pytest.FixtureRequest):
     """A trunk and the same in OpenSim."""
-    trunk = trunk_of_myo_sim() if request.param == "myo-sim" else made_up_trunk()
+    trunk = source_of_myo_sim().trunk if request.param == "myo-sim" else made_up_trunk()
     return trunk, peers.build(trunk)
 
 

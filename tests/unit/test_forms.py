@@ -20,7 +20,7 @@ from spinepipe.muscles import regressions
 from spinepipe.problems import InputProblem
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, FILMS, NEEDED
 from spinepipe.studies.tracking.trials import FORMS, MOVING, STANCE, TRIALS
-from spinepipe.studies.trunk_loads.checks_of_muscles import CARRIERS
+from spinepipe.studies.trunk_loads.checks import CARRIERS
 from spinepipe.studies.trunk_loads.forms import BODY_FRAMES, FORCE, HANDS, TASKS, UPRIGHT
 from spinepipe.units import COORDINATES
 

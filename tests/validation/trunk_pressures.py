@@ -15,12 +15,12 @@ import pandas as pd
 
 from spinepipe.cohort import read
 from spinepipe.muscles.folder import SpecimenTables, source_of_folder
-from spinepipe.muscles.muscle_equilibrium import held
+from spinepipe.muscles.muscle_equilibrium import solve_task
 from spinepipe.muscles.trunk import Trunk
 from spinepipe.progress import Progress
-from spinepipe.studies.subjects import SUBJECTS, subject_of
+from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.forms import TASKS
-from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
+from spinepipe.studies.trunk_loads.persons import solver_options, source_of
 from spinepipe.studies.trunk_loads.settings import TrunkLoads, VolunteerSettings
 from spinepipe.studies.trunk_loads.tune import rows_of, volunteer_of
 
@@ -65,11 +65,9 @@ def _rows() -> Iterator[dict[str, Any]]:
                 lift = who.tasks[LIFT]
                 hung = replace(lift, hands=replace(lift.hands, at=None))
                 who = replace(who, tasks={**who.tasks, LIFT: hung})
-            regressions = regressions_of(SETTINGS, cohort.folder)
-            subject = subject_of(cohort, "volunteer")
-            person = standing(SETTINGS, source, subject, regressions).person
+            person, options = who.stands.person, solver_options(SETTINGS)
             slack = {
-                name: float(np.abs(held(person, task, how_of(SETTINGS)).found.slack).max())
+                name: float(np.abs(solve_task(person, task, options).found.slack).max())
                 for name, task in who.tasks.items()
                 if task.number in range(1, 10)
             }

@@ -3,22 +3,34 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.inside import outside
 from spinepipe.documents.names import name_fault
 from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.muscles.folder import PELVIS, SHEATH, in_ground
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
 from spinepipe.muscles.regressions import PACKAGED
-from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
+from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES
+from spinepipe.plausibility.warnings.columns import beyond_ranges
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning
+from spinepipe.problems import InputError, InputProblem, Spelling, did_you_mean, one_of
+from spinepipe.studies.implausible_subjects import subject_doubts
 from spinepipe.studies.places import at, unknown_names
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
-from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
 from spinepipe.studies.trunk_loads.forms import MUSCLE_PARAMETERS, MUSCLES, TASKS
 from spinepipe.studies.trunk_loads.persons import regressions_of, source_of
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.units import MM_PER_M
+
+CARRIERS = tuple(dict.fromkeys((*BODIES, *reversed(SLICES))))
+"""Vertebrae that a body may move with: T1 to T10 move with T11."""
+
+PLACES = (*CARRIERS, *PELVIS, SHEATH)
+"""Bodies that a point of a muscle may belong to, where the cohort tells of no others."""
 
 _FIRST_ROW = 2
 """Line of a file below its header."""
@@ -37,7 +49,11 @@ def check_trunk(
     if "subjects" in further:
         yield from subject_problems(cohort, further["subjects"])
     if "tasks" in further:
-        tallest = _tallest(further.get("subjects"))
+        tallest = None  # m, of those whose height can be
+        if "subjects" in further:
+            heights = further["subjects"]["height_cm"]
+            sound = heights[heights.between(*HEIGHT_CM)]
+            tallest = None if sound.empty else float(sound.max()) / 100.0
         file = f"{cohort.name}/{TASKS.file}"
         yield from task_problems(file, further["tasks"], tallest, study.trunk_angle)
         yield from _named(document, study, cohort, list(further["tasks"]["task"]))
@@ -113,14 +129,6 @@ def _regressions(
         yield from error.problems
 
 
-def _tallest(subjects: pd.DataFrame | None) -> float | None:
-    """Height of the tallest whose height can be, m; None where nobody's can."""
-    if subjects is None:
-        return None
-    sound = subjects["height_cm"][subjects["height_cm"].between(*HEIGHT_CM)]
-    return None if sound.empty else float(sound.max()) / 100.0
-
-
 def _named(
     document: YamlDocument, study: TrunkLoads, cohort: Cohort, tasks: list[str]
 ) -> Iterator[InputProblem]:
@@ -141,3 +149,97 @@ def _named(
         place = at(document, "volunteer.specimen")
         remedy = did_you_mean(name, known, "name a person of specimens.csv")
         yield InputProblem(*place, f"unknown specimen '{name}'", one_of(known), remedy)
+
+
+def muscle_problems(cohort: Cohort) -> Iterator[InputProblem]:
+    """Everything that is wrong with muscles.csv, muscle_parameters.csv, body_frames.csv and columns
+    of levels."""
+    name, further = cohort.name, cohort.further
+    points, muscles = further.get("muscles"), further.get("muscle_parameters")
+    frames = further.get("body_frames")
+    if frames is not None and cohort.joints is not None:
+        # of the specimen whose joints are taken, the first of joints.csv
+        frames = frames[frames["specimen"] == cohort.joints["specimen"].iloc[0]]
+    if frames is not None:
+        yield from _frames(f"{name}/body_frames.csv", further["body_frames"], not frames.empty)
+    if points is not None:
+        yield from _points(f"{name}/muscles.csv", points, frames)
+    if points is not None and muscles is not None:
+        yield from _sides(f"{name}/muscles.csv", points, muscles, frames)
+    levels = Spelling((*LEVELS, *SLICES), "a joint is named upper vertebra first")
+    for stem, rows in further.items():
+        if "level" in rows:
+            column = rows["level"].dropna()
+            for line, level in column[~column.isin(levels.known)].items():
+                place, found = (f"{name}/{stem}.csv", int(str(line)), "level"), f"'{level}'"
+                remedy = levels.remedy(str(level))
+                yield InputProblem(*place, f"unknown level {found}", levels.allowed, remedy)
+
+
+def _frames(file: str, rows: pd.DataFrame, has_owner: bool) -> Iterator[InputProblem]:
+    """Bodies of anybody that move with nothing known; no rows of whose muscles are taken."""
+    if not has_owner:
+        found, allowed = "no row of the first specimen of joints.csv", "a frame for each body"
+        yield InputProblem(
+            file, None, "specimen", found, allowed, "add its rows, or delete the file"
+        )
+    as_written = {name.casefold(): name for name in CARRIERS}
+    for line, body in rows["body"].items():
+        if body not in CARRIERS and (meant := as_written.get(str(body).casefold())):
+            place, found = (file, int(str(line)), "body"), f"unknown body '{body}'"
+            yield InputProblem(*place, found, f"'{meant}', as elsewhere", f"write '{meant}'")
+
+
+def _points(file: str, rows: pd.DataFrame, frames: pd.DataFrame | None) -> Iterator[InputProblem]:
+    known = PLACES if frames is None else tuple(frames["body"])
+    otherwise = "ribs, arms and head belong to T11, or add body_frames.csv with their frames"
+    if frames is not None:
+        otherwise = "add its frame to body_frames.csv"
+    bodies = Spelling(known, otherwise)
+    for line, body in rows["body"][~rows["body"].isin(known)].items():
+        place, found = (file, int(str(line)), "body"), f"unknown body '{body}'"
+        yield InputProblem(*place, found, bodies.allowed, bodies.remedy(str(body)))
+
+
+def _sides(
+    file: str, points: pd.DataFrame, muscles: pd.DataFrame, frames: pd.DataFrame | None
+) -> Iterator[InputProblem]:
+    """Sides most of whose muscles lie on the other one; single ones are mirrored with a remark."""
+    side = dict(zip(muscles["muscle"], muscles["side"], strict=True))
+    if frames is not None:
+        points = points[points["body"].isin(list(frames["body"]))]
+    if points.empty:
+        return
+    # metres by which points lie to the right in ground, muscle by muscle
+    own = points[["x_mm", "y_mm", "z_mm"]].to_numpy(float) / MM_PER_M
+    placed = own if frames is None else in_ground(frames, points["body"].tolist(), own)
+    right = points.assign(right_m=np.asarray(placed[:, 2])).groupby("muscle", sort=False)
+    lies = {str(name): float(rows["right_m"].sum()) for name, rows in right}
+    outwards = {"right": 1.0, "left": -1.0}
+    wrong = {
+        one: [m for m, z in lies.items() if side.get(m) == one and z * outwards[one] < 0.0]
+        for one in SIDES
+    }
+    judged = {one: [m for m in lies if side.get(m) == one] for one in SIDES}
+    most = [one for one in SIDES if 2 * len(wrong[one]) > len(judged[one])]
+    if len(most) == len(SIDES):
+        found, allowed = "most muscles on the other side of the body", "z to the right"
+        remedy = "change the sign of z: the axes are x forwards, y up, z to the right"
+        yield InputProblem(file, None, "z_mm", found, allowed, remedy)
+        return
+    for one in most:
+        first = points.index[points["muscle"] == wrong[one][0]][0]
+        found = (
+            f"{len(wrong[one])} of {len(judged[one])} muscles that are {one} lie on the other side,"
+            f" {wrong[one][0]} among them"
+        )
+        allowed = "z above 0 on the right, below 0 on the left"
+        remedy = "not mirrored, or mirrored twice? change the sign of their z, or their side"
+        yield InputProblem(file, int(str(first)), "z_mm", found, allowed, remedy)
+
+
+def doubts(cohort: Cohort) -> Iterator[PlausibilityWarning]:
+    """Persons and tasks that are sound cell by cell and most likely wrong."""
+    yield from subject_doubts(cohort)
+    yield from beyond_ranges(cohort, "abdominal_pressure", "muscle_stress", "trunk_rotation")
+    yield from beyond_ranges(cohort, "hands_away", "push", "twist")

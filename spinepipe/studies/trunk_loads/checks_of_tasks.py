@@ -10,14 +10,7 @@ from spinepipe.facts import number
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import BODIES
 from spinepipe.problems import InputProblem, one_of
-from spinepipe.studies.trunk_loads.forms import (
-    FORCE,
-    HANDS,
-    PUSH_N,
-    PUSH_NM,
-    TASKS,
-    turn,
-)
+from spinepipe.studies.trunk_loads.forms import FORCE, HANDS, PUSH_N, PUSH_NM, TASKS, turn
 from spinepipe.studies.trunk_loads.postures import THORAX_DEG, Row, rhythm, turned_deg
 from spinepipe.studies.trunk_loads.settings import TrunkAngle
 from spinepipe.units import MM_PER_M, ROTATIONS
@@ -80,7 +73,9 @@ def task_problems(
         row = _Row(file, int(line), cells)
         postures = list(_posture(row, means))
         yield from postures
-        yield from _load(row)
+        if (kg := row.number("hand_load_kg")) > HEAVIEST_KG:
+            remedy = f"is it in N? write {kg / 9.80665:.1f}"
+            yield row.problem("hand_load_kg", f"{kg:g} kg", f"{HEAVIEST_KG:g} at most", remedy)
         yield from _place_of_hands(row, means, None if postures else tallest_m)
         yield from _push(row)
         yield from _muscles(row)
@@ -88,8 +83,8 @@ def task_problems(
 
 
 def _posture(row: _Row, means: TrunkAngle) -> Iterator[InputProblem]:
-    told = [turn(what, axis) for what in ("trunk", *BODIES) for axis in ROTATIONS]
-    if not any(row.given(name) for name in (*told, *(turn("pelvis", axis) for axis in ROTATIONS))):
+    told = [turn(what, axis) for what in ("trunk", *BODIES, "pelvis") for axis in ROTATIONS]
+    if not any(row.given(name) for name in told):
         allowed = "a rotation of the trunk, or of every body"
         yield row.problem(None, "no posture", allowed, "write trunk_extension_deg, 0 for upright")
         return
@@ -134,13 +129,6 @@ def _bend(row: _Row, pelvis: bool, means: TrunkAngle) -> Iterator[InputProblem]:
         allowed = f"the pelvis too: it was measured up to {THORAX_DEG:g} deg of the thorax"
         remedy = "write the pelvis' rotation"
         yield row.problem(turn("pelvis", "extension"), found, allowed, remedy)
-
-
-def _load(row: _Row) -> Iterator[InputProblem]:
-    kg = row.number("hand_load_kg")
-    if kg > HEAVIEST_KG:
-        remedy = f"is it in N? write {kg / 9.80665:.1f}"
-        yield row.problem("hand_load_kg", f"{kg:g} kg", f"{HEAVIEST_KG:g} at most", remedy)
 
 
 def _place_of_hands(

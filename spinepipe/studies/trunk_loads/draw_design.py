@@ -2,8 +2,8 @@
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.studies.trunk_loads.sampling import UNITS, values_of_design
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.sampling import values_of_design
+from spinepipe.studies.trunk_loads.settings import FACTOR_UNITS, TrunkLoads
 from spinepipe.studies.trunk_loads.tables import DESIGN
 from spinepipe.tables import from_rows, write
 
@@ -12,7 +12,7 @@ def run(root: str, study: str, output: str) -> None:
     """Write ``design.parquet``: sample by sample, factor by factor."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     rows = [
-        {"sample": sample, "factor": factor, "value": value, "unit": UNITS.get(factor, "")}
+        {"sample": sample, "factor": factor, "value": value, "unit": FACTOR_UNITS[factor]}
         for sample, values in enumerate(values_of_design(settings).tolist())
         for factor, value in zip(settings.uncertain.factors, values, strict=True)
     ]

@@ -20,18 +20,10 @@ from spinepipe.studies.trunk_loads.findings_of_loads import (
     sound_rows,
     upright,
 )
-from spinepipe.studies.trunk_loads.headline import (
-    ended_words,
-    leading,
-    missed,
-)
+from spinepipe.studies.trunk_loads.headline import leading, missed
+from spinepipe.studies.trunk_loads.selection import sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import (
-    TIERS,
-    factor,
-    mpa,
-    sound,
-)
+from spinepipe.studies.trunk_loads.words import TIERS, ended_words, factor, mpa, unbroken
 
 _MOST_PLACES = 4
 _MOST_SHARE = 1.1
@@ -45,8 +37,7 @@ Finding = Callable[[TrunkLoads, Cohort, ResultTables], Iterator[str]]
 
 def findings(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> list[str]:
     """The sentences, without those that the study has no table for."""
-    told = [sentence for make in MAKERS for sentence in make(study, cohort, results)]
-    return [sentence.replace(" %", "\u00a0%") for sentence in told]
+    return [unbroken(told) for make in MAKERS for told in make(study, cohort, results)]
 
 
 def ended(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
@@ -112,25 +103,19 @@ def agreement(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Itera
         if pd.isna(row["rmse_mpa"]):
             yield f"{name}: no computed pressure can be held against a measured one."
             continue
+        r = ", too few for a correlation"
+        if pd.notna(row["r"]):
+            ends = ", without an interval"
+            if pd.notna(row["r_low"]) and pd.notna(row["r_high"]):
+                ends = f" (95 % interval {fixed(row['r_low'])} to {fixed(row['r_high'])})"
+            r = f", r {fixed(row['r'])}{ends}"
+        goal = f"The goal of {mpa(float(row['goal_rmse_mpa']))} is reached."
+        if not row["reached"]:
+            goal = f"The goal is not reached: {missed(row)}."
         yield (
             f"{name}: over {count(int(row['n_tasks']), 'task')} computed pressures are off from "
-            f"measured ones by {mpa(row['rmse_mpa'])} (root mean square){_correlated(row)}. "
-            f"{_goal(row)}"
+            f"measured ones by {mpa(row['rmse_mpa'])} (root mean square){r}. {goal}"
         )
-
-
-def _correlated(row: dict[Any, Any]) -> str:
-    if pd.isna(row["r"]):
-        return ", too few for a correlation"
-    if pd.isna(row["r_low"]) or pd.isna(row["r_high"]):
-        return f", r {fixed(row['r'])}, without an interval"
-    return f", r {fixed(row['r'])} (95 % interval {fixed(row['r_low'])} to {fixed(row['r_high'])})"
-
-
-def _goal(row: dict[Any, Any]) -> str:
-    if row["reached"]:
-        return f"The goal of {mpa(float(row['goal_rmse_mpa']))} is reached."
-    return f"The goal is not reached: {missed(row)}."
 
 
 def unsettled(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
@@ -177,8 +162,8 @@ def tuned(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[
         return
     own = rows[rows["tier"] == "tuned"].to_dict("records")
     told = [
-        f"{factor(row['parameter'])} {number(row['value'])}{_unit(row)} instead of "
-        f"{number(row['default'])}{_ends(row)}"
+        f"{factor(row['parameter'])} {number(row['value'])}"
+        f"{row['unit'] and ' ' + row['unit']} instead of {number(row['default'])}{_ends(row)}"
         + (", at the end of its range" if row["at_bound"] else "")
         for row in own
     ]
@@ -215,18 +200,14 @@ def _ends(row: dict[Any, Any]) -> str:
     return f" ({number(row['low'], 2)} to {number(row['high'], 2)})"
 
 
-def _unit(row: dict[Any, Any]) -> str:
-    return f" {row['unit']}" if row["unit"] else ""
-
-
 def drivers(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """What the pressure of every sampled task hangs on."""
     rows = results.table("intervals")
     if rows.empty:
         return
     several = rows["specimen"].nunique() > 1
-    told = []
-    for place in rows.drop_duplicates(["specimen", "task"]).to_dict("records"):
+    told, lost = [], rows.drop_duplicates(["specimen", "task"])
+    for place in lost.to_dict("records"):
         first = leading(results, place)[:2]
         name = plain(place["task"]) + (f" of {place['specimen']}" if several else "")
         if first and first[0].total > _MOST_SHARE:
@@ -245,7 +226,6 @@ def drivers(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterato
             "What the pressure in L4L5 hangs on most, as share of its variance with interactions "
             f"and 95 % interval: {'; '.join(told)}."
         )
-    lost = rows.drop_duplicates(["specimen", "task"])
     failed, n = int(lost["n_failed"].sum()), int((lost["n_failed"] + lost["n_samples"]).sum())
     yield f"{failed} of {count(n, 'sample')} ({percent(failed, n)}) did not hold and are left out."
 
@@ -289,7 +269,7 @@ def stability(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Itera
         yield f"Least activation of all muscles that makes a posture stable: {listed(told)}."
 
 
-def beside_the_paper(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
+def paper_agreement(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """How published quantities were judged."""
     told = judged(results.table("against_ghezelbash_2016"))
     if told:
@@ -299,5 +279,5 @@ def beside_the_paper(study: TrunkLoads, cohort: Cohort, results: ResultTables) -
 MAKERS: tuple[Finding, ...] = (
     *(ended, outside, slack, agreement, unsettled, uncounted, tuned, relaxation, largest),
     *(by_level, muscles, persons, drivers, strength, stability, simplified, upright),
-    beside_the_paper,
+    paper_agreement,
 )

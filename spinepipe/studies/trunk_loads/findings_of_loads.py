@@ -5,13 +5,19 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.muscles.fascicles import GLOBAL_EXTENSORS
+from spinepipe.muscles.trunk import GLOBAL_EXTENSORS
 from spinepipe.report.page.document import ResultTables
 from spinepipe.report.words import count, listed, number, plain
-from spinepipe.studies.trunk_loads.chosen import bends, grouped, of_person
-from spinepipe.studies.trunk_loads.headline import COMPRESSION, AnsweredTask, Row, answer_of
+from spinepipe.studies.trunk_loads.headline import COMPRESSION, Row, answer_of, of_task
+from spinepipe.studies.trunk_loads.selection import (
+    courses_of,
+    extensor_forces,
+    grouped,
+    of_person,
+    sound,
+)
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import SIMPLIFIED, newton, sound
+from spinepipe.studies.trunk_loads.words import SIMPLIFIED, newton
 
 _LOADS = {
     COMPRESSION: "compression of L4L5",
@@ -55,8 +61,10 @@ def largest(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterato
 def by_level(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Which level of the task of the headline carries most."""
     found = answer_of(study, cohort, results)
-    rows = filled(_of_answer(found, results.table("levels")), "compression_n")
-    if found is None or rows.empty:
+    if found is None or results.table("levels").empty:
+        return
+    rows = of_task(results.table("levels"), found.task).dropna(subset=["compression_n"])
+    if rows.empty:
         return
     highest = most(rows, "compression_n")
     lowest = min(rows.to_dict("records"), key=lambda row: float(row["compression_n"]))
@@ -72,8 +80,10 @@ def by_level(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterat
 def muscles(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
     """Which muscles hold the task of the headline."""
     found = answer_of(study, cohort, results)
-    rows = filled(_of_answer(found, results.table("muscles")), "force_n")
-    if found is None or rows.empty or rows["force_n"].sum() <= 0.0:
+    if found is None or results.table("muscles").empty:
+        return
+    rows = of_task(results.table("muscles"), found.task).dropna(subset=["force_n"])
+    if rows.empty or rows["force_n"].sum() <= 0.0:
         return
     summed = grouped(rows, ("force_n",)).groupby("group")["force_n"].sum()
     first = summed.sort_values(ascending=False, kind="stable").head(3)
@@ -91,9 +101,9 @@ def relaxation(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iter
     if tasks.empty or rows.empty:
         return
     told = []
-    for person in dict.fromkeys(tasks["specimen"]):
-        course = bends(of_person(tasks, person), cohort)
-        force = _active(of_person(rows, person), course)
+    for person, course in courses_of(tasks, cohort).items():
+        forces = extensor_forces(of_person(rows, person), course)
+        force = forces.groupby("flexion_deg")["active"].sum().sort_index()
         if len(force) and force.max() > 0.0:
             share = 100.0 * float(force.iloc[-1]) / float(force.max())
             peak = float(force.index[int(force.to_numpy().argmax())])
@@ -107,14 +117,6 @@ def relaxation(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iter
             f"({listed([plain(name) for name in GLOBAL_EXTENSORS])}) the deepest bend forwards "
             f"leaves: {'; '.join(told)}."
         )
-
-
-def _active(muscles_: pd.DataFrame, course: pd.DataFrame) -> "pd.Series[float]":
-    """N, active force of the global extensors by flexion, deg."""
-    angle = course.set_index("task")["flexion_deg"]
-    rows = muscles_[muscles_["group"].isin(GLOBAL_EXTENSORS) & muscles_["task"].isin(angle.index)]
-    active = rows["force_n"].astype(float) - rows["passive_n"].astype(float)
-    return active.groupby(rows["task"].map(angle)).sum().sort_index()
 
 
 def persons(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
@@ -153,15 +155,13 @@ def simplified(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iter
         off = 100.0 * (both[name] / both["none"] - 1.0)
         at = int(off.abs().to_numpy().argmax())
         person, task = both.index.to_list()[at]
-        told.append(f"{words}: {_signed(float(off.iloc[at]))} ({plain(str(task))} of {person})")
+        change = float(off.iloc[at])
+        signed = f"{'+' if change > 0.0 else ''}{number(change, 2)} %"
+        told.append(f"{words}: {signed} ({plain(str(task))} of {person})")
     if told:
         yield (
             f"What simplifications change the compression of L4L5 by, at most: {'; '.join(told)}."
         )
-
-
-def _signed(value: float) -> str:
-    return f"{'+' if value > 0.0 else ''}{number(value, 2)} %"
 
 
 def upright(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[str]:
@@ -179,11 +179,3 @@ def upright(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterato
         f"{number(after)} N m, before bodies turned to {number(before)} N m; {bound} of "
         f"{count(len(rows), 'rotation')} of all persons end at a bound."
     )
-
-
-def _of_answer(found: AnsweredTask | None, rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the task of the headline."""
-    if found is None or rows.empty:
-        return pd.DataFrame()
-    own = of_person(rows, found.task["specimen"])
-    return own[own["task"] == found.task["task"]]

@@ -4,26 +4,22 @@ One task of one person stands for the others: one with an interval if any has, e
 the hands if there is one, and of these the one that presses L4L5 most.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Headline, ResultTables
-from spinepipe.report.words import capital, count, fixed, listed, number, plain
-from spinepipe.studies.trunk_loads.chosen import of_person, relaxed, shown_person
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import (
-    ENDED,
-    TIERS,
-    factor,
-    held_words,
-    mpa,
-    newton,
+from spinepipe.report.words import count, fixed, listed, number, plain
+from spinepipe.studies.trunk_loads.selection import (
+    of_person,
+    relaxed_standing,
+    shown_person,
     sound,
 )
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.words import TIERS, factor, load_words, mpa, newton
 
 COMPRESSION, PRESSURE = "l4l5_compression_n", "l4l5_pressure_mpa"
 MOST = 0.5
@@ -71,7 +67,7 @@ def answer_of(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Answe
         }
     )
     best = good.loc[rank.sort_values(["sampled", "loaded", "n"], kind="stable").index[-1]]
-    still = relaxed(own, cohort)
+    still = relaxed_standing(own, cohort)
     others = own[(own["task"] == still) & (own["task"] != best["task"])]
     rows = others.to_dict("records")
     return AnsweredTask(best.to_dict(), rows[0] if rows else None)
@@ -89,20 +85,25 @@ def headline(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Headli
     return Headline(_words(found, results), " ".join(part for part in sure if part), doubts)
 
 
+def of_task(rows: pd.DataFrame, task: Row) -> pd.DataFrame:
+    """Rows of the person and the task of a row; none of a table that is absent."""
+    if rows.empty:
+        return rows
+    return rows[(rows["specimen"] == task["specimen"]) & (rows["task"] == task["task"])]
+
+
 def interval(results: ResultTables, row: Row, quantity: str) -> tuple[float, float] | None:
     """Middle 95 % of the samples of a quantity of a task; None where it is not known."""
-    rows = results.table("intervals")
+    rows = of_task(results.table("intervals"), row)
     if rows.empty:
         return None
-    same = (rows["specimen"] == row["specimen"]) & (rows["task"] == row["task"])
-    known = rows[same & (rows["quantity"] == quantity)].dropna(subset=["low", "high"])
+    known = rows[rows["quantity"] == quantity].dropna(subset=["low", "high"])
     if known.empty:
         return None
     return float(known["low"].iloc[0]), float(known["high"].iloc[0])
 
 
-@dataclass(frozen=True)
-class Driver:
+class Driver(NamedTuple):
     """A factor with its total index and the index's 95 % interval."""
 
     factor: str
@@ -113,26 +114,14 @@ class Driver:
 
 def leading(results: ResultTables, row: Row, quantity: str = PRESSURE) -> list[Driver]:
     """Factors of a quantity of a task with their total indices, the largest first."""
-    rows = results.table("drivers")
+    rows = of_task(results.table("drivers"), row)
     if rows.empty:
         return []
-    same = (rows["specimen"] == row["specimen"]) & (rows["task"] == row["task"])
     columns = ["total", "total_low", "total_high"]
-    known = rows[same & (rows["quantity"] == quantity)].dropna(subset=columns)
+    known = rows[rows["quantity"] == quantity].dropna(subset=columns)
     known = known.sort_values("total", ascending=False, kind="stable")
     values = known[columns].to_numpy(float).tolist()
     return [Driver(str(n), *ends) for n, ends in zip(known["factor"], values, strict=True)]
-
-
-def spread_words(drivers: Sequence[Driver]) -> str:
-    """Which input a spread comes of, as far as the indices' intervals tell; nothing without any."""
-    if not drivers:
-        return ""
-    first, second = drivers[0], drivers[1].total if len(drivers) > 1 else 0.0
-    if first.low <= second:
-        return "which input that spread comes of most, the samples do not tell"
-    part = "most" if first.low > MOST else "the largest part"
-    return f"{part} of that spread comes of {factor(first.factor)}"
 
 
 def _words(found: AnsweredTask, results: ResultTables) -> str:
@@ -140,7 +129,7 @@ def _words(found: AnsweredTask, results: ResultTables) -> str:
     ends = interval(results, row, COMPRESSION)
     between = f" ({newton(ends[0])} to {newton(ends[1])})" if ends else ""
     told = (
-        f"Task {found.name}{held_words(row)} presses L4L5 of {row['specimen']} with "
+        f"Task {found.name}{load_words(row)} presses L4L5 of {row['specimen']} with "
         f"{newton(row[COMPRESSION])}{between}"
     )
     if found.standing is not None and found.standing[COMPRESSION] > 0.0:
@@ -149,17 +138,22 @@ def _words(found: AnsweredTask, results: ResultTables) -> str:
     ends = interval(results, row, PRESSURE)
     between = f" ({fixed(ends[0])} to {mpa(ends[1])})" if ends else ""
     told += f"; the pressure in the disc is {mpa(row[PRESSURE])}{between}"
-    spread = spread_words(leading(results, row)) if ends else ""
-    told += f"; {spread}" if spread else ""
+    drivers = leading(results, row) if ends else []
+    if drivers:
+        # which input that comes of, as far as the intervals of the indices tell
+        first, second = drivers[0], drivers[1].total if len(drivers) > 1 else 0.0
+        part = "most" if first.low > MOST else "the largest part"
+        spread = f"{part} of that spread comes of {factor(first.factor)}"
+        if first.low <= second:
+            spread = "which input that spread comes of most, the samples do not tell"
+        told += f"; {spread}"
     return f"{told}."
 
 
 def _sampled(found: AnsweredTask, results: ResultTables) -> str:
-    rows = results.table("intervals")
     if interval(results, found.task, COMPRESSION) is None:
         return "How far this can be trusted is not known: the task was not sampled."
-    row = of_person(rows, found.task["specimen"])
-    row = row[row["task"] == found.task["task"]].iloc[0]
+    row = of_task(results.table("intervals"), found.task).iloc[0]
     held, failed = int(row["n_samples"]), int(row["n_failed"])
     lost = f"; {failed} more did not hold" if failed else ""
     return (
@@ -190,7 +184,8 @@ def _doubts(results: ResultTables, found: AnsweredTask | None) -> list[str]:
     lost = tasks[~sound(tasks)] if len(tasks) else tasks
     if len(lost):
         ends = [
-            f"{len(part)} {plain(str(status))} ({listed(_names(part), 3)})"
+            f"{len(part)} {plain(str(status))} "
+            f"({listed([plain(str(name)) for name in dict.fromkeys(part['task'])], 3)})"
             for status, part in lost.groupby("status", sort=False)
         ]
         doubts.append(
@@ -203,30 +198,17 @@ def _doubts(results: ResultTables, found: AnsweredTask | None) -> list[str]:
             f"The pressure of task {found.name} lies outside the range in which its formula was "
             "fitted."
         )
-    missed = missed_goals(results)
-    if missed:
-        doubts.append(f"{capital(missed)}.")
-    return doubts
-
-
-def _names(rows: pd.DataFrame) -> list[str]:
-    return [plain(str(name)) for name in dict.fromkeys(rows["task"])]
-
-
-def missed_goals(results: ResultTables) -> str:
-    """Goals of agreement that are missed, and by how much; nothing where none is."""
-    rows = results.table("agreement")
-    if rows.empty:
-        return ""
-    known = rows.dropna(subset=["rmse_mpa"])
-    told = [
+    goals = results.table("agreement")
+    known = goals if goals.empty else goals.dropna(subset=["rmse_mpa"])
+    misses = [
         f"{plain(row['tier'])} {missed(row)}"
         for row in known.to_dict("records")
         if not row["reached"]
     ]
-    return f"agreement with measured pressures is not what was asked for: {'; '.join(told)}" * bool(
-        told
-    )
+    if misses:
+        words = "Agreement with measured pressures is not what was asked for"
+        doubts.append(f"{words}: {'; '.join(misses)}.")
+    return doubts
 
 
 def missed(row: Row) -> str:
@@ -238,8 +220,3 @@ def missed(row: Row) -> str:
         held = count(loose, "counted task is", "counted tasks are")
         parts.append(f"{held} not held by any muscle forces")
     return ", and ".join(parts)
-
-
-def ended_words(status: str) -> str:
-    """An ending, said of one task."""
-    return ENDED.get(status, plain(status))

@@ -2,32 +2,26 @@
 
 import sys
 from collections.abc import Iterator
-from typing import Any
-
-import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.muscles.co_contraction import least_stable
 from spinepipe.muscles.masses import ARM, shares
-from spinepipe.muscles.muscle_equilibrium import SolverOptions, held
+from spinepipe.muscles.muscle_equilibrium import solve_task
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.scaling import applied_ratios
-from spinepipe.muscles.stability import smallest_eigenvalue
+from spinepipe.muscles.stability import least_stable, smallest_eigenvalue
 from spinepipe.muscles.strength import capacity_left, load_factor
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import BODIES
+from spinepipe.muscles.upright import Upright
 from spinepipe.progress import Progress
-from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.trunk_loads.extra_inputs import marks_of
 from spinepipe.studies.trunk_loads.persons import (
     UprightPerson,
-    how_of,
-    regressions_of,
+    extra_inputs,
+    solver_options,
     source_of,
-    standing,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import (
@@ -54,7 +48,7 @@ from spinepipe.studies.trunk_loads.tables import (
 from spinepipe.tables import from_rows, write
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-HELD = (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS)
+PER_PERSON = (TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS)
 """Tables that this job makes."""
 
 NO_TONE = "no tone that can be held makes it stable; shown without"
@@ -63,36 +57,34 @@ NO_TONE = "no tone that can be held makes it stable; shown without"
 def run(root: str, study: str, specimen: str, **paths: str) -> None:
     """Write the rows of a person, a file for each table."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
-    rows = rows_of(settings, cohort, specimen, Progress(_said(study)))
-    made_by = provenance("hold", settings, cohort, [specimen], marks_of(settings, cohort))
-    for table in HELD:
+    progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
+    rows = rows_of(settings, cohort, specimen, progress)
+    made_by = provenance("hold", settings, cohort, [specimen], extra_inputs(settings, cohort))
+    for table in PER_PERSON:
         whole = [{c.name: row.get(c.name) for c in table.columns} for row in rows[table.name]]
         write(from_rows(table, whole), paths[table.name], made_by)
-
-
-def _said(study: str) -> Any:
-    return lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True)
 
 
 def rows_of(
     settings: TrunkLoads, cohort: Cohort, specimen: str, progress: Progress
 ) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
-    who, read = subject_of(cohort, specimen), source_of(settings, cohort)
-    source = read.trunk
-    regressions = regressions_of(settings, cohort.folder)
-    stood = standing(settings, source, who, regressions)
-    known: Row = {"specimen": specimen}
-    found: dict[str, list[Row]] = {table.name: [] for table in HELD}
-    found["upright"] = [known | row for row in _upright(stood)]
-    found["masses"] = [known | row for row in _masses(stood.person)]
-    ratios = applied_ratios(source, who, REFERENCE, regressions)
+    stands = UprightPerson.of_cohort(settings, cohort, specimen)
+    person, known = stands.person, {"specimen": specimen}
+    ratios = applied_ratios(stands.source, stands.subject, REFERENCE, stands.regressions)
+    remarks = source_of(settings, cohort).remarks
+    found: dict[str, list[Row]] = {table.name: [] for table in PER_PERSON}
+    found["upright"] = [known | row for row in _upright_rows(stands.upright)]
+    found["masses"] = [known | row for row in _mass_rows(person)]
     found["scaling"] = [known | dict(vars(ratio)) for ratio in ratios]
-    found["remarks"] = [known | {"remark": remark} for remark in read.remarks]
+    found["remarks"] = [known | {"remark": remark} for remark in remarks]
     tasks = read_tasks(cohort, settings.trunk_angle)
     drawn = settings.drawn_tasks or tuple(tasks)[:1]
     for name in progress.through(list(tasks), f"{specimen}: tasks"):
-        outcome = outcome_of(settings, stood.person, tasks[name])
+        try:
+            outcome = _outcome(settings, person, tasks[name])
+        except ValueError as why:
+            outcome = TaskOutcome(person, tasks[name], None, str(why))
         place = known | {"task": name}
         found["tasks"].append(place | task_row(outcome))
         found["levels"] += [place | row for row in level_rows(outcome)]
@@ -103,25 +95,16 @@ def rows_of(
     return found
 
 
-def outcome_of(settings: TrunkLoads, person: Person, task: Task) -> TaskOutcome:
-    """What becomes of a task."""
-    how, gain = how_of(settings, twice=True), settings.solving.stiffness_gain
-    try:
-        return _outcome(settings, person, task, how, gain)
-    except ValueError as why:
-        return TaskOutcome(person, task, None, str(why))
-
-
-def _outcome(
-    settings: TrunkLoads, person: Person, task: Task, how: SolverOptions, gain: float
-) -> TaskOutcome:
+def _outcome(settings: TrunkLoads, person: Person, task: Task) -> TaskOutcome:
+    """A task with its stability and strength; raises where it cannot be posed."""
+    options, gain = solver_options(settings, twice=True), settings.solving.stiffness_gain
     message, tone = "", task.tone_share if task.tone == "stated" else 0.0
     found = None
     if task.tone == "stable":
-        toned = least_stable(person, task, how, gain)
-        message = "" if toned else NO_TONE
-        found, tone = (toned.held, toned.tone) if toned else (None, 0.0)
-    found = found or held(person, task, how, tone)
+        least = least_stable(person, task, options, gain)
+        message = "" if least else NO_TONE
+        found, tone = (least.solved, least.tone) if least else (None, 0.0)
+    found = found or solve_task(person, task, options, tone)
     stable = smallest_eigenvalue(person, found, gain) >= 0.0
     asked = settings.solving.strength
     return TaskOutcome(
@@ -136,8 +119,7 @@ def _outcome(
     )
 
 
-def _upright(stood: UprightPerson) -> Iterator[Row]:
-    found = stood.upright
+def _upright_rows(found: Upright) -> Iterator[Row]:
     for number, body in enumerate(BODIES):
         below = number - 1
         yield {
@@ -150,7 +132,7 @@ def _upright(stood: UprightPerson) -> Iterator[Row]:
         }
 
 
-def _masses(person: Person) -> Iterator[Row]:
+def _mass_rows(person: Person) -> Iterator[Row]:
     """Slices and head with their places, arms and what is left without."""
     subject, origin = person.subject, person.chain.centres[0]
     for mass in person.masses:
@@ -168,6 +150,6 @@ def _masses(person: Person) -> Iterator[Row]:
             yield {
                 "part": share.part,
                 "carried_by": BODIES[-1] if share.carried else None,
-                "mass_kg": float(np.float64(share.percent) / 100.0 * subject.mass_kg),
+                "mass_kg": float(share.percent / 100.0 * subject.mass_kg),
                 "share": share.percent / 100.0,
             }

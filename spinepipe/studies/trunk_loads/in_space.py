@@ -70,26 +70,28 @@ def trunk_in_space(cohort: Cohort, paths: pd.DataFrame, levels: pd.DataFrame) ->
     """All that is drawn in 3-D; nothing without rows of the table paths."""
     if paths.empty:
         return Space()
-    every = list(held_tasks(cohort, paths, levels))
+    every = list(_drawn_tasks(cohort, paths, levels))
     shown = every[:MOST_SCENES]
     top = max(LEAST_MPA, *(float(one.paths["stress_mpa"].max()) for one in shown))
     groups = {str(name): plain(str(name)) for name in dict.fromkeys(paths["group"])}
     groups[SPINE] = "joint centres"
     if any(one.load_mm for one in shown):
         groups[LOAD] = "load in the hands"
+    with style():
+        paper = picture(still_figure(shown[0], top), "svg")
     return Space(
         "The trunk in 3-D",
         "Task",
         f"A trunk in space: muscles as lines coloured by stress ({', '.join(groups.values())})",
         {one.name: _scene(one, top) for one in shown},
         groups,
-        still(shown[0], top),
+        paper,
         f"Muscles and joint centres from the right and from behind: {shown[0].name}",
         _caption(shown[0].name, len(shown), len(every)),
     )
 
 
-def held_tasks(cohort: Cohort, paths: pd.DataFrame, levels: pd.DataFrame) -> Iterator[DrawnTask]:
+def _drawn_tasks(cohort: Cohort, paths: pd.DataFrame, levels: pd.DataFrame) -> Iterator[DrawnTask]:
     """Every person and task of the table paths."""
     several = paths["specimen"].nunique() > 1
     asked = cohort.further.get("tasks", pd.DataFrame())
@@ -205,14 +207,8 @@ def _caption(first: str, shown: int, every: int) -> str:
     )
 
 
-def still(one: DrawnTask, top: float) -> bytes:
-    """A task from the right and from behind, for paper."""
-    with style():
-        return picture(still_figure(one, top), "svg")
-
-
 def still_figure(one: DrawnTask, top: float) -> Figure:
-    """The same as a figure; the most stressed fascicles in front."""
+    """A task from the right and from behind, for paper; the most stressed fascicles in front."""
     figure, axes = _views(one)
     shades = LinearSegmentedColormap.from_list("stress", COLORS)
     stress = one.paths.groupby("muscle", sort=False)["stress_mpa"].first().sort_values()

@@ -1,6 +1,6 @@
 """The kind trunk_loads: muscle forces, joint loads and disc pressure of persons in tasks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,29 +11,14 @@ from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
-from spinepipe.studies.trunk_loads.extra_inputs import marks_of_source
-from spinepipe.studies.trunk_loads.forms import GEOMETRY_FORMS
-from spinepipe.studies.trunk_loads.forms import TASKS as TASK_FORM
-from spinepipe.studies.trunk_loads.ghezelbash_2016 import reproduces
-from spinepipe.studies.trunk_loads.sampling import batches, sampled
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.tables import (
-    ITERATIONS,
-    LEVELS_TABLE,
-    MASSES,
-    MUSCLES,
-    PATHS,
-    REMARKS,
-    SCALING,
-    TASKS,
-    UPRIGHT,
-)
+from spinepipe.studies.trunk_loads.forms import GEOMETRY_FORMS, TASKS
+from spinepipe.studies.trunk_loads.persons import extra_inputs
+from spinepipe.studies.trunk_loads.sampling import batches, sampled_specimens
+from spinepipe.studies.trunk_loads.settings import TrunkLoads, reproduces
 
-HELD = tuple(
-    table.name
-    for table in (
-        *(TASKS, LEVELS_TABLE, MUSCLES, PATHS, ITERATIONS, UPRIGHT, MASSES, SCALING, REMARKS),
-    )
+PER_PERSON = (
+    *("tasks", "levels", "muscles", "paths", "iterations"),
+    *("upright", "masses", "scaling", "remarks"),
 )
 """Tables with one job file for each person."""
 
@@ -62,7 +47,7 @@ class TrunkFiles(StudyFiles):
     """
 
     full = FULL
-    joined = (*HELD, "simplified", "responses")
+    joined = (*PER_PERSON, "simplified", "responses")
     drawings = (
         Figure(
             "pressure_against_measured",
@@ -123,7 +108,7 @@ class TrunkFiles(StudyFiles):
         tuned = TUNED if self.study.volunteer else ()
         samples = ("design", "responses", *_SPREAD.writes) if self.study.uncertain.tasks else ()
         against = _AGAINST.writes if self.rebuilt else ()
-        return (*HELD, "simplified", *tuned, *samples, *against)
+        return (*PER_PERSON, "simplified", *tuned, *samples, *against)
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -134,28 +119,31 @@ class TrunkFiles(StudyFiles):
         """The job that writes a file of which a table is made."""
         return {"simplified": "simplify", "responses": "respond"}.get(table, "hold")
 
-    @property
-    def _sampled(self) -> Sequence[str]:
-        return sampled(self.study, self.specimens)
-
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per person, of samples as many as it takes."""
-        if table == "responses":
-            return numbered_blocks(self._sampled, batches(self.study))
-        return numbered_blocks(self.specimens, 1)
+        if table != "responses":
+            return numbered_blocks(self.specimens, 1)
+        sampled = sampled_specimens(self.study, self.specimens)
+        return numbered_blocks(sampled, batches(self.study))
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
         place = f"{self.folder}/jobs/specimen={specimen}"
         if table == "responses":
-            numbers = files_of_block(block, len(self._sampled), batches(self.study))
+            sampled = sampled_specimens(self.study, self.specimens)
+            numbers = files_of_block(block, len(sampled), batches(self.study))
             return [f"{place}/batch={number:05d}/responses.parquet" for number in numbers]
         return [f"{place}/{table}.parquet"]
 
 
+def _source(expected: Any, _place: Mapping[str, str]) -> list[str]:
+    """The marks of the trunk's source."""
+    return extra_inputs(expected.study, expected.cohort)
+
+
 def _source_and_design(expected: Any, place: Mapping[str, str]) -> list[str]:
     """The marks of the trunk's source and of the drawn inputs."""
-    return [*marks_of_source(expected, place), expected.of_job("draw", {})]
+    return [*_source(expected, place), expected.of_job("draw", {})]
 
 
 _NO_TASK_OF_ITS_OWN = ignoring("uncertain", "volunteer", "simplified_tasks")
@@ -167,17 +155,17 @@ KIND = Kind(
     checks_at_start=(check_source,),
     tables=all_declared(__file__),
     jobs=(
-        Job("hold", ignores=_NO_TASK_OF_ITS_OWN, also=marks_of_source),
+        Job("hold", ignores=_NO_TASK_OF_ITS_OWN, also=_source),
         Job(
             "simplify",
             ignores=ignoring("uncertain", "volunteer", "drawn_tasks"),
-            also=marks_of_source,
+            also=_source,
         ),
         Job(
             "tune",
             makes=TUNED,
             ignores=ignoring("uncertain", "drawn_tasks", "simplified_tasks"),
-            also=marks_of_source,
+            also=_source,
         ),
         Job("draw", "draw_design", makes=("design",), header_alone=True),
         Job(
@@ -189,8 +177,8 @@ KIND = Kind(
         _SPREAD,
         _AGAINST,
     ),
-    forms=(SUBJECTS, TASK_FORM, *GEOMETRY_FORMS),
-    doubts="plausibility:doubts",
+    forms=(SUBJECTS, TASKS, *GEOMETRY_FORMS),
+    doubts="checks:doubts",
     why_no_export="a task is solved for muscle forces in a given posture, and muscles are not "
     "written: the source package of the trunk is the model to take elsewhere",
 )

@@ -10,10 +10,9 @@ from spinepipe.report.page.document import (
     page_tables,
 )
 from spinepipe.studies.trunk_loads.findings import findings
-from spinepipe.studies.trunk_loads.ghezelbash_2016 import reproduces
 from spinepipe.studies.trunk_loads.headline import headline
 from spinepipe.studies.trunk_loads.in_space import trunk_in_space
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.settings import TrunkLoads, reproduces
 from spinepipe.studies.trunk_loads.tables import (
     AGAINST_GHEZELBASH_2016,
     AGREEMENT,
@@ -31,6 +30,7 @@ from spinepipe.studies.trunk_loads.tables import (
     TUNING,
     UPRIGHT,
 )
+from spinepipe.studies.trunk_loads.words import unbroken
 
 QUESTION = (
     "What do tasks ask of a person's trunk: which forces of muscles, which compression and shear "
@@ -73,14 +73,9 @@ def document(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Docume
             *left_out(study),
             *papers.left_out("Ghezelbash et al. 2016", reproduces(cohort.name)),
         ),
-        headline=Headline(_joined(found.words), _joined(found.how_sure), found.warnings),
+        headline=Headline(unbroken(found.words), unbroken(found.how_sure), found.warnings),
         space=trunk_in_space(cohort, results.table(PATHS.name), results.table("levels")),
     )
-
-
-def _joined(words: str) -> str:
-    """No line ends between a number and its percent sign."""
-    return words.replace(" %", "\u00a0%")
 
 
 def shown_tables(results: ResultTables) -> list[Sortable]:

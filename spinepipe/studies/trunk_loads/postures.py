@@ -21,15 +21,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.facts import number, numbers, several
 from spinepipe.muscles.task import Exertion, Hands, Task
 from spinepipe.muscles.trunk import BODIES
-from spinepipe.studies.trunk_loads.forms import (
-    FORCE,
-    HANDS,
-    PUSH_N,
-    PUSH_NM,
-    TASKS,
-    UPRIGHT,
-    turn,
-)
+from spinepipe.studies.trunk_loads.forms import FORCE, HANDS, PUSH_N, PUSH_NM, TASKS, UPRIGHT, turn
 from spinepipe.studies.trunk_loads.settings import TrunkAngle
 from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
 
@@ -76,17 +68,10 @@ def between(pelvis: float, trunk: float, axis: str) -> Array:
     return found
 
 
-def pelvis_share(thorax_deg: float) -> float:
-    """Share of the pelvis in pelvis and lumbar rotation, at a rotation measured at the thorax.
-
-    Linear between the two ratios that Tafazzol's abstract has, and on beyond them.
-    """
-    (low, at_low), (high, at_high) = ((at, 1.0 / (1.0 + ratio)) for at, ratio in (_EARLY, _LATE))
-    return at_low + (at_high - at_low) * (abs(thorax_deg) - low) / (high - low)
-
-
 def rhythm(trunk_deg: float, means: TrunkAngle) -> tuple[float, float]:
     """Rotations of pelvis and T11, deg, of a trunk that bends forwards (negative) with its pelvis.
+
+    The pelvis' share is linear between the two ratios that Tafazzol's abstract has, and on beyond.
 
     Parameters
     ----------
@@ -96,10 +81,12 @@ def rhythm(trunk_deg: float, means: TrunkAngle) -> tuple[float, float]:
     """
     thorax = trunk_deg if means == "measured_at_thorax" else trunk_deg / SEEN_AT_THORAX
     t11 = SEEN_AT_THORAX * thorax
-    return pelvis_share(thorax) * t11, t11
+    (low, at_low), (high, at_high) = ((at, 1.0 / (1.0 + ratio)) for at, ratio in (_EARLY, _LATE))
+    share = at_low + (at_high - at_low) * (abs(thorax) - low) / (high - low)
+    return share * t11, t11
 
 
-def ends(row: Row, axis: str, means: TrunkAngle) -> tuple[float, float]:
+def _ends(row: Row, axis: str, means: TrunkAngle) -> tuple[float, float]:
     """Rotations of pelvis and T11 about an axis, deg; with the pelvis given the trunk is T11."""
     trunk, pelvis = (_number(row, turn(what, axis), np.nan) for what in ("trunk", "pelvis"))
     if np.isnan(trunk):
@@ -117,7 +104,7 @@ def turned_deg(row: Row, means: TrunkAngle) -> Array:
     for column, axis in enumerate(ROTATIONS):
         each = np.array([_number(row, turn(body, axis), np.nan) for body in BODIES])
         given = not np.isnan(each).any()
-        found[:, column] = each if given else between(*ends(row, axis, means), axis)
+        found[:, column] = each if given else between(*_ends(row, axis, means), axis)
     return found
 
 
@@ -129,13 +116,25 @@ def task_of(row: Row, means: TrunkAngle) -> Task:
     means : what the rotation of the trunk means where the pelvis follows the rhythm.
     """
     number = _number(row, "number", np.nan)
+    at = np.array([_number(row, name, np.nan) for name in HANDS]) / MM_PER_M
+    # moments of the file are about z, x and y; those of the task about x, y and z
+    extension, right_bending, left_rotation = (_number(row, name, 0.0) for name in PUSH_NM)
     return Task(
         name=str(row["task"]),
         number=None if np.isnan(number) else int(number),
         turned=turned_deg(row, means) / DEG_PER_RAD,
         from_upright=_word(row, "counted_from") == UPRIGHT,
-        hands=_hands(row),
-        exertion=_exertion(row),
+        hands=Hands(
+            _number(row, "hand_load_kg", 0.0),
+            None if np.isnan(at).any() else at,
+            _word(row, "holding"),
+        ),
+        exertion=Exertion(
+            force=np.array([_number(row, name, 0.0) for name in PUSH_N]),
+            moment=np.array([right_bending, left_rotation, extension]),
+            at=USUAL_VERTEBRA if pd.isna(row["applied_at"]) else str(row["applied_at"]),
+            as_force=_word(row, "applied_as") == FORCE,
+        ),
         pressure_pa=1e3 * _number(row, "intra_abdominal_pressure_kpa", 0.0),
         stress_pa=1e6 * _number(row, "largest_stress_mpa", USUAL_STRESS_MPA),
         tone=_word(row, "tone"),
@@ -147,23 +146,6 @@ def read_tasks(cohort: Cohort, means: TrunkAngle) -> dict[str, Task]:
     """The tasks of a cohort by name, in the order of its file."""
     rows = cohort.further["tasks"].to_dict("records")
     return {str(row["task"]): task_of(row, means) for row in rows}
-
-
-def _hands(row: Row) -> Hands:
-    at = np.array([_number(row, name, np.nan) for name in HANDS]) / MM_PER_M
-    kg, holding = _number(row, "hand_load_kg", 0.0), _word(row, "holding")
-    return Hands(kg, None if np.isnan(at).any() else at, holding)
-
-
-def _exertion(row: Row) -> Exertion:
-    """Moments of the file are about z, x and y; those of the task about x, y and z."""
-    extension, right_bending, left_rotation = (_number(row, name, 0.0) for name in PUSH_NM)
-    return Exertion(
-        force=np.array([_number(row, name, 0.0) for name in PUSH_N]),
-        moment=np.array([right_bending, left_rotation, extension]),
-        at=USUAL_VERTEBRA if pd.isna(row["applied_at"]) else str(row["applied_at"]),
-        as_force=_word(row, "applied_as") == FORCE,
-    )
 
 
 def _number(row: Row, name: str, empty: float) -> float:

@@ -6,20 +6,16 @@ from collections.abc import Iterator, Mapping
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.muscles.muscle_equilibrium import held
 from spinepipe.progress import Progress
-from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.trunk_loads.extra_inputs import marks_of
 from spinepipe.studies.trunk_loads.persons import (
-    changed_task,
-    how_of,
-    regressions_of,
-    source_of,
-    standing,
+    UprightPerson,
+    extra_inputs,
+    solver_options,
+    vary_task,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
-from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, task_row
-from spinepipe.studies.trunk_loads.sampling import drawn, of_batch
+from spinepipe.studies.trunk_loads.rows import Row, outcome_of, task_row
+from spinepipe.studies.trunk_loads.sampling import samples_of_batch, values_of_samples
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.tables import QUANTITIES, RESPONSES
 from spinepipe.tables import from_rows, read_frame, write
@@ -30,12 +26,13 @@ def run(
 ) -> None:
     """Write the rows of batches, a file each."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
-    read = [*marks_of(settings, cohort), mark_of(design)]
+    read = [*extra_inputs(settings, cohort), mark_of(design)]
     made_by = provenance("respond", settings, cohort, [specimen], read)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
     for path, place in parts.items():
-        samples = of_batch(settings, int(place["batch"]))
-        numbered = dict(zip(samples, drawn(read_frame(design), samples), strict=True))
+        samples = samples_of_batch(settings, int(place["batch"]))
+        values = values_of_samples(read_frame(design), samples)
+        numbered = dict(zip(samples, values, strict=True))
         rows = list(rows_of(settings, cohort, specimen, numbered, progress))
         write(from_rows(RESPONSES, rows), path, made_by)
 
@@ -48,26 +45,18 @@ def rows_of(
     progress: Progress,
 ) -> Iterator[Row]:
     """Rows of table responses."""
-    source, who = source_of(settings, cohort).trunk, subject_of(cohort, specimen)
-    regressions, how = regressions_of(settings, cohort.folder), how_of(settings)
-    tasks = read_tasks(cohort, settings.trunk_angle)
-    stood = standing(settings, source, who, regressions).upright
+    stands = UprightPerson.of_cohort(settings, cohort, specimen)
+    options, tasks = solver_options(settings), read_tasks(cohort, settings.trunk_angle)
     for sample in progress.through(list(samples), f"{specimen}: samples"):
         values = samples[sample]
-        person = standing(settings, source, who, regressions, values, stood=stood).person
+        person = stands.varied(values)
         for name in settings.uncertain.tasks:
-            task = changed_task(tasks[name], values)
-            try:
-                found = held(person, task, how)
-                outcome = TaskOutcome(person, task, found, found.message)
-            except ValueError as why:
-                outcome = TaskOutcome(person, task, None, str(why))
-            told = task_row(outcome)
+            found = task_row(outcome_of(person, vary_task(tasks[name], values), options))
             yield {
                 "specimen": specimen,
                 "task": name,
                 "sample": sample,
-                **{column: told.get(column) for column in QUANTITIES},
-                "status": told["status"],
-                "message": told["message"],
+                **{column: found.get(column) for column in QUANTITIES},
+                "status": found["status"],
+                "message": found["message"],
             }

@@ -6,23 +6,10 @@ import pandas as pd
 from spinepipe.effects.contract import Array
 from spinepipe.sensitivity.global_indices.design import Design, draw
 from spinepipe.sensitivity.global_indices.spread import Normal, values_of
-from spinepipe.studies.trunk_loads.persons import NOMINAL
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.settings import FACTOR_UNITS, NOMINAL, TrunkLoads
 
 SMALLEST_FACTOR = 0.3
 """Of a factor that is drawn: below that the model is another."""
-
-UNITS = {
-    "height_cm": "cm",
-    "bmi": "kg/m2",
-    "age_years": "years",
-    "hand_anterior_mm": "mm",
-    "pelvis_extension_deg": "deg",
-    "trunk_extension_deg": "deg",
-    "pressure_kpa": "kPa",
-    "largest_stress_mpa": "MPa",
-}
-"""Of the inputs that are added; the others are factors."""
 
 
 def design_of(settings: TrunkLoads) -> Design:
@@ -35,37 +22,30 @@ def design_of(settings: TrunkLoads) -> Design:
 
 def values_of_design(settings: TrunkLoads) -> Array:
     """(n, D) values of the inputs: what is added, or the factor."""
-    return values_of(
-        design_of(settings), [_spread(settings, f) for f in settings.uncertain.factors]
-    )
-
-
-def _spread(settings: TrunkLoads, factor: str) -> Normal:
-    mean = NOMINAL[factor]
-    sd = dict(settings.uncertain.factors)[factor].sd  # type: ignore[index]
-    low = -np.inf if factor in UNITS else SMALLEST_FACTOR
-    return Normal(mean, sd, low)
+    spreads = [
+        Normal(NOMINAL[name], one.sd, -np.inf if FACTOR_UNITS[name] else SMALLEST_FACTOR)
+        for name, one in settings.uncertain.factors.items()
+    ]
+    return values_of(design_of(settings), spreads)
 
 
 def batches(settings: TrunkLoads) -> int:
     """How many batches the samples are cut into."""
-    runs = settings.uncertain.samples * (len(settings.uncertain.factors) + 2)
-    return -(-runs // settings.uncertain.samples_per_target)
+    return -(-settings.uncertain.runs // settings.uncertain.samples_per_target)
 
 
-def of_batch(settings: TrunkLoads, batch: int) -> range:
+def samples_of_batch(settings: TrunkLoads, batch: int) -> range:
     """Numbers of the samples of a batch."""
     size = settings.uncertain.samples_per_target
-    runs = settings.uncertain.samples * (len(settings.uncertain.factors) + 2)
-    return range(batch * size, min((batch + 1) * size, runs))
+    return range(batch * size, min((batch + 1) * size, settings.uncertain.runs))
 
 
-def sampled(settings: TrunkLoads, specimens: tuple[str, ...]) -> tuple[str, ...]:
+def sampled_specimens(settings: TrunkLoads, specimens: tuple[str, ...]) -> tuple[str, ...]:
     """Persons that are sampled."""
     return settings.uncertain.specimens or specimens[:1]
 
 
-def drawn(design: pd.DataFrame, samples: range) -> list[dict[str, float]]:
+def values_of_samples(design: pd.DataFrame, samples: range) -> list[dict[str, float]]:
     """Values of the factors of some samples, from table design."""
     rows = design[design["sample"].isin(list(samples))]
     wide = rows.pivot(index="sample", columns="factor", values="value").sort_index()

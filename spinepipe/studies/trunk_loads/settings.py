@@ -1,6 +1,7 @@
 """What a study of trunk loads asks."""
 
-from typing import Annotated, Literal, get_args
+from collections.abc import Mapping
+from typing import Literal
 
 from pydantic import BaseModel, Field
 
@@ -26,7 +27,34 @@ Factor = Literal[
     "largest_stress_mpa",
 ]
 
-_Share = Annotated[float, Field(ge=0, le=1)]
+FACTOR_UNITS: Mapping[str, str] = {
+    "height_cm": "cm",
+    "bmi": "kg/m2",
+    "age_years": "years",
+    "hand_anterior_mm": "mm",
+    "pelvis_extension_deg": "deg",
+    "trunk_extension_deg": "deg",
+    "disc_area": "",
+    "pcsa": "",
+    "passive_rotation": "",
+    "passive_muscle": "",
+    "trunk_mass_ahead": "",
+    "pressure_kpa": "kPa",
+    "largest_stress_mpa": "MPa",
+}
+"""Of the inputs that are added; the others multiply."""
+
+NOMINAL: Mapping[str, float] = {name: 0.0 if unit else 1.0 for name, unit in FACTOR_UNITS.items()}
+"""Values that change nothing."""
+
+PAPER_COHORTS = ("trunk_volunteers",)
+"""Persons and tasks of the captions and of Table 1 of Ghezelbash 2016,
+doi 10.1007/s10237-016-0792-3."""
+
+
+def reproduces(cohort: str) -> bool:
+    """Whether a cohort has the paper's volunteers: only then are results set beside its numbers."""
+    return cohort in PAPER_COHORTS
 
 
 class Passive(BaseModel):
@@ -158,6 +186,11 @@ class Uncertain(BaseModel):
     samples_per_target: int = Field(default=64, ge=1, le=10_000, description="runs in one batch")
     seed: int = Field(default=1, ge=0, description="seed of the design")
 
+    @property
+    def runs(self) -> int:
+        """Samples in all, of Sobol's design without second order."""
+        return self.samples * (len(self.factors) + 2)
+
 
 class VolunteerSettings(BaseModel):
     """The person whose pressures were measured, and what may be fitted to them."""
@@ -217,6 +250,3 @@ class TrunkLoads(Study):
     simplified_tasks: EachOnce[str] = Field(
         default=(), description="tasks on which wrong simplifications are tried; none named: all"
     )
-
-
-FACTORS: tuple[Factor, ...] = get_args(Factor)

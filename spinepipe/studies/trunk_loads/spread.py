@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
+from spinepipe.sensitivity.global_indices.estimates import Settings
 from spinepipe.sensitivity.global_indices.indices import indices
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.rows import Row
@@ -57,15 +57,13 @@ def _intervals(who: str, task: str, rows: pd.DataFrame, nominal: pd.DataFrame) -
         values = good[quantity].to_numpy(float)
         lost = len(rows) - len(values)
         enough = len(values) >= LEAST_SAMPLES and lost <= MOST_FAILED * len(rows)
-        low, median, high = np.quantile(values, [0.025, 0.5, 0.975]) if enough else (None,) * 3
+        ends = np.quantile(values, [0.025, 0.5, 0.975]).tolist() if enough else [None] * 3
         yield {
             "specimen": who,
             "task": task,
             "quantity": quantity,
             "nominal": None if pd.isna(own[quantity]) else float(own[quantity]),
-            "low": None if low is None else float(low),
-            "median": None if median is None else float(median),
-            "high": None if high is None else float(high),
+            **dict(zip(("low", "median", "high"), ends, strict=True)),
             "n_samples": len(values),
             "n_failed": lost,
         }
@@ -96,11 +94,7 @@ def _drivers(settings: TrunkLoads, who: str, task: str, rows: pd.DataFrame) -> I
                 **dict.fromkeys(_EMPTY),
             }
             for one in of_factor:
-                row |= _told(one, number)
+                word = _WORDS[one.index]
+                ends = ("", one.estimate), ("_low", one.low), ("_high", one.high)
+                row |= {f"{word}{end}": values.tolist()[number] for end, values in ends}
             yield row
-
-
-def _told(index: SensitivityIndex, number: int) -> Row:
-    word = _WORDS[index.index]
-    ends = ("", index.estimate), ("_low", index.low), ("_high", index.high)
-    return {f"{word}{end}": values.tolist()[number] for end, values in ends}

@@ -16,45 +16,42 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.muscles.muscle_equilibrium import held
+from spinepipe.muscles.measured_pressures import PairedPressure, pair_with_tasks
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import Trunk
-from spinepipe.muscles.upright import Upright
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
 from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.trunk_loads.extra_inputs import marks_of
-from spinepipe.studies.trunk_loads.measured import PairedPressure, beside_tasks
 from spinepipe.studies.trunk_loads.persons import (
-    NOMINAL,
-    changed_task,
-    how_of,
+    UprightPerson,
+    extra_inputs,
     regressions_of,
+    solver_options,
     source_of,
-    standing,
+    vary_task,
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
-from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.rows import Row, outcome_of
+from spinepipe.studies.trunk_loads.settings import FACTOR_UNITS, NOMINAL, TrunkLoads
 from spinepipe.studies.trunk_loads.tables import AGREEMENT, PRESSURES, REGION, TUNING
 from spinepipe.tables import from_rows, write
 
 RANGE = {
-    "disc_area": (0.5, 2.0, 0.2, ""),
-    "pcsa": (0.5, 2.0, 0.2, ""),
-    "passive_rotation": (0.1, 3.0, 0.3, ""),
-    "passive_muscle": (0.0, 5.0, 0.5, ""),
-    "trunk_mass_ahead": (0.0, 2.0, 0.3, ""),
-    "hand_anterior_mm": (-150.0, 150.0, 30.0, "mm"),
-    "pelvis_extension_deg": (-10.0, 10.0, 3.0, "deg"),
-    "trunk_extension_deg": (-10.0, 10.0, 3.0, "deg"),
-    "height_cm": (-5.0, 5.0, 2.0, "cm"),
-    "bmi": (-3.0, 3.0, 1.0, "kg/m2"),
-    "age_years": (-10.0, 10.0, 5.0, "years"),
-    "pressure_kpa": (0.0, 10.0, 2.0, "kPa"),
-    "largest_stress_mpa": (-0.2, 0.6, 0.1, "MPa"),
+    "disc_area": (0.5, 2.0, 0.2),
+    "pcsa": (0.5, 2.0, 0.2),
+    "passive_rotation": (0.1, 3.0, 0.3),
+    "passive_muscle": (0.0, 5.0, 0.5),
+    "trunk_mass_ahead": (0.0, 2.0, 0.3),
+    "hand_anterior_mm": (-150.0, 150.0, 30.0),
+    "pelvis_extension_deg": (-10.0, 10.0, 3.0),
+    "trunk_extension_deg": (-10.0, 10.0, 3.0),
+    "height_cm": (-5.0, 5.0, 2.0),
+    "bmi": (-3.0, 3.0, 1.0),
+    "age_years": (-10.0, 10.0, 5.0),
+    "pressure_kpa": (0.0, 10.0, 2.0),
+    "largest_stress_mpa": (-0.2, 0.6, 0.1),
 }
-"""What each number may be: lowest, highest, size of a first step, unit."""
+"""What each number may be: lowest, highest, size of a first step."""
 
 SETTLED = DescentTolerances(cost=1e-3, step=3e-3, slope=1e-8, evaluations=25)
 _DIFFERENCE = 0.02
@@ -63,14 +60,16 @@ _DIFFERENCE = 0.02
 GOALS_MPA = {"untuned": 0.35, "tuned": 0.14, "left_out": 0.18}
 LEAST_FOR_R, LEAST_FOR_INTERVAL = 3, 4
 _Z = 1.959963984540054
+"""97.5 % quantile of the normal distribution."""
 
 
 def run(root: str, study: str, pressures: str, tuning: str, agreement: str) -> None:
     """Write the three tables."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
-    rows = rows_of(volunteer_of(settings, cohort, source_of(settings, cohort).trunk), progress)
-    made_by = provenance("tune", settings, cohort, None, marks_of(settings, cohort))
+    who = volunteer_of(settings, cohort, source_of(settings, cohort).trunk)
+    rows = rows_of(who, progress)
+    made_by = provenance("tune", settings, cohort, None, extra_inputs(settings, cohort))
     for table, path in ((PRESSURES, pressures), (TUNING, tuning), (AGREEMENT, agreement)):
         write(from_rows(table, rows[table.name]), path, made_by)
 
@@ -85,23 +84,14 @@ class Volunteer:
 
     Attributes
     ----------
-    source : trunk of the reference person. tasks : all tasks, by name. beside : measured pressures.
-    stood : how the person stands.
+    specimen : who stands for them. tasks : all tasks, by name. beside : measured pressures.
     """
 
-    settings: TrunkLoads
-    cohort: Cohort
-    source: Trunk
+    specimen: str
+    stands: UprightPerson
     tasks: Mapping[str, Task]
     beside: tuple[PairedPressure, ...]
-    stood: Upright
     _known: dict[tuple[float, ...], dict[str, Computed]] = field(default_factory=dict)
-
-    @property
-    def specimen(self) -> str:
-        """The person who stands for the volunteer."""
-        assert self.settings.volunteer is not None
-        return self.settings.volunteer.specimen
 
     def computed(
         self, values: Mapping[str, float], wanted: Sequence[PairedPressure] | None = None
@@ -111,7 +101,7 @@ class Volunteer:
         key = tuple(values.get(name, NOMINAL[name]) for name in RANGE)
         known = self._known.setdefault(key, {})
         if missing := [task for task in asked if task not in known]:
-            known.update(self._computed(values, missing))
+            known.update(self._compute(values, missing))
         return {task: known[task] for task in asked}
 
     def misfit(self, values: Mapping[str, float], wanted: Sequence[PairedPressure]) -> float:
@@ -133,53 +123,56 @@ class Volunteer:
             off.append(mpa - one.mpa)
         return np.array(off)
 
-    def _computed(
+    def _compute(
         self, values: Mapping[str, float], names: Sequence[str]
     ) -> Iterator[tuple[str, Computed]]:
-        settings, how = self.settings, how_of(self.settings)
-        who = subject_of(self.cohort, self.specimen)
-        regressions = regressions_of(settings, self.cohort.folder)
-        person = standing(settings, self.source, who, regressions, values, stood=self.stood).person
+        """Pressures of tasks with the person and the tasks varied."""
+        person, options = self.stands.varied(values), solver_options(self.stands.settings)
         for name in names:
-            task = changed_task(self.tasks[name], values)
-            try:
-                outcome = TaskOutcome(person, task, held(person, task, how), "")
-            except ValueError:
-                outcome = TaskOutcome(person, task, None, "")
+            outcome = outcome_of(person, vary_task(self.tasks[name], values), options)
             pressure = outcome.pressure
-            told = None if pressure is None else 1e-6 * float(pressure.pa)
-            yield name, (told, outcome.status.value)
+            mpa = None if pressure is None else 1e-6 * float(pressure.pa)
+            yield name, (mpa, outcome.status.value)
 
 
 def volunteer_of(settings: TrunkLoads, cohort: Cohort, source: Trunk) -> Volunteer:
-    """The volunteer of a study, before anything is computed."""
-    tasks = read_tasks(cohort, settings.trunk_angle)
+    """The volunteer of a study, before anything is computed.
+
+    Parameters
+    ----------
+    source : trunk of the reference person.
+    """
     assert settings.volunteer is not None
-    who = subject_of(cohort, settings.volunteer.specimen)
-    stood = standing(settings, source, who, regressions_of(settings, cohort.folder)).upright
-    return Volunteer(settings, cohort, source, tasks, beside_tasks(tasks), stood)
+    specimen, tasks = settings.volunteer.specimen, read_tasks(cohort, settings.trunk_angle)
+    subject, regressions = subject_of(cohort, specimen), regressions_of(settings, cohort.folder)
+    stands = UprightPerson.of(settings, source, subject, regressions)
+    return Volunteer(specimen, stands, tasks, pair_with_tasks(tasks))
 
 
 def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
-    assert who.settings.volunteer is not None
-    tuned = who.settings.volunteer.tuned
+    assert who.stands.settings.volunteer is not None
+    tuned = who.stands.settings.volunteer.tuned
     counted = [one for one in who.beside if one.counted]
     progress.round("fitting all counted tasks")
-    best, bound = fitted_widely(who, tuned, counted)
+    best, bound = fit_from_corners(who, tuned, counted)
     tiers = {"untuned": who.computed({}), "tuned": who.computed(_named(tuned, best))}
     progress.round("how far each number may go")
-    told = regions(who, tuned, counted, best)
-    tuning = list(_tuning("tuned", "", tuned, best, bound, told))
+    region = regions(who, tuned, counted, best)
+    of_all: Row = {"tier": "tuned", "left_out": ""}
+    tuning = [of_all | row for row in _tuning(tuned, best, bound, region)]
     without: dict[str, Computed] = {}
     for one in progress.through(counted, "tasks left out"):
         rest = [other for other in counted if other is not one]
-        left, at_bound = fitted(who, tuned, rest, best)
+        left, at_bound = fit(who, tuned, rest, best)
         without |= who.computed(_named(tuned, left), [one])
-        tuning += _tuning("left_out", one.task, tuned, left, at_bound)
+        of_rest: Row = {"tier": "left_out", "left_out": one.task}
+        tuning += [of_rest | row for row in _tuning(tuned, left, at_bound, None)]
     tiers["left_out"] = without
     known: Row = {"specimen": who.specimen}
-    pressures = [known | row for tier, found in tiers.items() for row in _rows(who, tier, found)]
+    pressures = [
+        known | {"tier": tier} | row for tier, found in tiers.items() for row in _rows(who, found)
+    ]
     return {
         PRESSURES.name: pressures,
         TUNING.name: [known | row for row in tuning],
@@ -187,23 +180,23 @@ def rows_of(who: Volunteer, progress: Progress) -> dict[str, list[Row]]:
     }
 
 
-def fitted_widely(
+def fit_from_corners(
     who: Volunteer, names: Sequence[str], counted: Sequence[PairedPressure]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """As `fitted`, from what is nominal and from a step off it in all directions.
+    """As `fit`, from what is nominal and from a step off it in all directions.
 
     Pressures jump where a muscle comes to its end and others take over: one descent stops there.
     """
     nominal = np.array([NOMINAL[name] for name in names])
     corners = np.array(list(product(*([-RANGE[name][2], RANGE[name][2]] for name in names))))
     found = [
-        fitted(who, names, counted, start)
+        fit(who, names, counted, start)
         for start in (nominal, *(nominal + corner for corner in corners if len(names)))
     ]
     return min(found, key=lambda one: who.misfit(_named(names, one[0]), counted))
 
 
-def fitted(
+def fit(
     who: Volunteer, names: Sequence[str], counted: Sequence[PairedPressure], start: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Values (P,) of the named numbers with the least squares of errors, and whether at a bound."""
@@ -223,12 +216,12 @@ def regions(
 
     None where errors tell no scatter: no task is left over, or all are met.
     """
-    found = _errors(who, names, counted)(best) if len(names) else None
+    errors = _errors(who, names, counted)
+    found = errors(best) if len(names) else None
     freedom = len(counted) - len(names)
     if found is None or freedom <= 0 or not found[0].any():
         return None
     scatter = sqrt(float(found[0] @ found[0]) / freedom)
-    errors = _errors(who, names, counted)
 
     def point(x: Array) -> tuple[Array, Array] | None:
         here = errors(x)
@@ -276,53 +269,42 @@ def _named(names: Sequence[str], x: Array) -> dict[str, float]:
 
 
 def _tuning(
-    tier: str,
-    left_out: str,
-    names: Sequence[str],
-    x: Array,
-    bound: NDArray[np.bool_],
-    told: Profile | None = None,
+    names: Sequence[str], x: Array, bound: NDArray[np.bool_], region: Profile | None
 ) -> Iterator[Row]:
-    for k, (name, value, at_bound) in enumerate(
-        zip(names, x.tolist(), bound.tolist(), strict=True)
-    ):
+    """Fitted values with their regions; an open end is none."""
+    for k, (name, value) in enumerate(zip(names, x.tolist(), strict=True)):
+        cells: Row = dict.fromkeys(REGION)
+        if region is not None:
+            below, above = bool(region.open_below[k]), bool(region.open_above[k])
+            low = None if below else float(region.low[k])
+            high = None if above else float(region.high[k])
+            cells = dict(
+                zip(REGION, (low, high, below, above, bool(region.closed[k])), strict=True)
+            )
         yield {
-            "tier": tier,
-            "left_out": left_out,
             "parameter": name,
             "value": value,
             "default": NOMINAL[name],
-            "unit": RANGE[name][3],
-            "at_bound": bool(at_bound),
-            **_region(told, k),
+            "unit": FACTOR_UNITS[name],
+            "at_bound": bool(bound[k]),
+            **cells,
         }
 
 
-def _region(told: Profile | None, k: int) -> Row:
-    """Cells of a number's region; an open end is none."""
-    if told is None:
-        return dict.fromkeys(REGION)
-    below, above = bool(told.open_below[k]), bool(told.open_above[k])
-    low, high = None if below else float(told.low[k]), None if above else float(told.high[k])
-    cells = (low, high, below, above, bool(told.closed[k]))
-    return dict(zip(REGION, cells, strict=True))
-
-
-def _rows(who: Volunteer, tier: str, found: Mapping[str, Computed]) -> Iterator[Row]:
+def _rows(who: Volunteer, found: Mapping[str, Computed]) -> Iterator[Row]:
+    """Computed beside measured pressures of the tasks that were computed."""
     for one in who.beside:
-        if one.task not in found:
-            continue
-        computed, status = found[one.task]
-        yield {
-            "tier": tier,
-            "task": one.task,
-            "measured_mpa": one.mpa,
-            "measured_status": one.status,
-            "measured_source": one.source,
-            "counted": one.counted,
-            "computed_mpa": computed,
-            "status": status,
-        }
+        if one.task in found:
+            computed, status = found[one.task]
+            yield {
+                "task": one.task,
+                "measured_mpa": one.mpa,
+                "measured_status": one.status,
+                "measured_source": one.source,
+                "counted": one.counted,
+                "computed_mpa": computed,
+                "status": status,
+            }
 
 
 def agreement(tier: str, pressures: Sequence[Row]) -> Row:
@@ -334,7 +316,10 @@ def agreement(tier: str, pressures: Sequence[Row]) -> Row:
     off, n = computed - measured, len(rows)
     not_held = sum(row["status"] != Balanced.CONVERGED for row in rows)
     r = float(np.corrcoef(measured, computed)[0, 1]) if n >= LEAST_FOR_R else None
-    low, high = _interval(r, n)
+    low = high = None
+    if r is not None and n >= LEAST_FOR_INTERVAL and abs(r) < 1.0:
+        z, reach = atanh(r), _Z / sqrt(n - 3)
+        low, high = tanh(z - reach), tanh(z + reach)
     rmse = float(np.sqrt(np.mean(off**2))) if n else None
     return {
         "tier": tier,
@@ -348,10 +333,3 @@ def agreement(tier: str, pressures: Sequence[Row]) -> Row:
         "goal_rmse_mpa": GOALS_MPA[tier],
         "reached": None if rmse is None else rmse <= GOALS_MPA[tier] and not not_held,
     }
-
-
-def _interval(r: float | None, n: int) -> tuple[float | None, float | None]:
-    if r is None or n < LEAST_FOR_INTERVAL or abs(r) >= 1.0:
-        return None, None
-    z, reach = atanh(r), _Z / sqrt(n - 3)
-    return tanh(z - reach), tanh(z + reach)

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import pandas as pd
-
 from spinepipe.report.words import fixed, number, plain
 from spinepipe.status import Balanced
 
@@ -54,11 +52,6 @@ def factor(name: str) -> str:
     return FACTORS.get(name, plain(name))
 
 
-def sound(rows: pd.DataFrame) -> "pd.Series[bool]":
-    """Rows whose forces settled and hold the task."""
-    return rows["status"] == Balanced.CONVERGED.value
-
-
 def newton(value: float) -> str:
     """A force to what such a model can tell: 3 digits."""
     return f"{number(value)} N"
@@ -69,7 +62,17 @@ def mpa(value: float) -> str:
     return f"{fixed(value)} MPa"
 
 
-def held_words(row: Any) -> str:
+def load_words(row: Any) -> str:
     """What a task holds, after its name: `` (19.8 kg in the hands)``; nothing without a load."""
     kg = float(row["hand_load_kg"])
     return f" ({number(kg)} kg in the hands)" if kg > 0.0 else ""
+
+
+def ended_words(status: str) -> str:
+    """An ending, said of one task."""
+    return ENDED.get(status, plain(status))
+
+
+def unbroken(sentence: str) -> str:
+    """A sentence in which no line ends between a number and its percent sign."""
+    return sentence.replace(" %", "\u00a0%")

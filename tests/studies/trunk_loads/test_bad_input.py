@@ -16,8 +16,7 @@ from spinepipe.muscles import myo_sim
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import SUBJECTS
-from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
-from spinepipe.studies.trunk_loads.checks_of_muscles import muscle_problems
+from spinepipe.studies.trunk_loads.checks import check_source, check_trunk, muscle_problems
 from spinepipe.studies.trunk_loads.forms import GEOMETRY_FORMS, TASKS
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
@@ -399,13 +398,19 @@ def test_a_package_that_is_not_there_is_named_with_its_remedy(
     assert myo_sim.VERSION in problem.allowed
 
 
+def joints(ahead_of_b_mm: int = 0) -> str:
+    """Joints of half a spine of both persons, 40 mm apart."""
+    header = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
+    return header + "".join(
+        f"{who},{level},{ahead},{40 * k},0,0,0,0\n"
+        for who, ahead in (("a", 0), ("b", ahead_of_b_mm))
+        for k, level in enumerate(LEVELS)
+    )
+
+
 def test_muscles_that_make_no_trunk_are_refused_at_the_start(tmp_path: Path) -> None:
     """Joints of half a spine: each file is sound, and no trunk comes of them."""
-    joints = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
-    joints += "".join(
-        f"{who},{level},0,{40 * k},0,0,0,0\n" for who in "ab" for k, level in enumerate(LEVELS)
-    )
-    cohort = small(tmp_path, text("joints.csv", joints))
+    cohort = small(tmp_path, text("joints.csv", joints()))
     asked = study(geometry="cohort")
     assert list(check_trunk(DOCUMENT, asked, cohort)) == []
     (problem,) = check_source(DOCUMENT, asked, cohort, tmp_path)
@@ -414,13 +419,8 @@ def test_muscles_that_make_no_trunk_are_refused_at_the_start(tmp_path: Path) -> 
 
 
 def test_one_trunk_is_scaled_to_all(tmp_path: Path) -> None:
-    joints = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
-    joints += "".join(
-        f"{who},{level},{5 * (who == 'b')},{40 * k},0,0,0,0\n"
-        for who in "ab"
-        for k, level in enumerate(LEVELS)
-    )
-    (problem,) = told(tmp_path, text("joints.csv", joints), geometry="cohort")
+    moved = text("joints.csv", joints(ahead_of_b_mm=5))
+    (problem,) = told(tmp_path, moved, geometry="cohort")
     assert (problem.file, problem.row, problem.column) == (f"{NAME}/joints.csv", 9, "specimen")
     assert "joints of b that are not those of a" in problem.found
     assert "joints of a" in problem.remedy
@@ -430,14 +430,5 @@ def test_the_generic_male_is_sound() -> None:
     """Ribs, pelvis, rectus sheath, and one left fascicle that lies right, as published."""
     cohort = cohorts.read(need_male(), FORMS)
     assert list(muscle_problems(cohort)) == []
-    assert (
-        list(
-            check_source(
-                DOCUMENT,
-                study(geometry="cohort", source_stress_mpa=MALE_STRESS_MPA),
-                cohort,
-                cohort.folder,
-            )
-        )
-        == []
-    )
+    asked = study(geometry="cohort", source_stress_mpa=MALE_STRESS_MPA)
+    assert list(check_source(DOCUMENT, asked, cohort, cohort.folder)) == []

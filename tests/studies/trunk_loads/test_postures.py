@@ -52,19 +52,23 @@ def test_all_twelve_tasks_of_table_1_are_there(tasks: dict[str, Task]) -> None:
     assert {task.number for task in tasks.values()} == {*range(1, 13), None}
 
 
-def test_flexion_shares_are_those_printed_made_to_sum_to_one() -> None:
-    """Ghezelbash 2016, 2.6, T11T12 to L5S1; printed they sum to 99.9 %."""
-    printed = np.array([6.0, 10.9, 14.1, 13.2, 16.9, 20.1, 18.7])
-    assert printed.sum() == pytest.approx(99.9)
-    assert shares("extension")[::-1] * 99.9 == pytest.approx(printed, abs=ROUNDING)
-    assert shares("extension").sum() == pytest.approx(1.0, abs=1e-12)
+SIDEWAYS = (8.3, 2.8, 9.4, 18.3, 22.8, 25.6, 12.8)
 
 
-@pytest.mark.parametrize("axis", ["right_bending", "left_rotation"])
-def test_lateral_shares_are_those_printed(axis: str) -> None:
+@pytest.mark.parametrize(
+    ("axis", "printed", "total"),
+    [
+        ("extension", (6.0, 10.9, 14.1, 13.2, 16.9, 20.1, 18.7), 99.9),
+        *(("right_bending", SIDEWAYS, 100.0), ("left_rotation", SIDEWAYS, 100.0)),
+    ],
+)
+def test_shares_are_those_printed_made_to_sum_to_one(
+    axis: str, printed: tuple[float, ...], total: float
+) -> None:
     """Ghezelbash 2016, 2.6, T11T12 to L5S1; axial rotation has none of its own."""
-    printed = np.array([8.3, 2.8, 9.4, 18.3, 22.8, 25.6, 12.8])
-    assert 100.0 * shares(axis)[::-1] == pytest.approx(printed, abs=ROUNDING)
+    assert sum(printed) == pytest.approx(total)
+    assert shares(axis)[::-1] * total == pytest.approx(printed, abs=ROUNDING)
+    assert shares(axis).sum() == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("axis", ROTATIONS)

@@ -19,11 +19,17 @@ from matplotlib.figure import Figure
 from trunk_table_cases import BEYOND, ERRORS, MEASURED, Size, cohort_of, study_of, tables_of
 
 from spinepipe.report.style import style
-from spinepipe.studies.trunk_loads.chosen import bends, of_person, relaxed, shown_person, some_tasks
 from spinepipe.studies.trunk_loads.figures.cost_of_simplifications import costs
 from spinepipe.studies.trunk_loads.figures.line_styles import look_of
-from spinepipe.studies.trunk_loads.figures.load_over_flexion import courses_of, extensor_forces
-from spinepipe.studies.trunk_loads.figures.muscle_force_bars import grouped_forces
+from spinepipe.studies.trunk_loads.selection import (
+    courses_of,
+    extensor_forces,
+    forward_bends,
+    of_person,
+    relaxed_standing,
+    shown_person,
+    some_tasks,
+)
 
 NAMES = (
     *("pressure_against_measured", "muscle_force_bars", "load_by_level", "load_over_flexion"),
@@ -182,11 +188,15 @@ def test_sides_have_bars_of_their_own_only_where_they_differ() -> None:
 
 
 def test_bars_add_up_to_the_forces_of_the_table() -> None:
+    """Sides alike, so that one of them is drawn: active bars, and passive ones on their ends."""
     rows = tables_of(Size(1))["muscles"]
-    own = rows[rows["task"] == "flexion_50"]
-    found = grouped_forces(own)
-    assert found["active_n"].sum() + found["passive_n"].sum() == pytest.approx(own["force_n"].sum())
-    assert found["passive_n"].sum() > 0.0
+    own = rows[(rows["task"] == "flexion_50") & (rows["side"] == "right")]
+    figure = draw("muscle_force_bars", Size(1, drawn=("flexion_50",)))
+    bars = panel(figure, "flexion 50").patches
+    passive = sum(bar.get_width() for bar in bars if bar.get_hatch())
+    assert sum(bar.get_width() for bar in bars) == pytest.approx(own["force_n"].sum())
+    assert passive > 0.0
+    assert passive == pytest.approx(own["passive_n"].sum())
 
 
 def test_what_is_beyond_strength_is_drawn_hollow_and_said() -> None:
@@ -215,25 +225,27 @@ def test_levels_stand_as_in_a_spine() -> None:
 def test_bends_are_free_handed_unpushed_and_settled() -> None:
     size = Size(1)
     tasks = tables_of(size)["tasks"]
-    found = bends(tasks, cohort_of(size))
+    found = forward_bends(tasks, cohort_of(size))
     angles = [0.0, *range(10, 101, 10), 107.3]
     assert found["flexion_deg"].tolist() == pytest.approx(angles)
     assert not {"exertion_torsion", "standing_stable", "load_away"} & set(found["task"])
     lost = tasks["task"] == "full_flexion"
     tasks.loc[lost, "status"] = "two_answers"
-    assert bends(tasks, cohort_of(size))["flexion_deg"].max() == 100.0
+    assert forward_bends(tasks, cohort_of(size))["flexion_deg"].max() == 100.0
     few = tasks[tasks["task"].isin(["standing", "flexion_50"])]
-    assert bends(few, cohort_of(size)).empty
+    assert forward_bends(few, cohort_of(size)).empty
 
 
 def test_relaxed_standing_is_found_by_number_or_by_what_it_is() -> None:
     size = Size(1)
     tasks = tables_of(size)["tasks"]
-    assert relaxed(tasks, cohort_of(size)) == "standing"
+    assert relaxed_standing(tasks, cohort_of(size)) == "standing"
     unnumbered = tasks.assign(number=None)
-    assert relaxed(unnumbered, cohort_of(size)) == "standing"
+    assert relaxed_standing(unnumbered, cohort_of(size)) == "standing"
     gone = unnumbered[unnumbered["task"] != "standing"]
-    assert relaxed(gone, cohort_of(size)) is None, "torsion is pushed, the other one is tense"
+    assert relaxed_standing(gone, cohort_of(size)) is None, (
+        "torsion is pushed, the other one is tense"
+    )
 
 
 def test_persons_and_tasks_are_chosen_by_rule() -> None:
@@ -254,7 +266,8 @@ def test_the_course_of_the_extensors_is_that_of_the_table() -> None:
     size = Size(1)
     tables = tables_of(size)
     course = courses_of(tables["tasks"], cohort_of(size))["volunteer"]
-    forces = extensor_forces(tables["muscles"], course).set_index(["group", "flexion_deg"])
+    rows = extensor_forces(tables["muscles"], course)
+    forces = rows.groupby(["group", "flexion_deg"]).sum()
     long = forces.loc["longissimus_thoracis"]
     assert long["active"].idxmax() == pytest.approx(60.0)
     assert long["passive"].is_monotonic_increasing

@@ -10,17 +10,16 @@ import pandas as pd
 import pytest
 from installed import need_male
 from scipy.stats import norm
-from trunk_person import SETTINGS, volunteers
+from trunk_person import SETTINGS, person_of, tasks, volunteers
 
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.folder import SpecimenTables, source_of_folder
-from spinepipe.muscles.muscle_equilibrium import held
+from spinepipe.muscles.muscle_equilibrium import solve_task
 from spinepipe.progress import Progress
 from spinepipe.status import Balanced
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.trunk_loads import hold, respond, simplify, spread, tune
-from spinepipe.studies.trunk_loads.persons import how_of, regressions_of, source_of, standing
-from spinepipe.studies.trunk_loads.postures import read_tasks
+from spinepipe.studies.trunk_loads.persons import solver_options, source_of
 from spinepipe.studies.trunk_loads.sampling import design_of
 from spinepipe.studies.trunk_loads.settings import Uncertain, VolunteerSettings
 from spinepipe.studies.trunk_loads.tables import QUANTITIES, SIMPLIFICATIONS
@@ -103,7 +102,7 @@ def test_numbers_that_made_the_pressures_are_found_again() -> None:
     made = who.computed(hidden)
     beside = tuple(replace(one, mpa=made[one.task][0], counted=True) for one in who.beside)
     blind = replace(who, beside=beside)
-    found, bound = tune.fitted_widely(blind, tuple(hidden), beside)
+    found, bound = tune.fit_from_corners(blind, tuple(hidden), beside)
     assert not bound.any()
     np.testing.assert_allclose(found, list(hidden.values()), atol=0.02)
 
@@ -125,8 +124,8 @@ def test_a_fitted_number_goes_as_far_as_the_errors_of_a_straight_line_allow() ->
     at_zero = -slopes @ [1.0, 1.1] + 0.02 * rng.normal(size=6)
     best = np.linalg.lstsq(slopes, -at_zero, rcond=None)[0]
     line: Any = Straight(slopes, at_zero)
-    tasks: Any = [None] * 6
-    found = tune.regions(line, names, tasks, best)
+    six: Any = [None] * 6
+    found = tune.regions(line, names, six, best)
     assert found is not None
     assert found.closed.all()
     left = slopes @ best + at_zero
@@ -137,10 +136,10 @@ def test_a_fitted_number_goes_as_far_as_the_errors_of_a_straight_line_allow() ->
     slopes[:, 1] = 0.0
     best = np.array([np.linalg.lstsq(slopes[:, :1], -at_zero, rcond=None)[0][0], 1.0])
     blind: Any = Straight(slopes, at_zero)
-    found = tune.regions(blind, names, tasks, best)
+    found = tune.regions(blind, names, six, best)
     assert found is not None
     assert (found.open_below[1], found.open_above[1]) == (True, True)
-    assert tune.regions(line, names, tasks[:2], best) is None
+    assert tune.regions(line, names, six[:2], best) is None
 
 
 def additive(weights: Mapping[str, float]) -> pd.DataFrame:
@@ -202,12 +201,9 @@ def test_the_generic_male_holds_tasks_1_to_9() -> None:
     names = ("muscles", "muscle_parameters", "joints", "body_frames")
     tables = SpecimenTables(*(pd.read_csv(place / f"{name}.csv") for name in names))
     trunk = source_of_folder("thoracolumbar_male", tables, 1.0e6).trunk
-    cohort = volunteers()
-    regressions = regressions_of(SETTINGS, cohort.folder)
-    person = standing(SETTINGS, trunk, subject_of(cohort, "volunteer"), regressions).person
-    tasks = read_tasks(cohort, SETTINGS.trunk_angle)
-    asked = {name: task for name, task in tasks.items() if task.number in range(1, 10)}
+    person = person_of(trunk, subject_of(volunteers(), "volunteer"))
+    asked = {name: task for name, task in tasks().items() if task.number in range(1, 10)}
     assert {task.number for task in asked.values()} == set(range(1, 10))
     for name, task in asked.items():
-        slack = np.abs(held(person, task, how_of(SETTINGS)).found.slack)
+        slack = np.abs(solve_task(person, task, solver_options(SETTINGS)).found.slack)
         assert slack.max() <= (2.5 if name == "full_flexion" else 0.5), name

@@ -11,15 +11,15 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
 from spinepipe.report.style import BLACK, GREY, blank, saying
-from spinepipe.studies.trunk_loads.chosen import of_person, shown_person
 from spinepipe.studies.trunk_loads.figures.line_styles import (
     HOLLOW_WORDS,
     key_of,
     look_of,
     task_label,
 )
+from spinepipe.studies.trunk_loads.selection import of_person, shown_person, sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import SIMPLIFIED, sound
+from spinepipe.studies.trunk_loads.words import SIMPLIFIED
 
 PERCENT, IMBALANCE = "percent", "imbalance_nm"
 LEAST_NM = 1e-2
@@ -47,7 +47,11 @@ def cost_of_simplifications_figure(
     axes[0].axvline(0.0, color=BLACK, lw=0.6, zorder=1)
     axes[0].set_xlabel("more than in the whole model (%)")
     _marks(axes[1], own, tasks, looks, IMBALANCE)
-    _logarithmic(axes[1], own)
+    moments = np.maximum(own[IMBALANCE].to_numpy(float), LEAST_NM)
+    low, high = 0.8 * float(np.nanmin(moments)), 1.25 * float(np.nanmax(moments))
+    axes[1].set_xscale("log")
+    axes[1].set_xlim(low, high)
+    log_ticks(axes[1].xaxis, low, high)
     axes[1].set_xlabel("when the forces act on the whole model (N m)")
     axes[0].set_yticks(range(len(tasks)), [task_label(task) for task in tasks])
     axes[0].set_ylim(-0.6, len(tasks) - 0.4)
@@ -77,14 +81,6 @@ def costs(rows: pd.DataFrame) -> pd.DataFrame:
     )
     both = sound(found).to_numpy() & sound(beside).to_numpy()
     return found.assign(**{PERCENT: 100.0 * (ratio - 1.0), "sound": both})
-
-
-def _logarithmic(axis: Axes, rows: pd.DataFrame) -> None:
-    moments = np.maximum(rows[IMBALANCE].to_numpy(float), LEAST_NM)
-    low, high = 0.8 * float(np.nanmin(moments)), 1.25 * float(np.nanmax(moments))
-    axis.set_xscale("log")
-    axis.set_xlim(low, high)
-    log_ticks(axis.xaxis, low, high)
 
 
 def _marks(

@@ -14,8 +14,8 @@ from spinepipe.report.glyphs import draw_interval
 from spinepipe.report.panels import explain_marks, head, sections
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, note, saying
 from spinepipe.report.words import count, fixed, listed
-from spinepipe.studies.trunk_loads.chosen import MOST_TASKS
 from spinepipe.studies.trunk_loads.figures.line_styles import task_label
+from spinepipe.studies.trunk_loads.selection import MOST_TASKS
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.words import factor
 

@@ -1,6 +1,5 @@
 """How tasks and persons are told apart in all figures of this kind, in colour and without."""
 
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
@@ -38,8 +37,3 @@ def task_label(name: str) -> str:
 def scale(axis: Axes) -> None:
     """Ticks of an upright axis that is a scale, not a list."""
     axis.tick_params(axis="y", size=2.5, width=0.6)
-
-
-def values(rows: pd.DataFrame, column: str) -> "pd.Series[float]":
-    """A column as numbers, empty cells as NaN."""
-    return rows[column].astype(float)

@@ -11,15 +11,14 @@ from spinepipe.cohort import Cohort
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, blank, saying
-from spinepipe.studies.trunk_loads.chosen import of_person, shown_person, some_tasks
 from spinepipe.studies.trunk_loads.figures.line_styles import (
     HOLLOW_WORDS,
     key_of,
     look_of,
     task_label,
 )
+from spinepipe.studies.trunk_loads.selection import of_person, shown_person, some_tasks, sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import sound
 
 PANELS = {
     "compression_n": ("Compression", "along the disc's axis (N)"),

@@ -9,13 +9,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.muscles.fascicles import GLOBAL_EXTENSORS
+from spinepipe.muscles.trunk import GLOBAL_EXTENSORS
 from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, BLUE, VERMILLION, blank, saying
 from spinepipe.report.words import plain, short
-from spinepipe.studies.trunk_loads.chosen import bends, of_person, shown_person
 from spinepipe.studies.trunk_loads.figures.line_styles import key_of, look_of, scale
+from spinepipe.studies.trunk_loads.selection import (
+    courses_of,
+    extensor_forces,
+    of_person,
+    shown_person,
+)
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
 LOADS = {
@@ -39,6 +44,7 @@ def load_over_flexion_figure(
     looks = {name: look_of(k) for k, name in enumerate(courses)}
     bender = shown_person(study, tasks[tasks["specimen"].isin(courses)])
     forces = extensor_forces(of_person(tables["muscles"], bender), courses[str(bender)])
+    forces = forces.groupby(["group", "flexion_deg"], as_index=False).sum()
     groups = [name for name in GLOBAL_EXTENSORS if name in set(forces["group"])]
     down = 2 if groups else 1
     figure = blank(down * _HEIGHT_MM + _KEY_MM)
@@ -53,37 +59,14 @@ def load_over_flexion_figure(
     for index, (axis, group) in enumerate(zip(axes[2:], groups, strict=False)):
         head(axis, 2 + index, f"{plain(group)}, both sides")
         _axes(axis, "N")
-        _muscle(axis, forces[forces["group"] == group])
-    _explain(figure, looks, str(bender), bool(groups), _left_out(tasks, courses))
+        own = forces[forces["group"] == group].sort_values("flexion_deg")
+        for part, (color, dashes) in PARTS.items():
+            axis.plot(
+                own["flexion_deg"], own[part], color=color, ls=dashes, marker="o", ms=3, mew=0
+            )
+    lost = [name for name in dict.fromkeys(tasks["specimen"]) if name not in courses]
+    _explain(figure, looks, str(bender), bool(groups), lost)
     return figure
-
-
-def courses_of(tasks: pd.DataFrame, cohort: Cohort) -> dict[str, pd.DataFrame]:
-    """Tasks of bending forwards by person, of those who have enough of them."""
-    names = list(dict.fromkeys(tasks["specimen"]))
-    found = {name: bends(of_person(tasks, name), cohort) for name in names}
-    return {name: rows for name, rows in found.items() if len(rows)}
-
-
-def extensor_forces(muscles: pd.DataFrame, course: pd.DataFrame) -> pd.DataFrame:
-    """Columns group, flexion_deg, active, passive (N, both sides) of the global extensors."""
-    angle = course.set_index("task")["flexion_deg"]
-    rows = muscles[muscles["group"].isin(GLOBAL_EXTENSORS) & muscles["task"].isin(angle.index)]
-    forces = pd.DataFrame(
-        {
-            "group": rows["group"],
-            "flexion_deg": rows["task"].map(angle).astype(float),
-            "active": rows["force_n"].astype(float) - rows["passive_n"].astype(float),
-            "passive": rows["passive_n"].astype(float),
-        }
-    )
-    return forces.groupby(["group", "flexion_deg"], as_index=False).sum()
-
-
-def _muscle(axis: Axes, rows: pd.DataFrame) -> None:
-    rows = rows.sort_values("flexion_deg")
-    for part, (color, dashes) in PARTS.items():
-        axis.plot(rows["flexion_deg"], rows[part], color=color, ls=dashes, marker="o", ms=3, mew=0)
 
 
 def _axes(axis: Axes, unit: str) -> None:
@@ -91,10 +74,6 @@ def _axes(axis: Axes, unit: str) -> None:
     axis.set_ylabel(unit)
     axis.axhline(0.0, color=BLACK, lw=0.5, zorder=0)
     scale(axis)
-
-
-def _left_out(tasks: pd.DataFrame, courses: Mapping[str, pd.DataFrame]) -> Sequence[str]:
-    return [name for name in dict.fromkeys(tasks["specimen"]) if name not in courses]
 
 
 def _explain(

@@ -14,10 +14,15 @@ from spinepipe.muscles.trunk import SIDES
 from spinepipe.report.panels import across_of, explain_marks, head, lines_of
 from spinepipe.report.style import BLUE, GREEN, GREY, WHITE, blank, saying
 from spinepipe.report.words import plain
-from spinepipe.studies.trunk_loads.chosen import grouped, of_person, shown_person, some_tasks
 from spinepipe.studies.trunk_loads.figures.line_styles import task_label
+from spinepipe.studies.trunk_loads.selection import (
+    grouped,
+    of_person,
+    shown_person,
+    some_tasks,
+    sound,
+)
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import sound
 
 SAME_SHARE = 0.02
 """Sides that differ by less than this, of the largest force of the task, are drawn as one."""
@@ -45,23 +50,14 @@ def muscle_force_bars_figure(
     axes = [axis for line in lines for axis in line][: len(shown)]
     unlike = False
     for index, (axis, task) in enumerate(zip(axes, shown, strict=True)):
-        head(axis, index, _heading(tasks[tasks["task"] == task]))
-        unlike |= _bars(axis, grouped_forces(rows[rows["task"] == task]), groups)
+        own, name = tasks[tasks["task"] == task], task_label(task)
+        ended = plain(str(own["status"].iloc[0]))
+        head(axis, index, name if sound(own).all() else f"{name} ({ended})")
+        forces = grouped(rows[rows["task"] == task], ("force_n", "passive_n"))
+        unlike |= _bars(axis, forces, groups)
     _scales(axes, groups, across)
     _explain(figure, str(person), unlike)
     return figure
-
-
-def _heading(rows: pd.DataFrame) -> str:
-    """The task, and how it ended if not well."""
-    name, status = task_label(str(rows["task"].iloc[0])), plain(str(rows["status"].iloc[0]))
-    return name if sound(rows).all() else f"{name} ({status})"
-
-
-def grouped_forces(rows: pd.DataFrame) -> pd.DataFrame:
-    """Columns active_n, passive_n by group and side of one task, N."""
-    summed = grouped(rows, ("force_n", "passive_n"))
-    return summed.assign(active_n=summed["force_n"] - summed["passive_n"])
 
 
 def _bars(axis: Axes, forces: pd.DataFrame, groups: Sequence[str]) -> bool:
@@ -77,7 +73,8 @@ def _bars(axis: Axes, forces: pd.DataFrame, groups: Sequence[str]) -> bool:
     for place, side in enumerate(drawn):
         y = np.arange(len(groups)) + 0.38 - (place + 0.5) * height
         color = _COLORS[side] if unlike else GREY
-        active, passive = (sides[side][name].to_numpy(float) for name in ("active_n", "passive_n"))
+        total, passive = (sides[side][name].to_numpy(float) for name in ("force_n", "passive_n"))
+        active = total - passive
         look: dict[str, Any] = {"height": 0.9 * height, "edgecolor": color, "lw": 0.6}
         axis.barh(y, active, color=color, zorder=3, **look)
         axis.barh(y, passive, left=active, color=WHITE, hatch="//////", zorder=3, **look)

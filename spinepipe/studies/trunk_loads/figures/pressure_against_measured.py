@@ -15,9 +15,10 @@ from spinepipe.report.panels import explain_marks, head
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION, WHITE, blank, note, saying
 from spinepipe.report.words import fixed, plain
 from spinepipe.studies.trunk_loads.figures.line_styles import scale, task_label
+from spinepipe.studies.trunk_loads.selection import sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.tables import TIERS
-from spinepipe.studies.trunk_loads.words import ENDED, sound
+from spinepipe.studies.trunk_loads.words import ENDED
 from spinepipe.studies.trunk_loads.words import TIERS as FITTED
 
 COLORS = dict(zip(TIERS, (BLUE, VERMILLION, GREEN), strict=True))

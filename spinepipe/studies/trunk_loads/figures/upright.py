@@ -6,7 +6,6 @@ from importlib.resources import files
 from typing import Any
 
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -16,8 +15,7 @@ from spinepipe.report.panels import explain_marks, head, side_by_side
 from spinepipe.report.style import BLACK, GREY, blank, saying
 from spinepipe.report.words import short
 from spinepipe.studies.trunk_loads.figures.line_styles import key_of, look_of
-from spinepipe.studies.trunk_loads.ghezelbash_2016 import reproduces
-from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.settings import TrunkLoads, reproduces
 
 _HEIGHT_MM, _KEY_MM = 68.0, 17.0
 MOST_PERSONS = 6
@@ -35,13 +33,20 @@ def upright_figure(study: TrunkLoads, cohort: Cohort, tables: Mapping[str, pd.Da
     head(moments, 1, "Moment required at the joint below")
     for number, person in enumerate(persons):
         own = rows[rows["specimen"] == person].set_index("body").reindex(list(BODIES))
-        _course(turned, own["upright_deg"], number)
-        _course(moments, own["moment_after_nm"], number)
+        for axis, column in ((turned, "upright_deg"), (moments, "moment_after_nm")):
+            look = look_of(number).line(zorder=3)
+            axis.plot(own[column].astype(float), range(len(BODIES)), **look)
     first = rows[rows["specimen"] == persons[0]].set_index("body").reindex(list(BODIES))
     turned.plot(first["start_deg"].astype(float), range(len(BODIES)), color=GREY, lw=0.8, zorder=1)
     before = first["moment_before_nm"].astype(float)
     moments.plot(before, range(len(BODIES)), color=GREY, lw=0.8, zorder=1)
-    printed = _printed(turned) if reproduces(cohort.name) else False
+    printed = reproduces(cohort.name)
+    if printed:  # Table 2 of the paper, whose geometry is another
+        text = files("spinepipe.studies.trunk_loads.figures").joinpath("ghezelbash_2016.toml")
+        table = tomllib.loads(text.read_text(encoding="utf-8"))
+        at = [BODIES.index(body) for body in table["bodies"]]
+        for angles in table["upright_deg"].values():
+            turned.plot(angles, at, "x", color=BLACK, ms=3.5, mew=0.7, zorder=2)
     for axis, unit in ((turned, "from the source's pose (°)"), (moments, "extension (N m)")):
         axis.axvline(0.0, color=BLACK, lw=0.5, zorder=0)
         axis.set_xlabel(unit)
@@ -49,20 +54,6 @@ def upright_figure(study: TrunkLoads, cohort: Cohort, tables: Mapping[str, pd.Da
     turned.set_ylim(-0.5, len(BODIES) - 0.5)
     _explain(figure, persons, printed, int(rows["specimen"].nunique()))
     return figure
-
-
-def _course(axis: Axes, values: "pd.Series[float]", number: int) -> None:
-    axis.plot(values.astype(float), range(len(BODIES)), **look_of(number).line(zorder=3))
-
-
-def _printed(axis: Axes) -> bool:
-    """Table 2 of the paper, whose geometry is another."""
-    text = files("spinepipe.studies.trunk_loads.figures").joinpath("ghezelbash_2016.toml")
-    table = tomllib.loads(text.read_text(encoding="utf-8"))
-    at = [BODIES.index(body) for body in table["bodies"]]
-    for turned in table["upright_deg"].values():
-        axis.plot(turned, at, "x", color=BLACK, ms=3.5, mew=0.7, zorder=2)
-    return True
 
 
 def _explain(figure: Figure, persons: list[str], printed: bool, n: int) -> None:

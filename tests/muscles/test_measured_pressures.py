@@ -1,7 +1,7 @@
 """Measured pressures: entered again."""
 
 from spinepipe.facts import STATUSES
-from spinepipe.muscles.references import measured_pressures
+from spinepipe.muscles.measured_pressures import measured_pressures
 
 
 def test_measured_pressures_by_task() -> None:

@@ -6,9 +6,9 @@ from scipy.optimize import minimize
 from trunk_person import held_task, tasks, volunteer
 
 from spinepipe.muscles.muscle_equilibrium import angles_of
-from spinepipe.muscles.pose import BodyPoses, posed, rotation_of_vector, rotations_of
+from spinepipe.muscles.pose import BodyPoses, place_bodies, rotation_of_vector, rotations_of
 from spinepipe.muscles.trunk import LEVELS
-from spinepipe.muscles.wrapping import wrap_path
+from spinepipe.muscles.wrapping import wrap_paths
 
 NO_MOVES = np.zeros((len(LEVELS), 3))
 
@@ -16,7 +16,7 @@ NO_MOVES = np.zeros((len(LEVELS), 3))
 def string(ends: np.ndarray, bars: np.ndarray, along: np.ndarray, behind: np.ndarray) -> tuple:
     """Length and touched bars of one string from the first end to the second."""
     count = len(bars)
-    found = wrap_path(
+    found = wrap_paths(
         ends[None],
         np.array([[0, 1]]),
         np.array([0, count]),
@@ -81,7 +81,7 @@ def at_flexion(degrees: float) -> BodyPoses:
     person = volunteer()
     share = degrees / 100.0
     angles = person.upright + share * tasks()["forward_100"].turned
-    return posed(person.chain, rotations_of(person.chain, angles), NO_MOVES)
+    return place_bodies(person.chain, rotations_of(person.chain, angles), NO_MOVES)
 
 
 def test_lengths_do_not_jump_while_the_trunk_bends() -> None:
@@ -102,7 +102,7 @@ def any_posture(seed: int) -> BodyPoses:
     person = volunteer()
     drawn = np.random.default_rng(seed).uniform(-9.0, 9.0, (len(LEVELS) + 1, 3))
     angles = np.deg2rad(np.cumsum(drawn, axis=0))
-    return posed(person.chain, rotations_of(person.chain, angles), NO_MOVES)
+    return place_bodies(person.chain, rotations_of(person.chain, angles), NO_MOVES)
 
 
 def seen_from(poses: BodyPoses, muscle: int, bar: int, trace: np.ndarray) -> np.ndarray:

@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
+from spinepipe.muscles.trunk import GLOBAL_EXTENSORS
+from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.forms import PUSH_N, PUSH_NM
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import sound
 
 MOST_TASKS = 6
 """So many tasks can be told apart by colour."""
@@ -21,6 +22,11 @@ FEWEST_ANGLES = 3
 
 _UPRIGHT_DEG = 0.5
 _TURNS = ("trunk_extension_deg", "trunk_right_bending_deg", "pelvis_extension_deg")
+
+
+def sound(rows: pd.DataFrame) -> "pd.Series[bool]":
+    """Rows whose forces settled and hold the task."""
+    return rows["status"] == Balanced.CONVERGED.value
 
 
 def shown_person(study: TrunkLoads, rows: pd.DataFrame) -> str | None:
@@ -49,20 +55,11 @@ def some_tasks(study: TrunkLoads, tasks: pd.DataFrame, most: int = MOST_TASKS) -
     ranked = others.sort_values("l4l5_compression_n", kind="stable")["task"].tolist()
     room = min(most - len(drawn), len(ranked))
     at = np.unique(np.linspace(0, len(ranked) - 1, room).round().astype(int)) if room else ()
-    kept = {*drawn, *(ranked[k] for k in at)}
-    return [name for name in tasks["task"] if name in kept]
+    chosen = {*drawn, *(ranked[k] for k in at)}
+    return [name for name in tasks["task"] if name in chosen]
 
 
-def pushed(cohort: Cohort) -> set[str]:
-    """Tasks in which something pushes at the trunk from outside, besides loads in the hands."""
-    asked = cohort.further.get("tasks")
-    if asked is None:
-        return set()
-    there = [name for name in (*PUSH_N, *PUSH_NM) if name in asked]
-    return set(asked.loc[asked[there].fillna(0.0).ne(0.0).any(axis=1), "task"])
-
-
-def relaxed(tasks: pd.DataFrame, cohort: Cohort) -> str | None:
+def relaxed_standing(tasks: pd.DataFrame, cohort: Cohort) -> str | None:
     """The task of a person that is relaxed standing, None where there is none that is sound.
 
     That of the paper's number, else one that is upright, without load, push and co-activation.
@@ -76,7 +73,7 @@ def relaxed(tasks: pd.DataFrame, cohort: Cohort) -> str | None:
     return str(still["task"].iloc[0]) if len(still) else None
 
 
-def bends(tasks: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
+def forward_bends(tasks: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
     """Sound tasks of one person bent forwards or upright with empty hands, by `flexion_deg`.
 
     Of two with the same angle the first; none where angles are fewer than `FEWEST_ANGLES`.
@@ -89,10 +86,36 @@ def bends(tasks: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
     return found if len(found) >= FEWEST_ANGLES else found.iloc[:0]
 
 
+def courses_of(tasks: pd.DataFrame, cohort: Cohort) -> dict[str, pd.DataFrame]:
+    """Tasks of bending forwards by person, of those who have enough of them."""
+    names = list(dict.fromkeys(tasks["specimen"]))
+    found = {name: forward_bends(of_person(tasks, name), cohort) for name in names}
+    return {name: rows for name, rows in found.items() if len(rows)}
+
+
+def extensor_forces(muscles: pd.DataFrame, course: pd.DataFrame) -> pd.DataFrame:
+    """Columns group, flexion_deg, active, passive (N) of each fascicle of the global extensors."""
+    angle = course.set_index("task")["flexion_deg"]
+    rows = muscles[muscles["group"].isin(GLOBAL_EXTENSORS) & muscles["task"].isin(angle.index)]
+    return pd.DataFrame(
+        {
+            "group": rows["group"],
+            "flexion_deg": rows["task"].map(angle).astype(float),
+            "active": rows["force_n"].astype(float) - rows["passive_n"].astype(float),
+            "passive": rows["passive_n"].astype(float),
+        }
+    )
+
+
 def _free_handed(tasks: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
     """Tasks without load in the hands, push from outside, or asked-for co-activation."""
     empty = (tasks["hand_load_kg"] == 0.0) & (tasks["tone"] == "none")
-    return tasks[empty & ~tasks["task"].isin(pushed(cohort))]
+    asked = cohort.further.get("tasks")
+    if asked is None:
+        return tasks[empty]
+    there = [name for name in (*PUSH_N, *PUSH_NM) if name in asked]
+    pushed = asked.loc[asked[there].fillna(0.0).ne(0.0).any(axis=1), "task"]
+    return tasks[empty & ~tasks["task"].isin(set(pushed))]
 
 
 def grouped(rows: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:

@@ -1,9 +1,13 @@
-"""What the joints of a trunk resist before any muscle pulls.
+"""Passive tissue of a trunk: what joints and stretched muscles resist before any muscle is active.
 
-Moments follow curves of one rotation each, stiffer the more the joint is pressed; the upper
-vertebra moves on the lower as far as the joint's own compliance lets the force push it. The paper
-prints no curves (Ghezelbash 2016 Fig 2); those here are measured ones of others, whole segments or
-discs alone.
+Moments of joints follow curves of one rotation each, stiffer the more the joint is pressed; the
+upper vertebra moves on the lower as far as the joint's own compliance lets the force push it. The
+paper prints no curves (Ghezelbash 2016 Fig 2); those here are measured ones of others, whole
+segments or discs alone.
+
+The force of a stretched muscle is an exponential of the strain of its fibres (Thelen 2003; default
+of OpenSim). Fibres are slack up to the length of the upright posture and take up all that the path
+gains; the curve of Davis 2003, which the paper uses, is printed nowhere that we know of.
 """
 
 from collections.abc import Mapping
@@ -18,13 +22,12 @@ from spinepipe.effects.contract import Array
 from spinepipe.facts import numbers, several
 from spinepipe.units import DEG_PER_RAD
 
-AXES = ("right_bending", "left_rotation", "extension")
-"""Order of rotation vectors and moments: about x, y, z."""
-
 AXIAL_N_PER_M = numbers(__name__, "axial_stiffness")
 
 PRELOADS_N, PRELOAD_FACTORS = zip(*several(__name__, "stiffening_by_preload").values(), strict=True)
 """Stiffness over that without preload, lumbar segments; held beyond the last."""
+
+_STRETCHED = numbers(__name__, "passive_muscle")
 
 
 @dataclass(frozen=True)
@@ -51,39 +54,39 @@ class MomentCurve:
 
     def moment(self, rad: Array) -> Array:
         """N m at rotations; straight on beyond the last points."""
-        ends = np.array(self.degrees)[[0, -1]] / DEG_PER_RAD
-        inside = np.clip(rad, *ends)
-        found: Array = self._through(inside) + self._end_slopes(rad, ends) * (rad - inside)
+        inside, beyond = self._split(rad)
+        found: Array = self._through(inside) + beyond * (rad - inside)
         return found
 
     def slope(self, rad: Array) -> Array:
         """N m/rad at rotations."""
-        ends = np.array(self.degrees)[[0, -1]] / DEG_PER_RAD
-        inside = np.clip(rad, *ends)
-        at = np.where(inside == rad, self._through(inside, 1), self._end_slopes(rad, ends))
-        return np.asarray(at, dtype=float)
+        inside, beyond = self._split(rad)
+        return np.asarray(np.where(inside == rad, self._through(inside, 1), beyond), dtype=float)
 
-    def _end_slopes(self, rad: Array, ends: Array) -> Array:
-        """Slope of the outermost chord on the side of each rotation."""
-        chords = np.diff(self.newton_metres) / np.diff(np.array(self.degrees) / DEG_PER_RAD)
-        found: Array = np.where(rad < ends[0], chords[0], chords[-1])
-        return found
+    def _split(self, rad: Array) -> tuple[Array, Array]:
+        """Rotations brought within the points, and slopes of the outermost chords beyond them."""
+        points = np.array(self.degrees) / DEG_PER_RAD
+        chords = np.diff(self.newton_metres) / np.diff(points)
+        return np.clip(rad, points[0], points[-1]), np.where(rad < points[0], chords[0], chords[-1])
 
 
-def _both_sides(back: str, fore: str) -> MomentCurve:
-    """From points of two sides, as `heuer flexion` names them in `facts.csv`."""
+def _measured(source: str, back: str = "flexion") -> tuple[MomentCurve, MomentCurve, MomentCurve]:
+    """About x, y and z, through the points of two sides, as `heuer flexion` names them in
+    `facts.csv`; `back` is extension where a source has one curve for both of its sides."""
     known = several(__name__, "moment_curve")
-    points = (
-        (*(-value for value in reversed(known[f"{back} {of}"])), 0.0, *known[f"{fore} {of}"])
-        for of in ("deg", "nm")
-    )
-    return MomentCurve(*points)
-
-
-def _of(source: str, back: str = "flexion") -> tuple[MomentCurve, MomentCurve, MomentCurve]:
-    """About x, y and z; `back` is extension where a source has one curve for both of its sides."""
     sides = (("right_bending",) * 2, ("left_rotation",) * 2, (back, "extension"))
-    x, y, z = (_both_sides(f"{source} {one}", f"{source} {other}") for one, other in sides)
+    x, y, z = (
+        MomentCurve(
+            *(
+                (
+                    *(-value for value in reversed(known[f"{source} {below} {of}"])),
+                    *(0.0, *known[f"{source} {beyond} {of}"]),
+                )
+                for of in ("deg", "nm")
+            )
+        )
+        for below, beyond in sides
+    )
     return x, y, z
 
 
@@ -93,7 +96,7 @@ def _linear(nm_per_rad: float) -> MomentCurve:
 
 
 _GOULD = published("gould_2024b")["uniform_stiffness"]
-_SCHMIDT, _HEUER = _of("schmidt"), _of("heuer")
+_SCHMIDT, _HEUER = _measured("schmidt"), _measured("heuer")
 
 CURVES: Mapping[str, tuple[MomentCurve, MomentCurve, MomentCurve]] = {
     "segment_gould": (  # linear, whole segments
@@ -104,8 +107,8 @@ CURVES: Mapping[str, tuple[MomentCurve, MomentCurve, MomentCurve]] = {
     "mixed": (_HEUER[0], _SCHMIDT[1], _SCHMIDT[2]),
     "segment": _SCHMIDT,
     "disc_heuer": _HEUER,
-    "disc_jaramillo": _of("jaramillo"),
-    "disc_han": _of("han", back="extension"),
+    "disc_jaramillo": _measured("jaramillo"),
+    "disc_han": _measured("han", back="extension"),
 }
 """About x, y and z: right bending, left rotation, extension. Sources: `facts.csv`, `anatomy`.
 
@@ -154,3 +157,47 @@ class JointLaws:
         """(..., 7, 3) m by which the upper vertebra moves, pushed with (..., 7, 3) N, disc axes."""
         forwards, right = (pushes[..., k] / self.shear[:, n] for n, k in enumerate((0, 2)))
         return np.stack([forwards, pushes[..., 1] / self.axial, right], axis=-1)
+
+
+@dataclass(frozen=True)
+class PassiveMuscle:
+    """Force of a stretched muscle without any activity.
+
+    Attributes
+    ----------
+    strain : of the fibres at which the force is the largest active one.
+    shape : how sharply it rises.
+    factor : of the force.
+    fibre_share : of the path upright that stretches, where the source has no length of the fibres.
+    """
+
+    strain: float = _STRETCHED["strain"]
+    shape: float = _STRETCHED["shape"]
+    factor: float = 1.0
+    fibre_share: float = 1.0
+
+    def forces(self, lengths: Array, rest: Array, fibres: Array, largest: Array) -> Array:
+        """(M,) N of paths of so many m, upright `rest` m, fibres of so many m.
+
+        Parameters
+        ----------
+        largest : (M,) N, largest active force at the stress of 0.6 MPa or whatever is stated.
+        """
+        strain = self._strain(lengths, rest, fibres)
+        share = np.expm1(self.shape * strain / self.strain) / np.expm1(self.shape)
+        found: Array = self.factor * largest * share
+        return found
+
+    def slopes(self, lengths: Array, rest: Array, fibres: Array, largest: Array) -> Array:
+        """(M,) N/m, how fast it rises with the length."""
+        strain = self._strain(lengths, rest, fibres)
+        rate = self.shape / self.strain / fibres
+        rising = rate * np.exp(self.shape * strain / self.strain) / np.expm1(self.shape)
+        found: Array = np.where(strain > 0.0, self.factor * largest * rising, 0.0)
+        return found
+
+    @staticmethod
+    def _strain(lengths: Array, rest: Array, fibres: Array) -> Array:
+        """(M,) of the fibres, never below nought."""
+        found: Array = np.maximum((lengths - rest) / fibres, 0.0)
+        return found

@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinepipe.muscles.discs import (
+from spinepipe.muscles.myo_sim import multifidus_above_l1
+from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY
+from spinepipe.muscles.trunk_source import (
+    Fascicle,
     disc_areas,
     disc_heights,
     disc_tilts,
+    mirror_wrong_sides,
+    muscles_of,
+    sheath_of,
     tilts,
     vertebra_centres,
 )
-from spinepipe.muscles.fascicles import Fascicle, muscles_of, on_their_sides, sheath_of
-from spinepipe.muscles.repeated import multifidus_above_l1
-from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY
 
 L1, T12, T11 = (BODIES.index(name) for name in ("L1", "T12", "T11"))
 
@@ -75,11 +78,11 @@ def test_fascicles_on_the_wrong_side_are_mirrored_and_named() -> None:
     right, left = fascicle("a_r", 0, 1), fascicle("b_l", 0, 1)
     wrong = left.mirrored()
     middle = replace(right, name="c_r", point=right.point * [1.0, 1.0, 0.0])
-    kept, remarks = on_their_sides([right, wrong, middle])
+    kept, remarks = mirror_wrong_sides([right, wrong, middle])
     np.testing.assert_array_equal(kept[1].point, left.point)
     np.testing.assert_array_equal(kept[0].point, right.point)
     assert remarks == ("mirrored, because the source has them on the other side: b_l",)
-    assert on_their_sides([right, left, middle])[1] == ()
+    assert mirror_wrong_sides([right, left, middle])[1] == ()
     assert right.mirrored().on_wrong_side
     most = replace(right, point=np.array([[0, 0, -0.01], [0, 0, 0.02]]))
     assert not most.on_wrong_side
