@@ -40,7 +40,6 @@ from spinepipe.studies.discrepancy.rows import (
     held_out_rows,
     where_rows,
 )
-from spinepipe.studies.discrepancy.search.base import BUSHING
 from spinepipe.studies.discrepancy.search.baseline import NoBase
 from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, taken_up
 from spinepipe.studies.discrepancy.search.investigation import (
@@ -52,6 +51,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import model_file
+from spinepipe.studies.discrepancy.search.prediction import BUSHING
 from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, beyond
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner, Store

@@ -14,8 +14,7 @@ from spinepipe.cohort.measured import measured_specimen
 from spinepipe.cohort.specimen import spine_model
 from spinepipe.model.file import ModelFile, effects_for
 from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
-from spinepipe.studies.discrepancy.search.base import DAMPING
-from spinepipe.studies.discrepancy.search.baseline import BaselineFit
+from spinepipe.studies.discrepancy.search.baseline import DAMPING, BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
 from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
 from spinepipe.studies.discrepancy.search.prediction import Simulated

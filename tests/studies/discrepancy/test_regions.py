@@ -14,7 +14,7 @@ from spring_chain_cases import SD, Array
 
 from spinepipe.calibrate.profile import NEAR, RegionEnds
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.search.base import base_parameters
+from spinepipe.studies.discrepancy.search.baseline import base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (
     ActiveTerm,
     CandidateForm,

@@ -19,7 +19,6 @@ from itertools import combinations
 import numpy as np
 
 from spinepipe.decomposition import lstsq
-from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import (
@@ -266,12 +265,8 @@ def _one_step(supposed: Hypothesis, setting: Setting, name: str) -> float:
         predicted = simulated.at(np.zeros(len(member.free)))
     except NoEquilibrium:
         return np.inf
-    errors: list[Array] = [
-        np.nan_to_num(seen - test.mean)
-        for seen, test in zip(predicted.readings, one.tests, strict=True)
-    ]
     white = setting.whitenings[name]
-    residual, jacobian = white(errors), white(predicted.by_x)
+    residual, jacobian = white(one.errors(predicted.readings)), white(predicted.by_x)
     step, _ = lstsq(jacobian, residual)
     left = residual - jacobian @ step
     return float(left @ left)

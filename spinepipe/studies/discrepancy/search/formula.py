@@ -14,7 +14,6 @@ import numpy as np
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.proof.formula_folds import ChosenTerm, proof_of_terms
-from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
@@ -26,6 +25,7 @@ from spinepipe.studies.discrepancy.search.law_terms import (
     term_columns,
 )
 from spinepipe.studies.discrepancy.search.model_files import standard_errors
+from spinepipe.studies.discrepancy.search.prediction import bushing_stiffness
 from spinepipe.studies.discrepancy.search.pursuit import (
     EVERYWHERE,
     PursuitProblem,

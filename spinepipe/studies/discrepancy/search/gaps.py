@@ -1,6 +1,6 @@
 """How large a discrepancy is, in noise SD, over all readings or pooled by place."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,7 +53,11 @@ class Gap:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the gap: of the noncentrality that chi2 allows."""
+        """95 % interval of the gap: of the noncentrality that chi2 allows.
+
+        By inversion of the noncentral chi squared distribution; what fits leave is of that kind
+        where a model lacks something.
+        """
         return self._of(self._noncentrality(0.975)), self._of(self._noncentrality(0.025))
 
     @property
@@ -72,7 +76,7 @@ class Gap:
         """Noncentrality at which chi2 or less has that probability; 0 where none has."""
         if self.dof <= 0.0 or chndtr(self.chi2, self.dof, 1e-12) <= share:
             return 0.0
-        most = 2.0 * self.chi2 + 100.0
+        most = 2.0 * self.chi2 + 100.0  # the mean is dof + noncentrality: far beyond both limits
         found: float = brentq(
             lambda size: chndtr(self.chi2, self.dof, size) - share, 1e-12, most, xtol=1e-12
         )
@@ -129,11 +133,8 @@ def left_over(grounds: BaselineFit, fit: JointFit) -> dict[str, LeftOver]:
     found = {}
     for name, one in grounds.readings.items():
         white = grounds.setting.whitenings[name]
-        errors = [
-            np.nan_to_num(seen - test.mean)
-            for seen, test in zip(fit.predicted[name], one.tests, strict=True)
-        ]
-        residual = white.left_over(grounds.plain[name].noise_only(errors))
+        plain = grounds.plain[name].noise_only(one.errors(fit.predicted[name]))
+        residual = white.left_over(plain)
         freedom = white.freedom * (1.0 - unknowns / total)
         found[name] = LeftOver(_spread(residual, white.used), _spread(freedom, white.used))
     return found
@@ -161,22 +162,14 @@ def gap_of(residuals: list[tuple[Array, ...]], freedoms: list[tuple[Array, ...]]
 
 def residual_frame(grounds: BaselineFit, fit: JointFit, joints: Sequence[str]) -> pd.DataFrame:
     """One row per reading: where it is, squared residual in noise SD, freedom it keeps."""
-    rows = [
-        row
-        for name, left in left_over(grounds, fit).items()
-        for row in _rows(grounds, name, left, joints)
-    ]
+    rows = []
+    for name, left in left_over(grounds, fit).items():
+        tests = grounds.readings[name].tests
+        for test, residual, freedom in zip(tests, left.residual, left.freedom, strict=True):
+            for t, j, c in zip(*test.count.nonzero(), strict=True):
+                place = (name, test.case.test, test.case.steps[t].step, joints[j], COORDINATES[c])
+                rows.append((*place, residual[t, j, c] ** 2, freedom[t, j, c]))
     return pd.DataFrame(rows, columns=[*KEYS, "chi2", "freedom"])
-
-
-def _rows(
-    grounds: BaselineFit, name: str, left: LeftOver, joints: Sequence[str]
-) -> Iterator[tuple[object, ...]]:
-    tests = grounds.readings[name].tests
-    for test, residual, freedom in zip(tests, left.residual, left.freedom, strict=True):
-        for t, j, c in zip(*test.count.nonzero(), strict=True):
-            place = (name, test.case.test, test.case.steps[t].step, joints[j], COORDINATES[c])
-            yield (*place, residual[t, j, c] ** 2, freedom[t, j, c])
 
 
 def places(frame: pd.DataFrame) -> list[GapPlace]:

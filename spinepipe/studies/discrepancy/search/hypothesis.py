@@ -261,6 +261,12 @@ class HypothesisMember:
     free: tuple[FreeParameter, ...]
     numbers: tuple[int, ...]
 
+    def among_all(self, own: Array, unknowns: int) -> Array:
+        """(N, m) columns (N, k) by its own unknowns put in their places among all."""
+        whole = np.zeros((len(own), unknowns))
+        np.add.at(whole.T, np.array(self.numbers), own.T)  # one number may stand for several
+        return whole
+
 
 @dataclass(frozen=True)
 class Hypothesis:

@@ -16,11 +16,11 @@ from scipy.stats import t as student
 
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap, gap_of, left_over, whole_gap
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
+from spinepipe.studies.discrepancy.search.prediction import bushing_stiffness
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.whitening import Whitening
 from spinepipe.studies.discrepancy.store import PieceRunner
@@ -187,9 +187,7 @@ def _parts(grounds: BaselineFit, fit: JointFit) -> list[_SpecimenBlock]:
     found = []
     for name, member in fit.hypothesis.members.items():
         white = grounds.setting.whitenings[name]
-        own = white.lengthened(fit.jacobians[name])
-        whole = np.zeros((len(own), len(fit.x)))
-        np.add.at(whole.T, np.array(member.numbers), own.T)
+        whole = member.among_all(white.lengthened(fit.jacobians[name]), len(fit.x))
         residual = -white.lengthened(fit.residuals[name])  # measured less predicted
         found.append(_SpecimenBlock(white.moves, _inverse(white), whole, residual))
     return found

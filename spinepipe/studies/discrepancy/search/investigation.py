@@ -12,11 +12,13 @@ from spinepipe.model.file import ModelFile
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
-from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_model, base_parameters
 from spinepipe.studies.discrepancy.search.baseline import (
+    PER_SPECIMEN,
     BaselineFit,
     BaselineModels,
     NoBase,
+    base_model,
+    base_parameters,
     fit_baseline,
 )
 from spinepipe.studies.discrepancy.search.hypothesis import trials

@@ -18,9 +18,8 @@ from scipy.special import logsumexp
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.studies.discrepancy.search.base import BUSHING
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen, bushing_stiffness
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
@@ -87,7 +86,8 @@ def generic_columns(
     motions = solved.poses
     largest = [np.abs(q).max(axis=0) for q in (motions if reached is None else reached)]
     reach = np.maximum(np.max(largest, axis=0), LEAST_REACH)
-    stiffness = _stiffness(model)
+    bushings = bushing_stiffness(model)
+    stiffness = np.where(bushings > 0.0, bushings, 1.0)  # 1 where a joint has none
     terms: list[Term] = []
     moved: list[list[Array]] = [[] for _ in cases]
     for name in coordinates:
@@ -100,7 +100,7 @@ def generic_columns(
             ]
         size = SIZE * stiffness[:, at] * reach[:, at]
         loads = [_loads(motion / reach, at, coordinates) * size[:, None] for motion in motions]
-        by_load = solved.by_loads([_alone(one, at) for one in loads])
+        by_load = solved.by_loads(loads, at)
         for place, motion in enumerate(motions):
             ramp = np.linspace(0.0, 1.0, len(motion))[:, None]
             shift = np.tile(
@@ -111,15 +111,6 @@ def generic_columns(
     stacked = [np.concatenate(columns, axis=-1) for columns in moved]
     seen = [subtract_baseline(c, zeroed) for c in stacked]
     return GenericColumns(tuple(terms), tuple(seen))
-
-
-def _stiffness(model: SpineModel) -> Array:
-    """(J, 6) of the bushings, the sum where there are several; 1 where a joint has none."""
-    total = np.zeros((model.n_joints, 6))
-    for scoped in model.effects:
-        if scoped.effect.name == BUSHING:
-            total[list(scoped.joints)] += scoped.values
-    return np.where(total > 0.0, total, 1.0)
 
 
 def _counts(coordinates: int, shifts: int) -> dict[str, int]:
@@ -146,15 +137,6 @@ def _loads(u: Array, at: int, coordinates: Sequence[str]) -> Array:
     above, below = np.zeros_like(own), np.zeros_like(own)
     above[:, :-1], below[:, 1:] = own[:, 1:], own[:, :-1]
     return np.stack([*found, above, below], axis=-1)
-
-
-def _alone(loads: Array, at: int) -> Array:
-    """(T, J, 6, K x J) each term's load (T, J, K) at each joint alone, terms first."""
-    steps, joints, count = loads.shape
-    alone = np.zeros((steps, joints, 6, count, joints))
-    every = np.arange(joints)
-    alone[:, every, at, :, every] = loads.swapaxes(0, 1)
-    return alone.reshape(steps, joints, 6, count * joints)
 
 
 def _readings(by_step: Array, size: Array, at: int) -> Array:
@@ -204,7 +186,9 @@ class LackOfFit(LackOfFitTest):
 
 
 @dataclass(frozen=True)
-class _SpecimenResiduals:
+class _FamilyEvidence:
+    """Of one family at one coordinate: log evidence (1 + D,), drop of chi2 of the data."""
+
     family: str
     coordinate: str
     spread: PlaceSpread
@@ -232,7 +216,7 @@ def lack_of_fit(
     return LackOfFit(**vars(whole), at=at)
 
 
-def _lack(parts: Sequence[_SpecimenResiduals]) -> LackOfFitTest:
+def _lack(parts: Sequence[_FamilyEvidence]) -> LackOfFitTest:
     logs = logsumexp(np.stack([part.logs for part in parts]), axis=0) - np.log(len(parts))
     best = max(parts, key=lambda part: part.logs[0])
     share = np.log(len(parts))
@@ -265,7 +249,7 @@ def _problem(
 
 def _part(
     problem: Linearised, terms: Sequence[Term], family: str, coordinate: str, spread: PlaceSpread
-) -> _SpecimenResiduals:
+) -> _FamilyEvidence:
     chosen = [
         number
         for number, term in enumerate(terms)
@@ -285,14 +269,9 @@ def _part(
     if spread is PlaceSpread.EACH:
         gram, moment, shared = block_diag(*grams), np.concatenate(moments), np.concatenate(coupled)
     else:
-        gram, moment, shared = _added(grams), _added(moments), _added(coupled)
+        gram, moment, shared = (np.sum(parts, axis=0) for parts in (grams, moments, coupled))
     gram, moment = problem.without_shared(gram, moment, shared)
     group = Group.of(gram, np.zeros(len(gram)))
     estimate = group.estimate(moment[:, 0])
     explained = float(2.0 * estimate @ moment[:, 0] - estimate @ gram @ estimate)
-    return _SpecimenResiduals(family, coordinate, spread, group.log_evidence(moment), explained)
-
-
-def _added(arrays: Sequence[Array]) -> Array:
-    total: Array = np.sum(arrays, axis=0)
-    return total
+    return _FamilyEvidence(family, coordinate, spread, group.log_evidence(moment), explained)

@@ -137,7 +137,7 @@ def term_columns(
         springs = (stiffness[:, at] * reach[:, at])[:, None]
         sizes.append((springs / np.where(strongest > 0.0, strongest, np.inf)).T)
         terms += own
-        for place, by_load in enumerate(solved.by_loads([_alone(one, at) for one in loads])):
+        for place, by_load in enumerate(solved.by_loads(loads, at)):
             moved[place].append(subtract_baseline(by_load, zeroed))
     for name in coordinates:
         at = COORDINATES.index(name)
@@ -219,15 +219,6 @@ def _powers(q: Array, name: str, coordinates: Sequence[str]) -> Iterator[Valued]
     for a, b in combinations(others, 2):
         x, y = (q[..., COORDINATES.index(one)] for one in (a, b))
         yield term(f"{a} x {b}".replace("_", " "), x * y, a, b)
-
-
-def _alone(loads: Array, at: int) -> Array:
-    """(T, J, 6, K x J) each term's load (T, J, K) at each joint alone, terms first."""
-    steps, joints, count = loads.shape
-    alone = np.zeros((steps, joints, 6, count, joints))
-    every = np.arange(joints)
-    alone[:, every, at, :, every] = loads.swapaxes(0, 1)
-    return alone.reshape(steps, joints, 6, count * joints)
 
 
 def _drift(shape: tuple[int, ...], at: int) -> Array:

@@ -12,9 +12,8 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase
-from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.hypothesis import Variant
-from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen, bushing_stiffness
 from spinepipe.studies.discrepancy.search.projected import (
     EVERY_TEST,
     VariantColumn,

@@ -22,7 +22,9 @@ from spinepipe.statics.batched import (
     readings_by,
 )
 from spinepipe.statics.batched.solve import carried
-from spinepipe.units import subtract_baseline
+from spinepipe.units import COORDINATES, subtract_baseline
+
+BUSHING = "linear_bushing"
 
 SAME = 1e-7
 """m and rad by which a pose may differ when it is solved afresh from the neutral pose."""
@@ -93,28 +95,23 @@ class JointPrediction:
         dq = poses_by(stack, q, self._free)
         self._last = (every, q, dq)
         seen, by_x = readings(stack, q), readings_by(stack, q, dq, self._free)
-        return {
-            name: self._predicted(stack, number, q, seen, by_x[..., : len(x[name])])
-            for number, name in enumerate(names)
-        }
+        predicted = {}
+        for number, name in enumerate(names):
+            # the stack has all steps of all tests one under the other: those of each test
+            runs = range(self._runs[number], self._runs[number + 1])
+            tests = [slice(stack.first[run], stack.first[run + 1]) for run in runs]
+            own = by_x[..., : len(x[name])]
+            predicted[name] = Predicted(
+                tuple(subtract_baseline(seen[steps], self.zeroed) for steps in tests),
+                tuple(subtract_baseline(own[steps], self.zeroed) for steps in tests),
+                tuple(q[steps].reshape(len(q[steps]), -1) for steps in tests),
+            )
+        return predicted
 
     def model(self, name: str, x: Array) -> SpineModel:
         """The model of a specimen with its unknowns moved by x (m,)."""
         one = self.subjects[name]
         return with_parameters(one.model, one.free, x)
-
-    def _predicted(
-        self, stack: Stack, number: int, q: Array, seen: Array, by_x: Array
-    ) -> Predicted:
-        tests = [
-            slice(stack.first[run], stack.first[run + 1])
-            for run in range(self._runs[number], self._runs[number + 1])
-        ]
-        return Predicted(
-            tuple(subtract_baseline(seen[lanes], self.zeroed) for lanes in tests),
-            tuple(subtract_baseline(by_x[lanes], self.zeroed) for lanes in tests),
-            tuple(q[lanes].reshape(len(q[lanes]), -1) for lanes in tests),
-        )
 
     def _padded(self, x: Sequence[Array]) -> Array:
         """(M, m) unknowns of each specimen, those that it does not have zero."""
@@ -248,13 +245,32 @@ class SolvedSpecimen:
             found.append(tuple(subtract_baseline(one, self.zeroed) for one in tests))
         return found
 
-    def by_loads(self, loads: Sequence[Array]) -> tuple[Array, ...]:
-        """(T, J, 6, m) motion by loads (T, J, 6, m) that hold the joints besides their laws."""
-        sources = np.negative(np.concatenate(list(loads)))
+    def by_loads(self, loads: Sequence[Array], at: int) -> tuple[Array, ...]:
+        """(T, J, 6, K x J) motion by each load (T, J, K) at each joint alone, loads first.
+
+        ``at``: the coordinate on which the loads hold the joints besides their laws.
+        """
+        alone = []
+        for one in loads:
+            steps, joints, count = one.shape
+            apart = np.zeros((steps, joints, 6, count, joints))
+            every = np.arange(joints)
+            apart[:, every, at, :, every] = one.swapaxes(0, 1)
+            alone.append(apart.reshape(steps, joints, 6, count * joints))
+        sources = np.negative(np.concatenate(alone))
         return self._by_test(answered(self._stack, self._q, sources))
 
     def _by_test(self, of_lanes: Array) -> tuple[Array, ...]:
         return tuple(np.split(of_lanes, self._stack.first[1:-1]))
+
+
+def bushing_stiffness(model: SpineModel) -> Array:
+    """(J, 6) N/m and N m/rad, of all linear bushings of each joint together."""
+    total = np.zeros((model.n_joints, len(COORDINATES)))
+    for scoped in model.effects:
+        if scoped.effect.name == BUSHING:
+            total[list(scoped.joints)] += scoped.values
+    return total
 
 
 def _must_stand(found: StepPoses, stack: Stack, models: Sequence[SpineModel]) -> None:
