@@ -9,7 +9,7 @@ import pytest
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.search import examination
+from spinepipe.studies.discrepancy.search import search as examination
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import Rival, SearchStage

@@ -14,15 +14,16 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect
 from spinepipe.statics import FreeParameter
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.formula import formula, text_of
-from spinepipe.studies.discrepancy.search.law_terms import LawTerm, tell_time, term_columns
-from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
-from spinepipe.studies.discrepancy.search.pursuit import (
+from spinepipe.studies.discrepancy.search.formula import (
     EVERYWHERE,
     PursuitProblem,
     TermAtPlace,
     _WhitenedColumns,
+    formula,
+    text_of,
 )
+from spinepipe.studies.discrepancy.search.law_terms import LawTerm, tell_time, term_columns
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 from spinepipe.units import ROTATIONS
 

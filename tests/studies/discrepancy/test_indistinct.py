@@ -8,7 +8,7 @@ from sweeps import sweep
 from spinepipe.effects import Wrench
 from spinepipe.effects.registry import registered
 from spinepipe.model import LoadCase, LoadStep
-from spinepipe.studies.discrepancy.search.indistinct import cannot_be_excluded
+from spinepipe.studies.discrepancy.search.outcome import cannot_be_excluded
 
 LEVELS = (0.0, 4.0, 8.0, 4.0, 0.0)
 TIMES = (0.0, 30.0, 60.0, 90.0, 120.0)

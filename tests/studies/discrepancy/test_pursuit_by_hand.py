@@ -7,9 +7,9 @@ import pytest
 from sweeps import sweep
 from test_formula import ALL, ONE, made_up
 
-from spinepipe.studies.discrepancy.search import pursuit
+from spinepipe.studies.discrepancy.search import formula
+from spinepipe.studies.discrepancy.search.formula import EVERYWHERE, PursuitProblem
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, TermColumns
-from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, PursuitProblem
 
 SQUARE = LawTerm("extension", "load", "extension^2", (0, 2, 0, 0), ("extension", "extension"))
 
@@ -31,7 +31,7 @@ def test_a_term_that_keeps_a_ten_thousandth_beside_the_rest_is_one(
 ) -> None:
     """A column of length one, whose square lies so much across what is taken out."""
     column = np.array([[np.sqrt(1.0 - left)], [np.sqrt(left)]])
-    part = pursuit._WhitenedColumns(column, np.ones(1))
+    part = formula._WhitenedColumns(column, np.ones(1))
     shared, errors = np.array([[1.0], [0.0]]), np.array([[0.0, 0.0], [3.0, 1.0]])
     problem = PursuitProblem((SQUARE,), 1, (part,), (0, 2), shared, errors, 1.0)
     values, drops = problem._drops(shared, errors)
@@ -54,17 +54,17 @@ def test_candidates_are_of_each_joint_and_specimen_and_of_all() -> None:
 def test_a_joint_alone_has_a_column_for_each_term() -> None:
     moved = np.arange(2.0 * 6 * 3).reshape(2, 1, 6, 3)
     one = TermColumns((SQUARE,) * 3, (moved,), np.ones((3, 1)))
-    assert pursuit._with_sums(one, 1)[0] is moved
+    assert formula._with_sums(one, 1)[0] is moved
     each = np.arange(4.0).reshape(1, 1, 1, 4) * np.ones((2, 2, 6, 1))
     both = TermColumns((SQUARE,) * 2, (each,), np.ones((2, 2)))
-    found = pursuit._with_sums(both, 2)[0]
+    found = formula._with_sums(both, 2)[0]
     assert found[0, 0, 0].tolist() == [1.0, 0.0, 1.0, 5.0, 2.0, 3.0]
 
 
 def test_what_columns_span_is_as_wide_as_they_are_apart() -> None:
     """Columns of other units, one of nothing, one that the others make."""
     columns_of = np.array([[1e-6, 0.0, 2.0, 1.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
-    basis = pursuit._orthonormal(columns_of)
+    basis = formula._orthonormal(columns_of)
     assert basis.shape == (3, 2)
     np.testing.assert_allclose(basis @ basis.T, np.diag([1.0, 1.0, 0.0]), atol=1e-12)
-    assert pursuit._orthonormal(np.zeros((3, 0))).shape == (3, 0)
+    assert formula._orthonormal(np.zeros((3, 0))).shape == (3, 0)

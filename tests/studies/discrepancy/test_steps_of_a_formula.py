@@ -12,9 +12,14 @@ from test_formula import ALL
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import formula as formulas
-from spinepipe.studies.discrepancy.search.formula import _FormulaState, _Term
+from spinepipe.studies.discrepancy.search.formula import (
+    EVERYWHERE,
+    Ranked,
+    TermAtPlace,
+    _FormulaState,
+    _Term,
+)
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, TermColumns
-from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, Ranked, TermAtPlace
 
 TESTS, STEPS, JOINTS, TERMS = 2, 3, 2, 3
 SQUARE = LawTerm("extension", "load", "extension^2", (0, 2, 0, 0), ("extension", "extension"))
@@ -255,7 +260,7 @@ def proven(beats: Sequence[bool], tells: bool, monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setattr(formulas, "proof_of_terms", proof)
     told = [SimpleNamespace(explained=0.8)]
-    monkeypatch.setattr(formulas, "_told", lambda state: told * len(state.terms))
+    monkeypatch.setattr(formulas, "_valued_terms", lambda state: told * len(state.terms))
     monkeypatch.setattr(formulas, "text_of", lambda terms: "text")
     found = formulas.formula(None, (), 10, 0, 0.01)  # type: ignore[arg-type]
     assert (found is None) is (not any(beats) and tells)
@@ -297,7 +302,7 @@ def test_a_term_is_told_with_its_value_in_units_of_tables() -> None:
         _Term(law, TermAtPlace(0, 1, 1), None, 0.25),
         _Term(RATE, TermAtPlace(1, EVERYWHERE, EVERYWHERE), 0, 0.5),
     )
-    first, second = formulas._told(_FormulaState(grounds, {}, problem, terms))
+    first, second = formulas._valued_terms(_FormulaState(grounds, {}, problem, terms))
     assert (first.specimen, first.joint, first.coordinate) == ("b", "L4L5", "anterior")
     assert (first.coefficient, first.sd, first.explained) == pytest.approx((4.0, 2.0, 0.25))
     assert (second.specimen, second.joint) == ("*", "*")

@@ -22,7 +22,6 @@ from spinepipe.studies.discrepancy.search.baseline import (
     fit_baseline,
 )
 from spinepipe.studies.discrepancy.search.hypothesis import trials
-from spinepipe.studies.discrepancy.search.indistinct import cannot_be_excluded
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.noise import (
     Noise,
@@ -30,7 +29,7 @@ from spinepipe.studies.discrepancy.search.noise import (
     without_outliers,
 )
 from spinepipe.studies.discrepancy.search.nuisance import as_si
-from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
+from spinepipe.studies.discrepancy.search.outcome import Outcome, cannot_be_excluded, outcome
 from spinepipe.studies.discrepancy.search.prediction import recorded
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
