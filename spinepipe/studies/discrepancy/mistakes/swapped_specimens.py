@@ -30,7 +30,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, SolvedSpecimen
-from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD, Screen
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, look
@@ -74,7 +74,11 @@ def exchanged(
     grounds : of the base. trials : effects that may be missing. found : where the search ended.
     """
     pairs, every = _promising(grounds), tuple(trials)
-    as_read = _as_read(grounds, run, every, found) if pairs else 0.0
+    as_read = 0.0
+    if pairs and every:  # log evidence of the effects that explain what the base leaves as it is
+        first = found.stages[0].screen if found else run(_look, grounds, every)
+        of_standing = sum(one.log_evidence for one in found.standing) if found else 0.0
+        as_read = max(0.0, first.effects[0].log_evidence, of_standing)
     ways = tuple(_ways(grounds, run, found)) if pairs else ()
     tried = run.map(_exchange, [(grounds, pair, every, as_read, ways) for pair in pairs])
     strong = [one for one in tried if one is not None and one.evidence > NEEDED]
@@ -142,17 +146,6 @@ def _exchange(
     return max(best, key=lambda one: one.evidence)
 
 
-def _as_read(
-    grounds: BaselineFit, run: PieceRunner, trials: Sequence[Trials], found: SearchResult | None
-) -> float:
-    """Log evidence of the effects that explain what the base leaves of the readings as they are."""
-    if not trials:
-        return 0.0
-    first = found.stages[0].screen if found else run(_look, grounds, trials)
-    standing_ones = sum(one.log_evidence for one in found.standing) if found else 0.0
-    return max(0.0, first.effects[0].log_evidence, standing_ones)
-
-
 def _look(grounds: BaselineFit, trials: Sequence[Trials]) -> Screen:
     return look(grounds, trials, 0, 0.5, 0, LEAST_THRESHOLD)
 
@@ -184,6 +177,7 @@ def _compared(
     ----------
     more : evidence besides. effects : log evidence of those that explain what ``after`` leaves.
     """
+    # the ratio of likelihoods at equal numbers of unknowns, its error SDs as large as what stays
     chi2 = _chi2(before), _chi2(after)
     count = sum(len(r) for r in after.fit.residuals.values())
     unexplained = max(1.0, (chi2[1] - 2.0 * effects) / count)
@@ -235,17 +229,12 @@ def _readings(a: SpecimenReadings, b: SpecimenReadings) -> dict[str, SpecimenRea
     shapes = [[(t.case.test, t.cycles.shape) for t in one.tests] for one in (a, b)]
     if shapes[0] != shapes[1]:
         return None
-    return {
-        mine.specimen: replace(mine, tests=_with_cycles(mine.tests, other.tests))
-        for mine, other in ((a, b), (b, a))
-    }
-
-
-def _with_cycles(tests: Sequence[Repeats], others: Sequence[Repeats]) -> tuple[Repeats, ...]:
-    """Tests with the readings of others."""
-    return tuple(
-        replace(test, cycles=other.cycles) for test, other in zip(tests, others, strict=True)
-    )
+    found = {}
+    for mine, other in ((a, b), (b, a)):
+        pairs = zip(mine.tests, other.tests, strict=True)
+        tests = tuple(replace(test, cycles=of_other.cycles) for test, of_other in pairs)
+        found[mine.specimen] = replace(mine, tests=tests)
+    return found
 
 
 def _models(models: Mapping[str, SpineModel], pair: tuple[str, str]) -> dict[str, SpineModel]:
