@@ -118,7 +118,7 @@ def test_the_terms_of_a_place_stand_together() -> None:
 )
 def test_units_of_coefficients(coordinate: str, powers: tuple, unit: str, border: float) -> None:
     term = LawTerm(coordinate, "load", "", powers)
-    assert (term.unit, term.border) == (unit, pytest.approx(border))
+    assert (term.unit, term.display_per_si) == (unit, pytest.approx(border))
 
 
 # Columns, against the sensitivities of the simulator to an effect that is off

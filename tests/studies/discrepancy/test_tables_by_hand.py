@@ -114,15 +114,15 @@ def test_a_term_of_a_formula_is_tabulated_at_its_place_over_each_of_its_motions(
 
 def test_a_table_goes_as_far_as_all_specimens_move() -> None:
     """As read, or in the model; to three digits."""
-    at = grounds({"a": readings(0.1, -0.21234), "b": readings(0.3)})
-    reach = dict(tables._variant(at, "extension", "extension").options)["reach"]
-    assert reach == 0.212
-    unread = grounds({"a": readings(0.1, 9.0, counts=[1, 0])})
-    assert tables._furthest(unread, "a", 3) == 0.1
+
+    def reach(at: Any) -> Any:
+        return dict(tables._variant(at, "extension", "extension").options)["reach"]
+
+    assert reach(grounds({"a": readings(0.1, -0.21234), "b": readings(0.3)})) == 0.212
+    assert reach(grounds({"a": readings(0.1, 9.0, counts=[1, 0])})) == 0.1
     predicted = np.zeros((2, 1, 6))
     predicted[1, 0, 3] = -0.4
-    moved = grounds({"a": readings(0.1)}, predicted={"a": (predicted,)})
-    assert tables._furthest(moved, "a", 3) == 0.4
+    assert reach(grounds({"a": readings(0.1)}, predicted={"a": (predicted,)})) == 0.4
 
 
 # Which

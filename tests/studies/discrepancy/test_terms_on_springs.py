@@ -112,7 +112,7 @@ def test_zeroed_columns_begin_with_nought() -> None:
 )
 def test_a_drift_is_told_over_a_whole_test(coordinate: str, unit: str, border: float) -> None:
     term = LawTerm(coordinate, READING, "", (0, 0, 0, 0))
-    assert (term.unit, term.border) == (unit, pytest.approx(border))
+    assert (term.unit, term.display_per_si) == (unit, pytest.approx(border))
     assert term.variant is None
 
 
@@ -130,4 +130,4 @@ def test_units_name_each_power_once(
     coordinate: str, powers: tuple[int, int, int, int], unit: str, border: float
 ) -> None:
     term = LawTerm(coordinate, "load", "", powers)
-    assert (term.unit, term.border) == (unit, pytest.approx(border))
+    assert (term.unit, term.display_per_si) == (unit, pytest.approx(border))

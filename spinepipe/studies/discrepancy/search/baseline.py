@@ -154,13 +154,11 @@ def fit_baseline(
         plain = _plain(by_name, noise)
     fit = first
     for _ in range(MOST_NUISANCES):
-        before = fit
-        whitenings = {
-            name: with_nuisances(
-                plain[name], _nuisances(before.models[name], one, noise.zeroed, priors)
-            )
-            for name, one in by_name.items()
-        }
+        before, whitenings = fit, {}
+        for name, one in by_name.items():
+            solved = SolvedSpecimen(before.models[name], one.cases, noise.zeroed)
+            moved = nuisance_signatures(solved, priors, one.coordinates)
+            whitenings[name] = with_nuisances(plain[name], moved)
         setting = Setting(by_name, whitenings, noise.zeroed)
         again = hypothesis(before.models, start.base, (), tests, start.bound)
         fit = _base_fit(again, setting, run)
@@ -170,24 +168,8 @@ def fit_baseline(
     return BaselineFit(by_name, noise, priors, start, tests, plain, setting, fit)
 
 
-def _nuisances(
-    model: SpineModel, one: SpecimenReadings, zeroed: bool, priors: NuisancePriors
-) -> tuple[Array, ...]:
-    return nuisance_signatures(SolvedSpecimen(model, one.cases, zeroed), priors, one.coordinates)
-
-
 def _plain(readings: Mapping[str, SpecimenReadings], noise: Noise) -> dict[str, Whitening]:
     return {name: whitening(one.tests, noise) for name, one in readings.items()}
-
-
-def _why_not(models: Hypothesis, setting: Setting) -> str:
-    """Why the models do not stand where their fit starts, by the engine of record; or nothing."""
-    for name, member in models.members.items():
-        try:
-            SolvedSpecimen(member.model, setting.readings[name].cases, setting.zeroed)
-        except NoEquilibrium as trouble:
-            return str(trouble)
-    return ""
 
 
 def _base_fit(models: Hypothesis, setting: Setting, run: PieceRunner) -> JointFit:
@@ -195,7 +177,13 @@ def _base_fit(models: Hypothesis, setting: Setting, run: PieceRunner) -> JointFi
     for _ in range(MOST_BASE_FITS):
         fit = run(joint_fit, models, setting, near)
         if not fit.usable:
-            raise NoBase(_why_not(models, setting) or fit.status)
+            # why the models do not stand where their fit starts, if they do not
+            for name, member in models.members.items():
+                try:
+                    SolvedSpecimen(member.model, setting.readings[name].cases, setting.zeroed)
+                except NoEquilibrium as trouble:
+                    raise NoBase(str(trouble) or fit.status) from None
+            raise NoBase(fit.status)
         if not fit.status:
             return fit
         members = {

@@ -22,7 +22,6 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, jo
 from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
 from spinepipe.studies.discrepancy.search.prediction import bushing_stiffness
 from spinepipe.studies.discrepancy.search.refit import standing
-from spinepipe.studies.discrepancy.search.whitening import Whitening
 from spinepipe.studies.discrepancy.store import PieceRunner
 
 EVERYWHERE = "*"
@@ -124,9 +123,20 @@ def taken_up(
     grounds: BaselineFit, fit: JointFit, joints: Sequence[str], run: PieceRunner
 ) -> AbsorbedGap:
     """What imperfections took up of what a fit would leave without them."""
-    places = _places(grounds, joints)
-    parts = _parts(grounds, fit)
-    posterior = _posterior(fit, parts)
+    places = tuple(
+        NuisancePlace(
+            specimen,
+            one.kind,
+            one.component,
+            EVERYWHERE if one.joint is None else joints[one.joint],
+            one.test,
+            one.sd,
+            one.unit,
+        )
+        for specimen in grounds.readings
+        for one in labels_of(grounds, specimen)
+    )
+    posterior = _posterior(fit, _parts(grounds, fit))
     return AbsorbedGap(
         run(gap_without, grounds, fit),
         whole_gap(grounds, fit),
@@ -157,22 +167,6 @@ def labels_of(grounds: BaselineFit, specimen: str) -> tuple[Label, ...]:
     return nuisance_labels(grounds.priors, stiffness, one.cases, one.coordinates)
 
 
-def _places(grounds: BaselineFit, joints: Sequence[str]) -> tuple[NuisancePlace, ...]:
-    return tuple(
-        NuisancePlace(
-            specimen,
-            one.kind,
-            one.component,
-            EVERYWHERE if one.joint is None else joints[one.joint],
-            one.test,
-            one.sd,
-            one.unit,
-        )
-        for specimen in grounds.readings
-        for one in labels_of(grounds, specimen)
-    )
-
-
 @dataclass(frozen=True)
 class _SpecimenBlock:
     """A specimen: U (N, K), H = (I + U'U)^-1 (K, K), J (N, m) of all unknowns, r (N,)."""
@@ -189,15 +183,11 @@ def _parts(grounds: BaselineFit, fit: JointFit) -> list[_SpecimenBlock]:
         white = grounds.setting.whitenings[name]
         whole = member.among_all(white.lengthened(fit.jacobians[name]), len(fit.x))
         residual = -white.lengthened(fit.residuals[name])  # measured less predicted
-        found.append(_SpecimenBlock(white.moves, _inverse(white), whole, residual))
+        # (I + U'U)^-1 from U = P S Q': I + Q ((1 + S^2)^-1 - I) Q'
+        shorter = (1.0 + white.shrink) ** 2 - 1.0
+        inverse = np.eye(white.mixing.shape[1]) + (white.mixing.T * shorter) @ white.mixing
+        found.append(_SpecimenBlock(white.moves, inverse, whole, residual))
     return found
-
-
-def _inverse(white: Whitening) -> Array:
-    """(K, K) (I + U'U)^-1."""
-    shorter = (1.0 + white.shrink) ** 2 - 1.0
-    result: Array = np.eye(white.mixing.shape[1]) + (white.mixing.T * shorter) @ white.mixing
-    return result
 
 
 @dataclass(frozen=True)
@@ -215,6 +205,8 @@ class _Posterior:
 
 def _posterior(fit: JointFit, parts: Sequence[_SpecimenBlock]) -> _Posterior:
     """Of all nuisances, with the unknowns of the fit free."""
+    # z given x, then L z by the precision of z with x integrated out: I + U' (I - J (P + J'J)^-1
+    # J') U applied to z
     prior = np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
     jacobians = [part.jacobian for part in parts]
     size = [part.inverse @ (part.moves.T @ part.residual) for part in parts]
@@ -269,6 +261,8 @@ def _mean(at: NuisancePlace, size: Array, covariance: Array) -> InCommon | None:
     Of random errors ``size`` is N(0, I - covariance): by their SDs as allowed for, and by their
     own scatter whatever their SDs.
     """
+    # what all have in common, m, is shrunk to (I - covariance) m, as the sizes are posterior means:
+    # generalised least squares for m in the eigenbasis
     values, vectors = eigh(np.eye(len(size)) - covariance)
     told = values > LEAST_TOLD
     ones = vectors[:, told].sum(axis=0) * np.sqrt(values[told])
@@ -297,15 +291,8 @@ def _groups(places: Sequence[NuisancePlace]) -> Mapping[NuisancePlace, Indices]:
         }
         for at in sorted(wider - {one}, key=str):
             found.setdefault(at, []).append(number)
-    return {
-        at: np.array(numbers)
-        for at, numbers in found.items()
-        if len(numbers) >= FEWEST_IN_COMMON and not _repeated(at, numbers, found)
-    }
-
-
-def _repeated(
-    at: NuisancePlace, numbers: list[int], found: Mapping[NuisancePlace, list[int]]
-) -> bool:
-    """Whether the same nuisances are another group already, as with one specimen or one joint."""
-    return next(other for other, same in found.items() if same == numbers) != at
+    # with one specimen or one joint several groups are the same: the first of them counts
+    first: dict[tuple[int, ...], NuisancePlace] = {}
+    for at, numbers in found.items():
+        first.setdefault(tuple(numbers), at)
+    return {at: np.array(n) for n, at in first.items() if len(n) >= FEWEST_IN_COMMON}

@@ -53,7 +53,7 @@ class LawTerm:
 
     @property
     def unit(self) -> str:
-        """Of the coefficient, at the border: N m or N, by rad, mm, s and N."""
+        """Of the coefficient in tables: N m or N, by rad, mm, s and N."""
         if self.acts == READING:
             return f"{'mm' if self.coordinate in TRANSLATIONS else 'deg'} per test"
         above = "N" if self.coordinate in TRANSLATIONS else "N m"
@@ -68,7 +68,7 @@ class LawTerm:
         return f"{above}/{below[0]}" if len(below) == 1 else f"{above}/({' '.join(below)})"
 
     @property
-    def border(self) -> float:
+    def display_per_si(self) -> float:
         """What one SI unit of the coefficient is in that unit."""
         if self.acts == READING:
             return MM_PER_M if self.coordinate in TRANSLATIONS else DEG_PER_RAD

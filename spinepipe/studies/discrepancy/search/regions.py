@@ -73,19 +73,7 @@ def estimated(fit: JointFit, setting: Setting, number: int) -> tuple[ValueWithRe
             None if end is None else in_tables(fit, unknown, end)[0]
             for end in (reach.low, reach.high)
         )
-        found.append(
-            ValueWithRegion(
-                value.name,
-                value.place,
-                value.value,
-                value.unit,
-                value.at_bound,
-                low,
-                high,
-                reach.open_below,
-                reach.open_above,
-            )
-        )
+        found.append(ValueWithRegion(**vars(value), **(vars(reach) | {"low": low, "high": high})))
     return tuple(found)
 
 
@@ -181,7 +169,7 @@ def _likeliest(fit: JointFit, point: Point, unknown: int, ruler: _Ruler) -> Best
     x[unknown] = ruler.mark(at)
     lower[unknown], upper[unknown] = ruler.limits(at, *reach)
     slope = ruler.slope(float(x[unknown]))
-    scale[unknown] /= slope
+    scale[unknown] /= slope  # as long a step on the ruler
     found = point(x)
     if found is None:
         return None

@@ -18,7 +18,7 @@ from spinepipe.studies.discrepancy.search.formula import formula
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
-from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, LackOfFitTest, lack_of_fit
+from spinepipe.studies.discrepancy.search.lack_of_fit import OWN, LackOfFit, lack_of_fit
 from spinepipe.studies.discrepancy.search.refit import laplace, standing
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD, exceeded
 from spinepipe.studies.discrepancy.search.search_state import Rules
@@ -91,11 +91,20 @@ def _forms(
     grounds: BaselineFit, lack: LackOfFit, found: Formula | None, false_alarm: float
 ) -> Iterator[CandidateForm]:
     """Tables worth a fit: where the generic basis or the formula sees a load over some motion."""
+    joints = next(iter(grounds.fit.models.values())).joints
     for coordinate, one in lack.at.items():
         evident = one.log_evidence > max(LEAST_THRESHOLD, exceeded(one.null, false_alarm))
-        if evident and one.family == "own":
-            yield from _of_lack(grounds, coordinate, one)
-    joints = next(iter(grounds.fit.models.values())).joints
+        if not evident or one.family != OWN:
+            continue
+        # the same everywhere, and as the lack differs
+        variant = _variant(grounds, coordinate, coordinate)
+        yield CandidateForm(variant, PlaceSpread.SHARED)
+        if one.spread is not PlaceSpread.SHARED and len(joints) > 1:
+            yield CandidateForm(variant, PlaceSpread.BY_JOINT)
+        if len(grounds.readings) > 1:
+            yield CandidateForm(variant, PlaceSpread.BY_SPECIMEN)
+        if one.spread is PlaceSpread.EACH:
+            yield CandidateForm(variant, PlaceSpread.EACH)
     for term in found.terms if found is not None else ():
         for along in dict.fromkeys((*term.of, *(term.of and (term.coordinate,)))):
             joint = None if term.joint == EVERY[0] else joints.index(term.joint)
@@ -108,33 +117,17 @@ def _forms(
                 yield CandidateForm(variant, spread, joint, specimen)
 
 
-def _of_lack(grounds: BaselineFit, coordinate: str, one: LackOfFitTest) -> Iterator[CandidateForm]:
-    variant = _variant(grounds, coordinate, coordinate)
-    joints = next(iter(grounds.fit.models.values())).n_joints
-    yield CandidateForm(variant, PlaceSpread.SHARED)
-    if one.spread is not PlaceSpread.SHARED and joints > 1:
-        yield CandidateForm(variant, PlaceSpread.BY_JOINT)
-    if len(grounds.readings) > 1:
-        yield CandidateForm(variant, PlaceSpread.BY_SPECIMEN)
-    if one.spread is PlaceSpread.EACH:
-        yield CandidateForm(variant, PlaceSpread.EACH)
-
-
 def _variant(grounds: BaselineFit, coordinate: str, along: str) -> Variant:
     """The table, as far as all specimens move: beyond, one would tell of the others."""
     at = COORDINATES.index(along)
-    furthest = min(_furthest(grounds, name, at) for name in grounds.readings)
-    reach = float(f"{furthest:.{DIGITS}g}")
+    furthest = []  # motion of each specimen in that coordinate, m or rad, in the model or as read
+    for name, one in grounds.readings.items():
+        moved = [np.abs(test.mean[..., at][test.count[..., at] > 0]) for test in one.tests]
+        moved += [np.abs(predicted[..., at]) for predicted in grounds.fit.predicted[name]]
+        furthest.append(max(float(of_test.max(initial=0.0)) for of_test in moved))
+    reach = float(f"{min(furthest):.{DIGITS}g}")
     over = ITSELF if along == coordinate else along
     return Variant(TABLE, (("coordinate", coordinate), ("over", over), ("reach", reach)))
-
-
-def _furthest(grounds: BaselineFit, specimen: str, at: int) -> float:
-    """The largest motion of a specimen in one coordinate, m or rad, in the model or as read."""
-    tests = grounds.readings[specimen].tests
-    found = [np.abs(test.mean[..., at][test.count[..., at] > 0]) for test in tests]
-    found += [np.abs(predicted[..., at]) for predicted in grounds.fit.predicted[specimen]]
-    return max(float(one.max(initial=0.0)) for one in found)
 
 
 def _fitted(grounds: BaselineFit, form: CandidateForm) -> tuple[float, BaselineFit] | None:

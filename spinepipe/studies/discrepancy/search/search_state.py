@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -188,6 +188,7 @@ class SearchState:
     ) -> None:
         self.base, self.rules, self.run, self.progress = base, rules, run, progress
         self.stages: list[SearchStage] = []
+        self._base_lack: LackOfFit | None = None
 
     @property
     def first(self) -> SearchStage:
@@ -206,42 +207,34 @@ class SearchState:
         if place and grounds is self.base:
             screen, tried = self.first.screen, self.first.refits
         else:
-            screen = self._look(grounds)
+            # the null's draws are those of the first look, beside the base alone
+            threshold = self.first.screen.threshold if self.stages else None
+            draws = (self.rules.draws, self.rules.false_alarm, self.rules.seed)
+            screen = self.run(look, grounds, self.rules.trials, *draws, threshold)
             best = screen.effects[0]
             self.progress.round(
                 f"round {len(self.stages) + 1}: {best.effect} leads {len(screen.effects)} effects "
                 f"with log evidence {best.log_evidence:.1f}, {screen.threshold:.1f} are needed"
             )
-            evident = not screen.effects[0].log_evidence <= screen.threshold
-            tried = self._refits(grounds, screen) if place or evident else ()
+            evident = not best.log_evidence <= screen.threshold
+            tried = ()
+            if place or evident:
+                tried = refits(grounds, screen, self.rules.trials, self.run, self.progress)
         number = 1 + sum(one.in_place == place for one in self.stages)
         name = f"in place of {in_place_of} ({number})" if place else str(number)
         beside = tuple(one.form.name for one in grounds.fit.hypothesis.supposed)
         self.stages.append(SearchStage(name, screen, tried, place, beside))
         return self.stages[-1]
 
-    def _look(self, grounds: BaselineFit) -> Screen:
-        """A screen; the null's draws are those of the first, beside the base alone."""
-        rules = self.rules
-        threshold = self.first.screen.threshold if self.stages else None
-        draws = (rules.draws, rules.false_alarm, rules.seed)
-        return self.run(look, grounds, rules.trials, *draws, threshold)
-
     def lack(self, grounds: BaselineFit) -> LackOfFit:
         """The generic basis beside the grounds' fit; that of the base is asked for again."""
-        return self._base_lack if grounds is self.base else self._lack(grounds)
-
-    @cached_property
-    def _base_lack(self) -> LackOfFit:
-        return self._lack(self.base)
-
-    def _lack(self, grounds: BaselineFit) -> LackOfFit:
-        rules = self.rules
-        return self.run(lack_of_fit, grounds, rules.coordinates, rules.draws, rules.seed)
-
-    def _refits(self, grounds: BaselineFit, screen: Screen) -> tuple[Refit, ...]:
-        """The forms that lead a screen, refitted; best first."""
-        return refits(grounds, screen, self.rules.trials, self.run, self.progress)
+        of_base = grounds is self.base
+        if of_base and self._base_lack:
+            return self._base_lack
+        asked = (self.rules.coordinates, self.rules.draws, self.rules.seed)
+        found: LackOfFit = self.run(lack_of_fit, grounds, *asked)
+        self._base_lack = found if of_base else self._base_lack
+        return found
 
     def refit(self, grounds: BaselineFit, one: ActiveTerm) -> Refit:
         """One form beside those of the grounds' fit."""
