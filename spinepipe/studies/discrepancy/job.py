@@ -41,18 +41,18 @@ from spinepipe.studies.discrepancy.rows import (
     where_rows,
 )
 from spinepipe.studies.discrepancy.search.baseline import NoBase
-from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, taken_up
+from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, absorbed_gap
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
     Prepared,
     investigate,
     on_record,
-    prepared,
+    prepare,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import model_file
 from spinepipe.studies.discrepancy.search.prediction import BUSHING
-from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, beyond
+from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, model_residual
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner, Store
 from spinepipe.studies.discrepancy.table_rows import tabulated_rows
@@ -164,7 +164,7 @@ def searched(
 ) -> DiscrepancyResults:
     """All that the files of a study hold, whether or not its base has a fit."""
     file = None if study.base.model is None else read_model(Path(root) / study.base.model)
-    ready = prepared(study, cohort, file)
+    ready = prepare(study, cohort, file)
     try:
         ended = investigate(ready, run, progress)
     except NoBase as trouble:
@@ -209,7 +209,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     seed, trials = ended.rules.seed, ended.rules.trials
     margin = ready.study.margin
     told = told_apart(ended.grounds, trials, needed, margin, ready.declared, seed, run)
-    ended = ended.as_told()
+    ended = ended.for_verdict()
     imperfect = _imperfections(ready.cohort.joint_names, ended, run)
     stays = _beyond(ended, run)
     hidden = hidden_effects(ended.found, ended.ended, ended.rules, run)
@@ -251,7 +251,7 @@ def _beyond(ended: Investigation, run: PieceRunner) -> ResidualModel:
     told = outcome.verdict in (Conclusion.UNKNOWN, Conclusion.PART)
     if not told or outcome.reason is Reason.DATA_ERRORS:
         return ResidualModel(None, None, final)
-    stays = beyond(final, ended.rules, run)
+    stays = model_residual(final, ended.rules, run)
     if stays.table is not None:
         on_record([stays.grounds.fit], final.readings, run)
     return stays
@@ -262,9 +262,9 @@ def _imperfections(
 ) -> Mapping[str, AbsorbedGap]:
     """What imperfections took up beside the base, and beside the model with the effects."""
     found = ended.found
-    base = taken_up(found.base, found.base.fit, joints, run)
+    base = absorbed_gap(found.base, found.base.fit, joints, run)
     same = found.final.fit is found.base.fit
-    final = base if same else taken_up(found.final, found.final.fit, joints, run)
+    final = base if same else absorbed_gap(found.final, found.final.fit, joints, run)
     return {"base": base, "with_effects": final}
 
 

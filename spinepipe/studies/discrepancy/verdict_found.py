@@ -15,7 +15,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
 from spinepipe.studies.discrepancy.search.investigation import Investigation, Prepared
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
-from spinepipe.studies.discrepancy.search.regions import ValueWithRegion, estimated
+from spinepipe.studies.discrepancy.search.regions import ValueWithRegion, values_with_regions
 from spinepipe.studies.discrepancy.search.residual_model import ResidualModel
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
@@ -147,7 +147,7 @@ def _missing(
         spread=form.spread.value,
         parameters=tuple(
             _estimate(value)
-            for value in run(estimated, found.final.fit, found.final.setting, number)
+            for value in run(values_with_regions, found.final.fit, found.final.setting, number)
         ),
         log_evidence=one.log_evidence,
         rivals=tuple(

@@ -17,7 +17,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     Trials,
     Variant,
 )
-from spinepipe.studies.discrepancy.search.refit import Refit, preferred
+from spinepipe.studies.discrepancy.search.refit import Refit, rank_refits
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
 from spinepipe.studies.discrepancy.search.search import examine
 from spinepipe.studies.discrepancy.search.search_state import SearchStage, SearchState
@@ -180,6 +180,6 @@ def test_a_plain_form_hardly_behind_stands_first(behind: float, first: int) -> N
         a_refit("creep", 40.0 - behind, 1),
         a_refit("hysteresis", 39.5, 1),
     ]
-    ranked = preferred(found)
+    ranked = rank_refits(found)
     assert (ranked[0].name, ranked[0].unknowns) == ("creep", first)
     assert sorted(one.log_evidence for one in ranked) == sorted(o.log_evidence for o in found)

@@ -15,9 +15,9 @@ from spinepipe.studies.discrepancy.search.imperfections import (
     AbsorbedGap,
     NuisancePlace,
     _mean,
+    absorbed_gap,
     in_common,
     labels_of,
-    taken_up,
 )
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
 from spinepipe.studies.discrepancy.store import at_once
@@ -32,7 +32,7 @@ AXES = ("anterior", "superior", "right")
 @pytest.fixture(scope="module")
 def shifted() -> tuple[BaselineFit, AbsorbedGap]:
     grounds = grounds_of(off_centre(alike(SHIFT_M)))
-    return grounds, taken_up(grounds, grounds.fit, JOINTS, at_once)
+    return grounds, absorbed_gap(grounds, grounds.fit, JOINTS, at_once)
 
 
 def centres(taken: AbsorbedGap) -> dict[tuple[str, str, str], tuple[float, float]]:
@@ -107,7 +107,7 @@ def test_random_centres_are_told_with_honest_errors_and_are_nothing_in_common():
     truth = {name: PRIOR_M * rng.standard_normal((len(JOINTS), 3)) for name in SPECIMENS}
     centres_alone = NuisancePriors(PRIOR_M, *[0.0] * 7)  # nothing else is wrong here
     grounds = grounds_of(off_centre(truth, seed=2), centres_alone)
-    taken = taken_up(grounds, grounds.fit, JOINTS, at_once)
+    taken = absorbed_gap(grounds, grounds.fit, JOINTS, at_once)
     away = [
         (size - truth[specimen][JOINTS.index(joint), AXES.index(axis)]) / sd
         for (specimen, joint, axis), (size, sd) in centres(taken).items()
@@ -182,7 +182,7 @@ def test_rows_and_words_say_what_was_taken_up(shifted):
 
 def test_where_nothing_is_allowed_for_nothing_is_taken_up():
     grounds = grounds_of(off_centre(alike(0.0 * SHIFT_M)), NuisancePriors(*[0.0] * 8))
-    taken = taken_up(grounds, grounds.fit, JOINTS, at_once)
+    taken = absorbed_gap(grounds, grounds.fit, JOINTS, at_once)
     assert (taken.each, taken.common, taken.linear_chi2) == ((), (), 0)
     assert taken.without.gap == pytest.approx(taken.beside.gap, abs=1e-4)
     assert "change little" in told_imperfections(taken).message

@@ -16,7 +16,7 @@ from spinepipe.studies.discrepancy.search.prediction import (
     Predicted,
     PredictedSpecimen,
     SolvedSpecimen,
-    recorded,
+    solve_on_record,
 )
 
 STIFFNESS = {"a": 40.0, "b": 60.0}
@@ -111,7 +111,7 @@ def test_first_poses_are_looked_for_near_those_that_are_told() -> None:
 
 def test_the_engine_of_record_is_asked_beside(monkeypatch: pytest.MonkeyPatch) -> None:
     model, given = chain("a", 40.0), cases(("extension",))
-    recorded(model, given)
+    solve_on_record(model, given)
     asked = []
 
     def elsewhere(*told: object) -> None:
@@ -119,7 +119,7 @@ def test_the_engine_of_record_is_asked_beside(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(prediction, "on_record", elsewhere)
     with pytest.raises(NoEquilibrium, match="a: the engine of record"):
-        recorded(model, given)
+        solve_on_record(model, given)
     ((_, _, (poses,), within),) = asked
     assert within == 1e-7
     expected = SolvedSpecimen(model, given, False).poses[0].reshape(6, -1)

@@ -81,7 +81,7 @@ def at_work(terms: Sequence[LawTerm], chi2: float = 100.0) -> Any:
     fit = SimpleNamespace(chi2=chi2, poses=None, hypothesis=SimpleNamespace(supposed=()))
     grounds = SimpleNamespace(readings={"a": None}, fit=fit, setting=None)
     problem = SimpleNamespace(terms=tuple(terms))
-    return SimpleNamespace(grounds=grounds, problem=problem, terms=())
+    return SimpleNamespace(baseline=grounds, problem=problem, terms=())
 
 
 class Fits:
@@ -146,7 +146,7 @@ def entered(
     here = at_work([law])
     monkeypatch.setattr(formulas, "_fit_with", Fits(*fits))
     grounds, (term,) = formulas._with_one_more(here, ranked([60.0]), excess)
-    return None if grounds is here.grounds else grounds, term
+    return None if grounds is here.baseline else grounds, term
 
 
 def test_a_law_enters_with_its_fit_and_its_share_of_what_is_above_the_noise(
@@ -250,7 +250,7 @@ def test_four_terms_at_most_enter(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def proven(beats: Sequence[bool], tells: bool, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many terms are put to the proof one after the other; the last is what is told."""
-    states = [SimpleNamespace(terms=range(n), linear=[], grounds=n) for n in range(3)]
+    states = [SimpleNamespace(terms=range(n), linear=[], baseline=n) for n in range(3)]
     monkeypatch.setattr(formulas, "_pursued", lambda *_: (states, 20.0))
     answers, asked = iter(beats), list[int]()
 

@@ -188,7 +188,7 @@ def test_three_tables_at_most_enter_one_for_each_law(
     monkeypatch.setattr(tables, "whole_gap", lambda at, fit: SimpleNamespace(gap=0.25))
     monkeypatch.setattr(tables, "proof_of_terms", lambda *_: SimpleNamespace(closed=0.75))
     before = grounds()
-    after, table = tables.tabulated(before, None, None, 0.01)  # type: ignore[arg-type]
+    after, table = tables.fit_tables(before, None, None, 0.01)  # type: ignore[arg-type]
     entered = min(worth, 3)
     assert asked == [8, 6, 4, 2][: min(worth + 1, 3)]
     assert (table is None) is (worth == 0)

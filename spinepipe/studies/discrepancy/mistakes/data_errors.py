@@ -35,7 +35,7 @@ from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     beside_the_curve,
     between_cycles,
 )
-from spinepipe.studies.discrepancy.mistakes.swapped_specimens import exchanged
+from spinepipe.studies.discrepancy.mistakes.swapped_specimens import swapped_pairs
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
@@ -52,7 +52,7 @@ APART = 30.0
 
 
 def suspected_errors(
-    grounds: BaselineFit,
+    baseline: BaselineFit,
     measured: Sequence[SpecimenReadings],
     run: PieceRunner,
     trials: Sequence[Trials] = (),
@@ -66,13 +66,13 @@ def suspected_errors(
     trials, search : effects that may be missing, and where the search for them ended: an exchange
         must explain the readings better.
     """
-    joints = next(iter(grounds.fit.models.values())).joints
-    found = [*before_a_fit(measured, joints, grounds.noise.sd, zeroed=grounds.noise.zeroed)]
+    joints = next(iter(baseline.fit.models.values())).joints
+    found = [*before_a_fit(measured, joints, baseline.noise.sd, zeroed=baseline.noise.zeroed)]
     if not _is_repeated(measured):
-        scatter = beside_the_curve(measured, grounds.fit.predicted)
-        found += bad_markers(scatter, list(grounds.readings), joints, in_every=True)
+        scatter = beside_the_curve(measured, baseline.fit.predicted)
+        found += bad_markers(scatter, list(baseline.readings), joints, in_every=True)
     if not found:
-        found += exchanged(grounds, run, trials, search)
+        found += swapped_pairs(baseline, run, trials, search)
     return tuple(found)
 
 

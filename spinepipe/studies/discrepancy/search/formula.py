@@ -189,15 +189,15 @@ class PursuitProblem:
 
 
 def pursuit_problem(
-    grounds: BaselineFit, columns: Mapping[str, TermColumns], draws: int, seed: int
+    baseline: BaselineFit, columns: Mapping[str, TermColumns], draws: int, seed: int
 ) -> PursuitProblem:
-    """The problem about the grounds' fit, with draws of the null."""
-    taken = taken_out(grounds.fit)
+    """The problem about the baseline's fit, with draws of the null."""
+    taken = taken_out(baseline.fit)
     parts, errors = [], []
     for number, (name, one) in enumerate(columns.items()):
         joints = one.sizes.shape[1]
-        plain = grounds.plain[name].noise_only(_with_sums(one, joints))
-        white = grounds.setting.whitenings[name].shortened(plain)
+        plain = baseline.plain[name].noise_only(_with_sums(one, joints))
+        white = baseline.setting.whitenings[name].shortened(plain)
         parts.append(_WhitenedColumns(taken[name].out_of(white), np.sum(plain**2, axis=0)))
         drawn_here = drawn(taken[name], draws, np.random.default_rng([seed, number]))
         errors.append(taken[name].out_of(drawn_here))
@@ -246,7 +246,7 @@ class _Term:
 class _FormulaState:
     """Terms so far, the fit with those that are laws, and the problem about it."""
 
-    grounds: BaselineFit
+    baseline: BaselineFit
     columns: Mapping[str, TermColumns]
     problem: PursuitProblem
     terms: tuple[_Term, ...]
@@ -258,18 +258,18 @@ class _FormulaState:
 
 
 def formula(
-    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
+    baseline: BaselineFit, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
 ) -> Formula | None:
-    """What the grounds' fit leaves as a formula; None where no term passes.
+    """What the baseline's fit leaves as a formula; None where no term passes.
 
     Parameters
     ----------
     draws : of the null; ``false_alarm`` : how often its best term may pass.
     """
-    states, threshold = _pursued(grounds, coordinates, draws, seed, false_alarm)
+    states, threshold = _pursued(baseline, coordinates, draws, seed, false_alarm)
     for state in states[:0:-1]:  # with all terms, then one less
         chosen = [_chosen(state, place) for place in state.linear]
-        proof = proof_of_terms(grounds, state.grounds, chosen)
+        proof = proof_of_terms(baseline, state.baseline, chosen)
         if proof.beats_base or not proof.tells:
             terms = _valued_terms(state)
             whole = min(sum(one.explained for one in terms), 1.0)
@@ -278,7 +278,7 @@ def formula(
 
 
 def _pursued(
-    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
+    baseline: BaselineFit, coordinates: Sequence[str], draws: int, seed: int, false_alarm: float
 ) -> tuple[list[_FormulaState], float]:
     """States with no term, one and so on; and what the first term had to explain."""
 
@@ -286,7 +286,7 @@ def _pursued(
         columns = terms_of(at, coordinates)
         return _FormulaState(at, columns, pursuit_problem(at, columns, draws, seed), terms)
 
-    states = [about(grounds, ())]
+    states = [about(baseline, ())]
     excess, threshold = states[0].problem.excess, None
     while len(states) <= MOST_TERMS:
         here = states[-1]
@@ -300,26 +300,26 @@ def _pursued(
     return states, threshold
 
 
-def terms_of(grounds: BaselineFit, coordinates: Sequence[str]) -> dict[str, TermColumns]:
+def terms_of(baseline: BaselineFit, coordinates: Sequence[str]) -> dict[str, TermColumns]:
     """Columns of all terms where the models of a fit stand, by specimen."""
-    timed = all(tell_time(one.cases) for one in grounds.readings.values())
+    timed = all(tell_time(one.cases) for one in baseline.readings.values())
     return {
         name: term_columns(
             model,
-            grounds.readings[name].cases,
-            grounds.noise.zeroed,
+            baseline.readings[name].cases,
+            baseline.noise.zeroed,
             coordinates,
             timed,
             np.where((k := bushing_stiffness(model)) > 0.0, k, 1.0),
         )
-        for name, model in grounds.fit.models.items()
+        for name, model in baseline.fit.models.items()
     }
 
 
 def _with_one_more(
     here: _FormulaState, ranked: Ranked, excess: float
 ) -> tuple[BaselineFit, tuple[_Term, ...]]:
-    """The grounds with one term more: the law that fits best, or the leader as it is."""
+    """The baseline with one term more: the law that fits best, or the leader as it is."""
     leader, drop = ranked.best[0], ranked.drops[0]
     above = max(excess, drop)
     law = here.problem.terms[leader.term]
@@ -328,14 +328,14 @@ def _with_one_more(
         if fitted is not None:
             at, place = fitted
             number = len(at.fit.hypothesis.supposed) - 1
-            gain = (here.grounds.fit.chi2 - at.fit.chi2) / above
+            gain = (here.baseline.fit.chi2 - at.fit.chi2) / above
             entered = _Term(here.problem.terms[place.term], place, number, gain)
             return at, (*here.terms, entered)
-    return here.grounds, (*here.terms, _Term(law, leader, None, drop / above))
+    return here.baseline, (*here.terms, _Term(law, leader, None, drop / above))
 
 
 def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[BaselineFit, TermAtPlace] | None:
-    """The grounds with the law, of those that lead, that fits best by the full simulator."""
+    """The baseline with the law, of those that lead, that fits best by the full simulator."""
     found: list[tuple[BaselineFit, TermAtPlace]] = []
     tried = 0
     for place, drop, value in zip(ranked.best, ranked.drops, ranked.values, strict=True):
@@ -345,8 +345,8 @@ def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[BaselineFit, TermAtP
         tried += 1
         (parameter,) = variant.create().parameters
         start = np.clip([value], 0.5 * parameter.low, 0.5 * parameter.high)
-        one = ActiveTerm(_form(variant, place, tuple(here.grounds.readings)), start)
-        at = _fit_with(here.grounds, one)
+        one = ActiveTerm(_form(variant, place, tuple(here.baseline.readings)), start)
+        at = _fit_with(here.baseline, one)
         if at is not None:
             found.append((at, place))
         if tried == MOST_REFITS:
@@ -354,14 +354,14 @@ def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[BaselineFit, TermAtP
     return min(found, key=lambda pair: pair[0].fit.chi2, default=None)
 
 
-def _fit_with(grounds: BaselineFit, one: ActiveTerm) -> BaselineFit | None:
-    """The grounds with an effect more; None where it has no fit or ends at a bound."""
-    before = grounds.fit
+def _fit_with(baseline: BaselineFit, one: ActiveTerm) -> BaselineFit | None:
+    """The baseline with an effect more; None where it has no fit or ends at a bound."""
+    before = baseline.fit
     for share in STARTS:
         supposed = (*standing(before), weaker(one, share))
-        fit = joint_fit(grounds.suppose(supposed), grounds.setting, before.poses)
+        fit = joint_fit(baseline.suppose(supposed), baseline.setting, before.poses)
         if fit.usable and not fit.at_bound.any() and fit.chi2 < before.chi2:
-            return grounds.at(fit)
+            return baseline.at(fit)
     return None
 
 
@@ -390,11 +390,11 @@ def _chosen(state: _FormulaState, one: TermAtPlace) -> ChosenTerm:
 
 def _valued_terms(state: _FormulaState) -> tuple[FormulaTerm, ...]:
     """The terms with their values, in the units of tables."""
-    fit = state.grounds.fit
+    fit = state.baseline.fit
     errors = standard_errors(fit)
     straight = iter(zip(*state.problem.fitted(state.linear), strict=True))
     joints = next(iter(fit.models.values())).joints
-    specimens = tuple(state.grounds.readings)
+    specimens = tuple(state.baseline.readings)
     found = []
     for one in state.terms:
         if one.number is None:

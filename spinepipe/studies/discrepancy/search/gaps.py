@@ -105,15 +105,15 @@ class GapPlace:
     gap: Gap
 
 
-def whole_gap(grounds: BaselineFit, fit: JointFit) -> Gap:
+def whole_gap(baseline: BaselineFit, fit: JointFit) -> Gap:
     """The gap over all readings."""
-    left = left_over(grounds, fit).values()
+    left = left_over(baseline, fit).values()
     return gap_of([one.residual for one in left], [one.freedom for one in left])
 
 
-def gaps_at(grounds: BaselineFit, fit: JointFit) -> dict[str, Gap]:
+def gaps_at(baseline: BaselineFit, fit: JointFit) -> dict[str, Gap]:
     """The gap over the readings of each coordinate that was read."""
-    left = left_over(grounds, fit).values()
+    left = left_over(baseline, fit).values()
     found = {}
     for place, name in enumerate(COORDINATES):
         residuals, freedoms = (
@@ -126,14 +126,14 @@ def gaps_at(grounds: BaselineFit, fit: JointFit) -> dict[str, Gap]:
     return found
 
 
-def left_over(grounds: BaselineFit, fit: JointFit) -> dict[str, LeftOver]:
+def left_over(baseline: BaselineFit, fit: JointFit) -> dict[str, LeftOver]:
     """What a fit leaves of every reading, nuisances at their most likely values."""
     unknowns = len(fit.x)
-    total = sum(float(w.freedom.sum()) for w in grounds.setting.whitenings.values())
+    total = sum(float(w.freedom.sum()) for w in baseline.setting.whitenings.values())
     found = {}
-    for name, one in grounds.readings.items():
-        white = grounds.setting.whitenings[name]
-        plain = grounds.plain[name].noise_only(one.errors(fit.predicted[name]))
+    for name, one in baseline.readings.items():
+        white = baseline.setting.whitenings[name]
+        plain = baseline.plain[name].noise_only(one.errors(fit.predicted[name]))
         residual = white.left_over(plain)
         freedom = white.freedom * (1.0 - unknowns / total)
         found[name] = LeftOver(_spread(residual, white.used), _spread(freedom, white.used))
@@ -160,11 +160,11 @@ def gap_of(residuals: list[tuple[Array, ...]], freedoms: list[tuple[Array, ...]]
     return Gap(float(np.sum(r[there] ** 2)), float(np.sum(f[there])), int(there.sum()))
 
 
-def residual_frame(grounds: BaselineFit, fit: JointFit, joints: Sequence[str]) -> pd.DataFrame:
+def residual_frame(baseline: BaselineFit, fit: JointFit, joints: Sequence[str]) -> pd.DataFrame:
     """One row per reading: where it is, squared residual in noise SD, freedom it keeps."""
     rows = []
-    for name, left in left_over(grounds, fit).items():
-        tests = grounds.readings[name].tests
+    for name, left in left_over(baseline, fit).items():
+        tests = baseline.readings[name].tests
         for test, residual, freedom in zip(tests, left.residual, left.freedom, strict=True):
             for t, j, c in zip(*test.count.nonzero(), strict=True):
                 place = (name, test.case.test, test.case.steps[t].step, joints[j], COORDINATES[c])

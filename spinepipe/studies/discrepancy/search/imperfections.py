@@ -119,8 +119,8 @@ class AbsorbedGap:
         return tuple(sorted(self.each, key=lambda one: -abs(one.size)))
 
 
-def taken_up(
-    grounds: BaselineFit, fit: JointFit, joints: Sequence[str], run: PieceRunner
+def absorbed_gap(
+    baseline: BaselineFit, fit: JointFit, joints: Sequence[str], run: PieceRunner
 ) -> AbsorbedGap:
     """What imperfections took up of what a fit would leave without them."""
     places = tuple(
@@ -133,13 +133,13 @@ def taken_up(
             one.sd,
             one.unit,
         )
-        for specimen in grounds.readings
-        for one in labels_of(grounds, specimen)
+        for specimen in baseline.readings
+        for one in labels_of(baseline, specimen)
     )
-    posterior = _posterior(fit, _parts(grounds, fit))
+    posterior = _posterior(fit, _parts(baseline, fit))
     return AbsorbedGap(
-        run(gap_without, grounds, fit),
-        whole_gap(grounds, fit),
+        run(gap_without, baseline, fit),
+        whole_gap(baseline, fit),
         tuple(
             Imperfection(place, float(size), float(sd), float(chi2))
             for place, size, sd, chi2 in zip(
@@ -150,21 +150,21 @@ def taken_up(
     )
 
 
-def gap_without(grounds: BaselineFit, fit: JointFit) -> Gap | None:
+def gap_without(baseline: BaselineFit, fit: JointFit) -> Gap | None:
     """The gap with everything that was fitted fitted again, and no nuisance; None without a fit."""
-    setting = Setting(grounds.readings, grounds.plain, grounds.noise.zeroed)
-    again = joint_fit(grounds.suppose(standing(fit)), setting, fit.poses)
+    setting = Setting(baseline.readings, baseline.plain, baseline.noise.zeroed)
+    again = joint_fit(baseline.suppose(standing(fit)), setting, fit.poses)
     if not again.usable:
         return None
-    left = left_over(replace(grounds, setting=setting), again).values()
+    left = left_over(replace(baseline, setting=setting), again).values()
     return gap_of([one.residual for one in left], [one.freedom for one in left])
 
 
-def labels_of(grounds: BaselineFit, specimen: str) -> tuple[Label, ...]:
+def labels_of(baseline: BaselineFit, specimen: str) -> tuple[Label, ...]:
     """What the nuisances of a specimen's whitening are, in their order."""
-    stiffness = bushing_stiffness(grounds.fit.models[specimen])
-    one = grounds.readings[specimen]
-    return nuisance_labels(grounds.priors, stiffness, one.cases, one.coordinates)
+    stiffness = bushing_stiffness(baseline.fit.models[specimen])
+    one = baseline.readings[specimen]
+    return nuisance_labels(baseline.priors, stiffness, one.cases, one.coordinates)
 
 
 @dataclass(frozen=True)
@@ -177,10 +177,10 @@ class _SpecimenBlock:
     residual: Array
 
 
-def _parts(grounds: BaselineFit, fit: JointFit) -> list[_SpecimenBlock]:
+def _parts(baseline: BaselineFit, fit: JointFit) -> list[_SpecimenBlock]:
     found = []
     for name, member in fit.hypothesis.members.items():
-        white = grounds.setting.whitenings[name]
+        white = baseline.setting.whitenings[name]
         whole = member.among_all(white.lengthened(fit.jacobians[name]), len(fit.x))
         residual = -white.lengthened(fit.residuals[name])  # measured less predicted
         # (I + U'U)^-1 from U = P S Q': I + Q ((1 + S^2)^-1 - I) Q'

@@ -30,7 +30,7 @@ from spinepipe.studies.discrepancy.search.noise import (
 )
 from spinepipe.studies.discrepancy.search.nuisance import as_si
 from spinepipe.studies.discrepancy.search.outcome import Outcome, cannot_be_excluded, outcome
-from spinepipe.studies.discrepancy.search.prediction import recorded
+from spinepipe.studies.discrepancy.search.prediction import solve_on_record
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
@@ -77,7 +77,7 @@ class Investigation:
     proof: HeldOut
     ended: Outcome
 
-    def as_told(self) -> "Investigation":
+    def for_verdict(self) -> "Investigation":
         """With the base in the place of a model whose effects the verdict does not stand for."""
         if self.ended.named or self.ended.tied:
             return self
@@ -85,7 +85,7 @@ class Investigation:
         return replace(self, found=found, proof=self.proof.of_base())
 
 
-def prepared(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepared:
+def prepare(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepared:
     """Readings and noise of a study, before anything is fitted."""
     motion = motion_read(cohort)
     motion = motion[motion["test"].isin(list(study.tests or cohort.tests))]
@@ -131,10 +131,10 @@ def investigate(
         study.most_effects,
         study.seed,
     )
-    grounds = base_fitted(ready, run)
-    found = search(grounds, rules, run, progress)
-    on_record([found.base.fit, found.final.fit], grounds.readings, run)
-    errors = suspected_errors(grounds, ready.measured, run, rules.trials, found)
+    baseline = fit_base(ready, run)
+    found = search(baseline, rules, run, progress)
+    on_record([found.base.fit, found.final.fit], baseline.readings, run)
+    errors = suspected_errors(baseline, ready.measured, run, rules.trials, found)
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
     # by each standing effect, others that what was recorded cannot exclude, if they are tried
@@ -148,7 +148,7 @@ def investigate(
         for effect in found.standing
     }
     ended = outcome(found, study.margin, proof, errors, not_excluded)
-    told = Investigation(grounds, rules, found, errors, proof, ended)
+    told = Investigation(baseline, rules, found, errors, proof, ended)
     return _with_sure_effects(told, asked, run)
 
 
@@ -177,11 +177,11 @@ def on_record(
         Where it differs by more than rounding.
     """
     models = [(name, model) for fit in fits for name, model in fit.models.items()]
-    run.map(recorded, [(model, readings[name].cases) for name, model in models])
+    run.map(solve_on_record, [(model, readings[name].cases) for name, model in models])
 
 
-def base_fitted(ready: Prepared, run: PieceRunner) -> BaselineFit:
-    """Grounds with the base fitted."""
+def fit_base(ready: Prepared, run: PieceRunner) -> BaselineFit:
+    """Baseline with the base fitted."""
     study = ready.study
     start = np.array(study.stiffness.in_order(), dtype=float)
     models = {
@@ -192,9 +192,9 @@ def base_fitted(ready: Prepared, run: PieceRunner) -> BaselineFit:
         name: base_parameters(model, grouping, ready.coordinates) for name, model in models.items()
     }
     begin = BaselineModels(models, base, study.bound_factor)
-    grounds = fit_baseline(
+    baseline = fit_baseline(
         ready.readings, ready.noise, as_si(study.nuisance.model_dump()), begin, run
     )
-    if grounds.noise.source == DECLARED and ready.declared is None:
+    if baseline.noise.source == DECLARED and ready.declared is None:
         raise NoBase("too few repeated readings to tell the noise: state measurement_sd")
-    return grounds
+    return baseline

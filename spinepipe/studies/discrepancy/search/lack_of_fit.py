@@ -197,11 +197,11 @@ class _FamilyEvidence:
 
 
 def lack_of_fit(
-    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
+    baseline: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
 ) -> LackOfFit:
-    """Evidence of the generic basis beside the grounds' fit."""
-    terms, problem = _problem(grounds, coordinates, draws, seed)
-    spreads = [s for s in SPREADS if not (s is PlaceSpread.EACH and len(grounds.readings) == 1)]
+    """Evidence of the generic basis beside the baseline's fit."""
+    terms, problem = _problem(baseline, coordinates, draws, seed)
+    spreads = [s for s in SPREADS if not (s is PlaceSpread.EACH and len(baseline.readings) == 1)]
     families = list(dict.fromkeys(term.family for term in terms))
     parts = {
         coordinate: [
@@ -229,18 +229,18 @@ def _lack(parts: Sequence[_FamilyEvidence]) -> LackOfFitTest:
 
 
 def _problem(
-    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
+    baseline: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
 ) -> tuple[tuple[Term, ...], Linearised]:
     parts: dict[str, Products] = {}
     terms: tuple[Term, ...] = ()
-    taken = taken_out(grounds.fit)
-    for number, (name, one) in enumerate(grounds.readings.items()):
-        model = grounds.fit.models[name]
-        zeroed = grounds.noise.zeroed
-        shifted = () if zeroed else grounds.tests  # counted from step 0 there is none
+    taken = taken_out(baseline.fit)
+    for number, (name, one) in enumerate(baseline.readings.items()):
+        model = baseline.fit.models[name]
+        zeroed = baseline.noise.zeroed
+        shifted = () if zeroed else baseline.tests  # counted from step 0 there is none
         found = generic_columns(model, one.cases, zeroed, coordinates, shifted=shifted)
-        plain = grounds.plain[name].noise_only(found.moved)
-        white = grounds.setting.whitenings[name].shortened(plain)
+        plain = baseline.plain[name].noise_only(found.moved)
+        white = baseline.setting.whitenings[name].shortened(plain)
         errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
         parts[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
         terms = found.terms

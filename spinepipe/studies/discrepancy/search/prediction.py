@@ -140,7 +140,7 @@ class JointPrediction:
         return bool(np.abs(found.q.reshape(there.shape) - there).max() <= SAME)
 
 
-def recorded(model: SpineModel, cases: Sequence[LoadCase]) -> None:
+def solve_on_record(model: SpineModel, cases: Sequence[LoadCase]) -> None:
     """Solve a specimen's tests by the engine of record beside the stack.
 
     Raises

@@ -66,25 +66,25 @@ class Refit:
 
 
 def refits(
-    grounds: BaselineFit,
+    baseline: BaselineFit,
     screen: Screen,
     trials: Sequence[Trials],
     run: PieceRunner,
     progress: Progress,
 ) -> tuple[Refit, ...]:
-    """The leading effects of a screen, refitted beside those of the grounds' fit; best first."""
+    """The leading effects of a screen, refitted beside those of the baseline's fit; best first."""
     by_name = {one.effect: one for one in trials}
-    there = {one.form.variant for one in standing(grounds.fit)}
+    there = {one.form.variant for one in standing(baseline.fit)}
     new = [tried for tried in leading(screen) if tried.form.variant not in there]
     if new:
         progress.round(f"{len(new)} forms are refitted")
-    found = run.map(refit, [(grounds, started(t), by_name[t.form.name]) for t in new])
-    simpler = list(_simpler(found, screen, standing(grounds.fit)))
-    found += run.map(refit, [(grounds, one, by_name[one.form.name]) for one in simpler])
-    return preferred(found)
+    found = run.map(refit, [(baseline, starting_term(t), by_name[t.form.name]) for t in new])
+    simpler = list(_simpler(found, screen, standing(baseline.fit)))
+    found += run.map(refit, [(baseline, one, by_name[one.form.name]) for one in simpler])
+    return rank_refits(found)
 
 
-def preferred(found: Sequence[Refit]) -> tuple[Refit, ...]:
+def rank_refits(found: Sequence[Refit]) -> tuple[Refit, ...]:
     """Refits, best first; of one effect's forms that are hardly behind the best, the plainest.
 
     What an effect is in a specimen that was not measured, a form with values of their own for each
@@ -216,7 +216,7 @@ def _forms(one: Screened, most: int) -> list[ScreenedVariant]:
     return chosen
 
 
-def started(tried: ScreenedVariant) -> ActiveTerm:
+def starting_term(tried: ScreenedVariant) -> ActiveTerm:
     """The form with the typical strengths and the shapes that the screen suggests."""
     variant = tried.form.variant
     parameters = variant.create().parameters
@@ -237,15 +237,15 @@ def _value(p: Parameter, sds: float) -> float:
     return float(np.clip(value, p.low if p.logarithmic else p.low + margin, p.high - margin))
 
 
-def refit(grounds: BaselineFit, one: ActiveTerm, trials: Trials) -> Refit:
-    """One more form beside those of the grounds' fit.
+def refit(baseline: BaselineFit, one: ActiveTerm, trials: Trials) -> Refit:
+    """One more form beside those of the baseline's fit.
 
     What tips the segment over where it starts is tried again closer to off.
     """
-    before = grounds.fit
+    before = baseline.fit
     for share in STARTS:
         supposed = (*standing(before), weaker(one, share))
-        fit = joint_fit(grounds.suppose(supposed), grounds.setting, before.poses)
+        fit = joint_fit(baseline.suppose(supposed), baseline.setting, before.poses)
         if fit.usable:
             break
     if not fit.usable or _degenerate(fit, len(supposed) - 1):

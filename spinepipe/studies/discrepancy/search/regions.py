@@ -58,7 +58,9 @@ class ValueWithRegion(FittedValue):
         return not (self.open_below or self.open_above)
 
 
-def estimated(fit: JointFit, setting: Setting, number: int) -> tuple[ValueWithRegion, ...]:
+def values_with_regions(
+    fit: JointFit, setting: Setting, number: int
+) -> tuple[ValueWithRegion, ...]:
     """All fitted values of one supposed effect with their regions.
 
     Parameters

@@ -65,16 +65,16 @@ def search(
     base: BaselineFit, rules: Rules, run: PieceRunner, progress: Progress | None = None
 ) -> SearchResult:
     """Effects that the base lacks, each with its rivals."""
-    inquiry = SearchState(base, rules, run, progress or Progress())
-    base_at, base_lack = gaps_at(base, base.fit), inquiry.lack(base)
-    current, stood = _settled(_forward(base, inquiry, base_at), inquiry, base_at)
-    lack = inquiry.lack(current)
+    state = SearchState(base, rules, run, progress or Progress())
+    base_at, base_lack = gaps_at(base, base.fit), state.lack(base)
+    current, stood = _settled(_forward(base, state, base_at), state, base_at)
+    lack = state.lack(current)
     single = rules.false_alarm / len(rules.coordinates)
     return SearchResult(
         base,
         current,
         stood,
-        tuple(inquiry.stages),
+        tuple(state.stages),
         lack,
         exceeded(lack.null, rules.false_alarm),
         whole_gap(base, base.fit),
@@ -87,32 +87,32 @@ def search(
 
 
 def _settled(
-    current: BaselineFit, inquiry: SearchState, base_at: Mapping[str, Gap]
+    current: BaselineFit, state: SearchState, base_at: Mapping[str, Gap]
 ) -> tuple[BaselineFit, tuple[SelectedTerm, ...]]:
     """The effects that stand after all changes; what took turns ends up among the rivals."""
     for _ in range(MOST_CHANGES):
-        after, stands = examine(current, inquiry)
+        after, stands = examine(current, state)
         if stands is not None:
             return current, stands
-        current = _forward(after, inquiry, base_at)
-    return current, examine(current, inquiry, settled=True)[1] or ()
+        current = _forward(after, state, base_at)
+    return current, examine(current, state, settled=True)[1] or ()
 
 
-def _forward(current: BaselineFit, inquiry: SearchState, base_at: Mapping[str, Gap]) -> BaselineFit:
-    """Let effects enter; the grounds that are left."""
+def _forward(current: BaselineFit, state: SearchState, base_at: Mapping[str, Gap]) -> BaselineFit:
+    """Let effects enter; the fit that is left."""
     while (number := len(current.fit.hypothesis.supposed)) < MOST_FORMS_NAMED:
-        best = _admitted(current, inquiry.stage(current), inquiry, base_at)
-        if best is None or _outside_library(best, number, inquiry.lack(current), inquiry.rules):
+        best = _admitted(current, state.stage(current), state, base_at)
+        if best is None or _outside_library(best, number, state.lack(current), state.rules):
             break
         current = current.at(best.fit)
     return current
 
 
 def _admitted(
-    current: BaselineFit, stage: SearchStage, inquiry: SearchState, base_at: Mapping[str, Gap]
+    current: BaselineFit, stage: SearchStage, state: SearchState, base_at: Mapping[str, Gap]
 ) -> Refit | None:
     """The best refit, if it may enter."""
-    rules, supposed = inquiry.rules, current.fit.hypothesis.supposed
+    rules, supposed = state.rules, current.fit.hypothesis.supposed
     names = {one.form.name for one in supposed}
     for one in stage.refits:
         if not one.log_evidence > stage.screen.threshold:
@@ -139,7 +139,7 @@ def _outside_library(best: Refit, number: int, lack: LackOfFit, rules: Rules) ->
 
 
 def examine(
-    current: BaselineFit, inquiry: SearchState, *, settled: bool = False
+    current: BaselineFit, state: SearchState, *, settled: bool = False
 ) -> tuple[BaselineFit, tuple[SelectedTerm, ...] | None]:
     """The effects of a fit with their rivals; None, and the fit after, where one left or gave way.
 
@@ -150,46 +150,46 @@ def examine(
     stood: list[SelectedTerm] = []
     supposed = standing(current.fit)
     for number, one in enumerate(supposed):
-        found = _one(current, number, one, inquiry, settled)
+        found = _one(current, number, one, state, settled)
         if not isinstance(found, SelectedTerm):
             return found, None
         stood.append(found)
     for pair in combinations(range(len(supposed)), 2):
-        given, stood = _against_one(current, pair, stood, inquiry)
+        given, stood = _against_one(current, pair, stood, state)
         if given is not None and not settled:
             return given, None
     return current, tuple(stood)
 
 
 def _one(
-    current: BaselineFit, number: int, one: ActiveTerm, inquiry: SearchState, settled: bool
+    current: BaselineFit, number: int, one: ActiveTerm, state: SearchState, settled: bool
 ) -> BaselineFit | SelectedTerm:
-    """One effect with its rivals, or the grounds where it left or gave way."""
-    without, stage = _tried_without(current, (number,), inquiry)
+    """One effect with its rivals, or the fit after, where it left or gave way."""
+    without, stage = _tried_without(current, (number,), state)
     if without is None or stage is None:
         # the others have no fit without it: nothing could be tried in its place
-        trials = next(t for t in inquiry.rules.trials if t.effect == one.form.name)
+        trials = next(t for t in state.rules.trials if t.effect == one.form.name)
         gain, log_evidence = in_place(current.fit, number)
         log_evidence += trials.log_share(one.form)
-        alone = _alone(one, inquiry)
+        alone = _alone(one, state)
         return SelectedTerm(one, log_evidence, alone, gain, (), None, rivals_known=False)
     tried = stage.refits
-    own = _own(without, one, tried, inquiry)
+    own = _own(without, one, tried, state)
     if not settled:
         if not own.log_evidence > stage.screen.threshold:
             return without
-        given = _better(one.form, own, tried, inquiry.rules.margin)
+        given = _better(one.form, own, tried, state.rules.margin)
         if given is not None:
             return without.at(given.fit)
     rivals = _rivals(own, tried, stage.screen)
-    two = _two_simpler(without, own, tried, inquiry)
+    two = _two_simpler(without, own, tried, state)
     if two is not None:
-        if two.lead > inquiry.rules.margin and not settled:
-            return two.grounds
+        if two.lead > state.rules.margin and not settled:
+            return two.baseline
         for form in two.forms:
             rivals = _nearest(rivals, Rival(form.name, -two.lead, form.variant.acts_on))
-    over = _over_stiffness(without, own, inquiry)
-    alone = _alone(one, inquiry)
+    over = _over_stiffness(without, own, state)
+    alone = _alone(one, state)
     return SelectedTerm(one, own.log_evidence, alone, own.gain, rivals, over)
 
 
@@ -209,49 +209,49 @@ def _of_effect(own: Refit, tried: Sequence[Refit]) -> float:
     return min(max([own.log_evidence, *same]), own.log_evidence + ANOTHER_FORM)
 
 
-def _alone(one: ActiveTerm, inquiry: SearchState) -> float:
+def _alone(one: ActiveTerm, state: SearchState) -> float:
     """Evidence of its effect on the first screen, beside none."""
-    effects = inquiry.first.screen.effects
+    effects = state.first.screen.effects
     return next(e.log_evidence for e in effects if e.effect == one.form.name)
 
 
 def _tried_without(
-    current: BaselineFit, left_out: tuple[int, ...], inquiry: SearchState
+    current: BaselineFit, left_out: tuple[int, ...], state: SearchState
 ) -> tuple[BaselineFit | None, SearchStage | None]:
-    """The grounds without some of the effects, and all effects tried there; None without a fit."""
+    """The fit without some of the effects, and all effects tried there; None without a fit."""
     supposed = standing(current.fit)
     others = tuple(one for number, one in enumerate(supposed) if number not in left_out)
-    without = inquiry.beside(current, others)
+    without = state.beside(current, others)
     if without is None:
         return None, None
     names = " and ".join(supposed[number].form.name for number in left_out)
-    return without, inquiry.stage(without, in_place_of=names)
+    return without, state.stage(without, in_place_of=names)
 
 
 def _against_one(
     current: BaselineFit,
     pair: tuple[int, ...],
     stood: Sequence[SelectedTerm],
-    inquiry: SearchState,
+    state: SearchState,
 ) -> tuple[BaselineFit | None, list[SelectedTerm]]:
     """Two effects against each single one in their place: together two may imitate a third.
 
-    Returns the grounds with the single one if it has clearly more evidence than both together, and
+    Returns the baseline with the single one if it has clearly more evidence than both together, and
     the effects, that one among their rivals.
     """
-    without, stage = _tried_without(current, pair, inquiry)
+    without, stage = _tried_without(current, pair, state)
     if without is None or stage is None:
         known = [replace(o, rivals_known=False) if k in pair else o for k, o in enumerate(stood)]
         return None, known
     tried = stage.refits
     first, second = (stood[number] for number in pair)
-    alone = _own(without, first.supposed, tried, inquiry)
+    alone = _own(without, first.supposed, tried, state)
     both = second.log_evidence + max(alone.log_evidence, 0.0)
     singles = [one for one in tried if one.name not in (first.name, second.name)]
     best = max(singles, key=lambda one: one.log_evidence, default=None)
     if best is None or not np.isfinite(best.log_evidence):
         return None, list(stood)
-    clearly = best.log_evidence > both + inquiry.rules.margin
+    clearly = best.log_evidence > both + state.rules.margin
     rival = Rival(best.name, both - best.log_evidence, best.form.variant.acts_on)
     return without.at(best.fit) if clearly else None, [
         replace(one, rivals=_nearest(one.rivals, rival)) if number in pair else one
@@ -263,13 +263,13 @@ def _against_one(
 class _Two:
     """Two effects in the place of one, and the evidence by which they are ahead of it."""
 
-    grounds: BaselineFit
+    baseline: BaselineFit
     forms: tuple[CandidateForm, CandidateForm]
     lead: float
 
 
 def _two_simpler(
-    without: BaselineFit, own: Refit, tried: Sequence[Refit], inquiry: SearchState
+    without: BaselineFit, own: Refit, tried: Sequence[Refit], state: SearchState
 ) -> _Two | None:
     """The best two effects in the place of one with more unknowns; None where none comes near.
 
@@ -286,14 +286,14 @@ def _two_simpler(
         return None
     first = max(simpler, key=lambda one: one.log_evidence)
     beside = without.at(first.fit)
-    stage = inquiry.stage(beside, in_place_of=f"{own.name}, beside {first.name}")
+    stage = state.stage(beside, in_place_of=f"{own.name}, beside {first.name}")
     few = own.unknowns - first.unknowns
     others = [one for one in stage.refits if one.name != own.name and one.unknowns <= few]
     second = max(others, key=lambda one: one.log_evidence, default=None)
     if second is None or not second.log_evidence > stage.screen.threshold:
         return None
     lead = first.log_evidence + second.log_evidence - own.log_evidence
-    if lead < -inquiry.rules.margin:
+    if lead < -state.rules.margin:
         return None
     return _Two(beside.at(second.fit), (first.form, second.form), lead)
 
@@ -308,26 +308,26 @@ def _nearest(rivals: Sequence[Rival], further: Rival) -> tuple[Rival, ...]:
 
 
 def _own(
-    without: BaselineFit, one: ActiveTerm, tried: Sequence[Refit], inquiry: SearchState
+    without: BaselineFit, one: ActiveTerm, tried: Sequence[Refit], state: SearchState
 ) -> Refit:
     """The effect itself beside the others: as tried already, or refitted from where it stands."""
     same = [other for other in tried if other.form == one.form]
-    return same[0] if same else inquiry.refit(without, one)
+    return same[0] if same else state.refit(without, one)
 
 
-def _over_stiffness(without: BaselineFit, own: Refit, inquiry: SearchState) -> float | None:
+def _over_stiffness(without: BaselineFit, own: Refit, state: SearchState) -> float | None:
     """Evidence above that of plain stiffness, joint by joint and specimen by specimen.
 
     Forms that differ between joints can imitate it by their many strengths.
     """
     many = own.form.spread in (PlaceSpread.BY_JOINT, PlaceSpread.EACH)
-    known = any(t.effect == LEVELS for t in inquiry.rules.trials)
+    known = any(t.effect == LEVELS for t in state.rules.trials)
     coordinate = dict(own.form.variant.options).get("coordinate")
     if not many or own.name == LEVELS or not known or coordinate not in COORDINATES:
         return None
     variant = Variant(LEVELS, (("coordinate", coordinate),))
     start = variant.off(()) * np.exp(0.01)
-    plain = inquiry.refit(without, ActiveTerm(CandidateForm(variant, PlaceSpread.EACH), start))
+    plain = state.refit(without, ActiveTerm(CandidateForm(variant, PlaceSpread.EACH), start))
     return own.log_evidence - plain.log_evidence if np.isfinite(plain.log_evidence) else None
 
 
