@@ -3,6 +3,7 @@
 The data are made by one line of algebra, F = k q (1 + c q^2), with all rotations blocked.
 """
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -89,6 +90,17 @@ def written(
 def laid(cohort: Cohort) -> tuple[Prepared, BaselineFit]:
     ready = prepare(STUDY, cohort, None)
     return ready, fit_base(ready, at_once)
+
+
+def test_a_study_says_before_its_cohort_how_large_the_noise_is(tmp_path: Path) -> None:
+    """Translations first; where neither says it, it is not known."""
+    cohort = written(tmp_path, 0.0)[0]
+    sd = {"rotation_deg": 0.2, "translation_mm": 0.5}
+    own = Discrepancy.model_validate(STUDY.model_dump() | {"measurement_sd": sd})
+    for study, mm, deg in ((STUDY, 0.02, 0.1), (own, 0.5, 0.2)):
+        expected = [1e-3 * mm] * 3 + [np.deg2rad(deg)] * 3
+        assert prepare(study, cohort, None).declared == pytest.approx(expected)
+    assert prepare(STUDY, replace(cohort, measurement_sd=None), None).declared is None
 
 
 def test_what_is_read_and_what_is_not(tmp_path: Path) -> None:
