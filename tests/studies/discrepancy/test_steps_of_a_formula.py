@@ -59,7 +59,8 @@ def test_a_form_is_of_the_place_of_its_candidate() -> None:
     assert variant is not None
 
     def form(joint: int, specimen: int) -> tuple[PlaceSpread, int | None, str | None]:
-        found = formulas._form(variant, TermAtPlace(0, joint, specimen), ("a", "b"))
+        place = formulas._named(TermAtPlace(0, joint, specimen), ("a", "b"))
+        found = formulas.CandidateForm.at(variant, *place)
         return found.spread, found.joint, found.specimen
 
     assert form(EVERYWHERE, EVERYWHERE) == (PlaceSpread.SHARED, None, None)

@@ -148,10 +148,12 @@ def fit_baseline(
     tests = tuple(dict.fromkeys(case.test for one in readings for case in one.cases))
     plain = _plain(by_name, noise)
     models = hypothesis(start.models, start.base, (), tests, start.bound)
+    # with noise alone; its residuals may say better how large the noise is
     first = _base_fit(models, Setting(by_name, plain, noise.zeroed), run)
     if noise.source != REPEATS:
         by_name, noise = noise_of_residuals(by_name, first.predicted, noise)
         plain = _plain(by_name, noise)
+    # a fixed point: nuisances linearised at a fit, the fit with them, until it stays where it is
     fit = first
     for _ in range(MOST_NUISANCES):
         before, whitenings = fit, {}

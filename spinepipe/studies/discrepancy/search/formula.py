@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.decomposition import svd
-from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.proof.formula_folds import ChosenTerm, proof_of_terms
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
+from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
 from spinepipe.studies.discrepancy.search.law_terms import (
     READING,
@@ -156,6 +155,7 @@ class PursuitProblem:
 
     def _beside(self, linear: Sequence[TermAtPlace]) -> tuple[Array, Array]:
         """Basis of all that is taken out, and the errors without it."""
+        # Gram-Schmidt, so that each candidate's drop is beside all terms that are there already
         basis, errors = self.shared, self.errors
         for one in linear:
             column = self.column(one)
@@ -179,6 +179,7 @@ class PursuitProblem:
         if len(self.parts) > 1:
             groups += list(zip(moments, norms, inside, raws, strict=True))
         values, drops = [], []
+        # of each candidate c: (c'r)^2 / |c|^2, c and r without what is taken out
         for moment, norm, within, raw in groups:
             left = norm - np.sum(within**2, axis=1)
             there = left > LEAST_LEFT * raw
@@ -202,6 +203,7 @@ def pursuit_problem(
         drawn_here = drawn(taken[name], draws, np.random.default_rng([seed, number]))
         errors.append(taken[name].out_of(drawn_here))
     shared = _orthonormal(np.concatenate([taken[name].shared for name in columns]))
+    # shared unknowns couple the specimens: taken out of all rows together
     every = np.concatenate(errors)
     every = every - shared @ (shared.T @ every)
     fitted = sum(one.own.shape[1] for one in taken.values()) + shared.shape[1]
@@ -345,8 +347,8 @@ def _best_fit(here: _FormulaState, ranked: Ranked) -> tuple[BaselineFit, TermAtP
         tried += 1
         (parameter,) = variant.create().parameters
         start = np.clip([value], 0.5 * parameter.low, 0.5 * parameter.high)
-        one = ActiveTerm(_form(variant, place, tuple(here.baseline.readings)), start)
-        at = _fit_with(here.baseline, one)
+        form = CandidateForm.at(variant, *_named(place, tuple(here.baseline.readings)))
+        at = _fit_with(here.baseline, ActiveTerm(form, start))
         if at is not None:
             found.append((at, place))
         if tried == MOST_REFITS:
@@ -365,14 +367,10 @@ def _fit_with(baseline: BaselineFit, one: ActiveTerm) -> BaselineFit | None:
     return None
 
 
-def _form(variant: Variant, place: TermAtPlace, specimens: Sequence[str]) -> CandidateForm:
+def _named(place: TermAtPlace, specimens: Sequence[str]) -> tuple[int | None, str | None]:
+    """Joint and specimen of a place; None for all."""
     joint = None if place.joint == EVERYWHERE else place.joint
-    specimen = None if place.specimen == EVERYWHERE else specimens[place.specimen]
-    if joint is None:
-        return CandidateForm(variant, PlaceSpread.SHARED, None, specimen)
-    return CandidateForm(
-        variant, PlaceSpread.ONE_JOINT if specimen is None else PlaceSpread.ONE, joint, specimen
-    )
+    return joint, None if place.specimen == EVERYWHERE else specimens[place.specimen]
 
 
 def _chosen(state: _FormulaState, one: TermAtPlace) -> ChosenTerm:
@@ -403,11 +401,11 @@ def _valued_terms(state: _FormulaState) -> tuple[FormulaTerm, ...]:
             unknowns = fit.hypothesis.unknowns
             at = next(n for n, u in enumerate(unknowns) if u.supposed == one.number)
             value, sd = fit.hypothesis.supposed[one.number].start[0] + fit.x[at], errors[at]
-        place = one.place
+        joint, specimen = _named(one.place, specimens)
         found.append(
             FormulaTerm(
-                EVERY[0] if place.specimen == EVERYWHERE else specimens[place.specimen],
-                EVERY[0] if place.joint == EVERYWHERE else joints[place.joint],
+                EVERY[0] if specimen is None else specimen,
+                EVERY[0] if joint is None else joints[joint],
                 one.law.coordinate,
                 one.law.acts,
                 one.law.words,

@@ -1,6 +1,6 @@
 """How large a discrepancy is, in noise SD, over all readings or pooled by place."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,23 +107,14 @@ class GapPlace:
 
 def whole_gap(baseline: BaselineFit, fit: JointFit) -> Gap:
     """The gap over all readings."""
-    left = left_over(baseline, fit).values()
-    return gap_of([one.residual for one in left], [one.freedom for one in left])
+    return _pooled(left_over(baseline, fit).values())
 
 
 def gaps_at(baseline: BaselineFit, fit: JointFit) -> dict[str, Gap]:
     """The gap over the readings of each coordinate that was read."""
     left = left_over(baseline, fit).values()
-    found = {}
-    for place, name in enumerate(COORDINATES):
-        residuals, freedoms = (
-            [tuple(test[..., place] for test in tests) for tests in every]
-            for every in ([one.residual for one in left], [one.freedom for one in left])
-        )
-        gap = gap_of(residuals, freedoms)
-        if gap.readings:
-            found[name] = gap
-    return found
+    found = {name: _pooled(left, place) for place, name in enumerate(COORDINATES)}
+    return {name: gap for name, gap in found.items() if gap.readings}
 
 
 def left_over(baseline: BaselineFit, fit: JointFit) -> dict[str, LeftOver]:
@@ -135,6 +126,7 @@ def left_over(baseline: BaselineFit, fit: JointFit) -> dict[str, LeftOver]:
         white = baseline.setting.whitenings[name]
         plain = baseline.plain[name].noise_only(one.errors(fit.predicted[name]))
         residual = white.left_over(plain)
+        # what is fitted takes degrees of freedom from all readings in proportion
         freedom = white.freedom * (1.0 - unknowns / total)
         found[name] = LeftOver(_spread(residual, white.used), _spread(freedom, white.used))
     return found
@@ -152,10 +144,10 @@ def _spread(values: Array, used: tuple[NDArray[np.bool_], ...]) -> tuple[Array, 
     return tuple(found)
 
 
-def gap_of(residuals: list[tuple[Array, ...]], freedoms: list[tuple[Array, ...]]) -> Gap:
-    """The gap over given readings; NaN counts nothing."""
-    r = np.concatenate([test.ravel() for one in residuals for test in one])
-    f = np.concatenate([test.ravel() for one in freedoms for test in one])
+def _pooled(left: Collection[LeftOver], coordinate: int | slice = slice(None)) -> Gap:
+    """The gap over readings of one coordinate or of all; NaN counts nothing."""
+    r = np.concatenate([test[..., coordinate].ravel() for one in left for test in one.residual])
+    f = np.concatenate([test[..., coordinate].ravel() for one in left for test in one.freedom])
     there = np.isfinite(r)
     return Gap(float(np.sum(r[there] ** 2)), float(np.sum(f[there])), int(there.sum()))
 

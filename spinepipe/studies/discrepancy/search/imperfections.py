@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.gaps import Gap, gap_of, left_over, whole_gap
+from spinepipe.studies.discrepancy.search.gaps import Gap, whole_gap
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
 from spinepipe.studies.discrepancy.search.prediction import bushing_stiffness
@@ -156,8 +156,7 @@ def gap_without(baseline: BaselineFit, fit: JointFit) -> Gap | None:
     again = joint_fit(baseline.suppose(standing(fit)), setting, fit.poses)
     if not again.usable:
         return None
-    left = left_over(replace(baseline, setting=setting), again).values()
-    return gap_of([one.residual for one in left], [one.freedom for one in left])
+    return whole_gap(replace(baseline, setting=setting), again)
 
 
 def labels_of(baseline: BaselineFit, specimen: str) -> tuple[Label, ...]:

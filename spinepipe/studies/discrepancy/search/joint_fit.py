@@ -155,8 +155,10 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting, near: Near = None) -> Jo
     scale = np.array([u.step for u in hypothesis.unknowns])
     ended = descend(points.compressed, start, (low, high), scale, len(begun[0]), SETTLED)
     status = "" if ended.arrived else SETTLED.given_up
+    # a descent keeps strictly inside its bounds: this close, one is reached
     x, at_bound = ended.x, (ended.x - low < 1e-6) | (high - ended.x < 1e-6)
     found = points.at(x)
+    # followed from near poses, a fit may end on a branch that the load path never comes to
     if found is None or not points.together.leads_to(points.own(x), found[2]):
         return _nowhere(hypothesis, x, OFF_THE_PATH)
     residuals, jacobians, predicted = found

@@ -38,6 +38,8 @@ LEAST_REACH = np.array([5e-5] * 3 + [np.deg2rad(0.2)] * 3)
 """m and rad; less motion than this has no shape."""
 
 BUMPS, BUMP_WIDTH = (-0.6, -0.2, 0.2, 0.6), 0.25
+"""Centres of Gaussian bumps and their width, in parts of the largest motion: they overlap."""
+
 
 OWN = "own"
 FAMILIES = {
@@ -134,6 +136,7 @@ def _loads(u: Array, at: int, coordinates: Sequence[str]) -> Array:
         x = u[..., other]
         found += [x, x**2, x * own, x**2 * own]
     found += [u[..., a] * u[..., b] for a, b in combinations(others, 2)]
+    # motion of the neighbours, nothing beyond the ends of the chain
     above, below = np.zeros_like(own), np.zeros_like(own)
     above[:, :-1], below[:, 1:] = own[:, 1:], own[:, :-1]
     return np.stack([*found, above, below], axis=-1)
@@ -250,6 +253,7 @@ def _problem(
 def _part(
     problem: Linearised, terms: Sequence[Term], family: str, coordinate: str, spread: PlaceSpread
 ) -> _FamilyEvidence:
+    # columns of one strength each, or of a term at all joints summed: F S' with S = onto
     chosen = [
         number
         for number, term in enumerate(terms)
@@ -266,6 +270,7 @@ def _part(
         grams.append(onto @ part.gram[np.ix_(chosen, chosen)] @ onto.T)
         moments.append(onto @ part.moments[chosen])
     coupled = [onto @ part.shared[chosen] for part in problem.of.values()]
+    # strengths of each specimen stand side by side, those of all are sums over specimens
     if spread is PlaceSpread.EACH:
         gram, moment, shared = block_diag(*grams), np.concatenate(moments), np.concatenate(coupled)
     else:

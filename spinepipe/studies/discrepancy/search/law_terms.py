@@ -134,6 +134,7 @@ def term_columns(
         own = [term for term, _ in found[0]]
         loads = [np.stack([values for _, values in test], axis=-1) for test in found]
         strongest = np.max([np.abs(one).max(axis=0) for one in loads], axis=0)  # (J, K)
+        # a term that is nought everywhere has no size: springs over infinity
         springs = (stiffness[:, at] * reach[:, at])[:, None]
         sizes.append((springs / np.where(strongest > 0.0, strongest, np.inf)).T)
         terms += own
@@ -156,6 +157,7 @@ def _states(solved: SolvedSpecimen, timed: bool) -> list[_TestState]:
         rate = None
         if timed:
             times = np.array([step.time for step in case.steps], dtype=float)
+            # backward differences; the first step is at rest, whatever time it is given
             rate = steps / np.diff(times, prepend=times[0] - 1.0)[:, None, None]
         least = AT_REST * np.abs(steps).max(axis=0)
         way = np.where(np.abs(steps) > least, np.sign(steps), 0.0)

@@ -58,6 +58,7 @@ def model_file(
             entries.append(_of_scoped(acting, scoped, specimens))
         for specimen in acting:
             after[specimen] += 1
+    # `after`: the next effect of each specimen's model, which stand base, given, supposed
     for specimen in after:
         after[specimen] += given.get(specimen, 0)
     for supposed in fit.hypothesis.supposed:
@@ -172,6 +173,7 @@ def standard_errors(fit: JointFit) -> Array:
 
 def covariance(fit: JointFit) -> Array:
     """(m, m) of all unknowns, priors counted in."""
+    # Gauss-Newton: inverse of the curvature of half chi2 and of the priors
     jacobian = fit.whole_jacobian()
     precision = jacobian.T @ jacobian + np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
     return np.asarray(np.linalg.inv(precision), dtype=np.float64)

@@ -121,7 +121,7 @@ class JointPrediction:
         return found
 
     def _guess(self, x: Array) -> Array | None:
-        """(L, J, 6) poses to start from, to first order from the last ones."""
+        """(L, J, 6) poses to start from: one Euler step of a continuation from the last ones."""
         if self._last is None:
             return self._near
         there, q, dq = self._last
@@ -218,6 +218,7 @@ class SolvedSpecimen:
         free : unknowns of ``full``.
         """
         stack = Stack.of([full], [(0, case) for case in self.cases])
+        # an effect that is off changes no pose: derivatives are taken where the bare model stands
         if all(full.effects[one.effect].effect.kind is EffectKind.MEASUREMENT for one in free):
             dq = np.zeros((*self._q.shape, len(free)))  # instruments move no joint
         else:
@@ -239,7 +240,7 @@ class SolvedSpecimen:
         lanes, joints, _ = self._q.shape
         found = []
         for by_strength in self.answering.by_strengths(idle):
-            every = np.moveaxis(by_strength, 1, 2)
+            every = np.moveaxis(by_strength, 1, 2)  # the joint of the parameter behind that read
             every = every.reshape(lanes, joints, 6, joints, *every.shape[3:])
             tests = self._by_test(every)
             found.append(tuple(subtract_baseline(one, self.zeroed) for one in tests))

@@ -151,6 +151,7 @@ def _basis(columns: Array) -> Array:
     """(N, p) orthonormal basis of columns."""
     if not columns.shape[1]:
         return np.zeros((len(columns), 0))
+    # units differ: singular values tell only of columns of one length
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     left, sizes, _ = svd(scaled)
     seen: Array = left[:, sizes > SEEN * max(sizes.max(initial=0.0), SEEN)]
@@ -207,6 +208,7 @@ def signatures_of_each(
     parts: dict[Variant, list[_IdleStrength]] = {}
     for one in every:
         parts.setdefault(one.variant, []).append(one)
+    # every strength once, effects that need a model of their own apart; then columns by number
     found, places = _derived(solved, list(parts.values()))
     whole = [np.concatenate(of_test, axis=-1) for of_test in zip(*found, strict=True)]
     for columns in groups:
@@ -274,6 +276,7 @@ def _answered(
         shapes = {sds: place for place, sds in enumerate(dict.fromkeys(one.sds for one in some))}
         values = np.stack([variant.off(sds) for sds in shapes])
         rows = np.array([(one.joint, shapes[one.sds], one.strength) for one in some]).T
+        # by the logarithm of a parameter: its value times the derivative by itself
         logarithmic = np.array([p.logarithmic for p in effect.parameters])[rows[2]]
         at.append((*rows, np.where(logarithmic, values[rows[1], rows[2]], 1.0)))
         idle.append(Idle(effect, values))

@@ -175,7 +175,7 @@ def _likeliest(fit: JointFit, point: Point, unknown: int, ruler: _Ruler) -> Best
     found = point(x)
     if found is None:
         return None
-    straight = np.zeros(len(x), dtype=bool)
+    straight = np.zeros(len(x), dtype=bool)  # none is looked for along one over it
     begun = Best(x, *found, lower, upper, scale, straight, _enough(found[0]), True, AHEAD)
     pull = slope * abs(at - own.mean) / own.sd**2  # of its own prior, which the readings withstood
     if pull <= PULLED * begun.told_by(unknown) and not (fit.at_bound[unknown] or fit.status):

@@ -110,11 +110,7 @@ def _forms(
             joint = None if term.joint == EVERY[0] else joints.index(term.joint)
             specimen = None if term.specimen == EVERY[0] else term.specimen
             variant = _variant(baseline, term.coordinate, along)
-            if joint is None:
-                yield CandidateForm(variant, PlaceSpread.SHARED, None, specimen)
-            else:
-                spread = PlaceSpread.ONE_JOINT if specimen is None else PlaceSpread.ONE
-                yield CandidateForm(variant, spread, joint, specimen)
+            yield CandidateForm.at(variant, joint, specimen)
 
 
 def _variant(baseline: BaselineFit, coordinate: str, along: str) -> Variant:

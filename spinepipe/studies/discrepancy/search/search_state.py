@@ -146,7 +146,7 @@ def look(
     ----------
     threshold : as known already; then no draws of the null are needed.
     """
-    number = draws if threshold is None else 0
+    number = draws if threshold is None else 0  # of the null, which the threshold is taken from
     problems = linearised_for(baseline, trials, number, seed)
     found = [
         screened(one, index, problem, tuple(baseline.readings), baseline.tests)
@@ -220,6 +220,7 @@ class SearchState:
             tried = ()
             if place or evident:
                 tried = refits(baseline, screen, self.rules.trials, self.run, self.progress)
+        # rounds of entry and trials in a place are counted apart
         number = 1 + sum(one.in_place == place for one in self.stages)
         name = f"in place of {in_place_of} ({number})" if place else str(number)
         beside = tuple(one.form.name for one in baseline.fit.hypothesis.supposed)
