@@ -19,7 +19,12 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap, whole_gap
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
-from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
+from spinepipe.studies.discrepancy.search.nuisance import (
+    COMMON_TO_JOINTS,
+    KINDS,
+    Label,
+    nuisance_labels,
+)
 from spinepipe.studies.discrepancy.search.prediction import bushing_stiffness
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.store import PieceRunner
@@ -33,7 +38,7 @@ FEWEST_IN_COMMON = 2
 LEAST_TOLD = 0.05
 """Share of a nuisance's prior variance that readings must tell at least, or it has no say."""
 
-SHARED = tuple(KINDS.get(name, name) for name in ALIKE)
+SHARED = tuple(KINDS.get(name, name) for name in COMMON_TO_JOINTS)
 """Kinds that may be common to all joints anyhow."""
 
 

@@ -100,13 +100,13 @@ def _columns(variant: Variant, sds: Array, places: Sequence[str]) -> list[Varian
     ]
 
 
-ALIKE = ("rotation_order", "bending_rotation_coupling")
+COMMON_TO_JOINTS = ("rotation_order", "bending_rotation_coupling")
 """Nuisances that joints may share, as they come from one convention or one kind of tissue."""
 
 
 def _shared(columns: Sequence[VariantColumn]) -> list[tuple[Variant, int]]:
     """Variant and strength of the nuisances that joints may share, in order of appearance."""
-    names = [(c.variant, c.strength) for c in columns if c.variant.effect in ALIKE]
+    names = [(c.variant, c.strength) for c in columns if c.variant.effect in COMMON_TO_JOINTS]
     return list(dict.fromkeys(names))
 
 
@@ -195,7 +195,9 @@ def nuisance_signatures(
     tilts = [_columns(variant, posture, (EVERY_TEST,)) for variant in POSTURE]
     single, *together = signatures_of_each(solved, [columns, *tilts])
     # columns of a nuisance that joints may share, all joints together: onto (k, g)
-    names = [(c.variant, c.strength) if c.variant.effect in ALIKE else None for c in columns]
+    names = [
+        (c.variant, c.strength) if c.variant.effect in COMMON_TO_JOINTS else None for c in columns
+    ]
     kinds = _shared(columns)
     onto = np.array([[name == kind for kind in kinds] for name in names], dtype=float)
     onto = onto.reshape(len(columns), len(kinds))

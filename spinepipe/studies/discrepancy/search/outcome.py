@@ -100,8 +100,9 @@ def outcome(
     proof : on data held out; None where none was asked for. errors : suspected in the data.
     not_excluded : by effect, others that nothing recorded speaks for or against.
     """
-    doubts = {number: _doubt(found, number, margin) for number in range(len(found.standing))}
-    kept = [one for number, one in enumerate(found.standing) if doubts[number] is None]
+    doubted = [(one, _doubt(found, one, margin)) for one in found.standing]
+    kept = [one for one, doubt in doubted if doubt is None]
+    doubts = [doubt for _, doubt in doubted if doubt is not None]
     close = [_close(one, found, margin, not_excluded) for one in kept]
     tied = tuple(
         dict.fromkeys(
@@ -112,7 +113,6 @@ def outcome(
         )
     )
     named = tuple(one for one, names in zip(kept, close, strict=True) if not names)
-    first = next((doubt for doubt in doubts.values() if doubt is not None), None)
     unexplained: _NoName | None = None
     if errors:  # data errors are not physics: nothing is named before they are looked at
         places = "; ".join(f"{one.what} ({one.where})" for one in errors[:3])
@@ -124,14 +124,14 @@ def outcome(
         why = f"a discrepancy that no known effect explains: {found.lack.shape}"
         unexplained = Reason.NO_KNOWN_EFFECT, why
     else:
-        unexplained = (first if not kept else None) or _unproven(found, proof)
+        unexplained = doubts[0] if doubts and not kept else _unproven(found, proof)
     if unexplained:
         reason, why = unexplained
         return Outcome(Conclusion.UNKNOWN, why, reason=reason)
     if not found.standing:
         why = "no effect has evidence above what noise alone would show on these tests"
         return Outcome(Conclusion.NULL, why)
-    left = _left(found, [doubt for doubt in doubts.values() if doubt is not None], proof)
+    left = _left(found, doubts, proof)
     if tied:
         why = f"something is missing, but these tests cannot tell which: {_listed(tied, 'or')}"
         return Outcome(Conclusion.SET, why, named, tied, left=left)
@@ -146,9 +146,8 @@ def outcome(
     return Outcome(Conclusion.NAMED, why, named)
 
 
-def _doubt(found: SearchResult, number: int, margin: float) -> _NoName | None:
+def _doubt(found: SearchResult, one: SelectedTerm, margin: float) -> _NoName | None:
     """Why an effect that stands is not sure, if so."""
-    one = found.standing[number]
     if one.over_stiffness is not None and one.over_stiffness < margin:
         why = (
             f"{one.name} explains no more than a stiffness of its own for each joint of each "
