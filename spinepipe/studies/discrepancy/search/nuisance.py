@@ -195,9 +195,7 @@ def nuisance_signatures(
     tilts = [_columns(variant, posture, (EVERY_TEST,)) for variant in POSTURE]
     single, *together = signatures_of_each(solved, [columns, *tilts])
     # columns of a nuisance that joints may share, all joints together: onto (k, g)
-    names = [
-        (c.variant, c.strength) if c.variant.effect in COMMON_TO_JOINTS else None for c in columns
-    ]
+    names = [(c.variant, c.strength) for c in columns]
     kinds = _shared(columns)
     onto = np.array([[name == kind for kind in kinds] for name in names], dtype=float)
     onto = onto.reshape(len(columns), len(kinds))
