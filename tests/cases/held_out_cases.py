@@ -9,8 +9,12 @@ from spinepipe.effects import PlaceSpread, Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.studies.discrepancy.search.base import base_parameters
-from spinepipe.studies.discrepancy.search.baseline import BaselineFit, BaselineModels, fit_baseline
+from spinepipe.studies.discrepancy.search.baseline import (
+    BaselineFit,
+    BaselineModels,
+    base_parameters,
+    fit_baseline,
+)
 from spinepipe.studies.discrepancy.search.gaps import gaps_at, whole_gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.studies.discrepancy.search.base import base_parameters
-from spinepipe.studies.discrepancy.search.baseline import BaselineModels
+from spinepipe.studies.discrepancy.search.baseline import BaselineModels, base_parameters
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.units import ROTATIONS
 

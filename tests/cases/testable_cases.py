@@ -9,12 +9,17 @@ from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
 from spinepipe.studies.discrepancy.design.fisher_information import specimen_signatures
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
-from spinepipe.studies.discrepancy.search.base import BUSHING, DAMPING, base_parameters
-from spinepipe.studies.discrepancy.search.baseline import BaselineFit, BaselineModels, fit_baseline
+from spinepipe.studies.discrepancy.search.baseline import (
+    DAMPING,
+    BaselineFit,
+    BaselineModels,
+    base_parameters,
+    fit_baseline,
+)
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant, trials
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors
-from spinepipe.studies.discrepancy.search.prediction import Simulated
+from spinepipe.studies.discrepancy.search.prediction import BUSHING, Simulated
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.units import ROTATIONS

@@ -38,19 +38,19 @@ from spinepipe.studies.discrepancy.rows import (
     imperfection_rows,
     where_rows,
 )
-from spinepipe.studies.discrepancy.search.base import BUSHING
 from spinepipe.studies.discrepancy.search.baseline import NoBase
-from spinepipe.studies.discrepancy.search.imperfections import taken_up
+from spinepipe.studies.discrepancy.search.imperfections import absorbed_gap
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
     Prepared,
     investigate,
     on_record,
-    prepared,
+    prepare,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import model_file
-from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, beyond
+from spinepipe.studies.discrepancy.search.prediction import BUSHING
+from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, model_residual
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner, Store
 from spinepipe.studies.discrepancy.summary import noise_summary, summarise
@@ -142,7 +142,7 @@ def searched(
     ----------
     file : the model that the study starts from, where it is a file. run : of the pieces of work.
     """
-    ready = prepared(study, cohort, file)
+    ready = prepare(study, cohort, file)
     try:
         ended = investigate(ready, run, progress)
     except NoBase as trouble:
@@ -188,14 +188,14 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     told = distinguishability(
         ended.grounds, rules.trials, needed, ready.study.margin, ready.declared, rules.seed, run
     )
-    ended = ended.as_told()
+    ended = ended.for_verdict()
     found, outcome = ended.found, ended.ended
     base, final = found.base.fit, found.final.fit
 
     # what imperfections took up beside each model; without effects both are the same
-    taken = {"base": taken_up(found.base, base, joints, run)}
+    taken = {"base": absorbed_gap(found.base, base, joints, run)}
     taken["with_effects"] = (
-        taken["base"] if final is base else taken_up(found.final, final, joints, run)
+        taken["base"] if final is base else absorbed_gap(found.final, final, joints, run)
     )
     stays = _beyond(ended, run)
     table = None if stays.table is None else stays.grounds.fit
@@ -234,7 +234,7 @@ def _beyond(ended: Investigation, run: PieceRunner) -> ResidualModel:
     told = outcome.verdict in (Conclusion.UNKNOWN, Conclusion.PART)
     if not told or outcome.reason is Reason.DATA_ERRORS:
         return ResidualModel(None, None, final)
-    stays = beyond(final, ended.rules, run)
+    stays = model_residual(final, ended.rules, run)
     if stays.table is not None:
         on_record([stays.grounds.fit], final.readings, run)
     return stays

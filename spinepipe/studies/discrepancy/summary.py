@@ -21,7 +21,7 @@ from spinepipe.studies.discrepancy.search.investigation import Investigation, Pr
 from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
-from spinepipe.studies.discrepancy.search.regions import estimated
+from spinepipe.studies.discrepancy.search.regions import values_with_regions
 from spinepipe.studies.discrepancy.search.residual_model import ResidualModel
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
@@ -208,7 +208,7 @@ def _missing(
                 value.open_above,
                 value.identifiable,
             )
-            for value in run(estimated, found.final.fit, found.final.setting, number)
+            for value in run(values_with_regions, found.final.fit, found.final.setting, number)
         ),
         log_evidence=one.log_evidence,
         rivals=tuple(

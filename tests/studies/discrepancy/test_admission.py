@@ -102,12 +102,12 @@ def test_a_search_is_hopeless_where_the_generic_basis_has_that_many_times_the_ev
         at["extension"] = SimpleNamespace(log_evidence=evidence)
         own: Any = SimpleNamespace(log_evidence=900.0, at=at)
         best = refitted("a", 10.0, 0.0)
-        assert searches._hopeless(best, number, own, rules()) is hopeless
+        assert searches._outside_library(best, number, own, rules()) is hopeless
         everywhere = replace(
             best, form=CandidateForm(Variant("load_offset", ()), PlaceSpread.SHARED)
         )
         whole: Any = SimpleNamespace(log_evidence=evidence, at=dict.fromkeys((), at["extension"]))
-        assert searches._hopeless(everywhere, number, whole, rules()) is hopeless
+        assert searches._outside_library(everywhere, number, whole, rules()) is hopeless
 
 
 class Enters:
@@ -155,19 +155,16 @@ def test_what_takes_turns_is_settled_in_the_end(monkeypatch: pytest.MonkeyPatch)
     """Six changes at most; then what stands is asked for as it is."""
     asked: list[bool] = []
 
-    def examined(current: Any, inquiry: Any, settled: bool = False) -> Any:
+    def examine(current: Any, inquiry: Any, settled: bool = False) -> Any:
         asked.append(settled)
-        stands = ("last",) if settled else None
-        return SimpleNamespace(standing=stands, grounds=At(("given way",)))
+        return At(("given way",)), ("last",) if settled else None
 
-    monkeypatch.setattr(searches, "examined", examined)
+    monkeypatch.setattr(searches, "examine", examine)
     inquiry: Any = Enters()
     current, stood = searches._settled(At(("a",)), inquiry, BASE_AT)  # type: ignore[arg-type]
     assert asked == [False] * 6 + [True]
     assert (current, stood) == (At(("given way",)), ("last",))
-    monkeypatch.setattr(
-        searches, "examined", lambda *_: SimpleNamespace(standing=("at once",), grounds=None)
-    )
+    monkeypatch.setattr(searches, "examine", lambda *_: (None, ("at once",)))
     current, stood = searches._settled(At(("a",)), inquiry, BASE_AT)  # type: ignore[arg-type]
     assert (current, stood) == (At(("a",)), ("at once",))
 

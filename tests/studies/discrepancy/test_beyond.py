@@ -14,12 +14,11 @@ from spinepipe.cohort.measured import measured_specimen
 from spinepipe.cohort.specimen import spine_model
 from spinepipe.model.file import ModelFile, effects_for
 from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
-from spinepipe.studies.discrepancy.search.base import DAMPING
-from spinepipe.studies.discrepancy.search.baseline import BaselineFit
+from spinepipe.studies.discrepancy.search.baseline import DAMPING, BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
 from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
 from spinepipe.studies.discrepancy.search.prediction import Simulated
-from spinepipe.studies.discrepancy.search.residual_model import tabulated
+from spinepipe.studies.discrepancy.search.residual_model import fit_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import Conclusion, plain_data, verdict_of
@@ -29,7 +28,7 @@ from spinepipe.units import ROTATIONS
 
 def tables(at: BaselineFit) -> tuple[BaselineFit, Tabulated | None]:
     lack = lack_of_fit(at, ROTATIONS, DRAWS, 0)
-    return tabulated(at, lack, found(at), FALSE_ALARM)
+    return fit_tables(at, lack, found(at), FALSE_ALARM)
 
 
 @sweep("seed", [1, 2, 3])

@@ -13,8 +13,13 @@ from sweeps import sweep
 from spinepipe.cohort import read
 from spinepipe.model import LoadStep
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
-from spinepipe.studies.discrepancy.search.base import base_model, base_parameters
-from spinepipe.studies.discrepancy.search.baseline import BaselineFit, BaselineModels, fit_baseline
+from spinepipe.studies.discrepancy.search.baseline import (
+    BaselineFit,
+    BaselineModels,
+    base_model,
+    base_parameters,
+    fit_baseline,
+)
 from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors

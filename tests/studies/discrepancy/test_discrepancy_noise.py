@@ -231,39 +231,3 @@ def test_whitened_draws_are_independent_with_sd_one() -> None:
     white = with_nuisances(plain, [moved[..., None]])([mean])
     found = white @ white.T / draws
     np.testing.assert_allclose(found, np.eye(24), atol=5.0 * np.sqrt(2.0 / draws))
-
-
-@sweep("zeroed", [False, True])
-def test_left_over_is_what_remains_at_the_most_likely_nuisances(zeroed: bool) -> None:
-    tests, noise, nuisances, white = setup(0.4, zeroed)
-    residual = nuisances @ [1.0, -2.0, 0.5] + np.linalg.cholesky(noise) @ np.linspace(
-        -1.0, 1.0, len(noise)
-    )
-    inverse = np.linalg.inv(noise)
-    normal = np.eye(3) + nuisances.T @ inverse @ nuisances
-    best = np.linalg.solve(normal, nuisances.T @ inverse @ residual)
-    left = residual - nuisances @ best
-    found = white.left_over(white.noise_only(per_test(tests, residual)))
-    np.testing.assert_allclose(found, white.noise_only(per_test(tests, left)), atol=1e-8)
-    assert found @ found == pytest.approx(left @ inverse @ left)
-
-
-def test_freedom_is_the_expected_square_of_what_is_left_over() -> None:
-    tests, noise, nuisances, white = setup(0.4, False)
-    plain = white.noise_only(per_test(tests, np.eye(len(noise))))
-    inverse = np.linalg.inv(noise)
-    gain = np.linalg.solve(np.eye(3) + nuisances.T @ inverse @ nuisances, nuisances.T @ inverse)
-    left = plain @ (np.eye(len(noise)) - nuisances @ gain)
-    expected = np.diagonal(left @ (noise + nuisances @ nuisances.T) @ left.T)
-    np.testing.assert_allclose(white.freedom, expected, atol=1e-8)
-
-
-def test_whitened_readings_have_no_unit() -> None:
-    """Readings, nuisances and SDs in units a thousand times smaller: the same numbers."""
-    tests, noise, nuisances, white = setup(0.4, True)
-    errors = np.linalg.cholesky(noise) @ np.arange(float(len(noise)))
-    small = replace(noise_of(0.4, True), sd=1000.0 * SD)
-    other = with_nuisances(whitening(tests, small), per_test(tests, 1000.0 * nuisances))
-    np.testing.assert_allclose(
-        other(per_test(tests, 1000.0 * errors)), white(per_test(tests, errors)), rtol=1e-9
-    )

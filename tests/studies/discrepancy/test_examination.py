@@ -11,15 +11,15 @@ from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.examination import examined
 from spinepipe.studies.discrepancy.search.hypothesis import (
     ActiveTerm,
     CandidateForm,
     Trials,
     Variant,
 )
-from spinepipe.studies.discrepancy.search.refit import Refit, preferred
+from spinepipe.studies.discrepancy.search.refit import Refit, rank_refits
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
+from spinepipe.studies.discrepancy.search.search import examine
 from spinepipe.studies.discrepancy.search.search_state import SearchStage, SearchState
 
 MARGIN, NEEDED = 3.0, 5.0
@@ -93,19 +93,20 @@ class Says:
         return Refit(supposed(name).form, fit, value, 2.0 * value)
 
 
-def examine(says: Says, *names: str, settled: bool = False) -> Any:
-    return examined(cast(BaselineFit, Place(names)), cast(SearchState, says), settled=settled)
+def ended(says: Says, *names: str, settled: bool = False) -> tuple[Any, Any]:
+    """What stands where it came to, and the effects with their rivals."""
+    return examine(cast(BaselineFit, Place(names)), cast(SearchState, says), settled=settled)
 
 
 @sweep("lead, gives_way", [(0.5, False), (2.9, False), (3.1, True)])
 def test_another_takes_the_place_by_a_clear_margin_only(lead: float, gives_way: bool) -> None:
     says = Says({(): {"neutral_zone": 100.0, "nonlinear_stiffening": 100.0 + lead}})
-    result = examine(says, "neutral_zone")
+    result = ended(says, "neutral_zone")
     if gives_way:
-        assert result.standing is None
-        assert result.grounds.names == ("nonlinear_stiffening",)
+        assert result[1] is None
+        assert result[0].names == ("nonlinear_stiffening",)
     else:
-        (one,) = result.standing
+        (one,) = result[1]
         assert (one.name, one.rivals[0].name) == ("neutral_zone", "nonlinear_stiffening")
         assert one.rivals[0].margin == pytest.approx(-lead)
 
@@ -113,9 +114,9 @@ def test_another_takes_the_place_by_a_clear_margin_only(lead: float, gives_way: 
 def test_what_is_not_evident_beside_the_others_leaves() -> None:
     beside = {("neutral_zone",): {"facet_contact": 4.9}, ("facet_contact",): {"neutral_zone": 55.0}}
     says = Says(beside | {(): {"neutral_zone": 60.0}})
-    result = examine(says, "neutral_zone", "facet_contact")
-    assert result.standing is None
-    assert result.grounds.names == ("neutral_zone",)
+    result = ended(says, "neutral_zone", "facet_contact")
+    assert result[1] is None
+    assert result[0].names == ("neutral_zone",)
 
 
 def test_when_settled_nothing_gives_way_any_more() -> None:
@@ -127,10 +128,10 @@ def test_when_settled_nothing_gives_way_any_more() -> None:
             ("facet_contact",): {"neutral_zone": 90.0, "nonlinear_stiffening": 130.0},
         }
     )
-    result = examine(says, "neutral_zone", "facet_contact", settled=True)
-    assert [one.name for one in result.standing] == ["neutral_zone", "facet_contact"]
-    assert result.standing[0].rivals[0].name == "nonlinear_stiffening"
-    assert result.standing[0].rivals[0].margin == pytest.approx(-40.0)
+    result = ended(says, "neutral_zone", "facet_contact", settled=True)
+    assert [one.name for one in result[1]] == ["neutral_zone", "facet_contact"]
+    assert result[1][0].rivals[0].name == "nonlinear_stiffening"
+    assert result[1][0].rivals[0].margin == pytest.approx(-40.0)
 
 
 def test_a_single_one_replaces_two_by_a_clear_margin_only() -> None:
@@ -141,27 +142,27 @@ def test_a_single_one_replaces_two_by_a_clear_margin_only() -> None:
         ("neutral_zone",): {"facet_contact": 38.0},
         ("facet_contact",): {"neutral_zone": 59.0, "nonlinear_stiffening": 40.0},
     }
-    kept = examine(Says(evidence), "neutral_zone", "facet_contact")
-    assert kept.standing is not None
-    assert {one.rivals[0].name for one in kept.standing} == {"nonlinear_stiffening"}
+    kept = ended(Says(evidence), "neutral_zone", "facet_contact")
+    assert kept[1] is not None
+    assert {one.rivals[0].name for one in kept[1]} == {"nonlinear_stiffening"}
     evidence[()] = beside_none | {"nonlinear_stiffening": 120.0}
-    gone = examine(Says(evidence), "neutral_zone", "facet_contact")
-    assert (gone.standing, gone.grounds.names) == (None, ("nonlinear_stiffening",))
+    gone = ended(Says(evidence), "neutral_zone", "facet_contact")
+    assert (gone[1], gone[0].names) == (None, ("nonlinear_stiffening",))
 
 
 def test_where_the_rest_has_no_fit_rivals_are_unknown_and_the_base_stands_in_for_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Without facet contact the zone has no fit: nothing is tried in its place on the base."""
-    place = "spinepipe.studies.discrepancy.search.examination.in_place"
+    place = "spinepipe.studies.discrepancy.search.search.in_place"
     monkeypatch.setattr(place, lambda fit, number: (80.0, 35.0))
     monkeypatch.setattr(Trials, "log_share", lambda self, form: -1.0)
     says = Says(
         {("facet_contact",): {"neutral_zone": 90.0}, (): {"nonlinear_stiffening": 500.0}},
         no_fit=[("neutral_zone",)],
     )
-    result = examine(says, "neutral_zone", "facet_contact", settled=True)
-    zone, contact = result.standing
+    result = ended(says, "neutral_zone", "facet_contact", settled=True)
+    zone, contact = result[1]
     assert zone.rivals_known
     assert not contact.rivals_known
     assert (contact.log_evidence, contact.gain) == (34.0, 80.0)
@@ -179,6 +180,6 @@ def test_a_plain_form_hardly_behind_stands_first(behind: float, first: int) -> N
         a_refit("creep", 40.0 - behind, 1),
         a_refit("hysteresis", 39.5, 1),
     ]
-    ranked = preferred(found)
+    ranked = rank_refits(found)
     assert (ranked[0].name, ranked[0].unknowns) == ("creep", first)
     assert sorted(one.log_evidence for one in ranked) == sorted(o.log_evidence for o in found)

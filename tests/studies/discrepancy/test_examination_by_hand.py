@@ -9,7 +9,7 @@ import pytest
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.search import examination
+from spinepipe.studies.discrepancy.search import search as examination
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import Rival, SearchStage
@@ -139,7 +139,7 @@ def test_two_plain_effects_stand_for_one_of_many_unknowns() -> None:
     found = two(inquiry, MANY, MANY, refitted("b", 30.0), refitted("e", 29.0))
     assert inquiry.places == [(("b", PlaceSpread.SHARED), "a, beside b")]
     assert found.forms == (form("b"), form("d"))
-    assert found.grounds.there == ("d", PlaceSpread.SHARED)
+    assert found.baseline.there == ("d", PlaceSpread.SHARED)
     assert found.lead == pytest.approx(5.0)
 
 

@@ -13,8 +13,10 @@ from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import baseline as grounded
 from spinepipe.studies.discrepancy.search import joint_fit as fits
 from spinepipe.studies.discrepancy.search.baseline import NoBase
+from spinepipe.studies.discrepancy.search.hypothesis import HypothesisMember
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Points, joint_fit
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 
 # Fits: two specimens with an unknown of their own each and one that they share
 
@@ -54,8 +56,8 @@ def whitened(rows: Sequence[Array]) -> Array:
 
 
 def hypothesis(low: float = -9.0, high: float = 9.0) -> Any:
-    members = {
-        name: SimpleNamespace(model=name, free=(), numbers=numbers)
+    members: dict[str, Any] = {
+        name: HypothesisMember(name, (), numbers)  # type: ignore[arg-type]
         for name, numbers in NUMBERS.items()
     }
     unknowns = [
@@ -66,8 +68,8 @@ def hypothesis(low: float = -9.0, high: float = 9.0) -> Any:
 
 
 def setting() -> Any:
-    readings = {
-        name: SimpleNamespace(cases=(), tests=[SimpleNamespace(mean=one)])
+    readings: dict[str, Any] = {
+        name: SpecimenReadings(name, (), (SimpleNamespace(mean=one, case=None),))  # type: ignore[arg-type]
         for name, one in READ.items()
     }
     return SimpleNamespace(
@@ -205,7 +207,7 @@ class InTurn:
 
 def based(monkeypatch: pytest.MonkeyPatch, *ended: JointFit) -> tuple[JointFit, InTurn]:
     monkeypatch.setattr(grounded, "replace", lambda one, **changes: SimpleNamespace(**changes))
-    monkeypatch.setattr(grounded, "_why_not", lambda models, setting: "")
+    monkeypatch.setattr(grounded, "SolvedSpecimen", lambda model, cases, zeroed: None)
     run = InTurn(*ended)
     models: Any = SimpleNamespace(members={"a": SimpleNamespace(model="start")})
     return grounded._base_fit(models, setting(), run), run
@@ -247,12 +249,13 @@ def test_nuisances_are_taken_again_until_the_base_stays_within_a_tenth(
 
     monkeypatch.setattr(grounded, "_base_fit", base_fit)
     monkeypatch.setattr(grounded, "_plain", lambda readings, noise: {"a": None})
-    monkeypatch.setattr(grounded, "_nuisances", lambda *_: ())
+    monkeypatch.setattr(grounded, "SolvedSpecimen", lambda *_: None)
+    monkeypatch.setattr(grounded, "nuisance_signatures", lambda *_: ())
     monkeypatch.setattr(grounded, "with_nuisances", lambda plain, moved: moved)
     monkeypatch.setattr(grounded, "hypothesis", lambda models, *_: models)
     noise: Any = SimpleNamespace(source=grounded.REPEATS, zeroed=False)
     start = grounded.BaselineModels({}, {}, 9.0)
-    one: Any = SimpleNamespace(specimen="a", cases=())
+    one: Any = SimpleNamespace(specimen="a", cases=(), coordinates=())
     found = grounded.fit_baseline([one], noise, None, start, None)  # type: ignore[arg-type]
     assert len(asked) == 1 + fitted
     assert found.fit.x[1] == moves[fitted - 1]

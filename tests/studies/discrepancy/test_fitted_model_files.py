@@ -14,7 +14,7 @@ from spinepipe.effects import PlaceSpread
 from spinepipe.model import ScopedEffect
 from spinepipe.model.file import effects_for, read_model, write_model
 from spinepipe.statics import with_parameters
-from spinepipe.studies.discrepancy.search.base import base_parameters
+from spinepipe.studies.discrepancy.search.baseline import base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (
     ActiveTerm,
     CandidateForm,

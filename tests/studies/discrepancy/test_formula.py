@@ -1,6 +1,7 @@
 """Formulas of what no effect explains: the law that was put in, or nothing."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,16 +14,23 @@ from sweeps import sweep
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect
 from spinepipe.statics import FreeParameter
+from spinepipe.studies.discrepancy.search import formula as formulas
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.formula import formula, text_of
-from spinepipe.studies.discrepancy.search.law_terms import LawTerm, tell_time, term_columns
-from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
-from spinepipe.studies.discrepancy.search.pursuit import (
+from spinepipe.studies.discrepancy.search.formula import (
     EVERYWHERE,
     PursuitProblem,
     TermAtPlace,
     _WhitenedColumns,
+    formula,
+    text_of,
 )
+from spinepipe.studies.discrepancy.search.law_terms import (
+    LawTerm,
+    TermColumns,
+    tell_time,
+    term_columns,
+)
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
 from spinepipe.studies.discrepancy.verdict_unnamed import Formula, FormulaTerm
 from spinepipe.units import ROTATIONS
 
@@ -103,21 +111,6 @@ def test_the_terms_of_a_place_stand_together() -> None:
         "drift of the reading in extension at every joint of s1 = "
         "+0.5 (SD 0.1) deg * step / last step"
     )
-
-
-@sweep(
-    "coordinate, powers, unit, border",
-    [
-        ("extension", (0, 2, 0, 0), "N m/rad^2", 1.0),
-        ("anterior", (2, 0, 0, 0), "N/mm^2", 1e-6),
-        ("extension", (1, 1, 0, 0), "N m/(mm rad)", 1e-3),
-        ("extension", (0, 1, -1, 0), "N m s/rad", 1.0),
-        ("superior", (1, 0, 0, 1), "N/(mm N)", 1e-3),
-    ],
-)
-def test_units_of_coefficients(coordinate: str, powers: tuple, unit: str, border: float) -> None:
-    term = LawTerm(coordinate, "load", "", powers)
-    assert (term.unit, term.border) == (unit, pytest.approx(border))
 
 
 # Columns, against the sensitivities of the simulator to an effect that is off
@@ -258,3 +251,62 @@ def test_noise_alone_passes_as_seldom_as_is_allowed() -> None:
         ranked = one.ranked([], FALSE_ALARM)
         passed += ranked.drops[0] > ranked.threshold
     assert passed <= 12
+
+
+SQUARE = LawTerm("extension", "load", "extension^2", (0, 2, 0, 0), ("extension", "extension"))
+
+
+def test_twenty_candidates_are_ranked_best_first() -> None:
+    found = made_up(1, {ALL: 1.0}).ranked([], 0.01)
+    assert len(found.best) == len(found.drops) == len(found.values) == 20
+    assert list(found.drops) == sorted(found.drops, reverse=True)
+
+
+def test_without_linear_terms_there_are_no_coefficients() -> None:
+    values, sds = made_up(1, {ALL: 1.0}).fitted([])
+    assert (values.shape, sds.shape) == ((0,), (0,))
+
+
+@sweep("left, is_term", [(1.1e-4, True), (0.9e-4, False)])
+def test_a_term_that_keeps_a_ten_thousandth_beside_the_rest_is_one(
+    left: float, is_term: bool
+) -> None:
+    """A column of length one, whose square lies so much across what is taken out."""
+    column = np.array([[np.sqrt(1.0 - left)], [np.sqrt(left)]])
+    part = formulas._WhitenedColumns(column, np.ones(1))
+    shared, errors = np.array([[1.0], [0.0]]), np.array([[0.0, 0.0], [3.0, 1.0]])
+    problem = PursuitProblem((SQUARE,), 1, (part,), (0, 2), shared, errors, 1.0)
+    values, drops = problem._drops(shared, errors)
+    assert drops[0] == pytest.approx([9.0, 1.0] if is_term else [0.0, 0.0])
+    assert values[0] == pytest.approx(3.0 / np.sqrt(left) if is_term else 0.0)
+
+
+def test_candidates_are_of_each_joint_and_specimen_and_of_all() -> None:
+    problem = made_up(1, {})
+    alone = replace(problem, parts=problem.parts[:1])
+    assert {one.specimen for one in alone.candidates()} == {EVERYWHERE}
+    assert {one.joint for one in alone.candidates()} == {EVERYWHERE, 0, 1}
+    single = replace(problem, joints=1)
+    assert {one.joint for one in single.candidates()} == {0}
+    assert {one.specimen for one in single.candidates()} == {EVERYWHERE, 0, 1}
+    assert problem.column(ONE)[60:].tolist() == [0.0] * 60
+    assert problem.column(ONE)[:60].tolist() == problem.parts[0].columns[:, 3 * 3 + 2].tolist()
+
+
+def test_a_joint_alone_has_a_column_for_each_term() -> None:
+    moved = np.arange(2.0 * 6 * 3).reshape(2, 1, 6, 3)
+    one = TermColumns((SQUARE,) * 3, (moved,), np.ones((3, 1)))
+    assert formulas._with_sums(one, 1)[0] is moved
+    each = np.arange(4.0).reshape(1, 1, 1, 4) * np.ones((2, 2, 6, 1))
+    both = TermColumns((SQUARE,) * 2, (each,), np.ones((2, 2)))
+    found = formulas._with_sums(both, 2)[0]
+    assert found[0, 0, 0].tolist() == [1.0, 0.0, 1.0, 5.0, 2.0, 3.0]
+
+
+def test_what_columns_span_is_as_wide_as_they_are_apart() -> None:
+    """Columns of other units, one of nothing, one that the others make."""
+    columns_of = np.array([[1e-6, 0.0, 2.0, 1.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
+    basis = formulas._orthonormal(columns_of)
+    assert basis.shape == (3, 2)
+    np.testing.assert_allclose(basis @ basis.T, np.diag([1.0, 1.0, 0.0]), atol=1e-12)
+    assert formulas._orthonormal(np.zeros((3, 0))).shape == (3, 0)

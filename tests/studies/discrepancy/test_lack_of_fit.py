@@ -20,6 +20,7 @@ from spinepipe.studies.discrepancy.search.lack_of_fit import (
     Term,
     generic_columns,
 )
+from spinepipe.studies.discrepancy.search.prediction import bushing_stiffness
 from spinepipe.studies.discrepancy.search.screen import Group
 from spinepipe.units import COORDINATES, ROTATIONS
 
@@ -150,10 +151,10 @@ def test_zeroed_columns_begin_with_nought() -> None:
     np.testing.assert_allclose(other, one - one[:1], atol=1e-15)
 
 
-def test_joints_without_bushings_count_as_of_one() -> None:
+def test_a_joint_is_as_stiff_as_its_bushings() -> None:
     bare = chain().with_effects(())
-    np.testing.assert_array_equal(basis._stiffness(bare), np.ones((JOINTS, 6)))
-    np.testing.assert_array_equal(basis._stiffness(chain())[1, 3:], chains.STIFFNESS)
+    assert not bushing_stiffness(bare).any()
+    np.testing.assert_array_equal(bushing_stiffness(chain())[1, 3:], chains.STIFFNESS)
 
 
 # Evidence
@@ -190,7 +191,7 @@ def test_the_evidence_of_a_family_is_that_of_its_columns_summed(spread: PlaceSpr
 
 
 def part(family: str, coordinate: str, spread: PlaceSpread, *ratios: float) -> Any:
-    return basis._SpecimenResiduals(family, coordinate, spread, np.log(ratios), 10.0 * ratios[0])
+    return basis._FamilyEvidence(family, coordinate, spread, np.log(ratios), 10.0 * ratios[0])
 
 
 def test_evidence_is_averaged_over_families_and_ways_to_differ() -> None:

@@ -3,6 +3,7 @@
 from itertools import combinations
 
 import numpy as np
+import pytest
 import spring_chain_cases as chains
 from sweeps import sweep
 
@@ -10,11 +11,13 @@ from spinepipe.effects import Wrench
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.discrepancy.search.nuisance import (
     NuisancePriors,
+    as_si,
     nuisance_columns,
     nuisance_labels,
     nuisance_signatures,
 )
 from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
+from spinepipe.studies.discrepancy.settings import Nuisance
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 FORCE = 100.0
@@ -76,3 +79,27 @@ def test_forces_turn_by_themselves_where_there_are_any(force: float, count: int)
     assert len(labels) == count
     assert sum("of forces" in one.component for one in labels) == count - 2
     assert {one.kind for one in labels} == {"load_axis"}
+
+
+# As large as studies declare
+
+
+def test_imperfections_are_as_large_as_a_study_has_them_that_says_nothing() -> None:
+    """Two mm; two degrees of posture, one of all else; 2 % of loads and of stiffness."""
+    usual = as_si(Nuisance().model_dump())
+    assert vars(usual) == pytest.approx(vars(NuisancePriors()))
+    assert usual.joint_centre == pytest.approx(0.002)
+    assert np.rad2deg(usual.posture) == pytest.approx(2.0)
+    one_degree = (usual.law_axes, usual.registration, usual.load_axis)
+    assert np.rad2deg(one_degree) == pytest.approx([1.0] * 3)
+    assert (usual.load_gain, usual.off_diagonal, usual.rotation_order) == (0.02, 0.02, 0.5)
+
+
+def test_each_size_is_told_by_its_own_name() -> None:
+    names = list(Nuisance.model_fields)
+    for name in names:
+        found = vars(as_si(dict.fromkeys(names, 0.0) | {name: 3.0}))
+        (field,) = [one for one, size in found.items() if size != 0.0]
+        assert name.startswith(field)
+        unit = {"mm": 0.003, "deg": np.deg2rad(3.0)}.get(name.removeprefix(f"{field}_"), 3.0)
+        assert found[field] == pytest.approx(unit)

@@ -16,7 +16,7 @@ from spinepipe.studies.discrepancy.search.prediction import (
     Predicted,
     PredictedSpecimen,
     SolvedSpecimen,
-    recorded,
+    solve_on_record,
 )
 
 STIFFNESS = {"a": 40.0, "b": 60.0}
@@ -111,7 +111,7 @@ def test_first_poses_are_looked_for_near_those_that_are_told() -> None:
 
 def test_the_engine_of_record_is_asked_beside(monkeypatch: pytest.MonkeyPatch) -> None:
     model, given = chain("a", 40.0), cases(("extension",))
-    recorded(model, given)
+    solve_on_record(model, given)
     asked = []
 
     def elsewhere(*told: object) -> None:
@@ -119,7 +119,7 @@ def test_the_engine_of_record_is_asked_beside(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(prediction, "on_record", elsewhere)
     with pytest.raises(NoEquilibrium, match="a: the engine of record"):
-        recorded(model, given)
+        solve_on_record(model, given)
     ((_, _, (poses,), within),) = asked
     assert within == 1e-7
     expected = SolvedSpecimen(model, given, False).poses[0].reshape(6, -1)
@@ -146,11 +146,12 @@ def test_a_load_that_holds_moves_the_other_way() -> None:
     """A moment of 1 N m that holds a joint besides its spring turns it back by 1 / k."""
     model, given = chain("a", 40.0), cases(("extension", "bending"))
     solved = SolvedSpecimen(model, given, False)
-    loads = [np.zeros((6, JOINTS, 6, 1)) for _ in given]
-    loads[1][3, 0, 4, 0] = 1.0
-    first, second = solved.by_loads(loads)
+    loads = [np.zeros((6, JOINTS, 1)) for _ in given]
+    loads[1][3, 0, 0] = 1.0
+    first, second = solved.by_loads(loads, 4)
     assert np.abs(first).max() < 1e-12
     assert second[3, 0, 4, 0] == pytest.approx(-1.0 / 40.0, rel=1e-6)
+    assert np.abs(second[3, ..., 1:]).max() < 1e-12  # of the other joints
     assert np.abs(np.delete(second, 3, axis=0)).max() < 1e-12
 
 

@@ -21,7 +21,7 @@ from spinepipe.studies.discrepancy.search.refit import (
     leading,
     refit,
     standing,
-    started,
+    starting_term,
     weaker,
 )
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
@@ -100,7 +100,7 @@ def test_the_form_of_equal_values_is_refitted_beside_the_best_of_its_variant() -
 def test_a_fit_starts_at_the_mean_strength_and_the_shapes_of_the_screen() -> None:
     """Ratio of stiffness 1 when off, 0.5 less for a prior SD; the width one SD of its logarithm."""
     _, width, sharpness = ZONE.create().parameters
-    found = started(
+    found = starting_term(
         tried(CandidateForm(ZONE, PlaceSpread.BY_JOINT), 0.0, [-0.6, -1.0], [0, 0], (1.0, 0.0))
     )
     expected = [1.0 - 0.8 * 0.5, width.default * np.exp(0.7), sharpness.default]
@@ -109,7 +109,9 @@ def test_a_fit_starts_at_the_mean_strength_and_the_shapes_of_the_screen() -> Non
 
 def test_strengths_of_several_columns_start_each_at_its_own() -> None:
     estimate, columns = [1.0, -2.0, 0.5, 2.0, -4.0, 0.7], [0, 1, 2, 0, 1, 2]
-    found = started(tried(CandidateForm(OFFSET, PlaceSpread.BY_SPECIMEN), 0.0, estimate, columns))
+    found = starting_term(
+        tried(CandidateForm(OFFSET, PlaceSpread.BY_SPECIMEN), 0.0, estimate, columns)
+    )
     scales = np.array([p.prior_scale for p in OFFSET.create().parameters])
     assert found.start == pytest.approx(np.array([1.5, -3.0, 0.6]) * scales)
 
@@ -134,14 +136,16 @@ def test_a_strength_starts_on_its_side_and_inside_its_bounds(
     of_variant: Variant, sds: float, value: float
 ) -> None:
     """A fraction has SD 0.3 from 0 to 0.95, a ratio 0.5 in its logarithm from 0.01 to 100."""
-    found = started(tried(CandidateForm(of_variant, PlaceSpread.SHARED), 0.0, [sds], [0]))
+    found = starting_term(tried(CandidateForm(of_variant, PlaceSpread.SHARED), 0.0, [sds], [0]))
     assert found.start[0] == pytest.approx(value, rel=1e-9)
 
 
 def test_a_moment_starts_off_both_its_bounds_by_a_fiftieth_of_its_prior_sd() -> None:
     """0.3 N m, of 10 N m to either side: a thousandth of the whole way is 0.02 N m."""
     for sds, value in ((90.0, 9.994), (-90.0, -9.994)):
-        found = started(tried(CandidateForm(OFFSET, PlaceSpread.SHARED), 0.0, [sds] * 3, [0, 1, 2]))
+        found = starting_term(
+            tried(CandidateForm(OFFSET, PlaceSpread.SHARED), 0.0, [sds] * 3, [0, 1, 2])
+        )
         assert found.start == pytest.approx([value] * 3)
 
 

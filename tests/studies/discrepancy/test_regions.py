@@ -14,7 +14,7 @@ from spring_chain_cases import SD, Array
 
 from spinepipe.calibrate.profile import NEAR, RegionEnds
 from spinepipe.effects import PlaceSpread
-from spinepipe.studies.discrepancy.search.base import base_parameters
+from spinepipe.studies.discrepancy.search.baseline import base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (
     ActiveTerm,
     CandidateForm,
@@ -25,7 +25,11 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, jo
 from spinepipe.studies.discrepancy.search.model_files import standard_errors
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
-from spinepipe.studies.discrepancy.search.regions import ValueWithRegion, estimated, region
+from spinepipe.studies.discrepancy.search.regions import (
+    ValueWithRegion,
+    region,
+    values_with_regions,
+)
 from spinepipe.studies.discrepancy.search.whitening import whitening
 from spinepipe.studies.discrepancy.verdict import REPEATS
 from spinepipe.units import DEG_PER_RAD, ROTATIONS
@@ -92,7 +96,7 @@ def test_a_value_that_readings_follow_in_one_over_it_has_the_region_of_a_straigh
     theta = given.tests[0].mean[:, 1, EXTENSION]
     size = float(LEVELS @ LEVELS)
     u, way = float(LEVELS @ theta) / size, Z * SD / np.sqrt(CYCLES * size)
-    (found,) = estimated(fit, setting, 0)
+    (found,) = values_with_regions(fit, setting, 0)
     ends = 1.0 / (K * (1.0 - np.array([found.low, found.high], dtype=float)))
     np.testing.assert_allclose(ends, [u - way, u + way], rtol=0, atol=SLACK * way)
     assert found.identifiable
@@ -111,7 +115,7 @@ def test_with_the_base_fitted_along_it_is_fiellers() -> None:
     su, sv = SD / np.sqrt(CYCLES * 2.0 * size), SD / np.sqrt(CYCLES * size)
     # (u - r v)^2 = Z^2 (su^2 + r^2 sv^2)
     ratios = np.roots([v**2 - Z**2 * sv**2, -2.0 * u * v, u**2 - Z**2 * su**2])
-    (found,) = estimated(fit, setting, 0)
+    (found,) = values_with_regions(fit, setting, 0)
     expected = np.sort(1.0 - ratios.real)
     way = float(np.ptp(expected)) / 2.0
     assert abs(expected.mean() - found.value) > 0.02 * way  # no symmetric interval
@@ -124,7 +128,7 @@ def test_where_all_is_straight_it_is_the_interval_of_the_standard_error() -> Non
     fit, setting = fitted(given, ActiveTerm(CandidateForm(BIAS, PlaceSpread.SHARED), start))
     mean = float(np.nanmean(given.tests[0].mean[..., EXTENSION] - (LEVELS / K)[:, None]))
     way = Z * SD / np.sqrt(CYCLES * len(LEVELS) * JOINTS)
-    every = by_name(estimated(fit, setting, 0))
+    every = by_name(values_with_regions(fit, setting, 0))
     found, unread = every["extension"], every["anterior"]
     expected = np.array([mean - way, mean + way]) * DEG_PER_RAD
     np.testing.assert_allclose(
@@ -156,7 +160,7 @@ def test_loads_that_stay_inside_a_zone_do_not_tell_where_it_ends() -> None:
     levels = LEVELS / 6.0
     given = read(lambda _, moments: moments / (0.33 * K), levels)
     fit, setting = fitted(given, zoned(0.06, 0.33))
-    width = by_name(estimated(fit, setting, 0))["width"]
+    width = by_name(values_with_regions(fit, setting, 0))["width"]
     reached = DEG_PER_RAD / (0.33 * K)
     assert np.isfinite(local(fit, "width"))
     assert (width.high, width.open_above, width.identifiable) == (None, True, False)
@@ -175,7 +179,7 @@ def test_loads_beyond_a_zone_tell_where_it_ends() -> None:
         return np.where(np.abs(moments) < within, moments / (0.33 * K), beyond)
 
     fit, setting = fitted(read(turned, np.linspace(-6.0, 6.0, 25)), zoned(0.02, 0.4))
-    width = by_name(estimated(fit, setting, 0))["width"]
+    width = by_name(values_with_regions(fit, setting, 0))["width"]
     assert width.identifiable
     assert width.low is not None
     assert width.high is not None
@@ -191,7 +195,7 @@ def test_a_contact_as_rigid_as_a_wall_has_no_upper_end() -> None:
     names = [p.name for p in CONTACT.create().parameters]
     values[names.index("gap")], values[names.index("stiffness")] = 0.9 * gap, 500.0
     fit, setting = fitted(given, ActiveTerm(CandidateForm(CONTACT, PlaceSpread.SHARED), values))
-    stiffness = by_name(estimated(fit, setting, 0))["stiffness"]
+    stiffness = by_name(values_with_regions(fit, setting, 0))["stiffness"]
     assert np.isfinite(local(fit, "stiffness"))
     assert (stiffness.high, stiffness.open_above) == (None, True)
     assert stiffness.low is not None
@@ -206,7 +210,7 @@ def test_a_region_that_holds_a_bound_is_open_there() -> None:
     size = float(LEVELS @ LEVELS)
     u, way = float(LEVELS @ theta) / size, Z * SD / np.sqrt(CYCLES * size)
     assert u - way < 1.0 / K < u + way
-    (found,) = estimated(fit, setting, 0)
+    (found,) = values_with_regions(fit, setting, 0)
     assert (found.low, found.open_below, found.open_above) == (None, True, False)
     assert not found.identifiable
     end = 1.0 / (K * (1.0 - np.array([found.high], dtype=float)))

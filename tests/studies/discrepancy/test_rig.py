@@ -3,6 +3,7 @@
 The data are made by one line of algebra, F = k q (1 + c q^2), with all rotations blocked.
 """
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -21,11 +22,11 @@ from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.investigation import (
     Investigation,
     Prepared,
-    base_fitted,
+    fit_base,
     investigate,
-    prepared,
+    prepare,
 )
-from spinepipe.studies.discrepancy.search.regions import estimated
+from spinepipe.studies.discrepancy.search.regions import values_with_regions
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import Conclusion
@@ -87,12 +88,23 @@ def written(
 
 
 def laid(cohort: Cohort) -> tuple[Prepared, BaselineFit]:
-    ready = prepared(STUDY, cohort, None)
-    return ready, base_fitted(ready, at_once)
+    ready = prepare(STUDY, cohort, None)
+    return ready, fit_base(ready, at_once)
+
+
+def test_a_study_says_before_its_cohort_how_large_the_noise_is(tmp_path: Path) -> None:
+    """Translations first; where neither says it, it is not known."""
+    cohort = written(tmp_path, 0.0)[0]
+    sd = {"rotation_deg": 0.2, "translation_mm": 0.5}
+    own = Discrepancy.model_validate(STUDY.model_dump() | {"measurement_sd": sd})
+    for study, mm, deg in ((STUDY, 0.02, 0.1), (own, 0.5, 0.2)):
+        expected = [1e-3 * mm] * 3 + [np.deg2rad(deg)] * 3
+        assert prepare(study, cohort, None).declared == pytest.approx(expected)
+    assert prepare(STUDY, replace(cohort, measurement_sd=None), None).declared is None
 
 
 def test_what_is_read_and_what_is_not(tmp_path: Path) -> None:
-    ready = prepared(STUDY, written(tmp_path, 0.0)[0], None)
+    ready = prepare(STUDY, written(tmp_path, 0.0)[0], None)
     assert ready.coordinates == ("anterior", "superior", "right")
     for test in ready.readings[0].tests:
         assert (test.cycles[..., 0] == 0.0).all()  # reactions: none is needed beside what is listed
@@ -127,7 +139,7 @@ def test_the_law_that_made_the_forces_leaves_noise(tmp_path: Path) -> None:
 def test_rows_of_a_rig_are_loads(tmp_path: Path) -> None:
     """Measured is what is listed; the model's is what it holds where the machine has the joint."""
     cohort, _ = written(tmp_path, 0.0)
-    (first, *_) = prepared(STUDY, cohort, None).readings[0].tests
+    (first, *_) = prepare(STUDY, cohort, None).readings[0].tests
     step = first.case.steps[3]
     rig = next(one for one in step.supports if one.place == 0)
     assert rig.read_as is not None
@@ -173,7 +185,7 @@ def searched(folder: Path, growth_per_mm2: float) -> Investigation:
     cohort, _ = written(folder, growth_per_mm2, FORCE_SD, "abcd")
     few = ("nonlinear_stiffening", "neutral_zone", "flexion_extension_asymmetry")
     study = STUDY.model_copy(update={"effects": few})
-    return investigate(prepared(study, cohort, None), at_once)
+    return investigate(prepare(study, cohort, None), at_once)
 
 
 def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) -> None:
@@ -184,7 +196,7 @@ def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) ->
     assert standing.name == "nonlinear_stiffening"
     assert dict(standing.supposed.form.variant.options)["coordinate"] == "anterior"
     final = found.found.final
-    growth = next(v for v in estimated(final.fit, final.setting, 0) if v.name == "growth")
+    growth = next(v for v in values_with_regions(final.fit, final.setting, 0) if v.name == "growth")
     assert growth.unit == "1/m^2"
     assert growth.low < 0.15e6 < growth.high
     assert growth.high - growth.low < 0.1 * growth.value

@@ -12,7 +12,7 @@ import pytest
 import search_cases as cases
 from search_cases import Array, Searched, exponential, one_sided, searched
 
-from spinepipe.studies.discrepancy.search.regions import estimated
+from spinepipe.studies.discrepancy.search.regions import values_with_regions
 from spinepipe.studies.discrepancy.verdict import Conclusion
 
 pytestmark = pytest.mark.slow
@@ -40,7 +40,7 @@ def test_stiffening_is_named_with_its_coordinate_and_rate() -> None:
     )
     options = dict(found.standing[0].supposed.form.variant.options)
     assert options == {"coordinate": "right_bending", "shape": "exponential"}
-    (rate,) = estimated(found.final.fit, found.final.setting, 0)
+    (rate,) = values_with_regions(found.final.fit, found.final.setting, 0)
     assert (rate.name, rate.unit, rate.place) == ("rate", "1/rad", ())
     assert rate.low < RATE < rate.high
     assert rate.high - rate.low < 0.3 * RATE
@@ -73,7 +73,7 @@ def test_two_effects_are_both_named_with_their_values() -> None:
     assert ended.verdict is Conclusion.NAMED
     values = {}
     for number, one in enumerate(found.standing):
-        (value,) = estimated(found.final.fit, found.final.setting, number)
+        (value,) = values_with_regions(found.final.fit, found.final.setting, number)
         coordinate = dict(one.supposed.form.variant.options)["coordinate"]
         values[one.name, coordinate] = (value.low, value.high)
     assert set(values) == {
@@ -93,7 +93,7 @@ def test_a_lax_joint_is_named_with_its_specimen_and_its_level() -> None:
     everywhere = {"flexion": lax, "bending": lax, "rotation": lax}
     result = searched([*cases.readings(6, everywhere, ("a",)), *cases.readings(7, {}, ("b",))])
     assert [one.name for one in result.ended.named] == ["local_laxity"]
-    (fraction,) = estimated(result.found.final.fit, result.found.final.setting, 0)
+    (fraction,) = values_with_regions(result.found.final.fit, result.found.final.setting, 0)
     assert fraction.place == ("a", "L4L5")
     assert fraction.low < 0.3 < fraction.high
 

@@ -12,9 +12,14 @@ from test_formula import ALL
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import formula as formulas
-from spinepipe.studies.discrepancy.search.formula import _FormulaState, _Term
+from spinepipe.studies.discrepancy.search.formula import (
+    EVERYWHERE,
+    Ranked,
+    TermAtPlace,
+    _FormulaState,
+    _Term,
+)
 from spinepipe.studies.discrepancy.search.law_terms import LawTerm, TermColumns
-from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, Ranked, TermAtPlace
 
 TESTS, STEPS, JOINTS, TERMS = 2, 3, 2, 3
 SQUARE = LawTerm("extension", "load", "extension^2", (0, 2, 0, 0), ("extension", "extension"))
@@ -54,7 +59,8 @@ def test_a_form_is_of_the_place_of_its_candidate() -> None:
     assert variant is not None
 
     def form(joint: int, specimen: int) -> tuple[PlaceSpread, int | None, str | None]:
-        found = formulas._form(variant, TermAtPlace(0, joint, specimen), ("a", "b"))
+        place = formulas._named(TermAtPlace(0, joint, specimen), ("a", "b"))
+        found = formulas.CandidateForm.at(variant, *place)
         return found.spread, found.joint, found.specimen
 
     assert form(EVERYWHERE, EVERYWHERE) == (PlaceSpread.SHARED, None, None)
@@ -76,7 +82,7 @@ def at_work(terms: Sequence[LawTerm], chi2: float = 100.0) -> Any:
     fit = SimpleNamespace(chi2=chi2, poses=None, hypothesis=SimpleNamespace(supposed=()))
     grounds = SimpleNamespace(readings={"a": None}, fit=fit, setting=None)
     problem = SimpleNamespace(terms=tuple(terms))
-    return SimpleNamespace(grounds=grounds, problem=problem, terms=())
+    return SimpleNamespace(baseline=grounds, problem=problem, terms=())
 
 
 class Fits:
@@ -141,7 +147,7 @@ def entered(
     here = at_work([law])
     monkeypatch.setattr(formulas, "_fit_with", Fits(*fits))
     grounds, (term,) = formulas._with_one_more(here, ranked([60.0]), excess)
-    return None if grounds is here.grounds else grounds, term
+    return None if grounds is here.baseline else grounds, term
 
 
 def test_a_law_enters_with_its_fit_and_its_share_of_what_is_above_the_noise(
@@ -245,7 +251,7 @@ def test_four_terms_at_most_enter(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def proven(beats: Sequence[bool], tells: bool, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many terms are put to the proof one after the other; the last is what is told."""
-    states = [SimpleNamespace(terms=range(n), linear=[], grounds=n) for n in range(3)]
+    states = [SimpleNamespace(terms=range(n), linear=[], baseline=n) for n in range(3)]
     monkeypatch.setattr(formulas, "_pursued", lambda *_: (states, 20.0))
     answers, asked = iter(beats), list[int]()
 
@@ -255,7 +261,7 @@ def proven(beats: Sequence[bool], tells: bool, monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setattr(formulas, "proof_of_terms", proof)
     told = [SimpleNamespace(explained=0.8)]
-    monkeypatch.setattr(formulas, "_told", lambda state: told * len(state.terms))
+    monkeypatch.setattr(formulas, "_valued_terms", lambda state: told * len(state.terms))
     monkeypatch.setattr(formulas, "text_of", lambda terms: "text")
     found = formulas.formula(None, (), 10, 0, 0.01)  # type: ignore[arg-type]
     assert (found is None) is (not any(beats) and tells)
@@ -297,7 +303,7 @@ def test_a_term_is_told_with_its_value_in_units_of_tables() -> None:
         _Term(law, TermAtPlace(0, 1, 1), None, 0.25),
         _Term(RATE, TermAtPlace(1, EVERYWHERE, EVERYWHERE), 0, 0.5),
     )
-    first, second = formulas._told(_FormulaState(grounds, {}, problem, terms))
+    first, second = formulas._valued_terms(_FormulaState(grounds, {}, problem, terms))
     assert (first.specimen, first.joint, first.coordinate) == ("b", "L4L5", "anterior")
     assert (first.coefficient, first.sd, first.explained) == pytest.approx((4.0, 2.0, 0.25))
     assert (second.specimen, second.joint) == ("*", "*")

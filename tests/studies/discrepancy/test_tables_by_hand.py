@@ -114,15 +114,15 @@ def test_a_term_of_a_formula_is_tabulated_at_its_place_over_each_of_its_motions(
 
 def test_a_table_goes_as_far_as_all_specimens_move() -> None:
     """As read, or in the model; to three digits."""
-    at = grounds({"a": readings(0.1, -0.21234), "b": readings(0.3)})
-    reach = dict(tables._variant(at, "extension", "extension").options)["reach"]
-    assert reach == 0.212
-    unread = grounds({"a": readings(0.1, 9.0, counts=[1, 0])})
-    assert tables._furthest(unread, "a", 3) == 0.1
+
+    def reach(at: Any) -> Any:
+        return dict(tables._variant(at, "extension", "extension").options)["reach"]
+
+    assert reach(grounds({"a": readings(0.1, -0.21234), "b": readings(0.3)})) == 0.212
+    assert reach(grounds({"a": readings(0.1, 9.0, counts=[1, 0])})) == 0.1
     predicted = np.zeros((2, 1, 6))
     predicted[1, 0, 3] = -0.4
-    moved = grounds({"a": readings(0.1)}, predicted={"a": (predicted,)})
-    assert tables._furthest(moved, "a", 3) == 0.4
+    assert reach(grounds({"a": readings(0.1)}, predicted={"a": (predicted,)})) == 0.4
 
 
 # Which
@@ -188,7 +188,7 @@ def test_three_tables_at_most_enter_one_for_each_law(
     monkeypatch.setattr(tables, "whole_gap", lambda at, fit: SimpleNamespace(gap=0.25))
     monkeypatch.setattr(tables, "proof_of_terms", lambda *_: SimpleNamespace(closed=0.75))
     before = grounds()
-    after, table = tables.tabulated(before, None, None, 0.01)  # type: ignore[arg-type]
+    after, table = tables.fit_tables(before, None, None, 0.01)  # type: ignore[arg-type]
     entered = min(worth, 3)
     assert asked == [8, 6, 4, 2][: min(worth + 1, 3)]
     assert (table is None) is (worth == 0)

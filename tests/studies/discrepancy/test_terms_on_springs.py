@@ -112,7 +112,7 @@ def test_zeroed_columns_begin_with_nought() -> None:
 )
 def test_a_drift_is_told_over_a_whole_test(coordinate: str, unit: str, border: float) -> None:
     term = LawTerm(coordinate, READING, "", (0, 0, 0, 0))
-    assert (term.unit, term.border) == (unit, pytest.approx(border))
+    assert (term.unit, term.display_per_si) == (unit, pytest.approx(border))
     assert term.variant is None
 
 
@@ -124,10 +124,13 @@ def test_a_drift_is_told_over_a_whole_test(coordinate: str, unit: str, border: f
         ("anterior", (1, 0, -1, 0), "N s/mm", 1e-3),
         ("extension", (0, 1, 0, 1), "N m/(rad N)", 1.0),
         ("extension", (2, 1, 0, 0), "N m/(mm^2 rad)", 1e-6),
+        ("extension", (0, 2, 0, 0), "N m/rad^2", 1.0),
+        ("anterior", (2, 0, 0, 0), "N/mm^2", 1e-6),
+        ("superior", (1, 0, 0, 1), "N/(mm N)", 1e-3),
     ],
 )
 def test_units_name_each_power_once(
     coordinate: str, powers: tuple[int, int, int, int], unit: str, border: float
 ) -> None:
     term = LawTerm(coordinate, "load", "", powers)
-    assert (term.unit, term.border) == (unit, pytest.approx(border))
+    assert (term.unit, term.display_per_si) == (unit, pytest.approx(border))

@@ -16,7 +16,7 @@ from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.investigation import Investigation
-from spinepipe.studies.discrepancy.search.residual_model import beyond
+from spinepipe.studies.discrepancy.search.residual_model import model_residual
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import Conclusion
@@ -109,7 +109,7 @@ def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
     """Where most is left by the model that the verdict stands for, as the verdict file says it."""
     if ended.ended.verdict not in (Conclusion.UNKNOWN, Conclusion.PART):
         return {}
-    told = ended.as_told().found.final
+    told = ended.for_verdict().found.final
     left = worst(places(residual_frame(told, told.fit, joints)), PLACES_KEPT)
     return {"worst": [dict(place.at) | {"gap": place.gap.gap} for place in left]}
 
@@ -117,13 +117,13 @@ def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
 @_told
 def table_told(ended: Investigation) -> Told:
     """Of UNKNOWN and PART: what a tabulated law and a formula close of held-out readings."""
-    final, said = ended.as_told().found.final, ended.ended
+    final, said = ended.for_verdict().found.final, ended.ended
     if (
         said.verdict not in (Conclusion.UNKNOWN, Conclusion.PART)
         or said.reason is Reason.DATA_ERRORS
     ):
         return {}
-    stays = beyond(final, ended.rules, at_once)
+    stays = model_residual(final, ended.rules, at_once)
     table, formula = stays.table, stays.formula
     return {
         "place": table.place if table else None,

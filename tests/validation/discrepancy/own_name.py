@@ -20,7 +20,7 @@ from spinepipe.studies.discrepancy.design.fisher_information import (
 )
 from spinepipe.studies.discrepancy.design.testable import judgements
 from spinepipe.studies.discrepancy.search.hypothesis import trials
-from spinepipe.studies.discrepancy.search.investigation import base_fitted, prepared
+from spinepipe.studies.discrepancy.search.investigation import fit_base, prepare
 from spinepipe.studies.discrepancy.store import at_once
 from tests.generators.hidden import make, recipe_from
 from tests.validation.discrepancy.further import repeats_of
@@ -58,8 +58,8 @@ def gap_of_own_name(row: Row) -> dict[str, Any]:
     (name,) = row["truth"]["names"]
     with TemporaryDirectory() as place:
         make(recipe_from(row["recipe"]), Path(place) / "hidden")
-        ready = prepared(STUDY, cohorts.read(Path(place) / "hidden"), None)
-        grounds = base_fitted(ready, at_once)
+        ready = prepare(STUDY, cohorts.read(Path(place) / "hidden"), None)
+        grounds = fit_base(ready, at_once)
         joints, specimens = len(ready.cohort.joint_names), sorted(ready.cohort.specimen_names)
     every = trials(STUDY.effects, ready.coordinates, specimens, joints)
     of = {specimen: specimen_signatures(grounds, specimen, every) for specimen in grounds.readings}

@@ -8,9 +8,9 @@ from typing import Any
 from spinepipe import cohort as cohorts
 from spinepipe.problems import InputError
 from spinepipe.studies.discrepancy.search.baseline import NoBase
-from spinepipe.studies.discrepancy.search.investigation import investigate, prepared
+from spinepipe.studies.discrepancy.search.investigation import investigate, prepare
 from spinepipe.studies.discrepancy.search.outcome import Outcome
-from spinepipe.studies.discrepancy.search.regions import estimated
+from spinepipe.studies.discrepancy.search.regions import values_with_regions
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.settings import Discrepancy, DiscrepancyBase
 from spinepipe.studies.discrepancy.store import at_once
@@ -69,7 +69,7 @@ def _truth(truth: Truth) -> Row:
 def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -> Row:
     """What the search says, then what is asked besides."""
     started = time.process_time()
-    ended = investigate(prepared(STUDY, cohort, None), at_once)
+    ended = investigate(prepare(STUDY, cohort, None), at_once)
     found = ended.found
     row = _said(found, ended.ended)
     seconds["search"] = time.process_time() - started
@@ -114,7 +114,7 @@ def _standing(found: SearchResult, number: int) -> Row:
     """A form that stands, with its values and their regions in the units of tables."""
     one: SelectedTerm = found.standing[number]
     form = one.supposed.form
-    values = estimated(found.final.fit, found.final.setting, number)
+    values = values_with_regions(found.final.fit, found.final.setting, number)
     return {
         "name": one.name,
         "options": dict(form.variant.options),

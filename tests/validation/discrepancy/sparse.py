@@ -18,9 +18,13 @@ from sklearn.linear_model import LassoCV, LassoLarsIC, OrthogonalMatchingPursuit
 from spinepipe import cohort as cohorts
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.formula import formula, terms_of
-from spinepipe.studies.discrepancy.search.investigation import base_fitted, prepared
-from spinepipe.studies.discrepancy.search.pursuit import EVERYWHERE, pursuit_problem
+from spinepipe.studies.discrepancy.search.formula import (
+    EVERYWHERE,
+    formula,
+    pursuit_problem,
+    terms_of,
+)
+from spinepipe.studies.discrepancy.search.investigation import fit_base, prepare
 from spinepipe.studies.discrepancy.store import at_once
 from tests.generators.hidden import make
 from tests.validation.discrepancy.designs import plain, soiled, with_effects
@@ -75,7 +79,7 @@ def grounds_of(seed: int, hidden: str) -> BaselineFit:
     with TemporaryDirectory() as place:
         make(recipe, Path(place) / "hidden")
         cohort = cohorts.read(Path(place) / "hidden")
-    return base_fitted(prepared(STUDY, cohort, None), at_once)
+    return fit_base(prepare(STUDY, cohort, None), at_once)
 
 
 def counted(grounds: BaselineFit) -> Mapping[str, tuple[int, str]]:

@@ -35,8 +35,7 @@ from spinepipe.studies.discrepancy.design.plans import (
     with_unloading,
 )
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
-from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_parameters
-from spinepipe.studies.discrepancy.search.baseline import BaselineFit
+from spinepipe.studies.discrepancy.search.baseline import PER_SPECIMEN, BaselineFit, base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, SolvedSpecimen

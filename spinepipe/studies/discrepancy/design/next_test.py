@@ -24,11 +24,7 @@ from spinepipe.studies.discrepancy.design.plans import (
     with_preloads,
 )
 from spinepipe.studies.discrepancy.design.runs import ExtraCycle, runs
-from spinepipe.studies.discrepancy.search.base import (
-    PER_SPECIMEN,
-    base_parameters,
-    bushing_stiffness,
-)
+from spinepipe.studies.discrepancy.search.baseline import PER_SPECIMEN, base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import LOG_STIFFNESS_SD
 from spinepipe.studies.discrepancy.search.imperfections import labels_of
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
@@ -37,7 +33,12 @@ from spinepipe.studies.discrepancy.search.nuisance import (
     nuisance_labels,
     nuisance_signatures,
 )
-from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, SolvedSpecimen
+from spinepipe.studies.discrepancy.search.prediction import (
+    NoEquilibrium,
+    Simulated,
+    SolvedSpecimen,
+    bushing_stiffness,
+)
 from spinepipe.studies.discrepancy.search.projected import EVERY_TEST
 from spinepipe.studies.discrepancy.search.readings import Repeats
 from spinepipe.studies.discrepancy.search.refit import standing

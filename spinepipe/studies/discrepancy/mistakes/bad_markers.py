@@ -63,23 +63,18 @@ def bad_markers(
     places = int((freedom > 0.0).sum())
     bad = np.zeros(together.shape, dtype=bool)
     for place in np.argwhere(freedom > 0.0):
+        # an F test of each place against all others, Bonferroni over the places
         at = tuple(place)
         limit = f_distribution.isf(CHANCE / places, freedom[at], freedom.sum() - freedom[at])
         bad[at] = together[at] > max(MANY_TIMES, float(np.sqrt(limit)))
     if bad.mean() > 0.5:
         return []
-    return _told(bad, together, specimens, joints)
-
-
-def _told(
-    bad: Array, ratios: Array, specimens: Sequence[str], joints: Sequence[str]
-) -> list[SuspectedError]:
     errors = []
     for joint, joint_name in enumerate(joints):
         if not bad[:, joint].any():
             continue
         names = [name for name, is_bad in zip(specimens, bad[:, joint], strict=True) if is_bad]
-        ratio = float(np.median(ratios[bad[:, joint], joint]))
+        ratio = float(np.median(together[bad[:, joint], joint]))
         where = f"{of_specimens(names, specimens)}, {joint_name}"
         evidence = f"scatters {ratio:.1f} times as much as is usual in the other joints"
         errors.append(SuspectedError(where, "markers of the joint", evidence))
@@ -103,30 +98,26 @@ def between_cycles(readings: Sequence[SpecimenReadings]) -> Scatter:
 
     Readings of one cycle are not independent: a cycle counts once for each test and coordinate.
     """
-    found = [_of_specimen(one) for one in readings]
-    return Scatter(np.stack([sd for sd, _ in found]), np.stack([n for _, n in found]))
-
-
-def _of_specimen(one: SpecimenReadings) -> tuple[Array, Array]:
-    joints = one.tests[0].cycles.shape[2]
-    sd, freedom = np.full((joints, 6), np.nan), np.zeros((joints, 6))
-    deviations = [_deviations(test) for test in one.tests]
-    for joint in range(joints):
-        for coordinate in range(6):
+    shape = (len(readings), readings[0].tests[0].cycles.shape[2], 6)
+    sd, freedom = np.full(shape, np.nan), np.zeros(shape)
+    for number, one in enumerate(readings):
+        deviations = [_deviations(test) for test in one.tests]
+        for joint, coordinate in np.ndindex(shape[1:]):
             values = [d[:, :, joint, coordinate] for d in deviations]
             there = np.concatenate([v[np.isfinite(v)] for v in values])
             if len(there):
-                sd[joint, coordinate] = np.median(np.abs(there)) / MAD_PER_SD
+                sd[number, joint, coordinate] = np.median(np.abs(there)) / MAD_PER_SD
                 cycles = [int(np.isfinite(v).any(axis=1).sum()) - 1 for v in values]
-                freedom[joint, coordinate] = sum(max(0, n) for n in cycles)
-    return sd, freedom
+                freedom[number, joint, coordinate] = sum(max(0, n) for n in cycles)
+    return Scatter(sd, freedom)
 
 
 def _deviations(test: Repeats) -> Array:
     """(C, T, J, 6) from the mean of the cycles, with the SD of one reading; NaN for one alone."""
     enough = test.count >= 2
-    grown = np.sqrt(test.count / np.maximum(test.count - 1, 1))
-    return np.where(enough, (test.cycles - test.mean) * grown, np.nan)
+    # of n readings one is sqrt((n - 1) / n) SDs from their mean
+    scale = np.sqrt(test.count / np.maximum(test.count - 1, 1))
+    return np.where(enough, (test.cycles - test.mean) * scale, np.nan)
 
 
 def beside_the_curve(

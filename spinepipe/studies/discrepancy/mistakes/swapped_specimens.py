@@ -19,7 +19,6 @@ from itertools import combinations
 import numpy as np
 
 from spinepipe.decomposition import lstsq
-from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import (
@@ -31,7 +30,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, SolvedSpecimen
-from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
+from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD, Screen
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, look
@@ -62,8 +61,8 @@ class _Exchange:
     evidence: float
 
 
-def exchanged(
-    grounds: BaselineFit,
+def swapped_pairs(
+    baseline: BaselineFit,
     run: PieceRunner,
     trials: Sequence[Trials] = (),
     found: SearchResult | None = None,
@@ -72,12 +71,16 @@ def exchanged(
 
     Parameters
     ----------
-    grounds : of the base. trials : effects that may be missing. found : where the search ended.
+    baseline : of the base. trials : effects that may be missing. found : where the search ended.
     """
-    pairs, every = _promising(grounds), tuple(trials)
-    as_read = _as_read(grounds, run, every, found) if pairs else 0.0
-    ways = tuple(_ways(grounds, run, found)) if pairs else ()
-    tried = run.map(_exchange, [(grounds, pair, every, as_read, ways) for pair in pairs])
+    pairs, every = _promising(baseline), tuple(trials)
+    as_read = 0.0
+    if pairs and every:  # log evidence of the effects that explain what the base leaves as it is
+        first = found.stages[0].screen if found else run(_look, baseline, every)
+        of_standing = sum(one.log_evidence for one in found.standing) if found else 0.0
+        as_read = max(0.0, first.effects[0].log_evidence, of_standing)
+    ways = tuple(_ways(baseline, run, found)) if pairs else ()
+    tried = run.map(_exchange, [(baseline, pair, every, as_read, ways) for pair in pairs])
     strong = [one for one in tried if one is not None and one.evidence > NEEDED]
     taken: set[str] = set()
     errors = []
@@ -93,20 +96,20 @@ def exchanged(
     return errors
 
 
-def _promising(grounds: BaselineFit) -> list[tuple[str, str]]:
+def _promising(baseline: BaselineFit) -> list[tuple[str, str]]:
     """Pairs worth a fit, by one linear step of the base; best first."""
-    residuals = grounds.fit.residuals
+    residuals = baseline.fit.residuals
     chi2 = {name: float(r @ r) for name, r in residuals.items()}
-    hidden = HIDDEN * max(_chi2(grounds) - sum(len(r) for r in residuals.values()), 0.0)
+    hidden = HIDDEN * max(_chi2(baseline) - sum(len(r) for r in residuals.values()), 0.0)
     found = []
     for pair in combinations(chi2, 2):
-        readings = _readings(grounds.readings[pair[0]], grounds.readings[pair[1]])
+        readings = _readings(baseline.readings[pair[0]], baseline.readings[pair[1]])
         if readings is None:
             continue
-        models = _models(grounds.fit.models, pair)
-        supposed = hypothesis(models, grounds.start.base, (), grounds.tests, grounds.start.bound)
-        white = {n: grounds.setting.whitenings[m] for n, m in zip(pair, pair[::-1], strict=True)}
-        setting = Setting(readings, white, grounds.noise.zeroed)
+        models = _models(baseline.fit.models, pair)
+        supposed = hypothesis(models, baseline.start.base, (), baseline.tests, baseline.start.bound)
+        white = {n: baseline.setting.whitenings[m] for n, m in zip(pair, pair[::-1], strict=True)}
+        setting = Setting(readings, white, baseline.noise.zeroed)
         after = sum(_one_step(supposed, setting, name) for name in pair)
         gain = sum(chi2[name] for name in pair) - after
         if gain > -hidden:
@@ -115,7 +118,7 @@ def _promising(grounds: BaselineFit) -> list[tuple[str, str]]:
 
 
 def _exchange(
-    grounds: BaselineFit,
+    baseline: BaselineFit,
     pair: tuple[str, str],
     trials: Sequence[Trials],
     as_read: float,
@@ -128,14 +131,14 @@ def _exchange(
     as_read : log evidence of the effects that explain what the base leaves without an exchange.
     ways : fits with effects, see `_ways`.
     """
-    setting = _setting(grounds, pair)
+    setting = _setting(baseline, pair)
     if setting is None:
         return None
-    there = _fitted(grounds, setting, pair, ())
+    there = _fitted(baseline, setting, pair, ())
     if there is None:
         return None
     effects = max(0.0, _look(there, trials).effects[0].log_evidence) if trials else 0.0
-    best = [_compared(grounds, there, pair, effects - as_read, effects)]
+    best = [_compared(baseline, there, pair, effects - as_read, effects)]
     for others, left_out in ways:
         beside = _fitted(others, setting, pair, standing(others.fit))
         if beside is not None:
@@ -143,23 +146,12 @@ def _exchange(
     return max(best, key=lambda one: one.evidence)
 
 
-def _as_read(
-    grounds: BaselineFit, run: PieceRunner, trials: Sequence[Trials], found: SearchResult | None
-) -> float:
-    """Log evidence of the effects that explain what the base leaves of the readings as they are."""
-    if not trials:
-        return 0.0
-    first = found.stages[0].screen if found else run(_look, grounds, trials)
-    standing_ones = sum(one.log_evidence for one in found.standing) if found else 0.0
-    return max(0.0, first.effects[0].log_evidence, standing_ones)
-
-
-def _look(grounds: BaselineFit, trials: Sequence[Trials]) -> Screen:
-    return look(grounds, trials, 0, 0.5, 0, LEAST_THRESHOLD)
+def _look(baseline: BaselineFit, trials: Sequence[Trials]) -> Screen:
+    return look(baseline, trials, 0, 0.5, 0, LEAST_THRESHOLD)
 
 
 def _ways(
-    grounds: BaselineFit, run: PieceRunner, found: SearchResult | None
+    baseline: BaselineFit, run: PieceRunner, found: SearchResult | None
 ) -> Iterator[tuple[BaselineFit, float]]:
     """Fits with effects that stand: all, and all but one with the evidence of that one."""
     if found is None or not found.standing:
@@ -185,50 +177,51 @@ def _compared(
     ----------
     more : evidence besides. effects : log evidence of those that explain what ``after`` leaves.
     """
+    # the ratio of likelihoods at equal numbers of unknowns, its error SDs as large as what stays
     chi2 = _chi2(before), _chi2(after)
     count = sum(len(r) for r in after.fit.residuals.values())
     unexplained = max(1.0, (chi2[1] - 2.0 * effects) / count)
     return _Exchange(pair, *chi2, (0.5 * (chi2[0] - chi2[1]) + more) / unexplained)
 
 
-def _chi2(grounds: BaselineFit) -> float:
-    return sum(float(r @ r) for r in grounds.fit.residuals.values())
+def _chi2(baseline: BaselineFit) -> float:
+    return sum(float(r @ r) for r in baseline.fit.residuals.values())
 
 
-def _setting(grounds: BaselineFit, pair: tuple[str, str]) -> Setting | None:
+def _setting(baseline: BaselineFit, pair: tuple[str, str]) -> Setting | None:
     """The readings of a pair exchanged: noise goes with them, nuisances stay with the specimen.
 
     These are linearised where the base of each then stands; None where it does not.
     """
-    readings = _readings(grounds.readings[pair[0]], grounds.readings[pair[1]])
+    readings = _readings(baseline.readings[pair[0]], baseline.readings[pair[1]])
     assert readings is not None
-    models, whitenings = _models(grounds.fit.models, pair), dict(grounds.setting.whitenings)
+    models, whitenings = _models(baseline.fit.models, pair), dict(baseline.setting.whitenings)
     for name, other in zip(pair, pair[::-1], strict=True):
         one = readings[name]
         try:
-            solved = SolvedSpecimen(models[name], one.cases, grounds.noise.zeroed)
+            solved = SolvedSpecimen(models[name], one.cases, baseline.noise.zeroed)
         except NoEquilibrium:
             return None
-        moved = nuisance_signatures(solved, grounds.priors, one.coordinates)
-        whitenings[name] = with_nuisances(grounds.plain[other], moved)
-    return Setting({**grounds.readings, **readings}, whitenings, grounds.noise.zeroed)
+        moved = nuisance_signatures(solved, baseline.priors, one.coordinates)
+        whitenings[name] = with_nuisances(baseline.plain[other], moved)
+    return Setting({**baseline.readings, **readings}, whitenings, baseline.noise.zeroed)
 
 
 def _fitted(
-    grounds: BaselineFit,
+    baseline: BaselineFit,
     setting: Setting,
     pair: tuple[str, str],
     supposed: Sequence[ActiveTerm],
 ) -> BaselineFit | None:
-    """The grounds with a pair exchanged, base and effects fitted anew; None without a fit."""
-    start = grounds.start
+    """The baseline with a pair exchanged, base and effects fitted anew; None without a fit."""
+    start = baseline.start
     models = {**start.models, **_models(start.models, pair)}
-    again = hypothesis(models, start.base, supposed, grounds.tests, start.bound)
+    again = hypothesis(models, start.base, supposed, baseline.tests, start.bound)
     fit = joint_fit(again, setting)
     if not fit.usable:
         return None
-    plain = {**grounds.plain, pair[0]: grounds.plain[pair[1]], pair[1]: grounds.plain[pair[0]]}
-    return replace(grounds, readings=setting.readings, plain=plain, setting=setting).at(fit)
+    plain = {**baseline.plain, pair[0]: baseline.plain[pair[1]], pair[1]: baseline.plain[pair[0]]}
+    return replace(baseline, readings=setting.readings, plain=plain, setting=setting).at(fit)
 
 
 def _readings(a: SpecimenReadings, b: SpecimenReadings) -> dict[str, SpecimenReadings] | None:
@@ -236,17 +229,12 @@ def _readings(a: SpecimenReadings, b: SpecimenReadings) -> dict[str, SpecimenRea
     shapes = [[(t.case.test, t.cycles.shape) for t in one.tests] for one in (a, b)]
     if shapes[0] != shapes[1]:
         return None
-    return {
-        mine.specimen: replace(mine, tests=_with_cycles(mine.tests, other.tests))
-        for mine, other in ((a, b), (b, a))
-    }
-
-
-def _with_cycles(tests: Sequence[Repeats], others: Sequence[Repeats]) -> tuple[Repeats, ...]:
-    """Tests with the readings of others."""
-    return tuple(
-        replace(test, cycles=other.cycles) for test, other in zip(tests, others, strict=True)
-    )
+    found = {}
+    for mine, other in ((a, b), (b, a)):
+        pairs = zip(mine.tests, other.tests, strict=True)
+        tests = tuple(replace(test, cycles=of_other.cycles) for test, of_other in pairs)
+        found[mine.specimen] = replace(mine, tests=tests)
+    return found
 
 
 def _models(models: Mapping[str, SpineModel], pair: tuple[str, str]) -> dict[str, SpineModel]:
@@ -266,12 +254,8 @@ def _one_step(supposed: Hypothesis, setting: Setting, name: str) -> float:
         predicted = simulated.at(np.zeros(len(member.free)))
     except NoEquilibrium:
         return np.inf
-    errors: list[Array] = [
-        np.nan_to_num(seen - test.mean)
-        for seen, test in zip(predicted.readings, one.tests, strict=True)
-    ]
     white = setting.whitenings[name]
-    residual, jacobian = white(errors), white(predicted.by_x)
+    residual, jacobian = white(one.errors(predicted.readings)), white(predicted.by_x)
     step, _ = lstsq(jacobian, residual)
     left = residual - jacobian @ step
     return float(left @ left)

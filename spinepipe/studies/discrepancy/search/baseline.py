@@ -1,22 +1,68 @@
-"""The grounds a search stands on: readings, noise, and the base fitted nuisances allowed for."""
+"""The base that is asked what it lacks, fitted with noise and nuisances allowed for.
+
+Its joints are linear, alike at all levels or not, or those of a model file.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import spine_model
+from spinepipe.effects import create
 from spinepipe.effects.contract import Array
-from spinepipe.model import SpineModel
-from spinepipe.statics import FreeParameter
+from spinepipe.model import ScopedEffect, SpineModel
+from spinepipe.model.file import ModelFile, effects_for
+from spinepipe.statics import FreeParameter, free_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, Hypothesis, hypothesis
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Near, Setting, joint_fit
 from spinepipe.studies.discrepancy.search.noise import Noise, noise_of_residuals
 from spinepipe.studies.discrepancy.search.nuisance import NuisancePriors, nuisance_signatures
-from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, SolvedSpecimen
+from spinepipe.studies.discrepancy.search.prediction import BUSHING, NoEquilibrium, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening, with_nuisances
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import REPEATS
+from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+
+PER_SPECIMEN = "per_specimen"
+DAMPING = np.array([2000.0] * 3 + [10.0] * 3)
+"""N s/m and N m s/rad; poses at rest do not hang on it, only the verdict that they are stable."""
+
+
+def base_model(
+    cohort: Cohort,
+    readings: SpecimenReadings,
+    stiffness: Array,
+    file: ModelFile | None,
+) -> SpineModel:
+    """The model of a specimen where its fit starts: (6,) SI for all joints, or as in the file."""
+    joints = cohort.joint_names
+    if file is not None:
+        effects = effects_for(file, readings.specimen, joints)
+    else:
+        values = np.tile(stiffness, (len(joints), 1))
+        effects = (ScopedEffect(create(BUSHING), tuple(range(len(joints))), values),)
+    return spine_model(cohort, readings.specimen, readings.frames, effects, DAMPING)
+
+
+def base_parameters(
+    model: SpineModel, grouping: str, coordinates: Sequence[str]
+) -> tuple[FreeParameter, ...]:
+    """The stiffnesses that are fitted along with everything: of the coordinates that are read.
+
+    A model file's bushings keep the ratios of their joints: ``per_specimen`` moves them together.
+    """
+    names = [STIFFNESS_COLUMNS[COORDINATES.index(name)] for name in coordinates]
+    bushings = [
+        index for index, scoped in enumerate(model.effects) if scoped.effect.name == BUSHING
+    ]
+    return tuple(
+        parameter
+        for index in bushings
+        for parameter in free_parameters(model, index, names, grouping)
+    )
 
 
 @dataclass(frozen=True)
@@ -102,19 +148,19 @@ def fit_baseline(
     tests = tuple(dict.fromkeys(case.test for one in readings for case in one.cases))
     plain = _plain(by_name, noise)
     models = hypothesis(start.models, start.base, (), tests, start.bound)
+    # with noise alone; its residuals may say better how large the noise is
     first = _base_fit(models, Setting(by_name, plain, noise.zeroed), run)
     if noise.source != REPEATS:
         by_name, noise = noise_of_residuals(by_name, first.predicted, noise)
         plain = _plain(by_name, noise)
+    # a fixed point: nuisances linearised at a fit, the fit with them, until it stays where it is
     fit = first
     for _ in range(MOST_NUISANCES):
-        before = fit
-        whitenings = {
-            name: with_nuisances(
-                plain[name], _nuisances(before.models[name], one, noise.zeroed, priors)
-            )
-            for name, one in by_name.items()
-        }
+        before, whitenings = fit, {}
+        for name, one in by_name.items():
+            solved = SolvedSpecimen(before.models[name], one.cases, noise.zeroed)
+            moved = nuisance_signatures(solved, priors, one.coordinates)
+            whitenings[name] = with_nuisances(plain[name], moved)
         setting = Setting(by_name, whitenings, noise.zeroed)
         again = hypothesis(before.models, start.base, (), tests, start.bound)
         fit = _base_fit(again, setting, run)
@@ -124,24 +170,8 @@ def fit_baseline(
     return BaselineFit(by_name, noise, priors, start, tests, plain, setting, fit)
 
 
-def _nuisances(
-    model: SpineModel, one: SpecimenReadings, zeroed: bool, priors: NuisancePriors
-) -> tuple[Array, ...]:
-    return nuisance_signatures(SolvedSpecimen(model, one.cases, zeroed), priors, one.coordinates)
-
-
 def _plain(readings: Mapping[str, SpecimenReadings], noise: Noise) -> dict[str, Whitening]:
     return {name: whitening(one.tests, noise) for name, one in readings.items()}
-
-
-def _why_not(models: Hypothesis, setting: Setting) -> str:
-    """Why the models do not stand where their fit starts, by the engine of record; or nothing."""
-    for name, member in models.members.items():
-        try:
-            SolvedSpecimen(member.model, setting.readings[name].cases, setting.zeroed)
-        except NoEquilibrium as trouble:
-            return str(trouble)
-    return ""
 
 
 def _base_fit(models: Hypothesis, setting: Setting, run: PieceRunner) -> JointFit:
@@ -149,7 +179,13 @@ def _base_fit(models: Hypothesis, setting: Setting, run: PieceRunner) -> JointFi
     for _ in range(MOST_BASE_FITS):
         fit = run(joint_fit, models, setting, near)
         if not fit.usable:
-            raise NoBase(_why_not(models, setting) or fit.status)
+            # why the models do not stand where their fit starts, if they do not
+            for name, member in models.members.items():
+                try:
+                    SolvedSpecimen(member.model, setting.readings[name].cases, setting.zeroed)
+                except NoEquilibrium as trouble:
+                    raise NoBase(str(trouble) or fit.status) from None
+            raise NoBase(fit.status)
         if not fit.status:
             return fit
         members = {

@@ -1,6 +1,6 @@
 """How large a discrepancy is, in noise SD, over all readings or pooled by place."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,7 +53,11 @@ class Gap:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the gap: of the noncentrality that chi2 allows."""
+        """95 % interval of the gap: of the noncentrality that chi2 allows.
+
+        By inversion of the noncentral chi squared distribution; what fits leave is of that kind
+        where a model lacks something.
+        """
         return self._of(self._noncentrality(0.975)), self._of(self._noncentrality(0.025))
 
     @property
@@ -72,7 +76,7 @@ class Gap:
         """Noncentrality at which chi2 or less has that probability; 0 where none has."""
         if self.dof <= 0.0 or chndtr(self.chi2, self.dof, 1e-12) <= share:
             return 0.0
-        most = 2.0 * self.chi2 + 100.0
+        most = 2.0 * self.chi2 + 100.0  # the mean is dof + noncentrality: far beyond both limits
         found: float = brentq(
             lambda size: chndtr(self.chi2, self.dof, size) - share, 1e-12, most, xtol=1e-12
         )
@@ -101,39 +105,28 @@ class GapPlace:
     gap: Gap
 
 
-def whole_gap(grounds: BaselineFit, fit: JointFit) -> Gap:
+def whole_gap(baseline: BaselineFit, fit: JointFit) -> Gap:
     """The gap over all readings."""
-    left = left_over(grounds, fit).values()
-    return gap_of([one.residual for one in left], [one.freedom for one in left])
+    return _pooled(left_over(baseline, fit).values())
 
 
-def gaps_at(grounds: BaselineFit, fit: JointFit) -> dict[str, Gap]:
+def gaps_at(baseline: BaselineFit, fit: JointFit) -> dict[str, Gap]:
     """The gap over the readings of each coordinate that was read."""
-    left = left_over(grounds, fit).values()
-    found = {}
-    for place, name in enumerate(COORDINATES):
-        residuals, freedoms = (
-            [tuple(test[..., place] for test in tests) for tests in every]
-            for every in ([one.residual for one in left], [one.freedom for one in left])
-        )
-        gap = gap_of(residuals, freedoms)
-        if gap.readings:
-            found[name] = gap
-    return found
+    left = left_over(baseline, fit).values()
+    found = {name: _pooled(left, place) for place, name in enumerate(COORDINATES)}
+    return {name: gap for name, gap in found.items() if gap.readings}
 
 
-def left_over(grounds: BaselineFit, fit: JointFit) -> dict[str, LeftOver]:
+def left_over(baseline: BaselineFit, fit: JointFit) -> dict[str, LeftOver]:
     """What a fit leaves of every reading, nuisances at their most likely values."""
     unknowns = len(fit.x)
-    total = sum(float(w.freedom.sum()) for w in grounds.setting.whitenings.values())
+    total = sum(float(w.freedom.sum()) for w in baseline.setting.whitenings.values())
     found = {}
-    for name, one in grounds.readings.items():
-        white = grounds.setting.whitenings[name]
-        errors = [
-            np.nan_to_num(seen - test.mean)
-            for seen, test in zip(fit.predicted[name], one.tests, strict=True)
-        ]
-        residual = white.left_over(grounds.plain[name].noise_only(errors))
+    for name, one in baseline.readings.items():
+        white = baseline.setting.whitenings[name]
+        plain = baseline.plain[name].noise_only(one.errors(fit.predicted[name]))
+        residual = white.left_over(plain)
+        # what is fitted takes degrees of freedom from all readings in proportion
         freedom = white.freedom * (1.0 - unknowns / total)
         found[name] = LeftOver(_spread(residual, white.used), _spread(freedom, white.used))
     return found
@@ -151,32 +144,24 @@ def _spread(values: Array, used: tuple[NDArray[np.bool_], ...]) -> tuple[Array, 
     return tuple(found)
 
 
-def gap_of(residuals: list[tuple[Array, ...]], freedoms: list[tuple[Array, ...]]) -> Gap:
-    """The gap over given readings; NaN counts nothing."""
-    r = np.concatenate([test.ravel() for one in residuals for test in one])
-    f = np.concatenate([test.ravel() for one in freedoms for test in one])
+def _pooled(left: Collection[LeftOver], coordinate: int | slice = slice(None)) -> Gap:
+    """The gap over readings of one coordinate or of all; NaN counts nothing."""
+    r = np.concatenate([test[..., coordinate].ravel() for one in left for test in one.residual])
+    f = np.concatenate([test[..., coordinate].ravel() for one in left for test in one.freedom])
     there = np.isfinite(r)
     return Gap(float(np.sum(r[there] ** 2)), float(np.sum(f[there])), int(there.sum()))
 
 
-def residual_frame(grounds: BaselineFit, fit: JointFit, joints: Sequence[str]) -> pd.DataFrame:
+def residual_frame(baseline: BaselineFit, fit: JointFit, joints: Sequence[str]) -> pd.DataFrame:
     """One row per reading: where it is, squared residual in noise SD, freedom it keeps."""
-    rows = [
-        row
-        for name, left in left_over(grounds, fit).items()
-        for row in _rows(grounds, name, left, joints)
-    ]
+    rows = []
+    for name, left in left_over(baseline, fit).items():
+        tests = baseline.readings[name].tests
+        for test, residual, freedom in zip(tests, left.residual, left.freedom, strict=True):
+            for t, j, c in zip(*test.count.nonzero(), strict=True):
+                place = (name, test.case.test, test.case.steps[t].step, joints[j], COORDINATES[c])
+                rows.append((*place, residual[t, j, c] ** 2, freedom[t, j, c]))
     return pd.DataFrame(rows, columns=[*KEYS, "chi2", "freedom"])
-
-
-def _rows(
-    grounds: BaselineFit, name: str, left: LeftOver, joints: Sequence[str]
-) -> Iterator[tuple[object, ...]]:
-    tests = grounds.readings[name].tests
-    for test, residual, freedom in zip(tests, left.residual, left.freedom, strict=True):
-        for t, j, c in zip(*test.count.nonzero(), strict=True):
-            place = (name, test.case.test, test.case.steps[t].step, joints[j], COORDINATES[c])
-            yield (*place, residual[t, j, c] ** 2, freedom[t, j, c])
 
 
 def places(frame: pd.DataFrame) -> list[GapPlace]:

@@ -5,7 +5,7 @@ between specimens or of one; each moves rows of an effect's values.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import product
@@ -74,6 +74,14 @@ class CandidateForm:
     joint: int | None = None
     specimen: str | None = None
 
+    @classmethod
+    def at(cls, variant: Variant, joint: int | None, specimen: str | None) -> "CandidateForm":
+        """Of one joint or of all (None), in one specimen or in all."""
+        if joint is None:
+            return cls(variant, PlaceSpread.SHARED, None, specimen)
+        spread = PlaceSpread.ONE_JOINT if specimen is None else PlaceSpread.ONE
+        return cls(variant, spread, joint, specimen)
+
     @property
     def name(self) -> str:
         """Name of the effect."""
@@ -94,17 +102,15 @@ class Trials:
 
     def log_share(self, form: CandidateForm) -> float:
         """Logarithm of a form's share of its effect: equal for variants, ways to differ, places."""
-        spreads, places = self._alike
-        return -float(np.log(len(self.variants) * spreads * places.get(_place(form), 1)))
+        spreads, places = self._counts
+        shares = places.get((form.variant, form.spread), 1)
+        return -float(np.log(len(self.variants) * spreads * shares))
 
     @cached_property
-    def _alike(self) -> tuple[int, Mapping[tuple[Variant, PlaceSpread], int]]:
+    def _counts(self) -> tuple[int, Mapping[tuple[Variant, PlaceSpread], int]]:
         """Number of ways to differ, and of forms of each variant and way to differ."""
-        return len({one.spread for one in self.forms}), Counter(map(_place, self.forms))
-
-
-def _place(form: CandidateForm) -> tuple[Variant, PlaceSpread]:
-    return form.variant, form.spread
+        pairs = Counter((one.variant, one.spread) for one in self.forms)
+        return len({spread for _, spread in pairs}), pairs
 
 
 @cache
@@ -147,7 +153,13 @@ def trials(
     for name, cls in sorted(registered().items()):
         trial: TriedValues | None = getattr(cls, "trial", None)
         if trial is not None and (names is None or name in names):
-            every = (Variant(name, _options(options)) for options in trial.variants)
+            every = [
+                Variant(
+                    name,
+                    tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in options.items()),
+                )
+                for options in trial.variants
+            ]
             variants = tuple(variant for variant in every if _is_read(variant, coordinates))
             forms = [
                 form
@@ -166,19 +178,8 @@ def _is_read(variant: Variant, coordinates: Sequence[str]) -> bool:
     Of a kind, one that is read will do; what rotation and translation do to each other is of second
     order where one of the two is hidden.
     """
-    read = [coordinate for coordinate in variant.acts_on if coordinate in coordinates]
-    return _kinds(read) == _kinds(variant.acts_on)
-
-
-def _kinds(coordinates: Iterable[str]) -> set[bool]:
-    """Of rotations, of translations, or of both."""
-    return {coordinate in TRANSLATIONS for coordinate in coordinates}
-
-
-def _options(options: Mapping[str, Any]) -> Options:
-    return tuple(
-        (key, tuple(value) if isinstance(value, list) else value) for key, value in options.items()
-    )
+    loaded = {name in TRANSLATIONS for name in variant.acts_on}
+    return loaded == {name in TRANSLATIONS for name in variant.acts_on if name in coordinates}
 
 
 def _possible(spreads: Sequence[PlaceSpread], specimens: int) -> list[PlaceSpread]:
@@ -260,6 +261,12 @@ class HypothesisMember:
     model: SpineModel
     free: tuple[FreeParameter, ...]
     numbers: tuple[int, ...]
+
+    def among_all(self, own: Array, unknowns: int) -> Array:
+        """(N, m) columns (N, k) by its own unknowns put in their places among all."""
+        whole = np.zeros((len(own), unknowns))
+        np.add.at(whole.T, np.array(self.numbers), own.T)  # one number may stand for several
+        return whole
 
 
 @dataclass(frozen=True)

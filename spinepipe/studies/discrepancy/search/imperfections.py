@@ -16,13 +16,17 @@ from scipy.stats import t as student
 
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.gaps import Gap, gap_of, left_over, whole_gap
+from spinepipe.studies.discrepancy.search.gaps import Gap, whole_gap
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
-from spinepipe.studies.discrepancy.search.nuisance import ALIKE, KINDS, Label, nuisance_labels
+from spinepipe.studies.discrepancy.search.nuisance import (
+    COMMON_TO_JOINTS,
+    KINDS,
+    Label,
+    nuisance_labels,
+)
+from spinepipe.studies.discrepancy.search.prediction import bushing_stiffness
 from spinepipe.studies.discrepancy.search.refit import standing
-from spinepipe.studies.discrepancy.search.whitening import Whitening
 from spinepipe.studies.discrepancy.store import PieceRunner
 
 EVERYWHERE = "*"
@@ -34,7 +38,7 @@ FEWEST_IN_COMMON = 2
 LEAST_TOLD = 0.05
 """Share of a nuisance's prior variance that readings must tell at least, or it has no say."""
 
-SHARED = tuple(KINDS.get(name, name) for name in ALIKE)
+SHARED = tuple(KINDS.get(name, name) for name in COMMON_TO_JOINTS)
 """Kinds that may be common to all joints anyhow."""
 
 
@@ -120,16 +124,27 @@ class AbsorbedGap:
         return tuple(sorted(self.each, key=lambda one: -abs(one.size)))
 
 
-def taken_up(
-    grounds: BaselineFit, fit: JointFit, joints: Sequence[str], run: PieceRunner
+def absorbed_gap(
+    baseline: BaselineFit, fit: JointFit, joints: Sequence[str], run: PieceRunner
 ) -> AbsorbedGap:
     """What imperfections took up of what a fit would leave without them."""
-    places = _places(grounds, joints)
-    parts = _parts(grounds, fit)
-    posterior = _posterior(fit, parts)
+    places = tuple(
+        NuisancePlace(
+            specimen,
+            one.kind,
+            one.component,
+            EVERYWHERE if one.joint is None else joints[one.joint],
+            one.test,
+            one.sd,
+            one.unit,
+        )
+        for specimen in baseline.readings
+        for one in labels_of(baseline, specimen)
+    )
+    posterior = _posterior(fit, _parts(baseline, fit))
     return AbsorbedGap(
-        run(gap_without, grounds, fit),
-        whole_gap(grounds, fit),
+        run(gap_without, baseline, fit),
+        whole_gap(baseline, fit),
         tuple(
             Imperfection(place, float(size), float(sd), float(chi2))
             for place, size, sd, chi2 in zip(
@@ -140,37 +155,20 @@ def taken_up(
     )
 
 
-def gap_without(grounds: BaselineFit, fit: JointFit) -> Gap | None:
+def gap_without(baseline: BaselineFit, fit: JointFit) -> Gap | None:
     """The gap with everything that was fitted fitted again, and no nuisance; None without a fit."""
-    setting = Setting(grounds.readings, grounds.plain, grounds.noise.zeroed)
-    again = joint_fit(grounds.suppose(standing(fit)), setting, fit.poses)
+    setting = Setting(baseline.readings, baseline.plain, baseline.noise.zeroed)
+    again = joint_fit(baseline.suppose(standing(fit)), setting, fit.poses)
     if not again.usable:
         return None
-    left = left_over(replace(grounds, setting=setting), again).values()
-    return gap_of([one.residual for one in left], [one.freedom for one in left])
+    return whole_gap(replace(baseline, setting=setting), again)
 
 
-def labels_of(grounds: BaselineFit, specimen: str) -> tuple[Label, ...]:
+def labels_of(baseline: BaselineFit, specimen: str) -> tuple[Label, ...]:
     """What the nuisances of a specimen's whitening are, in their order."""
-    stiffness = bushing_stiffness(grounds.fit.models[specimen])
-    one = grounds.readings[specimen]
-    return nuisance_labels(grounds.priors, stiffness, one.cases, one.coordinates)
-
-
-def _places(grounds: BaselineFit, joints: Sequence[str]) -> tuple[NuisancePlace, ...]:
-    return tuple(
-        NuisancePlace(
-            specimen,
-            one.kind,
-            one.component,
-            EVERYWHERE if one.joint is None else joints[one.joint],
-            one.test,
-            one.sd,
-            one.unit,
-        )
-        for specimen in grounds.readings
-        for one in labels_of(grounds, specimen)
-    )
+    stiffness = bushing_stiffness(baseline.fit.models[specimen])
+    one = baseline.readings[specimen]
+    return nuisance_labels(baseline.priors, stiffness, one.cases, one.coordinates)
 
 
 @dataclass(frozen=True)
@@ -183,23 +181,17 @@ class _SpecimenBlock:
     residual: Array
 
 
-def _parts(grounds: BaselineFit, fit: JointFit) -> list[_SpecimenBlock]:
+def _parts(baseline: BaselineFit, fit: JointFit) -> list[_SpecimenBlock]:
     found = []
     for name, member in fit.hypothesis.members.items():
-        white = grounds.setting.whitenings[name]
-        own = white.lengthened(fit.jacobians[name])
-        whole = np.zeros((len(own), len(fit.x)))
-        np.add.at(whole.T, np.array(member.numbers), own.T)
+        white = baseline.setting.whitenings[name]
+        whole = member.among_all(white.lengthened(fit.jacobians[name]), len(fit.x))
         residual = -white.lengthened(fit.residuals[name])  # measured less predicted
-        found.append(_SpecimenBlock(white.moves, _inverse(white), whole, residual))
+        # (I + U'U)^-1 from U = P S Q': I + Q ((1 + S^2)^-1 - I) Q'
+        shorter = (1.0 + white.shrink) ** 2 - 1.0
+        inverse = np.eye(white.mixing.shape[1]) + (white.mixing.T * shorter) @ white.mixing
+        found.append(_SpecimenBlock(white.moves, inverse, whole, residual))
     return found
-
-
-def _inverse(white: Whitening) -> Array:
-    """(K, K) (I + U'U)^-1."""
-    shorter = (1.0 + white.shrink) ** 2 - 1.0
-    result: Array = np.eye(white.mixing.shape[1]) + (white.mixing.T * shorter) @ white.mixing
-    return result
 
 
 @dataclass(frozen=True)
@@ -217,6 +209,8 @@ class _Posterior:
 
 def _posterior(fit: JointFit, parts: Sequence[_SpecimenBlock]) -> _Posterior:
     """Of all nuisances, with the unknowns of the fit free."""
+    # z given x, then L z by the precision of z with x integrated out: I + U' (I - J (P + J'J)^-1
+    # J') U applied to z
     prior = np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
     jacobians = [part.jacobian for part in parts]
     size = [part.inverse @ (part.moves.T @ part.residual) for part in parts]
@@ -271,6 +265,8 @@ def _mean(at: NuisancePlace, size: Array, covariance: Array) -> InCommon | None:
     Of random errors ``size`` is N(0, I - covariance): by their SDs as allowed for, and by their
     own scatter whatever their SDs.
     """
+    # what all have in common, m, is shrunk to (I - covariance) m, as the sizes are posterior means:
+    # generalised least squares for m in the eigenbasis
     values, vectors = eigh(np.eye(len(size)) - covariance)
     told = values > LEAST_TOLD
     ones = vectors[:, told].sum(axis=0) * np.sqrt(values[told])
@@ -299,15 +295,8 @@ def _groups(places: Sequence[NuisancePlace]) -> Mapping[NuisancePlace, Indices]:
         }
         for at in sorted(wider - {one}, key=str):
             found.setdefault(at, []).append(number)
-    return {
-        at: np.array(numbers)
-        for at, numbers in found.items()
-        if len(numbers) >= FEWEST_IN_COMMON and not _repeated(at, numbers, found)
-    }
-
-
-def _repeated(
-    at: NuisancePlace, numbers: list[int], found: Mapping[NuisancePlace, list[int]]
-) -> bool:
-    """Whether the same nuisances are another group already, as with one specimen or one joint."""
-    return next(other for other, same in found.items() if same == numbers) != at
+    # with one specimen or one joint several groups are the same: the first of them counts
+    first: dict[tuple[int, ...], NuisancePlace] = {}
+    for at, numbers in found.items():
+        first.setdefault(tuple(numbers), at)
+    return {at: np.array(n) for n, at in first.items() if len(n) >= FEWEST_IN_COMMON}

@@ -12,15 +12,16 @@ from spinepipe.model.file import ModelFile
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
 from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
-from spinepipe.studies.discrepancy.search.base import PER_SPECIMEN, base_model, base_parameters
 from spinepipe.studies.discrepancy.search.baseline import (
+    PER_SPECIMEN,
     BaselineFit,
     BaselineModels,
     NoBase,
+    base_model,
+    base_parameters,
     fit_baseline,
 )
 from spinepipe.studies.discrepancy.search.hypothesis import trials
-from spinepipe.studies.discrepancy.search.indistinct import cannot_be_excluded
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.noise import (
     Noise,
@@ -28,8 +29,8 @@ from spinepipe.studies.discrepancy.search.noise import (
     without_outliers,
 )
 from spinepipe.studies.discrepancy.search.nuisance import as_si
-from spinepipe.studies.discrepancy.search.outcome import Outcome, outcome
-from spinepipe.studies.discrepancy.search.prediction import recorded
+from spinepipe.studies.discrepancy.search.outcome import Outcome, cannot_be_excluded, outcome
+from spinepipe.studies.discrepancy.search.prediction import solve_on_record
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
@@ -76,7 +77,7 @@ class Investigation:
     proof: HeldOut
     ended: Outcome
 
-    def as_told(self) -> "Investigation":
+    def for_verdict(self) -> "Investigation":
         """With the base in the place of a model whose effects the verdict does not stand for."""
         if self.ended.named or self.ended.tied:
             return self
@@ -84,10 +85,23 @@ class Investigation:
         return replace(self, found=found, proof=self.proof.of_base())
 
 
-def prepared(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepared:
+def prepare(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepared:
     """Readings and noise of a study, before anything is fitted."""
-    coordinates, declared = _read_coordinates(study, cohort), _declared_sd(study, cohort)
-    measured = _measured(study, cohort, coordinates)
+    motion = motion_read(cohort)
+    motion = motion[motion["test"].isin(list(study.tests or cohort.tests))]
+    coordinates = tuple(
+        name
+        for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
+        if name in (study.coordinates or COORDINATES) and motion[column].notna().any()
+    )
+    sd, declared = study.measurement_sd or cohort.measurement_sd, None
+    if sd is not None:
+        translation, rotation = sd.translation_mm / MM_PER_M, sd.rotation_deg / DEG_PER_RAD
+        declared = np.array([translation] * 3 + [rotation] * 3)
+    # in an order of their own: how a cohort lists them says nothing, and changes no verdict
+    tests, names = sorted(study.tests or cohort.tests), sorted(cohort.specimen_names)
+    every = (specimen_readings(cohort, s, tests, coordinates) for s in names)
+    measured = tuple(one for one in every if one.tests)
     readings, outliers = without_outliers(measured)
     noise = estimated_noise(readings, declared, cohort.zeroed_at_step_0, outliers)
     if noise is None:  # cycles of unequal loads may still tell, once the base is fitted
@@ -106,22 +120,26 @@ def investigate(
     NoBase
         When the base has no fit, or nothing tells how large the noise is.
     """
-    study, rules = ready.study, _rules(ready)
-    grounds = base_fitted(ready, run)
-    found = search(grounds, rules, run, progress)
-    on_record([found.base.fit, found.final.fit], grounds.readings, run)
-    errors = suspected_errors(grounds, ready.measured, run, rules.trials, found)
+    study, cohort = ready.study, ready.cohort
+    specimens, joints = sorted(cohort.specimen_names), len(cohort.joint_names)
+    rules = Rules(
+        trials(study.effects, ready.coordinates, specimens, joints),
+        ready.coordinates,
+        study.false_alarm,
+        study.bootstrap,
+        study.margin,
+        study.most_effects,
+        study.seed,
+    )
+    baseline = fit_base(ready, run)
+    found = search(baseline, rules, run, progress)
+    on_record([found.base.fit, found.final.fit], baseline.readings, run)
+    errors = suspected_errors(baseline, ready.measured, run, rules.trials, found)
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
     proof = held_out(found, asked, run)
-    ended = outcome(found, study.margin, proof, errors, _not_excluded(study, found))
-    told = Investigation(grounds, rules, found, errors, proof, ended)
-    return _with_sure_effects(told, asked, run)
-
-
-def _not_excluded(study: Discrepancy, found: SearchResult) -> dict[str, tuple[str, ...]]:
-    """By each standing effect, others that what was recorded cannot exclude, if they are tried."""
+    # by each standing effect, others that what was recorded cannot exclude, if they are tried
     cases = {name: one.cases for name, one in found.base.readings.items()}
-    return {
+    not_excluded = {
         effect.name: tuple(
             name
             for name in cannot_be_excluded(effect.name, cases)
@@ -129,6 +147,9 @@ def _not_excluded(study: Discrepancy, found: SearchResult) -> dict[str, tuple[st
         )
         for effect in found.standing
     }
+    ended = outcome(found, study.margin, proof, errors, not_excluded)
+    told = Investigation(baseline, rules, found, errors, proof, ended)
+    return _with_sure_effects(told, asked, run)
 
 
 def _with_sure_effects(one: Investigation, asked: Asked, run: PieceRunner) -> Investigation:
@@ -156,37 +177,11 @@ def on_record(
         Where it differs by more than rounding.
     """
     models = [(name, model) for fit in fits for name, model in fit.models.items()]
-    run.map(recorded, [(model, readings[name].cases) for name, model in models])
+    run.map(solve_on_record, [(model, readings[name].cases) for name, model in models])
 
 
-def _read_coordinates(study: Discrepancy, cohort: Cohort) -> tuple[str, ...]:
-    motion = motion_read(cohort)
-    motion = motion[motion["test"].isin(list(study.tests or cohort.tests))]
-    return tuple(
-        name
-        for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
-        if name in (study.coordinates or COORDINATES) and motion[column].notna().any()
-    )
-
-
-def _measured(
-    study: Discrepancy, cohort: Cohort, coordinates: Sequence[str]
-) -> tuple[SpecimenReadings, ...]:
-    # in an order of their own: how a cohort lists them says nothing, and changes no verdict
-    tests, names = sorted(study.tests or cohort.tests), sorted(cohort.specimen_names)
-    found = (specimen_readings(cohort, s, tests, coordinates) for s in names)
-    return tuple(one for one in found if one.tests)
-
-
-def _declared_sd(study: Discrepancy, cohort: Cohort) -> Array | None:
-    sd = study.measurement_sd or cohort.measurement_sd
-    if sd is None:
-        return None
-    return np.array([sd.translation_mm / MM_PER_M] * 3 + [sd.rotation_deg / DEG_PER_RAD] * 3)
-
-
-def base_fitted(ready: Prepared, run: PieceRunner) -> BaselineFit:
-    """Grounds with the base fitted."""
+def fit_base(ready: Prepared, run: PieceRunner) -> BaselineFit:
+    """Baseline with the base fitted."""
     study = ready.study
     start = np.array(study.stiffness.in_order(), dtype=float)
     models = {
@@ -197,24 +192,9 @@ def base_fitted(ready: Prepared, run: PieceRunner) -> BaselineFit:
         name: base_parameters(model, grouping, ready.coordinates) for name, model in models.items()
     }
     begin = BaselineModels(models, base, study.bound_factor)
-    grounds = fit_baseline(
+    baseline = fit_baseline(
         ready.readings, ready.noise, as_si(study.nuisance.model_dump()), begin, run
     )
-    if grounds.noise.source == DECLARED and ready.declared is None:
+    if baseline.noise.source == DECLARED and ready.declared is None:
         raise NoBase("too few repeated readings to tell the noise: state measurement_sd")
-    return grounds
-
-
-def _rules(ready: Prepared) -> Rules:
-    """What a search may do, as the study says."""
-    study, cohort = ready.study, ready.cohort
-    joints = len(cohort.joint_names)
-    return Rules(
-        trials(study.effects, ready.coordinates, sorted(cohort.specimen_names), joints),
-        ready.coordinates,
-        study.false_alarm,
-        study.bootstrap,
-        study.margin,
-        study.most_effects,
-        study.seed,
-    )
+    return baseline

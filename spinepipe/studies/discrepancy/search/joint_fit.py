@@ -68,16 +68,16 @@ class JointFit:
 
     def whole_jacobian(self) -> Array:
         """(N, m) of all specimens, in their order."""
-        numbers = self.hypothesis.members
-        blocks = []
-        for name, jacobian in self.jacobians.items():
-            block = np.zeros((len(jacobian), len(self.x)))
-            np.add.at(block.T, np.array(numbers[name].numbers), jacobian.T)
-            blocks.append(block)
-        return np.concatenate(blocks)
+        members, count = self.hypothesis.members, len(self.x)
+        return np.concatenate(
+            [members[name].among_all(own, count) for name, own in self.jacobians.items()]
+        )
 
 
 Near = Mapping[str, tuple[Array, ...]] | None
+
+Evaluated = tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]]
+"""By specimen: whitened residuals (N,), their Jacobian by own unknowns (N, k), the prediction."""
 
 
 class Points:
@@ -92,42 +92,30 @@ class Points:
         self.together = JointPrediction(subjects, setting.zeroed, near)
         self.sd = np.array([u.sd for u in hypothesis.unknowns])
         self.mean = np.array([u.mean for u in hypothesis.unknowns])
-        self.known: dict[
-            bytes, tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]]
-        ] = {}
+        self.known: dict[bytes, Evaluated] = {}
         self.trouble = ""
 
     def begin_at(self, fit: "JointFit") -> None:
         """What a fit in the same setting has where it ended need not be solved again."""
         self.known = {fit.x.tobytes(): (dict(fit.residuals), dict(fit.jacobians), {})}
 
-    def at(
-        self, x: Array
-    ) -> tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]] | None:
+    def at(self, x: Array) -> Evaluated | None:
+        """What there is at x (m,); None where there is no equilibrium, ``trouble`` says why."""
         key = x.tobytes()
-        if key not in self.known:
-            try:
-                found = self._evaluated(x)
-            except (NoEquilibrium, RefusedModel) as trouble:
-                self.trouble = str(trouble)
-                return None
-            self.known = {key: found}
-        return self.known[key]
-
-    def _evaluated(
-        self, x: Array
-    ) -> tuple[dict[str, Array], dict[str, Array], dict[str, Predicted]]:
+        if key in self.known:
+            return self.known[key]
+        try:
+            predictions = self.together.at(self.own(x))
+        except (NoEquilibrium, RefusedModel) as trouble:
+            self.trouble = str(trouble)
+            return None
         residuals, jacobians = {}, {}
-        predictions = self.together.at(self.own(x))
         for name, predicted in predictions.items():
             white = self.setting.whitenings[name]
-            measured = [test.mean for test in self.setting.readings[name].tests]
-            errors = [
-                np.nan_to_num(seen - mean)
-                for seen, mean in zip(predicted.readings, measured, strict=True)
-            ]
-            residuals[name], jacobians[name] = white(errors), white(predicted.by_x)
-        return residuals, jacobians, predictions
+            residuals[name] = white(self.setting.readings[name].errors(predicted.readings))
+            jacobians[name] = white(predicted.by_x)
+        self.known = {key: (residuals, jacobians, predictions)}
+        return self.known[key]
 
     def own(self, x: Array) -> dict[str, Array]:
         """The unknowns of each specimen."""
@@ -140,11 +128,10 @@ class Points:
             return None
         rows, targets = [], []
         for name, member in self.hypothesis.members.items():
+            # [J r] = Q R: R has the same sums of squares in as few rows as there are unknowns
             own = np.column_stack([found[1][name], found[0][name]])
             triangle = np.linalg.qr(own).R
-            block = np.zeros((len(triangle), len(x)))
-            np.add.at(block.T, np.array(member.numbers), triangle[:, :-1].T)
-            rows.append(block)
+            rows.append(member.among_all(triangle[:, :-1], len(x)))
             targets.append(triangle[:, -1])
         rows.append(np.diag(1.0 / self.sd))
         targets.append((x - self.mean) / self.sd)
@@ -168,23 +155,22 @@ def joint_fit(hypothesis: Hypothesis, setting: Setting, near: Near = None) -> Jo
     scale = np.array([u.step for u in hypothesis.unknowns])
     ended = descend(points.compressed, start, (low, high), scale, len(begun[0]), SETTLED)
     status = "" if ended.arrived else SETTLED.given_up
-    return _ended(points, ended.x, (ended.x - low < 1e-6) | (high - ended.x < 1e-6), status)
-
-
-def _ended(points: Points, x: Array, at_bound: NDArray[np.bool_], status: str) -> JointFit:
+    # a descent keeps strictly inside its bounds: this close, one is reached
+    x, at_bound = ended.x, (ended.x - low < 1e-6) | (high - ended.x < 1e-6)
     found = points.at(x)
+    # followed from near poses, a fit may end on a branch that the load path never comes to
     if found is None or not points.together.leads_to(points.own(x), found[2]):
-        return _nowhere(points.hypothesis, x, OFF_THE_PATH)
+        return _nowhere(hypothesis, x, OFF_THE_PATH)
     residuals, jacobians, predicted = found
     models = {
         name: with_parameters(member.model, member.free, x[list(member.numbers)])
-        for name, member in points.hypothesis.members.items()
+        for name, member in hypothesis.members.items()
     }
     chi2 = float(sum(r @ r for r in residuals.values()))
     readings = {name: one.readings for name, one in predicted.items()}
     poses = {name: one.poses for name, one in predicted.items()}
     return JointFit(
-        points.hypothesis, x, models, chi2, residuals, jacobians, readings, poses, at_bound, status
+        hypothesis, x, models, chi2, residuals, jacobians, readings, poses, at_bound, status
     )
 
 

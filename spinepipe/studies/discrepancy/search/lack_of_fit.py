@@ -18,9 +18,8 @@ from scipy.special import logsumexp
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, SpineModel
-from spinepipe.studies.discrepancy.search.base import BUSHING
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen, bushing_stiffness
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
@@ -39,6 +38,8 @@ LEAST_REACH = np.array([5e-5] * 3 + [np.deg2rad(0.2)] * 3)
 """m and rad; less motion than this has no shape."""
 
 BUMPS, BUMP_WIDTH = (-0.6, -0.2, 0.2, 0.6), 0.25
+"""Centres of Gaussian bumps and their width, in parts of the largest motion: they overlap."""
+
 
 OWN = "own"
 FAMILIES = {
@@ -87,7 +88,8 @@ def generic_columns(
     motions = solved.poses
     largest = [np.abs(q).max(axis=0) for q in (motions if reached is None else reached)]
     reach = np.maximum(np.max(largest, axis=0), LEAST_REACH)
-    stiffness = _stiffness(model)
+    bushings = bushing_stiffness(model)
+    stiffness = np.where(bushings > 0.0, bushings, 1.0)  # 1 where a joint has none
     terms: list[Term] = []
     moved: list[list[Array]] = [[] for _ in cases]
     for name in coordinates:
@@ -100,7 +102,7 @@ def generic_columns(
             ]
         size = SIZE * stiffness[:, at] * reach[:, at]
         loads = [_loads(motion / reach, at, coordinates) * size[:, None] for motion in motions]
-        by_load = solved.by_loads([_alone(one, at) for one in loads])
+        by_load = solved.by_loads(loads, at)
         for place, motion in enumerate(motions):
             ramp = np.linspace(0.0, 1.0, len(motion))[:, None]
             shift = np.tile(
@@ -111,15 +113,6 @@ def generic_columns(
     stacked = [np.concatenate(columns, axis=-1) for columns in moved]
     seen = [subtract_baseline(c, zeroed) for c in stacked]
     return GenericColumns(tuple(terms), tuple(seen))
-
-
-def _stiffness(model: SpineModel) -> Array:
-    """(J, 6) of the bushings, the sum where there are several; 1 where a joint has none."""
-    total = np.zeros((model.n_joints, 6))
-    for scoped in model.effects:
-        if scoped.effect.name == BUSHING:
-            total[list(scoped.joints)] += scoped.values
-    return np.where(total > 0.0, total, 1.0)
 
 
 def _counts(coordinates: int, shifts: int) -> dict[str, int]:
@@ -143,18 +136,10 @@ def _loads(u: Array, at: int, coordinates: Sequence[str]) -> Array:
         x = u[..., other]
         found += [x, x**2, x * own, x**2 * own]
     found += [u[..., a] * u[..., b] for a, b in combinations(others, 2)]
+    # motion of the neighbours, nothing beyond the ends of the chain
     above, below = np.zeros_like(own), np.zeros_like(own)
     above[:, :-1], below[:, 1:] = own[:, 1:], own[:, :-1]
     return np.stack([*found, above, below], axis=-1)
-
-
-def _alone(loads: Array, at: int) -> Array:
-    """(T, J, 6, K x J) each term's load (T, J, K) at each joint alone, terms first."""
-    steps, joints, count = loads.shape
-    alone = np.zeros((steps, joints, 6, count, joints))
-    every = np.arange(joints)
-    alone[:, every, at, :, every] = loads.swapaxes(0, 1)
-    return alone.reshape(steps, joints, 6, count * joints)
 
 
 def _readings(by_step: Array, size: Array, at: int) -> Array:
@@ -204,7 +189,9 @@ class LackOfFit(LackOfFitTest):
 
 
 @dataclass(frozen=True)
-class _SpecimenResiduals:
+class _FamilyEvidence:
+    """Of one family at one coordinate: log evidence (1 + D,), drop of chi2 of the data."""
+
     family: str
     coordinate: str
     spread: PlaceSpread
@@ -213,11 +200,11 @@ class _SpecimenResiduals:
 
 
 def lack_of_fit(
-    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
+    baseline: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
 ) -> LackOfFit:
-    """Evidence of the generic basis beside the grounds' fit."""
-    terms, problem = _problem(grounds, coordinates, draws, seed)
-    spreads = [s for s in SPREADS if not (s is PlaceSpread.EACH and len(grounds.readings) == 1)]
+    """Evidence of the generic basis beside the baseline's fit."""
+    terms, problem = _problem(baseline, coordinates, draws, seed)
+    spreads = [s for s in SPREADS if not (s is PlaceSpread.EACH and len(baseline.readings) == 1)]
     families = list(dict.fromkeys(term.family for term in terms))
     parts = {
         coordinate: [
@@ -232,7 +219,7 @@ def lack_of_fit(
     return LackOfFit(**vars(whole), at=at)
 
 
-def _lack(parts: Sequence[_SpecimenResiduals]) -> LackOfFitTest:
+def _lack(parts: Sequence[_FamilyEvidence]) -> LackOfFitTest:
     logs = logsumexp(np.stack([part.logs for part in parts]), axis=0) - np.log(len(parts))
     best = max(parts, key=lambda part: part.logs[0])
     share = np.log(len(parts))
@@ -245,18 +232,18 @@ def _lack(parts: Sequence[_SpecimenResiduals]) -> LackOfFitTest:
 
 
 def _problem(
-    grounds: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
+    baseline: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
 ) -> tuple[tuple[Term, ...], Linearised]:
     parts: dict[str, Products] = {}
     terms: tuple[Term, ...] = ()
-    taken = taken_out(grounds.fit)
-    for number, (name, one) in enumerate(grounds.readings.items()):
-        model = grounds.fit.models[name]
-        zeroed = grounds.noise.zeroed
-        shifted = () if zeroed else grounds.tests  # counted from step 0 there is none
+    taken = taken_out(baseline.fit)
+    for number, (name, one) in enumerate(baseline.readings.items()):
+        model = baseline.fit.models[name]
+        zeroed = baseline.noise.zeroed
+        shifted = () if zeroed else baseline.tests  # counted from step 0 there is none
         found = generic_columns(model, one.cases, zeroed, coordinates, shifted=shifted)
-        plain = grounds.plain[name].noise_only(found.moved)
-        white = grounds.setting.whitenings[name].shortened(plain)
+        plain = baseline.plain[name].noise_only(found.moved)
+        white = baseline.setting.whitenings[name].shortened(plain)
         errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
         parts[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
         terms = found.terms
@@ -265,7 +252,8 @@ def _problem(
 
 def _part(
     problem: Linearised, terms: Sequence[Term], family: str, coordinate: str, spread: PlaceSpread
-) -> _SpecimenResiduals:
+) -> _FamilyEvidence:
+    # columns of one strength each, or of a term at all joints summed: F S' with S = onto
     chosen = [
         number
         for number, term in enumerate(terms)
@@ -282,17 +270,13 @@ def _part(
         grams.append(onto @ part.gram[np.ix_(chosen, chosen)] @ onto.T)
         moments.append(onto @ part.moments[chosen])
     coupled = [onto @ part.shared[chosen] for part in problem.of.values()]
+    # strengths of each specimen stand side by side, those of all are sums over specimens
     if spread is PlaceSpread.EACH:
         gram, moment, shared = block_diag(*grams), np.concatenate(moments), np.concatenate(coupled)
     else:
-        gram, moment, shared = _added(grams), _added(moments), _added(coupled)
+        gram, moment, shared = (np.sum(parts, axis=0) for parts in (grams, moments, coupled))
     gram, moment = problem.without_shared(gram, moment, shared)
     group = Group.of(gram, np.zeros(len(gram)))
     estimate = group.estimate(moment[:, 0])
     explained = float(2.0 * estimate @ moment[:, 0] - estimate @ gram @ estimate)
-    return _SpecimenResiduals(family, coordinate, spread, group.log_evidence(moment), explained)
-
-
-def _added(arrays: Sequence[Array]) -> Array:
-    total: Array = np.sum(arrays, axis=0)
-    return total
+    return _FamilyEvidence(family, coordinate, spread, group.log_evidence(moment), explained)

@@ -53,7 +53,7 @@ class LawTerm:
 
     @property
     def unit(self) -> str:
-        """Of the coefficient, at the border: N m or N, by rad, mm, s and N."""
+        """Of the coefficient in tables: N m or N, by rad, mm, s and N."""
         if self.acts == READING:
             return f"{'mm' if self.coordinate in TRANSLATIONS else 'deg'} per test"
         above = "N" if self.coordinate in TRANSLATIONS else "N m"
@@ -68,7 +68,7 @@ class LawTerm:
         return f"{above}/{below[0]}" if len(below) == 1 else f"{above}/({' '.join(below)})"
 
     @property
-    def border(self) -> float:
+    def display_per_si(self) -> float:
         """What one SI unit of the coefficient is in that unit."""
         if self.acts == READING:
             return MM_PER_M if self.coordinate in TRANSLATIONS else DEG_PER_RAD
@@ -134,10 +134,11 @@ def term_columns(
         own = [term for term, _ in found[0]]
         loads = [np.stack([values for _, values in test], axis=-1) for test in found]
         strongest = np.max([np.abs(one).max(axis=0) for one in loads], axis=0)  # (J, K)
+        # a term that is nought everywhere has no size: springs over infinity
         springs = (stiffness[:, at] * reach[:, at])[:, None]
         sizes.append((springs / np.where(strongest > 0.0, strongest, np.inf)).T)
         terms += own
-        for place, by_load in enumerate(solved.by_loads([_alone(one, at) for one in loads])):
+        for place, by_load in enumerate(solved.by_loads(loads, at)):
             moved[place].append(subtract_baseline(by_load, zeroed))
     for name in coordinates:
         at = COORDINATES.index(name)
@@ -156,6 +157,7 @@ def _states(solved: SolvedSpecimen, timed: bool) -> list[_TestState]:
         rate = None
         if timed:
             times = np.array([step.time for step in case.steps], dtype=float)
+            # backward differences; the first step is at rest, whatever time it is given
             rate = steps / np.diff(times, prepend=times[0] - 1.0)[:, None, None]
         least = AT_REST * np.abs(steps).max(axis=0)
         way = np.where(np.abs(steps) > least, np.sign(steps), 0.0)
@@ -219,15 +221,6 @@ def _powers(q: Array, name: str, coordinates: Sequence[str]) -> Iterator[Valued]
     for a, b in combinations(others, 2):
         x, y = (q[..., COORDINATES.index(one)] for one in (a, b))
         yield term(f"{a} x {b}".replace("_", " "), x * y, a, b)
-
-
-def _alone(loads: Array, at: int) -> Array:
-    """(T, J, 6, K x J) each term's load (T, J, K) at each joint alone, terms first."""
-    steps, joints, count = loads.shape
-    alone = np.zeros((steps, joints, 6, count, joints))
-    every = np.arange(joints)
-    alone[:, every, at, :, every] = loads.swapaxes(0, 1)
-    return alone.reshape(steps, joints, 6, count * joints)
 
 
 def _drift(shape: tuple[int, ...], at: int) -> Array:

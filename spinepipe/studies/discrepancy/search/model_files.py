@@ -15,12 +15,12 @@ from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.verdict import EVERY
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-BORDER = {
+DISPLAY_UNITS = {
     "rad": ("deg", DEG_PER_RAD),
     "m": ("mm", MM_PER_M),
     "m/rad": ("mm/deg", MM_PER_M / DEG_PER_RAD),
 }
-"""Unit inside to unit and factor outside; all other units stay."""
+"""Unit inside to unit and factor in tables; all other units stay."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,7 @@ def model_file(
             entries.append(_of_scoped(acting, scoped, specimens))
         for specimen in acting:
             after[specimen] += 1
+    # `after`: the next effect of each specimen's model, which stand base, given, supposed
     for specimen in after:
         after[specimen] += given.get(specimen, 0)
     for supposed in fit.hypothesis.supposed:
@@ -65,7 +66,8 @@ def model_file(
         copies = _copies(supposed.form, acting, after)
         for copy in range(copies):
             scoped = {n: m.effects[after[n] + copy] for n, m in acting.items()}
-            entries.append(_of_scoped(acting, scoped, _specimens(supposed.form)))
+            own = EVERY if supposed.form.specimen is None else (supposed.form.specimen,)
+            entries.append(_of_scoped(acting, scoped, own))
         for specimen in acting:
             after[specimen] += copies
     return ModelFile(model=name, cohort=cohort, effects=tuple(entries))
@@ -134,10 +136,6 @@ def _copies(form: CandidateForm, models: Mapping[str, SpineModel], after: Mappin
     return len(tests)
 
 
-def _specimens(form: CandidateForm) -> tuple[str, ...]:
-    return EVERY if form.specimen is None else (form.specimen,)
-
-
 def fitted_values(fit: JointFit, number: int) -> tuple[FittedValue, ...]:
     """All fitted values of one supposed effect."""
     own = [k for k, u in enumerate(fit.hypothesis.unknowns) if u.supposed == number]
@@ -164,7 +162,7 @@ def in_tables(fit: JointFit, index: int, move: float) -> tuple[float, str]:
 
 def display_value(unit: str, value: float) -> tuple[float, str]:
     """A value in the unit of tables, and that unit."""
-    name, factor = BORDER.get(unit, (unit, 1.0))
+    name, factor = DISPLAY_UNITS.get(unit, (unit, 1.0))
     return value * factor, name
 
 
@@ -175,6 +173,7 @@ def standard_errors(fit: JointFit) -> Array:
 
 def covariance(fit: JointFit) -> Array:
     """(m, m) of all unknowns, priors counted in."""
+    # Gauss-Newton: inverse of the curvature of half chi2 and of the priors
     jacobian = fit.whole_jacobian()
     precision = jacobian.T @ jacobian + np.diag([u.sd**-2.0 for u in fit.hypothesis.unknowns])
     return np.asarray(np.linalg.inv(precision), dtype=np.float64)

@@ -30,7 +30,11 @@ FEWEST_AGREEING = 3
 """
 
 MAD_PER_SD = 0.67449
+"""Median absolute deviation of a normal distribution: its third quartile."""
+
 CORRELATIONS = np.round(np.arange(-0.3, 0.96, 0.02), 2)
+"""Among which the most likely is taken."""
+
 FEWEST = 30
 """Independent differences between cycles from which an SD is taken for known."""
 
@@ -78,7 +82,8 @@ def estimated_noise(
     """
     contrasts = _contrasts(specimens)
     counts = np.array([sum(len(c) * c.shape[1] for c in contrasts[k]) for k in range(6)])
-    read = np.array([_is_read(specimens, k) for k in range(6)])
+    tests = [test for one in specimens for test in one.tests]
+    read = np.array([any(test.count[..., k].any() for test in tests) for k in range(6)])
     if np.all(counts[read] >= FEWEST):
         sd, correlation = _most_likely(contrasts, zeroed)
         return Noise(np.where(read, sd, np.nan), correlation, REPEATS, counts, outliers, zeroed)
@@ -89,28 +94,19 @@ def estimated_noise(
 
 
 def _contrasts(specimens: Sequence[SpecimenReadings]) -> list[list[Array]]:
-    """Per coordinate a list of (K, T) orthonormal differences between complete cycles."""
+    """Per coordinate a list of (K, T) orthonormal differences between complete cycles.
+
+    Helmert's contrasts: independent where cycles are, and free of what cycles have in common.
+    """
     found: list[list[Array]] = [[] for _ in range(6)]
-    for specimen in specimens:
-        for test in specimen.tests:
-            for contrasts, coordinate in _contrasts_of(test):
-                found[coordinate].append(contrasts)
+    for test in (test for one in specimens for test in one.tests):
+        used = test.count.any(axis=(1, 2))  # steps that were read
+        for joint, coordinate in np.argwhere(test.count.any(axis=0)):
+            cycles = test.cycles[:, used, joint, coordinate]
+            whole = cycles[np.isfinite(cycles).all(axis=1)]
+            if len(whole) >= 2:
+                found[coordinate].append(helmert(len(whole)) @ whole)
     return found
-
-
-def _contrasts_of(test: Repeats) -> list[tuple[Array, int]]:
-    used = test.count.any(axis=(1, 2))  # steps that were read
-    found = []
-    for joint, coordinate in np.argwhere(test.count.any(axis=0)):
-        cycles = test.cycles[:, used, joint, coordinate]
-        whole = cycles[np.isfinite(cycles).all(axis=1)]
-        if len(whole) >= 2:
-            found.append((helmert(len(whole)) @ whole, int(coordinate)))
-    return found
-
-
-def _is_read(specimens: Sequence[SpecimenReadings], coordinate: int) -> bool:
-    return any(test.count[..., coordinate].any() for one in specimens for test in one.tests)
 
 
 def _most_likely(contrasts: Sequence[Sequence[Array]], zeroed: bool) -> tuple[Array, float]:
@@ -138,11 +134,13 @@ def _profile(groups: dict[int, Array], rho: float, zeroed: bool) -> tuple[float,
     squares, count, logdet = 0.0, 0, 0.0
     for steps, rows in groups.items():
         noise = Noise(np.ones(6), rho, "", np.zeros(6, dtype=np.int64), 0, zeroed)
+        # step 0 of a zeroed cycle was not read, but its error is in all others
         full = noise.correlations(steps + 1)[1:, 1:] if zeroed else noise.correlations(steps)
         factor = np.linalg.cholesky(full)
         squares += float(np.sum(np.linalg.solve(factor, rows.T) ** 2))
         logdet += len(rows) * 2.0 * float(np.log(np.diagonal(factor)).sum())
         count += rows.size
+    # the likelihood at its best variance, mean square of the whitened contrasts
     variance = max(squares / count, np.finfo(float).tiny)
     return -0.5 * (count * np.log(variance) + logdet), float(np.sqrt(variance))
 
@@ -209,8 +207,11 @@ def without_outliers(
         for test in specimen.tests:
             shifted = np.abs(_mean_deviations(test)) > FAR_CYCLE * whole
             far = (np.abs(_deviations(test)) > FAR * single) | shifted[:, None]
-            far &= np.isfinite(test.cycles)
-            far |= _undecided(far, test)
+            there = np.isfinite(test.cycles)
+            far &= there
+            # readings of which too few cycles agree to say which one is wrong
+            few = (there & ~far).sum(axis=0) < FEWEST_AGREEING
+            far |= there & few & far.any(axis=0)
             dropped += int(far.sum())
             tests.append(replace(test, cycles=np.where(far, np.nan, test.cycles)))
         kept.append(replace(specimen, tests=tuple(tests)))
@@ -242,12 +243,4 @@ def _mean_deviations(test: Repeats) -> Array:
     count = np.isfinite(deviations).sum(axis=1)
     mean = np.nansum(deviations, axis=1) / np.maximum(count, 1)
     result: Array = np.where(count > 0, mean - np.median(mean, axis=0), np.nan)
-    return result
-
-
-def _undecided(far: NDArray[np.bool_], test: Repeats) -> NDArray[np.bool_]:
-    """(C, T, J, 6) readings of which too few cycles agree to say which one is wrong."""
-    there = np.isfinite(test.cycles)
-    few = (there & ~far).sum(axis=0) < FEWEST_AGREEING
-    result: NDArray[np.bool_] = there & few & far.any(axis=0)
     return result

@@ -12,9 +12,8 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase
-from spinepipe.studies.discrepancy.search.base import bushing_stiffness
 from spinepipe.studies.discrepancy.search.hypothesis import Variant
-from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen
+from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen, bushing_stiffness
 from spinepipe.studies.discrepancy.search.projected import (
     EVERY_TEST,
     VariantColumn,
@@ -65,7 +64,8 @@ def nuisance_columns(
     stiffness : (J, 6) of the base, SI. coordinates : those that are read.
     """
     every, each_test = (EVERY_TEST,), tuple(dict.fromkeys(case.test for case in cases))
-    pushed = tuple(dict.fromkeys(case.test for case in cases if _has_forces(case)))
+    wrenches = [(case.test, w) for case in cases for step in case.steps for w in step.wrenches]
+    pushed = tuple(dict.fromkeys(test for test, wrench in wrenches if wrench.force.any()))
     blocks = [
         (Variant("joint_centre_offset", ()), priors.joint_centre, every),
         (Variant("axes_tilt", ()), priors.law_axes, every),
@@ -87,10 +87,6 @@ def nuisance_columns(
     return found
 
 
-def _has_forces(case: LoadCase) -> bool:
-    return any(wrench.force.any() for step in case.steps for wrench in step.wrenches)
-
-
 def _columns(variant: Variant, sds: Array, places: Sequence[str]) -> list[VariantColumn]:
     """Columns of a nuisance with these prior SDs (J,), those of zero left out."""
     rows = list(range(len(sds))) if variant.create().per_joint else [None]
@@ -104,21 +100,13 @@ def _columns(variant: Variant, sds: Array, places: Sequence[str]) -> list[Varian
     ]
 
 
-ALIKE = ("rotation_order", "bending_rotation_coupling")
+COMMON_TO_JOINTS = ("rotation_order", "bending_rotation_coupling")
 """Nuisances that joints may share, as they come from one convention or one kind of tissue."""
-
-
-def _alike(columns: Sequence[VariantColumn], moved: tuple[Array, ...]) -> list[Array]:
-    """(T, J, 6, g) per test: columns of a nuisance that joints may share, all joints together."""
-    names = [(c.variant, c.strength) if c.variant.effect in ALIKE else None for c in columns]
-    kinds = _shared(columns)
-    onto = np.array([[name == kind for kind in kinds] for name in names], dtype=float)
-    return [one @ onto.reshape(len(columns), len(kinds)) for one in moved]
 
 
 def _shared(columns: Sequence[VariantColumn]) -> list[tuple[Variant, int]]:
     """Variant and strength of the nuisances that joints may share, in order of appearance."""
-    names = [(c.variant, c.strength) for c in columns if c.variant.effect in ALIKE]
+    names = [(c.variant, c.strength) for c in columns if c.variant.effect in COMMON_TO_JOINTS]
     return list(dict.fromkeys(names))
 
 
@@ -206,9 +194,12 @@ def nuisance_signatures(
     posture = np.full(len(stiffness), priors.posture)
     tilts = [_columns(variant, posture, (EVERY_TEST,)) for variant in POSTURE]
     single, *together = signatures_of_each(solved, [columns, *tilts])
-    single = tuple(
-        np.concatenate(pair, axis=-1) for pair in zip(single, _alike(columns, single), strict=True)
-    )
+    # columns of a nuisance that joints may share, all joints together: onto (k, g)
+    names = [(c.variant, c.strength) for c in columns]
+    kinds = _shared(columns)
+    onto = np.array([[name == kind for kind in kinds] for name in names], dtype=float)
+    onto = onto.reshape(len(columns), len(kinds))
+    single = tuple(np.concatenate([one, one @ onto], axis=-1) for one in single)
     if not priors.posture:
         return single
     return tuple(

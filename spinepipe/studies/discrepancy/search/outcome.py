@@ -6,14 +6,15 @@ says nothing against it, but forbids to say that it is all that is missing.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from types import MappingProxyType
 
 import numpy as np
 from scipy.special import logsumexp
 
+from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.proof.folds import TEST
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
-from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.lack_of_fit import FAMILIES, OWN
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.search.search_state import Rival, SearchResult, SelectedTerm
@@ -42,6 +43,19 @@ One that has less only mends what another gets wrong: together they imitate some
 """
 
 
+NEARLY_ALL = 0.9
+"""Share of the standing effects' evidence that a generic shape must have to be the truer one."""
+
+SAME = 0.05
+"""Share of the largest listed force by which tests that compress alike may differ."""
+
+AS_NEAR = 1.0
+"""Log evidence within which one rival is as near as another."""
+
+EVERYWHERE = ""
+"""In the place of a coordinate: all of them."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """A verdict, and why in one sentence.
@@ -68,6 +82,9 @@ class Outcome:
 _NoName = tuple[Reason, str]
 """Why nothing is named, for programs and in one sentence."""
 
+Cases = Mapping[str, Sequence[LoadCase]]
+"""Load histories by specimen."""
+
 
 def outcome(
     found: SearchResult,
@@ -83,8 +100,9 @@ def outcome(
     proof : on data held out; None where none was asked for. errors : suspected in the data.
     not_excluded : by effect, others that nothing recorded speaks for or against.
     """
-    doubts = {number: _doubt(found, number, margin) for number in range(len(found.standing))}
-    kept = [one for number, one in enumerate(found.standing) if doubts[number] is None]
+    doubted = [(one, _doubt(found, one, margin)) for one in found.standing]
+    kept = [one for one, doubt in doubted if doubt is None]
+    doubts = [doubt for _, doubt in doubted if doubt is not None]
     close = [_close(one, found, margin, not_excluded) for one in kept]
     tied = tuple(
         dict.fromkeys(
@@ -95,20 +113,25 @@ def outcome(
         )
     )
     named = tuple(one for one, names in zip(kept, close, strict=True) if not names)
-    first = next((doubt for doubt in doubts.values() if doubt is not None), None)
-    unexplained = (
-        _mistaken(errors)
-        or (_unexplained(found) if not found.standing else None)
-        or (first if not kept else None)
-        or _unproven(found, proof)
-    )
+    unexplained: _NoName | None = None
+    if errors:  # data errors are not physics: nothing is named before they are looked at
+        places = "; ".join(f"{one.what} ({one.where})" for one in errors[:3])
+        why = f"the data look wrong, so nothing is named: {places}"
+        unexplained = Reason.DATA_ERRORS, why
+    elif not found.standing and found.lack.log_evidence > max(
+        LEAST_THRESHOLD, found.generic_threshold
+    ):
+        why = f"a discrepancy that no known effect explains: {found.lack.shape}"
+        unexplained = Reason.NO_KNOWN_EFFECT, why
+    else:
+        unexplained = doubts[0] if doubts and not kept else _unproven(found, proof)
     if unexplained:
         reason, why = unexplained
         return Outcome(Conclusion.UNKNOWN, why, reason=reason)
     if not found.standing:
         why = "no effect has evidence above what noise alone would show on these tests"
         return Outcome(Conclusion.NULL, why)
-    left = _left(found, [doubt for doubt in doubts.values() if doubt is not None], proof)
+    left = _left(found, doubts, proof)
     if tied:
         why = f"something is missing, but these tests cannot tell which: {_listed(tied, 'or')}"
         return Outcome(Conclusion.SET, why, named, tied, left=left)
@@ -123,25 +146,8 @@ def outcome(
     return Outcome(Conclusion.NAMED, why, named)
 
 
-def _mistaken(errors: Sequence[SuspectedError]) -> _NoName | None:
-    """Data errors are not physics: nothing is named before they are looked at."""
-    if not errors:
-        return None
-    places = "; ".join(f"{one.what} ({one.where})" for one in errors[:3])
-    return Reason.DATA_ERRORS, f"the data look wrong, so nothing is named: {places}"
-
-
-def _unexplained(found: SearchResult) -> _NoName | None:
-    """Why something is missing that no known effect is, where none stands."""
-    if found.lack.log_evidence <= max(LEAST_THRESHOLD, found.generic_threshold):
-        return None
-    why = f"a discrepancy that no known effect explains: {found.lack.shape}"
-    return Reason.NO_KNOWN_EFFECT, why
-
-
-def _doubt(found: SearchResult, number: int, margin: float) -> _NoName | None:
+def _doubt(found: SearchResult, one: SelectedTerm, margin: float) -> _NoName | None:
     """Why an effect that stands is not sure, if so."""
-    one = found.standing[number]
     if one.over_stiffness is not None and one.over_stiffness < margin:
         why = (
             f"{one.name} explains no more than a stiffness of its own for each joint of each "
@@ -162,15 +168,12 @@ def _most_stays(found: SearchResult, one: SelectedTerm) -> _NoName | None:
         if share > UNEXPLAINED_SHARE:
             why = f"{one.name} would explain a part, but {100 * share:.0f} % stays"
             return Reason.A_PART_STAYS, f"{why}{_in(coordinate)}"
-        gain, gap = _gain(found, coordinate), _final(found, coordinate)
+        gain = _gain(found, coordinate)
+        gap = found.final_at[coordinate] if coordinate else found.final_gap
         if gap.interval[0] > LEAST_LEFT and gap.excess > GAP_LEFT * (gain + gap.excess):
             why = "most of the discrepancy stays whatever known effect is added"
             return Reason.MOST_STAYS, f"{why}{_in(coordinate)}"
     return None
-
-
-EVERYWHERE = ""
-"""In the place of a coordinate: all of them."""
 
 
 def _in(coordinate: str) -> str:
@@ -182,10 +185,6 @@ def _gain(found: SearchResult, coordinate: str) -> float:
     if not coordinate:
         return found.base.fit.chi2 - found.final.fit.chi2
     return found.base_at[coordinate].chi2 - found.final_at[coordinate].chi2
-
-
-def _final(found: SearchResult, coordinate: str) -> Gap:
-    return found.final_at[coordinate] if coordinate else found.final_gap
 
 
 def _share_left(found: SearchResult, coordinate: str) -> float:
@@ -225,10 +224,6 @@ def _imitated(found: SearchResult, one: SelectedTerm) -> _NoName | None:
     return Reason.IMITATED_TOGETHER, why
 
 
-NEARLY_ALL = 0.9
-"""Share of the standing effects' evidence that a generic shape must have to be the truer one."""
-
-
 def _other_shape(found: SearchResult, one: SelectedTerm, margin: float) -> _NoName | None:
     """Whether what the base lacks follows what no known effect follows.
 
@@ -243,26 +238,18 @@ def _other_shape(found: SearchResult, one: SelectedTerm, margin: float) -> _NoNa
         family = max(shapes, key=lambda name: shapes[name])
         if family == OWN:
             continue
-        own, best = shapes.get(OWN, 0.0), _best_of(found, coordinate)
-        rival = max(own, best, 0.0 if variant.acts_on else one.log_evidence)
-        if shapes[family] > max(rival + margin, NEARLY_ALL * _together(found, coordinate)):
+        # log evidence of the best effect of the coordinate, and of all that stand on it
+        forms = (form for effect in found.stages[0].screen.effects for form in effect.forms)
+        of_it = (f.log_evidence for f in forms if coordinate in f.form.variant.acts_on)
+        best = max(of_it, default=0.0)
+        on_it = (other for other in found.standing if coordinate in _loaded(found, other))
+        together = sum(other.log_evidence for other in on_it)
+        rival = max(shapes.get(OWN, 0.0), best, 0.0 if variant.acts_on else one.log_evidence)
+        if shapes[family] > max(rival + margin, NEARLY_ALL * together):
             shape = FAMILIES[family].format(coordinate=coordinate.replace("_", " "))
             why = f"{one.name} would imitate what no known effect is: {shape}"
             return Reason.NO_KNOWN_EFFECT, why
     return None
-
-
-def _best_of(found: SearchResult, coordinate: str) -> float:
-    """Log evidence of the best effect of a coordinate, beside the base alone."""
-    forms = (form for effect in found.stages[0].screen.effects for form in effect.forms)
-    of_it = (one.log_evidence for one in forms if coordinate in one.form.variant.acts_on)
-    return max(of_it, default=0.0)
-
-
-def _together(found: SearchResult, coordinate: str) -> float:
-    """Log evidence of all effects that stand on a coordinate."""
-    on_it = (one for one in found.standing if coordinate in _loaded(found, one))
-    return sum(one.log_evidence for one in on_it)
 
 
 def _loaded(found: SearchResult, one: SelectedTerm) -> set[str]:
@@ -274,22 +261,19 @@ def _unproven(found: SearchResult, proof: HeldOut | None) -> _NoName | None:
     """What is named must predict better than the base what it has not seen."""
     if not found.standing or proof is None or proof.over_base is None:
         return None
-    if not proof.tells or (proof.beats_base and not _worse_on_tests(proof)):
+    # whether tests that no fit has seen are together clearly worse with the effects
+    rows = [row for row in proof.folds if row.kind == TEST]
+    pairs = [(row.base, row.with_effects, row.expected) for row in rows]
+    drops = sum(b.chi2 - e.chi2 for b, e, _ in pairs if b is not None and e is not None)
+    excess = sum(b.chi2 - expected for b, _, expected in pairs if b is not None)
+    worse = drops < -max(WORSE, WORSE_SHARE * max(excess, 0.0))
+    if not proof.tells or (proof.beats_base and not worse):
         return None
     names = _listed(list(dict.fromkeys(one.name for one in found.standing)), "and")
     return (
         Reason.NOT_PROVEN,
         f"{names} would explain these readings, but predicts held-out ones no better than the base",
     )
-
-
-def _worse_on_tests(proof: HeldOut) -> bool:
-    """Whether tests that no fit has seen are together clearly worse with the effects."""
-    rows = [row for row in proof.folds if row.kind == TEST]
-    pairs = [(row.base, row.with_effects, row.expected) for row in rows]
-    drops = sum(b.chi2 - e.chi2 for b, e, _ in pairs if b is not None and e is not None)
-    excess = sum(b.chi2 - expected for b, _, expected in pairs if b is not None)
-    return drops < -max(WORSE, WORSE_SHARE * max(excess, 0.0))
 
 
 def _left(found: SearchResult, doubts: Sequence[_NoName], proof: HeldOut | None) -> tuple[str, ...]:
@@ -331,7 +315,7 @@ def _close(
 
 
 def _near(rivals: Sequence[Rival], margin: float) -> list[str]:
-    """Names that are less than the margin behind, one by one or all together.
+    """Names that are less than the margin behind, one by one or all together (log of the odds).
 
     The odds of a name are against all others: several that are a little more than the margin behind
     are together less; then those are told that are as near as the nearest.
@@ -344,8 +328,42 @@ def _near(rivals: Sequence[Rival], margin: float) -> list[str]:
     return [rival.name for rival in rivals if rival.margin < reach]
 
 
-AS_NEAR = 1.0
-"""Log evidence within which one rival is as near as another."""
+def cannot_be_excluded(name: str, cases_by_specimen: Cases) -> tuple[str, ...]:
+    """Other effects that these tests cannot tell from the named one, whatever was read in them.
+
+    An effect that needs what the files do not have cannot be fitted, so the evidence never speaks
+    for it, and not against it either. A loop of loading and unloading, or a zero that has moved on
+    at the end of a test, is friction (hysteresis) or, had time passed, creep: only recorded times
+    tell. Joints that differ in stiffness differ by level or, where all tests compress them alike,
+    by how much each is compressed: only a second compression tells.
+
+    Parameters
+    ----------
+    name : of an effect that would be named. cases_by_specimen : the tests as they were recorded.
+    """
+    every = list(chain.from_iterable(cases_by_specimen.values()))
+    if name in ("hysteresis", "neutral_pose_drift"):
+        several = [[step.time for step in case.steps] for case in every if len(case.steps) > 1]
+        timed = bool(several) and all(
+            None not in times and times[-1] > times[0]  # type: ignore[operator]
+            for times in several
+        )
+        return () if timed else ("creep",)
+    # N: of each test all listed forces of each step by their sizes (T,), and the one that stays
+    sizes = [
+        np.array([sum(float(np.linalg.norm(w.force)) for w in s.wrenches) for s in case.steps])
+        for case in every
+    ]
+    stay = [float(of_test.min()) for of_test in sizes]
+    smallest, largest = min(stay, default=0.0), max(stay, default=0.0)
+    if name == "level_dependence":
+        alike = largest > 0.0 and largest - smallest <= SAME * largest
+        return ("preload_stiffening",) if alike else ()
+    if name == "preload_stiffening":
+        differ = largest - smallest > SAME * largest
+        change = any(one.max() - one.min() > SAME * one.max() for one in sizes)
+        return () if differ or change else ("level_dependence",)
+    return ()
 
 
 def _listed(names: Sequence[str], word: str) -> str:

@@ -22,7 +22,9 @@ from spinepipe.statics.batched import (
     readings_by,
 )
 from spinepipe.statics.batched.solve import carried
-from spinepipe.units import subtract_baseline
+from spinepipe.units import COORDINATES, subtract_baseline
+
+BUSHING = "linear_bushing"
 
 SAME = 1e-7
 """m and rad by which a pose may differ when it is solved afresh from the neutral pose."""
@@ -93,28 +95,23 @@ class JointPrediction:
         dq = poses_by(stack, q, self._free)
         self._last = (every, q, dq)
         seen, by_x = readings(stack, q), readings_by(stack, q, dq, self._free)
-        return {
-            name: self._predicted(stack, number, q, seen, by_x[..., : len(x[name])])
-            for number, name in enumerate(names)
-        }
+        predicted = {}
+        for number, name in enumerate(names):
+            # the stack has all steps of all tests one under the other: those of each test
+            runs = range(self._runs[number], self._runs[number + 1])
+            tests = [slice(stack.first[run], stack.first[run + 1]) for run in runs]
+            own = by_x[..., : len(x[name])]
+            predicted[name] = Predicted(
+                tuple(subtract_baseline(seen[steps], self.zeroed) for steps in tests),
+                tuple(subtract_baseline(own[steps], self.zeroed) for steps in tests),
+                tuple(q[steps].reshape(len(q[steps]), -1) for steps in tests),
+            )
+        return predicted
 
     def model(self, name: str, x: Array) -> SpineModel:
         """The model of a specimen with its unknowns moved by x (m,)."""
         one = self.subjects[name]
         return with_parameters(one.model, one.free, x)
-
-    def _predicted(
-        self, stack: Stack, number: int, q: Array, seen: Array, by_x: Array
-    ) -> Predicted:
-        tests = [
-            slice(stack.first[run], stack.first[run + 1])
-            for run in range(self._runs[number], self._runs[number + 1])
-        ]
-        return Predicted(
-            tuple(subtract_baseline(seen[lanes], self.zeroed) for lanes in tests),
-            tuple(subtract_baseline(by_x[lanes], self.zeroed) for lanes in tests),
-            tuple(q[lanes].reshape(len(q[lanes]), -1) for lanes in tests),
-        )
 
     def _padded(self, x: Sequence[Array]) -> Array:
         """(M, m) unknowns of each specimen, those that it does not have zero."""
@@ -124,7 +121,7 @@ class JointPrediction:
         return found
 
     def _guess(self, x: Array) -> Array | None:
-        """(L, J, 6) poses to start from, to first order from the last ones."""
+        """(L, J, 6) poses to start from: one Euler step of a continuation from the last ones."""
         if self._last is None:
             return self._near
         there, q, dq = self._last
@@ -143,7 +140,7 @@ class JointPrediction:
         return bool(np.abs(found.q.reshape(there.shape) - there).max() <= SAME)
 
 
-def recorded(model: SpineModel, cases: Sequence[LoadCase]) -> None:
+def solve_on_record(model: SpineModel, cases: Sequence[LoadCase]) -> None:
     """Solve a specimen's tests by the engine of record beside the stack.
 
     Raises
@@ -221,6 +218,7 @@ class SolvedSpecimen:
         free : unknowns of ``full``.
         """
         stack = Stack.of([full], [(0, case) for case in self.cases])
+        # an effect that is off changes no pose: derivatives are taken where the bare model stands
         if all(full.effects[one.effect].effect.kind is EffectKind.MEASUREMENT for one in free):
             dq = np.zeros((*self._q.shape, len(free)))  # instruments move no joint
         else:
@@ -242,19 +240,38 @@ class SolvedSpecimen:
         lanes, joints, _ = self._q.shape
         found = []
         for by_strength in self.answering.by_strengths(idle):
-            every = np.moveaxis(by_strength, 1, 2)
+            every = np.moveaxis(by_strength, 1, 2)  # the joint of the parameter behind that read
             every = every.reshape(lanes, joints, 6, joints, *every.shape[3:])
             tests = self._by_test(every)
             found.append(tuple(subtract_baseline(one, self.zeroed) for one in tests))
         return found
 
-    def by_loads(self, loads: Sequence[Array]) -> tuple[Array, ...]:
-        """(T, J, 6, m) motion by loads (T, J, 6, m) that hold the joints besides their laws."""
-        sources = np.negative(np.concatenate(list(loads)))
+    def by_loads(self, loads: Sequence[Array], at: int) -> tuple[Array, ...]:
+        """(T, J, 6, K x J) motion by each load (T, J, K) at each joint alone, loads first.
+
+        ``at``: the coordinate on which the loads hold the joints besides their laws.
+        """
+        alone = []
+        for one in loads:
+            steps, joints, count = one.shape
+            apart = np.zeros((steps, joints, 6, count, joints))
+            every = np.arange(joints)
+            apart[:, every, at, :, every] = one.swapaxes(0, 1)
+            alone.append(apart.reshape(steps, joints, 6, count * joints))
+        sources = np.negative(np.concatenate(alone))
         return self._by_test(answered(self._stack, self._q, sources))
 
     def _by_test(self, of_lanes: Array) -> tuple[Array, ...]:
         return tuple(np.split(of_lanes, self._stack.first[1:-1]))
+
+
+def bushing_stiffness(model: SpineModel) -> Array:
+    """(J, 6) N/m and N m/rad, of all linear bushings of each joint together."""
+    total = np.zeros((model.n_joints, len(COORDINATES)))
+    for scoped in model.effects:
+        if scoped.effect.name == BUSHING:
+            total[list(scoped.joints)] += scoped.values
+    return total
 
 
 def _must_stand(found: StepPoses, stack: Stack, models: Sequence[SpineModel]) -> None:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spinepipe.decomposition import pinvh, svd
-from spinepipe.effects import Effect, EffectKind, PlaceSpread
+from spinepipe.effects import EffectKind, PlaceSpread
 from spinepipe.effects.contract import AcrossJoints, Array
 from spinepipe.effects.dead_load import DeadLoad
 from spinepipe.model import ScopedEffect
@@ -92,6 +92,7 @@ class Linearised:
 
         ``coupled`` (..., k, a): products of the strengths with the shared unknowns.
         """
+        # block elimination: the Schur complement in the shared unknowns
         if not coupled.shape[-1]:
             return gram, moments
         gain = coupled @ self._inverse_shared
@@ -132,28 +133,25 @@ def taken_out(fit: JointFit) -> dict[str, ProjectedOut]:
         for number in member.numbers:
             owners.setdefault(number, set()).add(name)
     common = sorted(number for number, names in owners.items() if len(names) > 1)
-    return {
-        name: _taken(fit, name, np.array(member.numbers), common)
-        for name, member in fit.hypothesis.members.items()
-    }
-
-
-def _taken(fit: JointFit, name: str, numbers: Array, common: Sequence[int]) -> ProjectedOut:
-    jacobian = fit.jacobians[name]
-    is_common = np.isin(numbers, common)
-    own = _basis(jacobian[:, ~is_common])
-    shared = np.zeros((len(jacobian), len(common)))
-    places = [common.index(number) for number in numbers[is_common]]
-    np.add.at(shared.T, places, jacobian[:, is_common].T)
-    shared -= own @ (own.T @ shared)
-    residual = -fit.residuals[name]  # measured less predicted: what a signature is to make
-    return ProjectedOut(own, shared, residual - own @ (own.T @ residual))
+    found = {}
+    for name, member in fit.hypothesis.members.items():
+        jacobian, numbers = fit.jacobians[name], np.array(member.numbers)
+        is_common = np.isin(numbers, common)
+        own = _basis(jacobian[:, ~is_common])
+        shared = np.zeros((len(jacobian), len(common)))
+        places = [common.index(number) for number in numbers[is_common]]
+        np.add.at(shared.T, places, jacobian[:, is_common].T)
+        shared -= own @ (own.T @ shared)
+        residual = -fit.residuals[name]  # measured less predicted: what a signature is to make
+        found[name] = ProjectedOut(own, shared, residual - own @ (own.T @ residual))
+    return found
 
 
 def _basis(columns: Array) -> Array:
     """(N, p) orthonormal basis of columns."""
     if not columns.shape[1]:
         return np.zeros((len(columns), 0))
+    # units differ: singular values tell only of columns of one length
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     left, sizes, _ = svd(scaled)
     seen: Array = left[:, sizes > SEEN * max(sizes.max(initial=0.0), SEEN)]
@@ -169,7 +167,7 @@ def products(taken: ProjectedOut, white: Array, raw: Array, errors: Array) -> Pr
     """Products of whitened signatures (N, M) with themselves, the errors and what is shared."""
     left = taken.out_of(white)
     gram, moments = left.T @ left, left.T @ errors
-    gone = np.diagonal(gram) < UNSEEN * raw
+    gone = np.diagonal(gram) < UNSEEN * raw  # rounding error, and no direction of its own
     gram[gone], gram[:, gone], moments[gone] = 0.0, 0.0, 0.0
     shared = np.where(gone[:, None], 0.0, left.T @ taken.shared)
     own = taken.shared.T
@@ -210,6 +208,7 @@ def signatures_of_each(
     parts: dict[Variant, list[_IdleStrength]] = {}
     for one in every:
         parts.setdefault(one.variant, []).append(one)
+    # every strength once, effects that need a model of their own apart; then columns by number
     found, places = _derived(solved, list(parts.values()))
     whole = [np.concatenate(of_test, axis=-1) for of_test in zip(*found, strict=True)]
     for columns in groups:
@@ -256,19 +255,15 @@ def _derived(
         if solved.answering is not None and acts_here(effect):
             acting.append((effect, some))
         else:
-            together.setdefault(_stands_with(effect), []).extend(some)
+            # idle effects of one key may stand in one model: none knows of the others
+            apart = effect.kind is EffectKind.MEASUREMENT
+            apart = apart or isinstance(effect, DeadLoad | AcrossJoints)
+            together.setdefault(effect.kind if apart else effect, []).extend(some)
     found = _answered(solved, acting) if acting else []
     found += [_by_model(solved, some) for some in together.values()]
     every = [one for some in (*(some for _, some in acting), *together.values()) for one in some]
     places = {one: place for place, one in enumerate(every)}
     return found or [_by_model(solved, [])], places
-
-
-def _stands_with(effect: Effect) -> object:
-    """Idle effects for which this is the same may stand in one model: none knows of the others."""
-    if effect.kind is EffectKind.MEASUREMENT or isinstance(effect, DeadLoad | AcrossJoints):
-        return effect.kind
-    return effect
 
 
 def _answered(
@@ -281,6 +276,7 @@ def _answered(
         shapes = {sds: place for place, sds in enumerate(dict.fromkeys(one.sds for one in some))}
         values = np.stack([variant.off(sds) for sds in shapes])
         rows = np.array([(one.joint, shapes[one.sds], one.strength) for one in some]).T
+        # by the logarithm of a parameter: its value times the derivative by itself
         logarithmic = np.array([p.logarithmic for p in effect.parameters])[rows[2]]
         at.append((*rows, np.where(logarithmic, values[rows[1], rows[2]], 1.0)))
         idle.append(Idle(effect, values))

@@ -63,6 +63,12 @@ class SpecimenReadings:
         read = np.any([test.count.any(axis=(0, 1)) for test in self.tests], axis=0)
         return tuple(name for name, is_read in zip(COORDINATES, read, strict=True) if is_read)
 
+    def errors(self, predicted: Sequence[Array]) -> list[Array]:
+        """(T, J, 6) per test, predicted less measured; 0 where nothing was read."""
+        return [
+            np.nan_to_num(one - test.mean) for one, test in zip(predicted, self.tests, strict=True)
+        ]
+
     @property
     def applied(self) -> tuple[Array, ...]:
         """(T, J, 6) N and N m of each test: what its loads do at each joint, weight not counted."""
@@ -77,17 +83,12 @@ def specimen_readings(
     chosen = np.array([name in coordinates for name in COORDINATES])
     read = [(cycle.case, np.where(chosen, cycle.readings, np.nan)) for cycle in one.tested]
     read = [(case, q) for case, q in read if np.isfinite(q).any()]
-    return SpecimenReadings(specimen, one.frames, _grouped(read))
-
-
-def _grouped(read: Sequence[tuple[LoadCase, Array]]) -> tuple[Repeats, ...]:
-    """Cycles of equal loads together, in order of first appearance."""
+    # cycles of equal loads together, in order of first appearance
     groups: dict[tuple[object, ...], list[tuple[LoadCase, Array]]] = {}
     for case, q in read:
         groups.setdefault(_loads(case), []).append((case, q))
-    return tuple(
-        Repeats(cycles[0][0], np.stack([q for _, q in cycles])) for cycles in groups.values()
-    )
+    repeats = (Repeats(own[0][0], np.stack([q for _, q in own])) for own in groups.values())
+    return SpecimenReadings(specimen, one.frames, tuple(repeats))
 
 
 def _loads(case: LoadCase) -> tuple[object, ...]:

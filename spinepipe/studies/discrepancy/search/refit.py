@@ -66,30 +66,31 @@ class Refit:
 
 
 def refits(
-    grounds: BaselineFit,
+    baseline: BaselineFit,
     screen: Screen,
     trials: Sequence[Trials],
     run: PieceRunner,
     progress: Progress,
 ) -> tuple[Refit, ...]:
-    """The leading effects of a screen, refitted beside those of the grounds' fit; best first."""
+    """The leading effects of a screen, refitted beside those of the baseline's fit; best first."""
     by_name = {one.effect: one for one in trials}
-    there = {one.form.variant for one in standing(grounds.fit)}
+    there = {one.form.variant for one in standing(baseline.fit)}
     new = [tried for tried in leading(screen) if tried.form.variant not in there]
     if new:
         progress.round(f"{len(new)} forms are refitted")
-    found = run.map(refit, [(grounds, started(t), by_name[t.form.name]) for t in new])
-    simpler = list(_simpler(found, screen, standing(grounds.fit)))
-    found += run.map(refit, [(grounds, one, by_name[one.form.name]) for one in simpler])
-    return preferred(found)
+    found = run.map(refit, [(baseline, starting_term(t), by_name[t.form.name]) for t in new])
+    simpler = list(_simpler(found, screen, standing(baseline.fit)))
+    found += run.map(refit, [(baseline, one, by_name[one.form.name]) for one in simpler])
+    return rank_refits(found)
 
 
-def preferred(found: Sequence[Refit]) -> tuple[Refit, ...]:
+def rank_refits(found: Sequence[Refit]) -> tuple[Refit, ...]:
     """Refits, best first; of one effect's forms that are hardly behind the best, the plainest.
 
     What an effect is in a specimen that was not measured, a form with values of their own for each
     specimen tells badly: where the data hardly ask for it, equal values predict better.
     """
+    # of each effect the form with the fewest unknowns, of those near its best one
     ranked = sorted(found, key=lambda one: -one.log_evidence)
     first: dict[str, Refit] = {}
     for one in ranked:
@@ -97,6 +98,7 @@ def preferred(found: Sequence[Refit]) -> tuple[Refit, ...]:
         near = one.log_evidence > best.log_evidence - ANOTHER_FORM
         if near and one.unknowns < first.get(one.name, best).unknowns:
             first[one.name] = one
+    # it moves up to where its effect's best one stood
     taken: set[str] = set()
     result: list[Refit] = []
     for one in ranked:
@@ -127,14 +129,17 @@ def _simpler(
 def laplace(fit: JointFit, number: int, gain: float) -> float:
     """Log evidence for one supposed effect of a fit, whose unknowns lower chi2 by ``gain``.
 
-    The likelihood is taken for normal around the fit; strengths are N(off, t^2), averaged over the
-    sizes t of the screen, shapes as their priors.
+    Laplace's method (Kass and Raftery 1995, doi 10.2307/2291091): the likelihood is taken for
+    normal around the fit, a from off with curvature A. With the prior N(off, S) the evidence is
+    gain / 2 - log det(I + A S) / 2 - a' (A^-1 + S)^-1 a / 2. Strengths have prior SDs of t,
+    averaged over the sizes t of the screen, shapes those that they declare. Signed strengths have
+    half a normal as prior, which adds log 2 + log Phi(mean / sd) of the posterior: see `Group`.
     """
     unknowns = fit.hypothesis.unknowns
     own = np.array([u.supposed == number for u in unknowns])
     curvature = curvature_of(fit, own)
     chosen = [u for u in unknowns if u.supposed == number]
-    away = fit.x[own] - np.array([u.mean for u in chosen])
+    away = fit.x[own] - np.array([u.mean for u in chosen])  # a: off is the mean of the prior
     is_strength = np.array([u.is_strength for u in chosen])
     declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
     parameters = fit.hypothesis.supposed[number].form.variant.create().parameters
@@ -144,6 +149,7 @@ def laplace(fit: JointFit, number: int, gain: float) -> float:
         sd = np.where(is_strength, size, 1.0) * declared
         spread = np.eye(len(sd)) + curvature * sd**2
         _, logdet = np.linalg.slogdet(spread)
+        # (I + A S)^-1 A = (A^-1 + S)^-1, without the inverse of a curvature that may be singular
         fit_to_prior = away @ np.linalg.solve(spread, curvature @ away)
         posterior = np.linalg.inv(curvature + np.diag(sd**-2.0))
         mean = posterior @ (curvature @ away)
@@ -167,6 +173,7 @@ def in_place(fit: JointFit, number: int) -> tuple[float, float]:
 
 def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
     """(k, k) curvature of half chi2 by some unknowns, all others free (and weakly held)."""
+    # the Schur complement of J'J + P in the others, by their QR: P is square of their priors
     jacobian = fit.whole_jacobian()
     priors = np.diag([1.0 / u.sd for u in fit.hypothesis.unknowns])
     others = np.vstack([jacobian[:, ~own], priors[np.ix_(~own, ~own)]])
@@ -209,7 +216,7 @@ def _forms(one: Screened, most: int) -> list[ScreenedVariant]:
     return chosen
 
 
-def started(tried: ScreenedVariant) -> ActiveTerm:
+def starting_term(tried: ScreenedVariant) -> ActiveTerm:
     """The form with the typical strengths and the shapes that the screen suggests."""
     variant = tried.form.variant
     parameters = variant.create().parameters
@@ -230,15 +237,15 @@ def _value(p: Parameter, sds: float) -> float:
     return float(np.clip(value, p.low if p.logarithmic else p.low + margin, p.high - margin))
 
 
-def refit(grounds: BaselineFit, one: ActiveTerm, trials: Trials) -> Refit:
-    """One more form beside those of the grounds' fit.
+def refit(baseline: BaselineFit, one: ActiveTerm, trials: Trials) -> Refit:
+    """One more form beside those of the baseline's fit.
 
     What tips the segment over where it starts is tried again closer to off.
     """
-    before = grounds.fit
+    before = baseline.fit
     for share in STARTS:
         supposed = (*standing(before), weaker(one, share))
-        fit = joint_fit(grounds.suppose(supposed), grounds.setting, before.poses)
+        fit = joint_fit(baseline.suppose(supposed), baseline.setting, before.poses)
         if fit.usable:
             break
     if not fit.usable or _degenerate(fit, len(supposed) - 1):

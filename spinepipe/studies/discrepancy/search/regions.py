@@ -58,7 +58,9 @@ class ValueWithRegion(FittedValue):
         return not (self.open_below or self.open_above)
 
 
-def estimated(fit: JointFit, setting: Setting, number: int) -> tuple[ValueWithRegion, ...]:
+def values_with_regions(
+    fit: JointFit, setting: Setting, number: int
+) -> tuple[ValueWithRegion, ...]:
     """All fitted values of one supposed effect with their regions.
 
     Parameters
@@ -73,19 +75,7 @@ def estimated(fit: JointFit, setting: Setting, number: int) -> tuple[ValueWithRe
             None if end is None else in_tables(fit, unknown, end)[0]
             for end in (reach.low, reach.high)
         )
-        found.append(
-            ValueWithRegion(
-                value.name,
-                value.place,
-                value.value,
-                value.unit,
-                value.at_bound,
-                low,
-                high,
-                reach.open_below,
-                reach.open_above,
-            )
-        )
+        found.append(ValueWithRegion(**vars(value), **(vars(reach) | {"low": low, "high": high})))
     return tuple(found)
 
 
@@ -181,11 +171,11 @@ def _likeliest(fit: JointFit, point: Point, unknown: int, ruler: _Ruler) -> Best
     x[unknown] = ruler.mark(at)
     lower[unknown], upper[unknown] = ruler.limits(at, *reach)
     slope = ruler.slope(float(x[unknown]))
-    scale[unknown] /= slope
+    scale[unknown] /= slope  # as long a step on the ruler
     found = point(x)
     if found is None:
         return None
-    straight = np.zeros(len(x), dtype=bool)
+    straight = np.zeros(len(x), dtype=bool)  # none is looked for along one over it
     begun = Best(x, *found, lower, upper, scale, straight, _enough(found[0]), True, AHEAD)
     pull = slope * abs(at - own.mean) / own.sd**2  # of its own prior, which the readings withstood
     if pull <= PULLED * begun.told_by(unknown) and not (fit.at_bound[unknown] or fit.status):

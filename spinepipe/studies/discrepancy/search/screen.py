@@ -58,6 +58,8 @@ class Group:
 
     def log_evidence(self, moments: Array) -> Array:
         """(..., D) evidence for F'r of each draw, (..., k, D)."""
+        # Bayesian linear regression in the eigenbasis of F'F, where strengths are independent:
+        # (..., S, k) posterior variance of each direction at each prior size t
         components = np.swapaxes(self.vectors, -1, -2) @ moments
         of_sizes = self.eigenvalues[..., None, :]
         variance = 1.0 / (SIZES[:, None] ** -2.0 + of_sizes)
@@ -67,7 +69,12 @@ class Group:
         return log_sum(np.moveaxis(found, -2, 0)) - float(np.log(len(SIZES)))
 
     def _one_sided(self, variance: Array, components: Array) -> Array:
-        """(..., S, D) what the signs add: twice the posterior's share on the allowed side, each.
+        """(..., S, D) log evidence of half-normal priors over that of whole ones.
+
+        Half a normal is the whole one, twice as high on the side that is allowed, so the evidence
+        is multiplied by the share of the posterior on that side over the share of the prior, 1/2
+        (encompassing prior, Klugkist and Hoijtink 2007): log 2 + log Phi(mean / sd) for each
+        signed strength. Marginals are taken, as if posteriors of strengths were independent.
 
         Parameters
         ----------
@@ -77,6 +84,7 @@ class Group:
         if not there.any():
             return np.zeros((*variance.shape[:-1], components.shape[-1]))
         vectors = self.vectors[..., there, :]
+        # posterior mean and SD of each signed strength, back from the eigenbasis
         by_size = variance[..., None] * components[..., None, :, :]
         mean = vectors[..., None, :, :] @ by_size
         sd = np.sqrt(variance @ np.swapaxes(vectors**2, -1, -2))
@@ -88,7 +96,7 @@ class Group:
 
         ``moments`` (..., k) F'r of the data.
         """
-        inverse = 1.0 / (SIZES[-1] ** -2.0 + self.eigenvalues)
+        inverse = 1.0 / (SIZES[-1] ** -2.0 + self.eigenvalues)  # ridge: the widest prior
         components = (np.swapaxes(self.vectors, -1, -2) @ moments[..., None])[..., 0]
         found: Array = (self.vectors @ (inverse * components)[..., None])[..., 0]
         return np.where(self.signs * found < 0.0, 0.0, found)
@@ -154,18 +162,18 @@ class EffectColumns:
             places = self._at.setdefault((c.variant, c.sds), {})
             places.setdefault((c.test, c.joint, c.strength), []).append(number)
         self.columns = tuple(columns)
-        self._alike: dict[tuple[object, ...], tuple[IndistinctVariants, ...]] = {}
+        self._batches: dict[tuple[object, ...], tuple[IndistinctVariants, ...]] = {}
 
-    def alike(
+    def batches(
         self, points: Sequence[Point], specimens: Sequence[str], tests: Sequence[str]
     ) -> tuple[IndistinctVariants, ...]:
-        """Points in portions that are summed alike; known already where asked before."""
+        """Points that are summed alike, together; known already where asked before."""
         key = (tuple(points), tuple(specimens), tuple(tests))
-        if key not in self._alike:
-            self._alike[key] = tuple(self._portions(*key))
-        return self._alike[key]
+        if key not in self._batches:
+            self._batches[key] = tuple(self._grouped(*key))
+        return self._batches[key]
 
-    def _portions(
+    def _grouped(
         self, points: Sequence[Point], specimens: Sequence[str], tests: Sequence[str]
     ) -> Iterator[IndistinctVariants]:
         found = [self.places(form, sds, specimens, tests) for form, sds in points]
@@ -291,17 +299,20 @@ def screened(
     logs = np.zeros((len(points), problem.moments_shared.shape[1]))
     found: dict[int, ScreenedVariant] = {}
     share = {form: trials.log_share(form) for form in trials.forms}
-    for some in index.alike(points, specimens, tests):
+    for some in index.batches(points, specimens, tests):
         gram, moments = some.summed(problem)
         group = Group.of(gram, some.signs)
         logs[some.numbers] = group.log_evidence(moments)
         estimates = group.estimate(moments[..., 0])
-        explained = _explained(estimates, moments[..., 0], gram)
+        # (B,) drop of chi2 with these strengths: 2 s'F'r - s'F'F s
+        left = 2.0 * moments[..., 0] - (gram @ estimates[..., None])[..., 0]
+        explained = np.sum(estimates * left, axis=-1)
         for row, number in enumerate(some.numbers.tolist()):
             (form, sds), gain = points[number], float(explained[row])
             log_evidence = float(logs[number, 0]) + share[form]
             told = (form, sds, some.strengths, log_evidence)
             found[number] = ScreenedVariant(*told, estimates[row], gain)
+    # the effect's evidence is the mean over its forms by their shares, and over shapes of each
     totals, tried, end = [], [], 0
     for form in trials.forms:
         start, end = end, end + len(shape_grid(form.variant))
@@ -310,13 +321,6 @@ def screened(
     whole = log_sum(np.stack(totals))
     order = sorted(tried, key=lambda one: -one.log_evidence)
     return Screened(trials.effect, float(whole[0]), whole[1:], tuple(order))
-
-
-def _explained(estimates: Array, moments: Array, gram: Array) -> Array:
-    """(B,) drop of chi2 with strengths (B, k) of moments (B, k) and Gram matrices (B, k, k)."""
-    left = 2.0 * moments - (gram @ estimates[..., None])[..., 0]
-    result: Array = np.sum(estimates * left, axis=-1)
-    return result
 
 
 def summed(
@@ -328,7 +332,7 @@ def summed(
     tests: Sequence[str],
 ) -> Summed:
     """A form's strengths at one shape."""
-    (alone,) = index.alike([(form, sds)], specimens, tests)
+    (alone,) = index.batches([(form, sds)], specimens, tests)
     (gram,), (moments,) = alone.summed(problem)
     return Summed(form, sds, alone.strengths, gram, moments, Group.of(gram, alone.signs))
 
@@ -341,8 +345,9 @@ def sides(form: CandidateForm, strengths: Sequence[int]) -> Array:
 
 def exceeded(values: Array, share: float) -> float:
     """The value exceeded by that share: of the draws, or of a Gumbel fit where these are few."""
-    if len(values) * share >= 5.0:
+    if len(values) * share >= 5.0:  # five draws beyond: the quantile is known to a half or so
         return float(np.quantile(values, 1.0 - share))
+    # by moments: mean = place + gamma scale, SD = pi scale / sqrt(6)
     scale = float(np.std(values)) * np.sqrt(6.0) / np.pi
     place = float(np.mean(values)) - np.euler_gamma * scale
     return place - scale * float(np.log(-np.log1p(-share)))

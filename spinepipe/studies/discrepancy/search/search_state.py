@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -104,7 +104,7 @@ class SearchResult:
 
     Attributes
     ----------
-    base, final : the grounds with the base alone and with what stands. standing : what stands.
+    base, final : fits of the base alone and of what stands. standing : what stands.
     lack : the generic basis beside the final model.
     generic_threshold, generic_threshold_at : evidence of the generic basis that the null seldom
         exceeds, as a whole and in any single coordinate.
@@ -133,7 +133,7 @@ class SearchResult:
 
 
 def look(
-    grounds: BaselineFit,
+    baseline: BaselineFit,
     trials: Sequence[Trials],
     draws: int,
     false_alarm: float,
@@ -146,30 +146,30 @@ def look(
     ----------
     threshold : as known already; then no draws of the null are needed.
     """
-    number = draws if threshold is None else 0
-    problems = linearised_for(grounds, trials, number, seed)
+    number = draws if threshold is None else 0  # of the null, which the threshold is taken from
+    problems = linearised_for(baseline, trials, number, seed)
     found = [
-        screened(one, index, problem, tuple(grounds.readings), grounds.tests)
+        screened(one, index, problem, tuple(baseline.readings), baseline.tests)
         for one, (index, problem) in zip(trials, problems, strict=True)
     ]
     return screen(found, false_alarm, threshold)
 
 
 def linearised_for(
-    grounds: BaselineFit, trials: Sequence[Trials], draws: int, seed: int
+    baseline: BaselineFit, trials: Sequence[Trials], draws: int, seed: int
 ) -> list[tuple[EffectColumns, Linearised]]:
     """The products of each effect's signatures; draws of the null are the same for all effects."""
-    joints = next(iter(grounds.fit.models.values())).n_joints
-    indices = [_index(one, joints, tuple(grounds.tests)) for one in trials]
+    joints = next(iter(baseline.fit.models.values())).n_joints
+    indices = [_index(one, joints, tuple(baseline.tests)) for one in trials]
     columns = [one.columns for one in indices]
-    taken = taken_out(grounds.fit)
+    taken = taken_out(baseline.fit)
     parts: list[dict[str, Products]] = [{} for _ in trials]
-    for number, (name, one) in enumerate(grounds.readings.items()):
-        solved = SolvedSpecimen(grounds.fit.models[name], one.cases, grounds.noise.zeroed)
+    for number, (name, one) in enumerate(baseline.readings.items()):
+        solved = SolvedSpecimen(baseline.fit.models[name], one.cases, baseline.noise.zeroed)
         errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
         for place, moved in zip(parts, signatures_of_each(solved, columns), strict=True):
-            plain = grounds.plain[name].noise_only(moved)
-            white = grounds.setting.whitenings[name].shortened(plain)
+            plain = baseline.plain[name].noise_only(moved)
+            white = baseline.setting.whitenings[name].shortened(plain)
             place[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
     return [(index, linearised(place)) for index, place in zip(indices, parts, strict=True)]
 
@@ -188,14 +188,15 @@ class SearchState:
     ) -> None:
         self.base, self.rules, self.run, self.progress = base, rules, run, progress
         self.stages: list[SearchStage] = []
+        self._base_lack: LackOfFit | None = None
 
     @property
     def first(self) -> SearchStage:
         """The first look, beside the base alone."""
         return self.stages[0]
 
-    def stage(self, grounds: BaselineFit, in_place_of: str = "") -> SearchStage:
-        """A look at all effects beside the grounds' fit, refits of those that lead, an entry.
+    def stage(self, baseline: BaselineFit, in_place_of: str = "") -> SearchStage:
+        """A look at all effects beside the baseline's fit, refits of those that lead, an entry.
 
         Parameters
         ----------
@@ -203,53 +204,46 @@ class SearchState:
             where none is evident.
         """
         place = bool(in_place_of)
-        if place and grounds is self.base:
+        if place and baseline is self.base:
             screen, tried = self.first.screen, self.first.refits
         else:
-            screen = self._look(grounds)
+            # the null's draws are those of the first look, beside the base alone
+            threshold = self.first.screen.threshold if self.stages else None
+            draws = (self.rules.draws, self.rules.false_alarm, self.rules.seed)
+            screen = self.run(look, baseline, self.rules.trials, *draws, threshold)
             best = screen.effects[0]
             self.progress.round(
                 f"round {len(self.stages) + 1}: {best.effect} leads {len(screen.effects)} effects "
                 f"with log evidence {best.log_evidence:.1f}, {screen.threshold:.1f} are needed"
             )
-            evident = not screen.effects[0].log_evidence <= screen.threshold
-            tried = self._refits(grounds, screen) if place or evident else ()
+            evident = not best.log_evidence <= screen.threshold
+            tried = ()
+            if place or evident:
+                tried = refits(baseline, screen, self.rules.trials, self.run, self.progress)
+        # rounds of entry and trials in a place are counted apart
         number = 1 + sum(one.in_place == place for one in self.stages)
         name = f"in place of {in_place_of} ({number})" if place else str(number)
-        beside = tuple(one.form.name for one in grounds.fit.hypothesis.supposed)
+        beside = tuple(one.form.name for one in baseline.fit.hypothesis.supposed)
         self.stages.append(SearchStage(name, screen, tried, place, beside))
         return self.stages[-1]
 
-    def _look(self, grounds: BaselineFit) -> Screen:
-        """A screen; the null's draws are those of the first, beside the base alone."""
-        rules = self.rules
-        threshold = self.first.screen.threshold if self.stages else None
-        draws = (rules.draws, rules.false_alarm, rules.seed)
-        return self.run(look, grounds, rules.trials, *draws, threshold)
+    def lack(self, baseline: BaselineFit) -> LackOfFit:
+        """The generic basis beside the baseline's fit; that of the base is asked for again."""
+        of_base = baseline is self.base
+        if of_base and self._base_lack:
+            return self._base_lack
+        asked = (self.rules.coordinates, self.rules.draws, self.rules.seed)
+        found: LackOfFit = self.run(lack_of_fit, baseline, *asked)
+        self._base_lack = found if of_base else self._base_lack
+        return found
 
-    def lack(self, grounds: BaselineFit) -> LackOfFit:
-        """The generic basis beside the grounds' fit; that of the base is asked for again."""
-        return self._base_lack if grounds is self.base else self._lack(grounds)
-
-    @cached_property
-    def _base_lack(self) -> LackOfFit:
-        return self._lack(self.base)
-
-    def _lack(self, grounds: BaselineFit) -> LackOfFit:
-        rules = self.rules
-        return self.run(lack_of_fit, grounds, rules.coordinates, rules.draws, rules.seed)
-
-    def _refits(self, grounds: BaselineFit, screen: Screen) -> tuple[Refit, ...]:
-        """The forms that lead a screen, refitted; best first."""
-        return refits(grounds, screen, self.rules.trials, self.run, self.progress)
-
-    def refit(self, grounds: BaselineFit, one: ActiveTerm) -> Refit:
-        """One form beside those of the grounds' fit."""
+    def refit(self, baseline: BaselineFit, one: ActiveTerm) -> Refit:
+        """One form beside those of the baseline's fit."""
         trials = next(t for t in self.rules.trials if t.effect == one.form.name)
-        return self.run(refit, grounds, one, trials)
+        return self.run(refit, baseline, one, trials)
 
     def beside(self, current: BaselineFit, others: tuple[ActiveTerm, ...]) -> BaselineFit | None:
-        """Grounds with these of the current effects alone; None where they have no fit.
+        """Baseline with these of the current effects alone; None where they have no fit.
 
         Looked for near where all stand, then from the neutral pose, then from the base as it stands
         alone, which is stiffer where what was taken away has stiffened it.
@@ -262,8 +256,8 @@ class SearchState:
             (current, 1.0, None),
             *((self.base, share, None) for share in STARTS),
         )
-        for grounds, share, poses in starts:
-            start = grounds.suppose(tuple(weaker(one, share) for one in others))
+        for baseline, share, poses in starts:
+            start = baseline.suppose(tuple(weaker(one, share) for one in others))
             fit: JointFit = self.run(joint_fit, start, self.base.setting, poses)
             if fit.usable:
                 return self.base.at(fit)

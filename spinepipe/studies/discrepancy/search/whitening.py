@@ -43,12 +43,13 @@ class Whitening:
 
     def noise_only(self, rows: Sequence[Array]) -> Array:
         """(N,) or (N, m) of rows (T, J, 6) or (T, J, 6, m) per test: noise has SD one."""
-        return np.concatenate(
-            [
-                _applied(root, used, array)
-                for root, used, array in zip(self.roots, self.used, rows, strict=True)
-            ]
-        )
+        found = []
+        for root, used, array in zip(self.roots, self.used, rows, strict=True):
+            flat = array.reshape(*array.shape[:3], -1)
+            there = np.where(used[..., None], flat, 0.0).transpose(1, 2, 0, 3)
+            white = (root @ there).transpose(2, 0, 1, 3)[used]  # over the load steps of a test
+            found.append(white[:, 0] if array.ndim == 3 else white)
+        return np.concatenate(found)
 
     def __call__(self, rows: Sequence[Array]) -> Array:
         """(N,) or (N, m): noise and nuisances together have SD one."""
@@ -67,7 +68,10 @@ class Whitening:
         return np.sqrt(np.maximum((1.0 + self.shrink) ** -2.0 - 1.0, 0.0))
 
     def left_over(self, white: Array) -> Array:
-        """(N,) of noise-whitened residuals (N,) with nuisances at their most likely values."""
+        """(N,) of noise-whitened residuals (N,) with nuisances at their most likely values.
+
+        These leave (I + U U')^-1 of a residual: the square of what shortens it.
+        """
         result: Array = self.shortened(self.shortened(white))
         return result
 
@@ -126,7 +130,7 @@ def joined(first: Whitening, second: Whitening, moves: Array) -> Whitening:
 
 def _with_moves(plain: Whitening, directions: Array, sizes: Array, mixing: Array) -> Whitening:
     """The whitening with nuisances that move readings by ``directions * sizes @ mixing``."""
-    seen = sizes > 1e-3
+    seen = sizes > 1e-3  # of a noise SD: less is as good as none
     shrink = 1.0 / np.sqrt(1.0 + sizes[seen] ** 2) - 1.0
     return Whitening(plain.used, plain.roots, directions[:, seen], shrink, mixing[seen])
 
@@ -156,11 +160,3 @@ def _inverse_root(serial: Array, count: NDArray[np.int64]) -> Array:
         factor = np.linalg.cholesky(serial[np.ix_(used, used)] * np.outer(shrunk, shrunk))
         root[np.ix_(used, used)] = np.linalg.inv(factor)
     return root
-
-
-def _applied(root: Array, used: NDArray[np.bool_], rows: Array) -> Array:
-    """(N, ...) rows of one test whitened over its load steps."""
-    flat = rows.reshape(*rows.shape[:3], -1)
-    there = np.where(used[..., None], flat, 0.0).transpose(1, 2, 0, 3)
-    white = (root @ there).transpose(2, 0, 1, 3)[used]
-    return white[:, 0] if rows.ndim == 3 else white
