@@ -96,7 +96,7 @@ class _Motion:
         """(2n,) rate of change of pose and rate."""
         q, rate = state.reshape(2, 1, -1, 6)
         self._place(q)
-        force = self._missing - self._moving.inertial(rate) - self.damping * rate
+        force = self._missing - self._moving.velocity_product_forces(rate) - self.damping * rate
         acceleration = self._moving.accelerations(force.reshape(1, -1))
         return np.concatenate([state[self.n :], acceleration[0]])
 
@@ -104,7 +104,7 @@ class _Motion:
         """What depends on the pose alone; asked for again when only rates have been varied."""
         if q.tobytes() == self._pose:
             return
-        held = self.bound.held(q)
+        held = self.bound.joint_forces(q)
         seen = forward_kinematics(self.stack.chains, self.stack.loads, q, held.tangent)
         self._missing = seen.applied - held.load
         self._moving = Moving.of(self.stack.chains, self.stack.loads.chain, seen)

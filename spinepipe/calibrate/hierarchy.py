@@ -76,6 +76,7 @@ def condensed(designs: Sequence[Array], targets: Sequence[Array], m: int) -> Lin
     """Readings (N_s, m) and (N_s,) of each specimen, turned into m rows that say the same."""
     rows = np.zeros((len(designs), m + 1, m + 1))
     for row, design, target in zip(rows, designs, targets, strict=True):
+        # R of a QR decomposition says of x what all rows say: R x = Q' target, and what is left
         triangle = np.linalg.qr(np.column_stack([design, target]), mode="r")
         row[: len(triangle)] = triangle
     left_over = float(np.sum(rows[:, m, m] ** 2))
@@ -117,6 +118,8 @@ class Hierarchy:
 
     def _share(self, factor: Array) -> None:
         """Mean and levels: the specimens' own parts count as errors of their readings."""
+        # posterior precision of mean and levels, in their prior SDs, with the specimens' own parts
+        # integrated out
         told = self.information.sum(axis=0)
         gain = self._size * self._unseen
         pull = np.einsum("skm,sk->m", self._towards, gain * self._aim)
@@ -142,6 +145,8 @@ class Hierarchy:
     def slopes(self) -> Spreads:
         """Derivative of the log likelihood by the logarithm of each spread."""
         told, score, of = self.information, self._score, self._of
+        # by a variance (score' score - trace of the information) / 2; by the logarithm of its root
+        # that is the variance times the bracket
         each = told - told @ self.common_covariance @ told  # of each specimen with itself
         total = told.sum(axis=0)
         between = total - total @ self.common_covariance @ total

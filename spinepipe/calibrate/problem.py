@@ -353,6 +353,7 @@ def whitened(errors: Array, used: NDArray[np.bool_]) -> Array:
     """
     there = used.reshape(*used.shape, *[1] * (errors.ndim - used.ndim))
     errors = np.where(there, errors, 0.0)
+    # I - c 1 1' along the steps, see the head of this file
     n = np.maximum(there.sum(axis=0), 1)
     shared: Array = (1.0 - 1.0 / np.sqrt(1.0 + n)) / n * errors.sum(axis=0)
     result: Array = errors - shared

@@ -35,8 +35,8 @@ from spinepipe.statics.batched import (
     readings,
     readings_by,
 )
-from spinepipe.statics.batched.forward_kinematics import Flags
 from spinepipe.statics.batched.lanes import acting
+from spinepipe.statics.batched.loads import Flags
 from spinepipe.statics.equilibrium import factor
 from spinepipe.status import Status
 from spinepipe.world import Chain

@@ -218,7 +218,7 @@ def test_laws_about_a_displaced_centre_are_a_joint_frame_displaced_alike() -> No
     solved = [follow(System(Chain(m), m, case)) for m in (model, other)]
     for about, moved_frame in zip(*solved, strict=True):
         system = System(Chain(model), model, case)
-        placed = system.placed(about.equilibrium.q, by_parameters=False).q
+        placed = system.joint_kinematics(about.equilibrium.q, by_parameters=False).q
         expected = moved_frame.equilibrium.q.reshape(-1, 6)
         np.testing.assert_allclose(placed, expected, rtol=0, atol=1e-12)
 

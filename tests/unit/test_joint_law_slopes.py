@@ -21,7 +21,7 @@ from sweeps import sweep
 
 from spinepipe.effects import JointLaw, Parameter, create, knee
 from spinepipe.effects.contract import Array
-from spinepipe.effects.knee import chord, inside
+from spinepipe.effects.neutral_zone import chord, inside
 from spinepipe.effects.nonlinear_stiffening import exponential_rise
 from spinepipe.units import COORDINATES
 

@@ -16,17 +16,16 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, ScopedEffect, SpineModel
-from spinepipe.statics.motion import ChainMotion
-from spinepipe.statics.prescribed import (
+from spinepipe.statics.held_chain import (
     HeldChain,
     NewtonTrial,
     PrescribedPlace,
-    PrescribedResult,
     Prescription,
     Tilt,
-    hold_at,
     newton_steps,
 )
+from spinepipe.statics.motion import ChainMotion
+from spinepipe.statics.prescribed import PrescribedResult, hold_at
 from spinepipe.status import PrescribedStatus
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain

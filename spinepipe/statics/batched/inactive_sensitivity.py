@@ -154,7 +154,7 @@ class Answering:
         load, tangent = np.zeros((count, 6)), np.zeros((count, 6, 6))
         for lanes, bound in self.stack.walked(self.q):
             at = (joints * lanes[:, None] + np.arange(joints)).ravel()
-            placed = bound.placed(self.q[lanes])
+            placed = bound.joint_kinematics(self.q[lanes])
             found = assemble_joint_forces(placed, bound.laws, bound.states, moved=False)
             q[at], load[at], tangent[at] = placed.q, found.load, found.tangent
             first[at] = placed.by_coordinate if bound.geometry else np.eye(6)

@@ -16,16 +16,8 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import Body, ScopedEffect, SpineModel
-from spinepipe.statics.prescribed import (
-    Ask,
-    HeldChain,
-    PrescribedPlace,
-    PrescribedResult,
-    Prescription,
-    Tilt,
-    alone,
-    hold_at,
-)
+from spinepipe.statics.held_chain import Ask, HeldChain, PrescribedPlace, Prescription, Tilt
+from spinepipe.statics.prescribed import PrescribedResult, alone, hold_at
 from spinepipe.studies.scoliosis.films import Film
 from spinepipe.studies.scoliosis.settings import SagittalProfile
 from spinepipe.units import COORDINATES, MM_PER_M
