@@ -41,6 +41,7 @@ from scipy.differentiate import jacobian
 from scipy.integrate import ode
 from scipy.optimize import Bounds, OptimizeResult, approx_fprime, minimize
 
+from spinepipe.calibrate.fit import values
 from spinepipe.calibrate.problem import Evaluator, Problem
 from spinepipe.calibrate.solvers import steps_alone
 from spinepipe.effects.contract import Array
@@ -243,7 +244,7 @@ def fit_by_cost(runs: ForwardCost, relative_step: float, raw_units: bool) -> For
     problem = runs.problem
     if not all(parameter.logarithmic for parameter in problem.free):
         raise ValueError("forward runs fit stiffness, not parameters that may be negative")
-    start = np.array([_first_value(problem, index) for index in range(len(problem.free))])
+    start = values(problem, np.zeros(len(problem.free)))
     search = _OptimiserRun(runs, start if raw_units else np.ones_like(start), relative_step)
     if runs.cost(np.zeros_like(start)) >= LOST:
         message = "the forward run with the start's stiffness is lost"
@@ -266,13 +267,6 @@ def _ended(
     cost = search.runs.costs[x.tobytes()]
     count = len(search.runs.costs)
     return ForwardFit(x, start * np.exp(x), cost, count, claims, status, message, gradient)
-
-
-def _first_value(problem: Problem, index: int) -> float:
-    parameter = problem.free[index]
-    return float(
-        problem.model.effects[parameter.effect].values[parameter.rows[0], parameter.column]
-    )
 
 
 class _OptimiserRun:

@@ -90,7 +90,9 @@ class Hierarchy:
         """``dof`` (m,): degree of freedom of each unknown, 0 to D - 1; each has its own level."""
         self._readings, self.spreads = readings, spreads
         self._of = np.eye(dof.max() + 1)[dof]  # (m, D)
-        self.own = own_covariance(dof, spreads)
+        # (m, m) prior covariance of a specimen's unknowns about mean and levels of the cohort
+        same = dof[:, None] == dof
+        self.own = same * spreads.specimen[dof] ** 2 + np.diag(spreads.rest[dof] ** 2)
         self._root = np.linalg.cholesky(self.own)
         self._unroot = np.linalg.inv(self._root)
         self._see(readings.design / spreads.scatter, readings.target / spreads.scatter)
@@ -155,18 +157,16 @@ class Hierarchy:
             "ad,sab,bd->d", of, each, of, optimize=True
         )
         by_rest = (np.sum(score**2, axis=0) - np.einsum("saa->a", each)) @ of
+        # by the scatter: zero where its square is the sum of squares over readings less parameters
         spreads = self.spreads
+        squares = self._squares + self._readings.left_over / spreads.scatter**2
+        by_scatter = float(squares + self.effective_parameters.sum() - self._readings.count)
         return Spreads(
             spreads.level**2 * by_level,
             spreads.specimen**2 * by_specimen,
             spreads.rest**2 * by_rest,
-            self._scatter_slope(),
+            by_scatter,
         )
-
-    def _scatter_slope(self) -> float:
-        """Zero where scatter squared is the sum of squares over readings less parameters."""
-        squares = self._squares + self._readings.left_over / self.spreads.scatter**2
-        return float(squares + self.effective_parameters.sum() - self._readings.count)
 
     @property
     def effective_parameters(self) -> Array:
@@ -198,13 +198,6 @@ class Hierarchy:
             newcomer_covariance=self.common_covariance + self.own,
             effective_parameters=self.effective_parameters,
         )
-
-
-def own_covariance(dof: Indices, spreads: Spreads) -> Array:
-    """(m, m) prior covariance of a specimen's unknowns about mean and levels of the cohort."""
-    same = dof[:, None] == dof
-    own: Array = same * spreads.specimen[dof] ** 2 + np.diag(spreads.rest[dof] ** 2)
-    return own
 
 
 PRIOR_RATE = 2.0

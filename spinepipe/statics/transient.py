@@ -97,13 +97,9 @@ class Course:
     def corners_after(self, times: Array) -> Array:
         """The next time at which the load changes its rate, for each of the times; or infinity."""
         corners = np.append(self.corners, np.inf)
-        following: Array = corners[np.searchsorted(corners, _just_after(times), side="right")]
+        behind = times * (1.0 + 1e-12) + 1e-15  # of times that are a corner but for rounding
+        following: Array = corners[np.searchsorted(corners, behind, side="right")]
         return following
-
-
-def _just_after(time: Array) -> Array:
-    """Times that are a corner but for rounding put behind it."""
-    return time * (1.0 + 1e-12) + 1e-15
 
 
 GAMMA = 4.3586652150845900e-01

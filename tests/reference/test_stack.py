@@ -18,11 +18,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import (
     FreeParameter,
-    SolvedStep,
     System,
     by_parameters,
     follow,
-    free_parameters,
     observe,
     observed_by_parameters,
 )
@@ -37,7 +35,6 @@ from spinepipe.statics.batched import (
 )
 from spinepipe.statics.batched.lanes import acting
 from spinepipe.statics.batched.loads import Flags
-from spinepipe.statics.equilibrium import factor
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -56,28 +53,10 @@ EVERY = pytest.mark.parametrize(
 Run = tuple[SpineModel, LoadCase]
 
 
-def unknowns(model: SpineModel) -> tuple[FreeParameter, ...]:
-    """All parameters of all effects, joint by joint."""
-    return tuple(
-        unknown
-        for number, here in enumerate(model.effects)
-        for unknown in free_parameters(
-            model, number, [p.name for p in here.effect.parameters], "per_joint"
-        )
-    )
-
-
-def with_tangent_there(system: System, step: SolvedStep) -> SolvedStep:
-    """The step with the tangent at its pose; Newton leaves that of one tiny step before."""
-    q = step.equilibrium.q
-    tangent = system.balance(q, step.loading, step.states).tangent
-    return replace(step, equilibrium=replace(step.equilibrium, factored=factor(tangent)))
-
-
 def by_engine(model: SpineModel, case: LoadCase, free: Sequence[FreeParameter]) -> list[np.ndarray]:
     """Poses (T, J, 6), what is reported, and derivatives of both by the unknowns."""
     system = System(Chain(model), model, case)
-    solved = [with_tangent_there(system, step) for step in follow(system)]
+    solved = draw.solved(system)
     poses, shape = [step.equilibrium.q for step in solved], (len(solved), model.n_joints, 6)
     dq = by_parameters(system, solved, free)
     by_x = [
@@ -106,7 +85,7 @@ def stack_of(runs: Sequence[Run]) -> Stack:
 
 def compare(runs: Sequence[Run]) -> None:
     """All that the stack says of the runs is what the engine says of each."""
-    stack, free = stack_of(runs), [unknowns(model) for model, _ in runs]
+    stack, free = stack_of(runs), [draw.unknowns(model) for model, _ in runs]
     q = stack.solve().q
     dq = poses_by(stack, q, free)
     found = (q, readings(stack, q), dq, readings_by(stack, q, dq, free))

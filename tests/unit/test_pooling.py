@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from example_effects import NOWHERE, loaded, spine
+from example_effects import NOWHERE, loaded, solved_poses, spine
 from scipy.linalg import block_diag
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal, norm
@@ -30,9 +30,8 @@ from spinepipe.calibrate.hierarchy import (
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
-from spinepipe.statics import System, follow, free_parameters, with_parameters
+from spinepipe.statics import free_parameters, with_parameters
 from spinepipe.status import Status
-from spinepipe.world import Chain
 
 pytestmark = pytest.mark.numeric
 
@@ -281,8 +280,7 @@ def measured_problem(truth: Array, seed: int, sd: Array = READING_SD, steps: int
     model = spine(2)
     free = free_parameters(model, 0, ROTATIONS, "per_joint")
     case, true_model = loaded(model, steps), with_parameters(model, free, truth)
-    solved = follow(System(Chain(true_model), true_model, case))
-    poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
+    poses = solved_poses(true_model, case)
     read = poses + sd * np.random.default_rng(seed).normal(size=poses.shape)
     return Problem(
         model, (MeasuredCase(case, read),), free, ANGLES, -np.full(6, 3.0), np.full(6, 3.0)
@@ -310,9 +308,7 @@ def penalised_cost(x: Array, problems: list[Problem], prior: Array, scatter: flo
     for problem, own in zip(problems, x.reshape(len(problems), -1), strict=True):
         model = with_parameters(problem.model, problem.free, own)
         for case in problem.cases:
-            solved = follow(System(Chain(model), model, case.case))
-            poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
-            error = np.rad2deg(poses - case.measured)[:, :, 3:]
+            error = np.rad2deg(solved_poses(model, case.case) - case.measured)[:, :, 3:]
             total += np.sum(error**2) / scatter**2
     return float(total)
 
