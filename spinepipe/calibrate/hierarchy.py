@@ -72,7 +72,7 @@ class HierarchicalPosterior:
     effective_parameters: Array
 
 
-def condensed(designs: Sequence[Array], targets: Sequence[Array], m: int) -> LinearReadings:
+def condense_readings(designs: Sequence[Array], targets: Sequence[Array], m: int) -> LinearReadings:
     """Readings (N_s, m) and (N_s,) of each specimen, turned into m rows that say the same."""
     rows = np.zeros((len(designs), m + 1, m + 1))
     for row, design, target in zip(rows, designs, targets, strict=True):
@@ -227,7 +227,7 @@ class SpreadEstimate:
     trouble: str
 
 
-def estimated(
+def estimate_spreads(
     readings: LinearReadings, dof: Indices, scatter: float | None, start: Spreads | None = None
 ) -> SpreadEstimate:
     """Spreads at the mode of marginal likelihood and prior; what cannot be told apart is dropped.
@@ -239,7 +239,7 @@ def estimated(
     ----------
     scatter : SD of a reading; None estimates it along.
     """
-    told = tellable(readings, dof)
+    told = tellable_spreads(readings, dof)
     size = np.full(dof.max() + 1, START)
     first = start or Spreads(size, size, size, _first_scatter(readings))
 
@@ -272,7 +272,7 @@ def estimated(
     return SpreadEstimate(_unpacked(found.x, told, scatter), trouble if lost else "")
 
 
-def tellable(readings: LinearReadings, dof: Indices) -> NDArray[np.bool_]:
+def tellable_spreads(readings: LinearReadings, dof: Indices) -> NDArray[np.bool_]:
     """(3, D) which spreads, of level, specimen and rest, the readings can tell apart."""
     information = np.sum(readings.design**2, axis=1)
     seen = information > SEEN * information.max(initial=0.0)
@@ -284,7 +284,7 @@ def tellable(readings: LinearReadings, dof: Indices) -> NDArray[np.bool_]:
     return told
 
 
-def between(one: Spreads, other: Spreads, share: float) -> Spreads:
+def interpolate_spreads(one: Spreads, other: Spreads, share: float) -> Spreads:
     """Spreads a share of the way from one to the other, in logarithms; dropped ones stay so."""
     first, second = _stacked(one), _stacked(other)
     both = (first > 0.0) & (second > 0.0)
@@ -294,7 +294,7 @@ def between(one: Spreads, other: Spreads, share: float) -> Spreads:
     return Spreads(level, specimen, rest, float(scatter[0]))
 
 
-def change(one: Spreads, other: Spreads) -> float:
+def largest_change(one: Spreads, other: Spreads) -> float:
     """Largest difference of logarithms of spreads that both have."""
     first, second = _stacked(one), _stacked(other)
     both = (first > 0.0) & (second > 0.0)

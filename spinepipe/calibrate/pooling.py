@@ -20,7 +20,13 @@ from spinepipe.calibrate.fit import (
     tipped,
     values,
 )
-from spinepipe.calibrate.hierarchy import Hierarchy, between, change, condensed, estimated
+from spinepipe.calibrate.hierarchy import (
+    Hierarchy,
+    condense_readings,
+    estimate_spreads,
+    interpolate_spreads,
+    largest_change,
+)
 from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
 from spinepipe.calibrate.uncertainty import declared_deviation, refuse_correlated
 from spinepipe.decomposition import bounded_lstsq
@@ -369,14 +375,16 @@ def _gauss_newton(
     hierarchy, rounds, settled, trouble = None, 0, False, ""
     while hierarchy is None or rounds < MOST_ROUNDS:
         designs, targets = zip(*[member.linearised() for member in members], strict=True)
-        readings = condensed(designs, targets, len(dof))
+        readings = condense_readings(designs, targets, len(dof))
         before = hierarchy.spreads if hierarchy else None
         # spreads of largest marginal likelihood where all stand now, then a step of all of them
-        estimate = estimated(readings, dof, scatter, before)
+        estimate = estimate_spreads(readings, dof, scatter, before)
         spreads, asked, trouble = estimate.spreads, estimate.spreads, estimate.trouble
         if before is not None:
-            settled = change(before, asked) < SETTLED
-            spreads = between(before, asked, 1.0 if rounds < FREE_ROUNDS else DAMPED_SHARE)
+            settled = largest_change(before, asked) < SETTLED
+            spreads = interpolate_spreads(
+                before, asked, 1.0 if rounds < FREE_ROUNDS else DAMPED_SHARE
+            )
         hierarchy = Hierarchy(readings, dof, spreads)
         _step_together(members, hierarchy)
         rounds += 1

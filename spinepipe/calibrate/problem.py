@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.solvers import AtRest, CaseResiduals, Settling, held_against
+from spinepipe.calibrate.solvers import AtRest, CaseResiduals, Settling, compare_with_record
 from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
@@ -208,7 +208,7 @@ class Evaluator:
             with_parameters(problem.model, problem.free, x),
             [c.case for c in problem.cases],
         )
-        poses = held_against(
+        poses = compare_with_record(
             self._solver.record(x, problem.model), model, cases, found.poses, SAME_POSE
         )
         if poses is None:

@@ -304,12 +304,12 @@ def on_record(
 ) -> tuple[Array, ...] | None:
     """The poses (T, n) of a stack as the engine of record has them, from the neutral pose.
 
-    See `held_against`.
+    See `compare_with_record`.
     """
-    return held_against(by_record(model, cases), model, cases, poses, same)
+    return compare_with_record(by_record(model, cases), model, cases, poses, same)
 
 
-def held_against(
+def compare_with_record(
     record: tuple[Array, ...] | str,
     model: SpineModel,
     cases: Sequence[LoadCase],

@@ -170,7 +170,7 @@ def solve(
         after = loading_to if target == 1.0 else loading_from.towards(loading_to, target)
         result = newton(system, q if start is None else start, after, states)
         iterations += result.iterations
-        verdict = certified(system, q, before, after, states, result, start is not None)
+        verdict = certify(system, q, before, after, states, result, start is not None)
         if verdict is not None:
             q, before, reached, increment = result.q, after, target, 2.0 * increment
             if reached == 1.0:
@@ -192,7 +192,7 @@ def solve(
         start = None
 
 
-def certified(
+def certify(
     system: System,
     origin: Array,
     before: Loading,

@@ -1,4 +1,4 @@
-"""Equilibrium with places of vertebrae prescribed and joint coordinates locked (`held_chain`).
+"""Equilibrium of a `prescribed_chain`: places of vertebrae prescribed, coordinates locked.
 
 The pose is the end of the path of stable poses along which what is prescribed comes on. A law may
 be infinite beyond its ends: a step that leaves them is halved.
@@ -20,12 +20,12 @@ from spinepipe.statics.equilibrium import (
     SMALLEST_FRACTION,
     STEP_TOLERANCE,
 )
-from spinepipe.statics.held_chain import (
+from spinepipe.statics.prescribed_chain import (
     Ask,
     Flags,
-    HeldChain,
     NewtonStep,
     NewtonTrial,
+    PrescribedChain,
     newton_steps,
 )
 from spinepipe.status import PrescribedStatus
@@ -128,7 +128,7 @@ def alone(trial: NewtonTrial) -> NewtonStep | None:
 
 
 def hold_at(
-    chain: HeldChain, wanted: Array, start: PrescribedResult | None = None, ask: Ask = alone
+    chain: PrescribedChain, wanted: Array, start: PrescribedResult | None = None, ask: Ask = alone
 ) -> PrescribedResult:
     """The pose in which a chain is held.
 
@@ -170,7 +170,7 @@ def _stood(found: PrescribedResult | None) -> TypeGuard[PrescribedResult]:
 class _Problem:
     """The equations of a held chain."""
 
-    def __init__(self, chain: HeldChain, ask: Ask) -> None:
+    def __init__(self, chain: PrescribedChain, ask: Ask) -> None:
         self.chain, self.free, self.ask = chain, chain.free, ask
         self.count = int(chain.free.sum())
         self.tolerance = np.tile(STEP_TOLERANCE, len(chain.free) // 6)[chain.free]

@@ -15,7 +15,14 @@ from spinepipe.effects.contract import Array, MeasurementContext
 from spinepipe.model import SpineModel
 from spinepipe.statics.joint_forces import ActivePath, Law
 from spinepipe.statics.joint_kinematics import Active
-from spinepipe.statics.measurement_model import Instrument, beside, followed, passed, read, read_by
+from spinepipe.statics.measurement_model import (
+    Instrument,
+    measurement_context,
+    read,
+    read_by,
+    reading_derivative,
+    share_passed,
+)
 from spinepipe.statics.path import SolvedStep
 from spinepipe.statics.system import System
 
@@ -275,7 +282,7 @@ def _beside(
     """What stands beside the joints in scope (J, 6); None where no load step is told."""
     if place is None:
         return None
-    every = beside(joints, passed(system.case)[place])
+    every = measurement_context(joints, share_passed(system.case)[place])
     at = active.joints
     return MeasurementContext(every.above[at], every.below[at], every.passed[at])
 
@@ -293,7 +300,7 @@ def observed_by_parameters(
         neighbours = np.zeros((2, len(joints), *by_x.shape[1:]))
         neighbours[0, :-1], neighbours[1, 1:] = by_x[1:], by_x[:-1]
         above, below = neighbours[:, active.joints]
-        by_x[active.joints] = followed(seen, by_x[active.joints], (above, below))
+        by_x[active.joints] = reading_derivative(seen, by_x[active.joints], (above, below))
         for column, parameter in enumerate(free):
             if parameter.effect == active.index:
                 rows = _joints_moved(parameter, active.per_joint)

@@ -33,7 +33,7 @@ from spinepipe.statics.batched import (
     readings,
     readings_by,
 )
-from spinepipe.statics.batched.lanes import acting
+from spinepipe.statics.batched.lanes import bind_effects
 from spinepipe.statics.batched.loads import Flags
 from spinepipe.status import Status
 from spinepipe.world import Chain
@@ -298,7 +298,7 @@ def test_effects_are_bound_as_a_double_loop_over_runs_and_joints_binds_them() ->
         models.append(replace(plain, effects=()).with_effects(tuple(effects[: rng.integers(1, 5)])))
     runs = [(int(rng.integers(7)), test) for test in ("bend", "turn") * 8]
     found: dict[tuple[int, int, int], tuple[Effect, list[float]]] = {}
-    for one in acting(models, runs):
+    for one in bind_effects(models, runs):
         places, at = one.on(np.arange(len(runs)))
         np.testing.assert_array_equal(places, np.arange(len(one.joint)))
         for run, joint, row in zip(at.tolist(), one.joint.tolist(), one.row.tolist(), strict=True):

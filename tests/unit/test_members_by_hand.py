@@ -15,8 +15,8 @@ from spinepipe.calibrate.hierarchy import (
     LinearReadings,
     Spreads,
     _first_scatter,
-    change,
-    tellable,
+    largest_change,
+    tellable_spreads,
 )
 from spinepipe.calibrate.pooling import PoolMember
 from spinepipe.effects.contract import Array
@@ -154,7 +154,7 @@ def test_less_than_a_hundred_millionth_of_the_information_is_no_reading(
 ) -> None:
     """The information is the square of the design."""
     design = np.array([np.eye(2), np.diag([share, 1.0])])
-    found = tellable(readings(design), np.zeros(2, dtype=int))
+    found = tellable_spreads(readings(design), np.zeros(2, dtype=int))
     assert found[:, 0].tolist() == [told, True, True] if told else [False, False, True]
 
 
@@ -170,9 +170,9 @@ def test_what_is_left_over_is_shared_among_readings_less_unknowns() -> None:
 def test_a_change_is_the_largest_factor_of_what_both_have() -> None:
     one = Spreads(np.array([0.1, 0.0]), np.array([0.2, 0.2]), np.array([0.3, 0.3]), 1.0)
     other = Spreads(np.array([0.2, 9.0]), np.array([0.2, 0.2]), np.array([0.3, 0.1]), 1.5)
-    assert change(one, other) == pytest.approx(np.log(3.0))
-    assert change(other, one) == pytest.approx(np.log(3.0))
-    assert change(one, one) == 0.0
+    assert largest_change(one, other) == pytest.approx(np.log(3.0))
+    assert largest_change(other, one) == pytest.approx(np.log(3.0))
+    assert largest_change(one, one) == 0.0
 
 
 def test_the_distance_of_specimens_is_that_of_their_common_normal() -> None:

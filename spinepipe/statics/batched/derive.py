@@ -14,12 +14,19 @@ import numpy as np
 from spinepipe.effects import MeasurementEffect
 from spinepipe.effects.contract import Array, Indices, MeasurementBeside, MeasurementContext
 from spinepipe.statics.batched.effects import Bound, Slopes
-from spinepipe.statics.batched.elimination import NONE, Changes, answers, missing
+from spinepipe.statics.batched.elimination import NONE, Changes, missing, solve_rates
 from spinepipe.statics.batched.forward_kinematics import KinematicsAndLoads, forward_kinematics
 from spinepipe.statics.batched.lanes import Acting
 from spinepipe.statics.batched.loads import Flags, dead_loads_by, part
 from spinepipe.statics.batched.stack import Stack
-from spinepipe.statics.measurement_model import Instrument, beside, followed, passed, read, read_by
+from spinepipe.statics.measurement_model import (
+    Instrument,
+    measurement_context,
+    read,
+    read_by,
+    reading_derivative,
+    share_passed,
+)
 from spinepipe.statics.path import follow, reaction
 from spinepipe.statics.sensitivity import FreeParameter, by_parameters
 from spinepipe.statics.sensitivity import reactions_by as engine_reactions_by
@@ -45,7 +52,7 @@ def answered(stack: Stack, q: Array, sources: Array, observed: bool = False) -> 
         bound = stack.bound(lanes, stack.initial_states())
         tangents = bound.joint_forces(q[lanes]).tangent
         seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q[lanes], tangents)
-        found[lanes], _ = answers(seen, Changes(sources[lanes]))
+        found[lanes], _ = solve_rates(seen, Changes(sources[lanes]))
         if stack.loads.supports.there:
             held[lanes] = missing(seen, found[lanes], Changes(sources[lanes]))
     if observed:
@@ -55,7 +62,7 @@ def answered(stack: Stack, q: Array, sources: Array, observed: bool = False) -> 
     return found
 
 
-def answered_on_path(stack: Stack, q: Array, own: Array, shift: Array | None) -> Array:
+def path_responses(stack: Stack, q: Array, own: Array, shift: Array | None) -> Array:
     """(L, J, 6, m) how what is read at poses q answers loads, laws that remember led along.
 
     Parameters
@@ -75,7 +82,7 @@ def answered_on_path(stack: Stack, q: Array, own: Array, shift: Array | None) ->
             seen = forward_kinematics(
                 stack.chains, part(stack.loads, lanes), there, bound.joint_forces(there).tangent
             )
-            dq = answers(seen, Changes(-loads))[0]
+            dq = solve_rates(seen, Changes(-loads))[0]
             found[lanes] = dq
             if stack.loads.supports.there:
                 held[lanes] = missing(seen, dq, Changes(-loads))
@@ -212,7 +219,7 @@ class _DerivedEffects:
         seen = forward_kinematics(
             stack.chains, part(stack.loads, lanes), q, bound.joint_forces(q).tangent
         )
-        return answers(seen, Changes(sources, self._pushes(lanes, seen)))[0]
+        return solve_rates(seen, Changes(sources, self._pushes(lanes, seen)))[0]
 
     def _pushes(self, lanes: Indices, seen: KinematicsAndLoads) -> Array:
         """(N, J, 6, m) derivative of the wrench on each vertebra, or none."""
@@ -258,8 +265,8 @@ def _beside(
     if not isinstance(effect, MeasurementBeside):
         return None
     runs = range(len(stack.remembers))
-    along = np.concatenate([passed(stack.case(run)) for run in runs])
-    every = beside(seen.reshape(-1, stack.joints, 6), along)
+    along = np.concatenate([share_passed(stack.case(run)) for run in runs])
+    every = measurement_context(seen.reshape(-1, stack.joints, 6), along)
     return MeasurementContext(every.above[flat], every.below[flat], every.passed[flat])
 
 
@@ -273,13 +280,13 @@ def _neighbours(stack: Stack, by_x: Array, flat: Indices) -> tuple[Array, Array]
 
 def readings(stack: Stack, q: Array) -> Array:
     """(L, J, 6) what is read at poses q (L, J, 6)."""
-    seen = reported(stack, q)
+    seen = instrument_readings(stack, q)
     if not stack.loads.supports.there:
         return seen
     return _with_reactions(stack, seen, reactions(stack, q))
 
 
-def reported(stack: Stack, q: Array) -> Array:
+def instrument_readings(stack: Stack, q: Array) -> Array:
     """(L, J, 6) what the instruments make of poses q (L, J, 6)."""
     seen = q.reshape(-1, 6).copy()
     for one in stack.effects.measurement:
@@ -291,7 +298,7 @@ def reported(stack: Stack, q: Array) -> Array:
     return seen.reshape(q.shape)
 
 
-def reported_by(stack: Stack, seen: Array, effect: Instrument, values: Array) -> Array:
+def instrument_readings_by(stack: Stack, seen: Array, effect: Instrument, values: Array) -> Array:
     """(S, L J, 6, P) how one more instrument, that is off, would change what is reported.
 
     Parameters
@@ -333,7 +340,7 @@ def _observed(stack: Stack, q: Array, dq: Array, unknowns: Unknowns | None) -> A
         around = _beside(stack, effect, seen, flat)
         observed = read(effect, seen[flat], one.values[rows], around)
         neighbours = None if around is None else _neighbours(stack, by_x, flat)
-        by_x[flat] = followed(observed, by_x[flat], neighbours)
+        by_x[flat] = reading_derivative(observed, by_x[flat], neighbours)
         if unknowns is not None:
             slope = one.by_unknowns(unknowns, dq.shape[3])[rows]
             by_x[flat] += read_by(effect, seen[flat], one.values[rows], around) @ slope

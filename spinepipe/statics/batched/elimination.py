@@ -195,7 +195,7 @@ def _signs(
 def _solve_chains(
     seen: Plain, free: Array, changes: Plain, asked: bool, rates: Array, signs: Indices
 ) -> bool:
-    """Fill rates (N, n) and the signs (N,), see `eliminated`; whether no sign is `BAD`.
+    """Fill rates (N, n) and the signs (N,), see `eliminate`; whether no sign is `BAD`.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def missing(seen: KinematicsAndLoads, rates: Array, changes: Changes) -> Array:
     return found
 
 
-def eliminated(
+def eliminate(
     seen: KinematicsAndLoads, changes: Changes, asked: bool = False
 ) -> tuple[Array, Indices]:
     """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; and signs (N,).
@@ -344,7 +344,7 @@ def _by_whole(seen: KinematicsAndLoads, changes: Changes, asked: bool) -> tuple[
     return rates.reshape(changes.sources.shape), signs
 
 
-def answers(seen: KinematicsAndLoads, changes: Changes) -> tuple[Array, Flags]:
+def solve_rates(seen: KinematicsAndLoads, changes: Changes) -> tuple[Array, Flags]:
     """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; where there is."""
-    rates, signs = eliminated(seen, changes)
+    rates, signs = eliminate(seen, changes)
     return rates, signs != 0

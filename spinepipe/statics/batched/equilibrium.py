@@ -3,8 +3,8 @@
 As `spinepipe.statics.equilibrium` does for one chain. A step of the load is taken where it is
 certified to be a piece of a path of stable equilibria: the tangent is positive under the whole load
 at its start, under the load before at its end, and in between where it is long or bent. What is not
-certified comes on in fractions (`continued`), each lane from the step before it, a first one from
-the neutral pose without any load or weight.
+certified comes on in fractions (`continue_in_parts`), each lane from the step before it, the first
+from the neutral pose without any load or weight.
 """
 
 from collections.abc import Callable
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.batched.dynamics import tangents_of
 from spinepipe.statics.batched.effects import Bound
-from spinepipe.statics.batched.elimination import POSITIVE, Changes, eliminated
+from spinepipe.statics.batched.elimination import POSITIVE, Changes, eliminate
 from spinepipe.statics.batched.forward_kinematics import forward_kinematics
-from spinepipe.statics.batched.loads import Chains, Loads, part, scaled
+from spinepipe.statics.batched.loads import Chains, Loads, part, scale_loads
 from spinepipe.statics.batched.stability import surely_stable
 from spinepipe.statics.equilibrium import (
     LARGEST_ROTATION,
@@ -59,7 +59,7 @@ class NewtonResults(NamedTuple):
     q : (N, J, 6) where it ended. tangents : (N, J, 6, 6) of the joints there.
     arrived : (N,) whether q is an equilibrium.
     first : (N, J, 6) its first step. signs : (N,) of the tangent at the start, see
-        `elimination.eliminated`.
+        `elimination.eliminate`.
     """
 
     q: Array
@@ -77,7 +77,7 @@ class Before(NamedTuple):
     at: Indices
 
 
-def certified(
+def certify(
     chains: Chains,
     before: Before,
     loads: Loads,
@@ -138,7 +138,7 @@ def stands(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
     own eigenvalues tell.
     """
     seen = forward_kinematics(chains, loads, q, tangents)
-    _, signs = eliminated(seen, Changes(np.empty((*q.shape, 0))), asked=True)
+    _, signs = eliminate(seen, Changes(np.empty((*q.shape, 0))), asked=True)
     found: Flags = signs == POSITIVE
     for lane in np.flatnonzero(signs == 1):
         scale = 1.0 / np.sqrt(chains.damping[loads.chain[lane]].ravel())
@@ -210,7 +210,7 @@ def _step(
     """Newton steps (N, J, 6) from q, signs (N,) of the tangents, and what is missing (N, J, 6)."""
     seen = forward_kinematics(chains, loads, q, tangents)
     missing = held - seen.applied
-    rates, signs = eliminated(seen, Changes(-missing[..., None]), asked)
+    rates, signs = eliminate(seen, Changes(-missing[..., None]), asked)
     return rates[..., 0], signs, missing
 
 
@@ -225,8 +225,8 @@ class Increment:
     def on(self, chains: Chains, lanes: Indices, reached: Array) -> tuple[Chains, Loads]:
         """Lanes with a fraction (N,) of the increment; each has a chain of its own."""
         before, after = (
-            scaled(self.before, lanes, 1.0 - reached),
-            scaled(self.after, lanes, reached),
+            scale_loads(self.before, lanes, 1.0 - reached),
+            scale_loads(self.after, lanes, reached),
         )
         own_chain, supports = (
             np.arange(len(lanes)),
@@ -242,7 +242,7 @@ class Increment:
         return np.where(self.first[lanes], reached, 1.0)
 
 
-def continued(
+def continue_in_parts(
     chains: Chains, increment: Increment, laws: SharedLaws, spacing: Array, start: Array
 ) -> tuple[Array, Flags]:
     """Poses (N, J, 6) under the whole load, and which lanes got there by certified steps."""
@@ -259,7 +259,7 @@ def continued(
         before = Before(*increment.on(chains, lanes, reached[lanes]), at)
         on = _on(laws, lanes, increment.share(lanes, target))
         results = newton(own, loads, on, q[lanes])
-        good = certified(own, before, loads, on, spacing[lanes], q[lanes], results)
+        good = certify(own, before, loads, on, spacing[lanes], q[lanes], results)
         # each lane goes on from the largest increment that was certified (they stand in that order)
         there, first = np.unique(lanes[good], return_index=True)
         best = np.flatnonzero(good)[first]

@@ -119,7 +119,7 @@ def part(loads: Loads, chosen: Indices) -> Loads:
     return Loads(chain[chosen], *wrenches, supports.part(chosen))
 
 
-def scaled(loads: Loads, lanes: Indices, share: Array) -> Loads:
+def scale_loads(loads: Loads, lanes: Indices, share: Array) -> Loads:
     """A share (N,) of the loads of some lanes."""
     some, on = part(loads, lanes), share[:, None, None]
     return some._replace(forces=some.forces * on, moments=some.moments * on)

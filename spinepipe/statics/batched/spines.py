@@ -134,7 +134,7 @@ class Cases:
         return replace(self.like, steps=tuple(steps))
 
 
-def stacked(spines: Spines, cases: Cases) -> Stack:
+def stack_spines(spines: Spines, cases: Cases) -> Stack:
     """The same test of many spines, a run each."""
     count, steps = len(spines), len(cases.like.steps)
     like, test = spines.like, cases.like
@@ -202,21 +202,21 @@ def solve_many(spines: Spines, cases: Cases, asked: Sequence[int] | None = None)
     every = range(len(cases.like.steps))
     asked = list(every if asked is None else asked)
     count, steps = len(spines), len(asked)
-    short = stacked(spines, cases.steps(asked))
+    short = stack_spines(spines, cases.steps(asked))
     q = np.full((count, steps, short.joints, 6), np.nan)
     status = np.full((count, steps), Status.CONVERGED.value, dtype="U20")
     messages: dict[tuple[int, int], str] = {}
     by_engine = np.zeros(count, dtype=bool)
     if count and steps < len(every):
         q = short.solve(why=False).q.reshape(q.shape)
-        q[~_passed(stacked(spines, cases), short, q, asked)] = np.nan
+        q[~_passed(stack_spines(spines, cases), short, q, asked)] = np.nan
         told = short.past_critical(
             q.reshape(-1, *q.shape[2:]), np.zeros(len(short.run), dtype=bool)
         )
         messages = {divmod(lane, steps): why for lane, why in told.items()}
     rest = np.flatnonzero(np.isnan(q[:, 0, 0, 0]))
     if len(rest):
-        found = stacked(spines.part(rest), cases.part(rest)).solve()
+        found = stack_spines(spines.part(rest), cases.part(rest)).solve()
         shape = (len(rest), len(every))
         q[rest] = found.q.reshape(*shape, *q.shape[2:])[:, asked]
         status[rest] = found.status.reshape(shape)[:, asked]

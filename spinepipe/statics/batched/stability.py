@@ -29,7 +29,11 @@ from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.batched.dynamics import inertias_of, masses_of, momenta_of, tangents_of
 from spinepipe.statics.batched.forward_kinematics import KinematicsAndLoads, forward_kinematics
 from spinepipe.statics.batched.loads import Chains, Loads, part
-from spinepipe.statics.batched.stability_certificate import is_positive_definite, respond, twists
+from spinepipe.statics.batched.stability_certificate import (
+    fill_skew_bounds,
+    is_positive_definite,
+    respond,
+)
 from spinepipe.statics.batched.vectors import blocks, lanes
 from spinepipe.statics.equilibrium import decays
 
@@ -112,7 +116,7 @@ class DynamicLanes:
     def top(self) -> Array:
         """(N,) no less than |A|."""
         squares = np.empty((len(self.inertia), self.inertia.shape[-1]))
-        twists(self.seen.numbers, blocks(self.damping), squares)
+        fill_skew_bounds(self.seen.numbers, blocks(self.damping), squares)
         return np.sqrt(lanes(squares, self.seen.count))
 
     def is_positive_definite(self, rate: Array) -> Flags:

@@ -53,7 +53,7 @@ def _skew(axes: Array, rows: Array, stiff: Array, slope: Array, skew: Plain) -> 
 
 
 @compiled
-def twists(seen: Plain, damping: Array, found: Array) -> None:
+def fill_skew_bounds(seen: Plain, damping: Array, found: Array) -> None:
     """Fill blocks (B, 4): no less than |A|^2 where damping is one; damping (B, J, 6, 4).
 
     Half the squares of A (Frobenius): singular values of a skew matrix come in pairs, so that this

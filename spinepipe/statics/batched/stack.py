@@ -20,8 +20,8 @@ from spinepipe.statics.batched.effects import Bound, PathStates
 from spinepipe.statics.batched.equilibrium import (
     Before,
     Increment,
-    certified,
-    continued,
+    certify,
+    continue_in_parts,
     newton,
     stands,
 )
@@ -33,7 +33,7 @@ from spinepipe.statics.batched.loads import (
     chains_of,
     durations,
     part,
-    scaled,
+    scale_loads,
     supports_of,
     with_dead_loads,
     wrenches_of,
@@ -228,7 +228,7 @@ class Stack:
                 continue
             # a hair less than the load: at the critical load itself rounding would decide
             share = np.full(len(lanes), less)
-            loads = scaled(self.loads, lanes, share)
+            loads = scale_loads(self.loads, lanes, share)
             neutral = loads.supports.on(np.zeros_like(q[lanes]))
             bound = self.bound(lanes, self.initial_states(), share)
             stood = stands(chains, loads, neutral, bound.joint_forces(neutral).tangent)
@@ -271,7 +271,7 @@ class Stack:
     def _solve_at_once(self, runs: Indices, guess: Array, q: Array) -> Flags:
         """Enter the poses of runs without memory, all steps together; which runs are solved."""
         lanes, states = self.lanes(runs), self.initial_states()
-        found, good = self._certified(lanes, states, guess[lanes], None)
+        found, good = self._solve_certified(lanes, states, guess[lanes], None)
         whole: Flags = np.logical_and.reduceat(good, np.searchsorted(self.run[lanes], runs))
         there = np.repeat(whole, np.diff(self.first)[runs])
         q[lanes[there]] = found[there]
@@ -294,7 +294,7 @@ class Stack:
                 break
             origin = last[runs[live]]
             near = None if guess is None else guess[lanes]
-            found, arrived = self._certified(lanes, states, near, origin)
+            found, arrived = self._solve_certified(lanes, states, near, origin)
             at_once[lanes] = arrived & (self.first[runs[live]] == lanes)
             lost = np.flatnonzero(~arrived)
             if len(lost):
@@ -359,7 +359,7 @@ class Stack:
             np.ones(len(lanes)) if share is None else share,
         )
 
-    def _certified(
+    def _solve_certified(
         self, lanes: Indices, states: PathStates, guess: Array | None, origin: Array | None
     ) -> tuple[Array, Flags]:
         """Poses (N, J, 6) of lanes, and which are certified to be where the loads lead.
@@ -383,7 +383,7 @@ class Stack:
         before = Before(self.chains, self.loads, np.where(self.released[lanes], lanes - 1, -1))
         spacing = self.spacing[self.run[lanes]]
         guessed = guess is not None
-        good = certified(self.chains, before, loads, laws, spacing, origin, results, guessed)
+        good = certify(self.chains, before, loads, laws, spacing, origin, results, guessed)
         return results.q, good
 
     def _continued(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
@@ -398,7 +398,7 @@ class Stack:
         def laws(some: Indices, share: Array) -> Bound:
             return self.bound(lanes[some], states, share)
 
-        return continued(self.chains, increment, laws, self.spacing[self.run[lanes]], start)
+        return continue_in_parts(self.chains, increment, laws, self.spacing[self.run[lanes]], start)
 
     def _solve_by_engine(
         self, number: int, q: Array, status: NDArray[np.str_], messages: dict[int, str]

@@ -16,8 +16,14 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import Body, ScopedEffect, SpineModel
-from spinepipe.statics.held_chain import Ask, HeldChain, PrescribedPlace, Prescription, Tilt
 from spinepipe.statics.prescribed import PrescribedResult, alone, hold_at
+from spinepipe.statics.prescribed_chain import (
+    Ask,
+    PrescribedChain,
+    PrescribedPlace,
+    Prescription,
+    Tilt,
+)
 from spinepipe.studies.scoliosis.films import Film
 from spinepipe.studies.scoliosis.settings import SagittalProfile
 from spinepipe.units import COORDINATES, MM_PER_M
@@ -136,7 +142,7 @@ class HeldSpine:
     ask : who answers Newton's questions.
     """
 
-    chain: HeldChain
+    chain: PrescribedChain
     erect: Film
     ask: Ask = alone
 
@@ -153,7 +159,7 @@ class HeldSpine:
         if level:
             grips = (*grips, Tilt(top, ANTERIOR, ANTERIOR, UP))
         free = np.tile([False] * 3 + [True] * 3, model.n_joints)
-        return cls(HeldChain(model, grips, free), erect)
+        return cls(PrescribedChain(model, grips, free), erect)
 
     def with_values(self, *values: Array) -> "HeldSpine":
         """The same spine with other values of its laws."""

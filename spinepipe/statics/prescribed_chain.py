@@ -208,7 +208,7 @@ def _assemble(motion: Plain, asked: Plain, holder: Plain, held: Plain, found: Pl
                         matrix[j, i] += tangents[n, joint, free[j] % 6, at]
 
 
-class HeldChain:
+class PrescribedChain:
     """An unloaded, weightless chain on joint laws, and what is prescribed of its poses.
 
     Attributes
@@ -239,7 +239,7 @@ class HeldChain:
             np.flatnonzero(free),
         )
 
-    def with_values(self, values: Sequence[Array]) -> "HeldChain":
+    def with_values(self, values: Sequence[Array]) -> "PrescribedChain":
         """The same with other values of the laws."""
         other = copy(self)
         other.values = tuple(values)
@@ -271,7 +271,7 @@ class NewtonTrial(NamedTuple):
     wanted : (k,) m and rad, value of each prescription. compliance : of the holder.
     """
 
-    chain: HeldChain
+    chain: PrescribedChain
     q: Array
     pushes: Array
     wanted: Array
@@ -315,7 +315,7 @@ def newton_steps(trials: Sequence[NewtonTrial]) -> list[NewtonStep | None]:
     return [None if number in beyond else NewtonStep(*one) for number, one in each]
 
 
-def _joint_forces(chains: Sequence[HeldChain], q: Array) -> tuple[Array, Array]:
+def _joint_forces(chains: Sequence[PrescribedChain], q: Array) -> tuple[Array, Array]:
     """Loads (N, n) and tangents (N, J, 6, 6) of the joints of all chains at q (N, n)."""
     joints, laws = q.shape[1] // 6, []
     for number, scoped in enumerate(chains[0].effects):
