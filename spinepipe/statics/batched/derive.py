@@ -75,9 +75,7 @@ def path_responses(stack: Stack, q: Array, own: Array, shift: Array | None) -> A
     for runs in stack.chunks(np.arange(len(stack.remembers)), stepwise=True):
         for _, lanes in stack.steps(runs):
             bound, there = stack.bound(lanes, states), q[lanes]
-            before = {
-                n: states_by_x[n][places] for n, places in bound.places.items() if n in states
-            }
+            before = bound.states_of(states_by_x)
             loads = own[lanes] + bound.joint_forces_by(there, still, before)
             seen = forward_kinematics(
                 stack.chains, part(stack.loads, lanes), there, bound.joint_forces(there).tangent
@@ -140,7 +138,7 @@ def reactions_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array
     for lanes in stack.portions(_supported(stack)):
         bound = stack.bound(lanes, states)
         slopes = moved.on(bound)
-        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
+        before = bound.states_of(states_by_x)
         found[lanes] = moved.reactions(lanes, bound, (q[lanes], dq[lanes]), slopes, before)
         after = bound.states_after_by(q[lanes], dq[lanes], slopes, before)
         stack.remember(states_by_x, bound, after)
@@ -167,7 +165,7 @@ def poses_by(stack: Stack, q: Array, unknowns: Unknowns) -> Array:
     for lanes in stack.portions(~stack.alone):
         bound = stack.bound(lanes, states)
         slopes = moved.on(bound)
-        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
+        before = bound.states_of(states_by_x)
         dq = found[lanes] = moved.poses(lanes, bound, q[lanes], slopes, before)
         if before:  # some of these remember: so do the derivatives of what they do
             stack.remember(states_by_x, bound, bound.states_after_by(q[lanes], dq, slopes, before))

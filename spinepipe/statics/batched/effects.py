@@ -164,6 +164,10 @@ class Bound:
             self.joint_kinematics(q), self.laws, self.states, moved=bool(self.geometry)
         )
 
+    def states_of(self, every: PathStates) -> dict[int, Array]:
+        """Of the states of all places, or their derivatives, those of the lanes."""
+        return {n: every[n][places] for n, places in self.places.items() if n in every}
+
     def states_after(self, q: Array) -> dict[int, Array]:
         """State (K, S) of each path law after steps that ended at q (N, J, 6)."""
         advances = states_after(self.joint_kinematics(q).q, self.laws, self.states)

@@ -332,7 +332,8 @@ class Stack:
             there = lanes[good[lanes]]
             bound = self.bound(there, states)
             yield there, bound
-            self.remember(states, bound, bound.states_after(q[there]))
+            if bound.states.of:
+                self.remember(states, bound, bound.states_after(q[there]))
 
     def initial_states(self, *unknowns: int) -> dict[int, Array]:
         """States of all path laws before the first step, zero; or their derivatives."""
