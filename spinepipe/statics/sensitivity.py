@@ -161,6 +161,7 @@ def unsupported_by_parameters(
     """(n, m) derivative, at fixed pose, of what the joints hold less what is applied."""
     q = step.equilibrium.q
     derivatives = system.derivatives(q, step.states)
+    # derivative by every parameter of every effect, (n, R, P) of each; unknowns pick from them
     table = {
         i: d.reshape(system.chain.n, *d.shape[2:]) for i, d in derivatives.by_parameter.items()
     }
