@@ -201,7 +201,17 @@ class PoolMember:
             here = self.clipped(expected)
         x = here * self.scale
         at_bound = bounds_reached(self.problem, x)
-        status, message = self._ending(at_bound)
+        # why there is nothing, what keeps it from being an optimum, or which bounds it is at
+        status, message = Status.CONVERGED, ""
+        if self.evaluator is None or evaluation is None:
+            status = Status.REFUSED if self.evaluator is None else Status.UNSTABLE
+            message = self.refusal
+        elif not self.arrived:
+            status, message = Status.NOT_CONVERGED, AT_THE_BRINK if self.stuck else ON_THE_MOVE
+        elif self.evaluator.on_record(self.x * self.scale) is None:
+            status, message = Status.NOT_CONVERGED, OFF_THE_PATH
+        elif at_bound.any():
+            status, message = Status.CONVERGED_AT_BOUND, names_at_bound(self.problem, at_bound)
         residual = None if evaluation is None else evaluation.residual
         return PooledSpecimen(
             x=x,
@@ -217,19 +227,6 @@ class PoolMember:
             cases=() if evaluation is None else self.problem.cases,
             poses=() if evaluation is None else evaluation.poses,
         )
-
-    def _ending(self, at_bound: Array) -> tuple[Status, str]:
-        if self.evaluator is None:
-            return Status.REFUSED, self.refusal
-        if self.evaluation is None:
-            return Status.UNSTABLE, self.refusal
-        if not self.arrived:
-            return Status.NOT_CONVERGED, AT_THE_BRINK if self.stuck else ON_THE_MOVE
-        if self.evaluator.on_record(self.x * self.scale) is None:
-            return Status.NOT_CONVERGED, OFF_THE_PATH
-        if at_bound.any():
-            return Status.CONVERGED_AT_BOUND, names_at_bound(self.problem, at_bound)
-        return Status.CONVERGED, ""
 
 
 @dataclass(frozen=True)
@@ -328,7 +325,12 @@ def pool(
     found = hierarchy.posterior()
     told = zip(found.x, found.covariance, found.effective_parameters.tolist(), strict=True)
     specimens = tuple(m.result(*all_of) for m, all_of in zip(members, told, strict=True))
-    status, message = _verdict(specimens)
+    # the worst status of the specimens that have poses; in words how many have no usable fit
+    lost = sum(not specimen.status.usable for specimen in specimens)
+    message = f"{lost} of {len(specimens)} specimens without a usable fit" if lost else ""
+    standing = [specimen.status for specimen in specimens if specimen.poses]
+    worst_first = (Status.NOT_CONVERGED, Status.CONVERGED_AT_BOUND, Status.CONVERGED)
+    status = next((one for one in worst_first if one in standing), specimens[0].status)
     if unsettled:
         costs = [s.cost / s.n_readings if s.poses else 0.0 for s in specimens]
         worst = problems[int(np.argmax(costs))].model.specimen  # of the largest cost per reading
@@ -423,17 +425,6 @@ def _cost(
     scatter = hierarchy.spreads.scatter
     squares = [member.squares(seen, scatter) for member, _, seen in places if seen is not None]
     return sum(squares) + hierarchy.distance(np.stack([x for _, x, _ in places]))
-
-
-def _verdict(specimens: Sequence[PooledSpecimen]) -> tuple[Status, str]:
-    """The worst of the specimens that have poses; in words how many have no usable fit."""
-    lost = sum(not specimen.status.usable for specimen in specimens)
-    message = f"{lost} of {len(specimens)} specimens without a usable fit" if lost else ""
-    standing = [specimen.status for specimen in specimens if specimen.poses]
-    for status in (Status.NOT_CONVERGED, Status.CONVERGED_AT_BOUND, Status.CONVERGED):
-        if status in standing:
-            return status, message
-    return specimens[0].status, message
 
 
 def _cohort_spreads(

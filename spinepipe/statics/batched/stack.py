@@ -111,8 +111,7 @@ class Stack:
         """Runs of models; ValueError where these differ in their number of joints."""
         if len({model.n_joints for model in models}) != 1:
             raise ValueError("models of a stack have equally many joints")
-        # models share their cases: each is read once, its steps copied to the runs that have it
-        cases = {id(case): case for _, case in runs}
+        cases = {id(case): case for _, case in runs}  # models share them: each is read once
         of_case = np.array([len(case.steps) for case in cases.values()], dtype=np.int64)
         first = dict(zip(cases, np.cumsum(of_case) - of_case, strict=True))
         steps = np.array([len(case.steps) for _, case in runs], dtype=np.int64)
@@ -210,7 +209,6 @@ class Stack:
         It is certified not to be so where one step brings there from the neutral pose, and in later
         steps under the same forces.
         """
-        # one certified step from the neutral pose has looked at it under the whole load already
         bodies, points, forces = self.loads.bodies, self.loads.points, self.loads.forces
         first = self.first[self.run]
         at_once = at_once[first] & (bodies == bodies[first]).all(axis=1)
@@ -374,8 +372,7 @@ class Stack:
         def laws(some: Indices) -> Bound:
             return self.bound(lanes[some], states)
 
-        loads = part(self.loads, lanes)
-        start = origin if guess is None else guess
+        loads, start = part(self.loads, lanes), origin if guess is None else guess
         assert start is not None
         results = newton(self.chains, loads, laws, start)
         if origin is None:
@@ -383,9 +380,8 @@ class Stack:
             origin = np.where(follows[:, None, None], np.roll(results.q, 1, axis=0), 0.0)
         before = Before(self.chains, self.loads, np.where(self.released[lanes], lanes - 1, -1))
         spacing = self.spacing[self.run[lanes]]
-        guessed = guess is not None
-        good = certify(self.chains, before, loads, laws, spacing, origin, results, guessed)
-        return results.q, good
+        given = (spacing, origin, results, guess is not None)
+        return results.q, certify(self.chains, before, loads, laws, *given)
 
     def _continued(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
         """The same from the steps before, the load in fractions."""
