@@ -18,7 +18,7 @@ from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import free_parameters
 from spinepipe.statics.batched import Cases, Spines, Stack, poses_by
-from spinepipe.statics.batched.spines import stacked
+from spinepipe.statics.batched.spines import stack_spines
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers.chain import random_chain
 
@@ -52,7 +52,7 @@ def stack(joints: int, count: int) -> Stack:
     values = [one * np.exp(rng.normal(0.0, 0.3, one.shape)) for one in spines.values]
     size = np.exp(rng.normal(0.0, 0.3, (count, 1, 1, 1)))
     cases = replace(cases, forces=cases.forces * size, moments=cases.moments * size)
-    return stacked(replace(spines, values=tuple(values)), cases)
+    return stack_spines(replace(spines, values=tuple(values)), cases)
 
 
 def figures() -> Figures:

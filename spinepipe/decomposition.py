@@ -138,15 +138,10 @@ def eigh(matrix: ArrayLike) -> tuple[Array, Array]:
     except LinAlgError:  # one matrix stops all of them
         values, vectors = np.empty(given.shape[:-1]), np.empty(given.shape)
         for place in np.ndindex(*given.shape[:-2]):
-            values[place], vectors[place] = _eigh(given[place])
-    return values, vectors
-
-
-def _eigh(given: Array) -> tuple[Array, Array]:
-    try:
-        values, vectors = np.linalg.eigh(given)
-    except LinAlgError:
-        values, vectors = scipy.linalg.eigh(given, driver="ev")
+            try:
+                values[place], vectors[place] = np.linalg.eigh(given[place])
+            except LinAlgError:  # QR iterations
+                values[place], vectors[place] = scipy.linalg.eigh(given[place], driver="ev")
     return values, vectors
 
 

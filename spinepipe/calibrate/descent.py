@@ -131,6 +131,7 @@ def descend_along(
     for number in range(1, settled.evaluations):
         residual, jacobian = found
         cost = float(residual @ residual)
+        # a step of the linear problem inside the bounds, and the gain that it promises
         step = damped_step(
             residual, jacobian * scale, damping, np.array([bounds[0] - x, bounds[1] - x]) / scale
         )
@@ -141,6 +142,7 @@ def descend_along(
         trial = np.clip(x + step * scale, *bounds)
         new = point(trial)
         gained = -np.inf if new is None else cost - float(new[0] @ new[0])
+        # taken where it keeps some of its promise, else damped more
         if new is not None and gained >= PROMISE * promised:
             x, found, damping = trial, new, max(damping * EASED, LEAST_DAMPING)
         elif damping < MOST_DAMPING:
@@ -157,6 +159,8 @@ def damped_step(residual: Array, jacobian: Array, damping: float, reach: Array) 
     ----------
     damping : as of `DAMPING`. reach : from no step to the bounds.
     """
+    # Marquardt's scaling by the columns; one that says nothing yet is damped as if a millionth of
+    # the largest, so that the rows below have full rank
     sizes = np.linalg.norm(jacobian, axis=0)
     sizes = np.maximum(sizes, 1e-6 * max(float(sizes.max(initial=0.0)), 1e-300))
     rows = np.vstack([jacobian, np.diag(np.sqrt(damping) * sizes)])

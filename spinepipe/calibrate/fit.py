@@ -31,16 +31,16 @@ STIFFENING = 2.0
 """Factor by which a start without a stable equilibrium is stiffened, again and again."""
 
 TIPPED = "no stable equilibrium up to the upper bounds: the loads tip the segment over"
-
 AT_THE_BRINK = "the cost still falls where the loads begin to tip the segment over: no optimum"
-
 BETTER = "beside the optimum there is a lower cost: more starts are needed"
 
 AT_BOUND = 1e-6
+"""An unknown so near a bound, in its typical changes, is told to be at it."""
 
 ROUNDING = 1e-12
+"""And one so near is put on it."""
 
-SETTLED = DescentTolerances(cost=1e-11, step=1e-7, slope=1e-14, evaluations=200)
+TOLERANCES = DescentTolerances(cost=1e-11, step=1e-7, slope=1e-14, evaluations=200)
 """When a fit at rest has arrived."""
 
 LAST_SETTLING_STEP = 1e-3
@@ -59,6 +59,7 @@ LEVEL = 1e-2
 """Slope of the cost at an optimum, as a share of it per unknown's unit (logarithm or prior SD)."""
 
 COST_TIE = 1e-6
+"""Costs that differ by less than this share are equal."""
 
 
 @dataclass(frozen=True)
@@ -298,7 +299,7 @@ def _least_squares(evaluator: Evaluator, at: At, start: Array, stiffened: int) -
         return found.residual, found.jacobian
 
     begin = np.clip(start, problem.lower + 1e-9, problem.upper - 1e-9)
-    bounds, settled = (problem.lower, problem.upper), _settled(problem)
+    bounds, settled = (problem.lower, problem.upper), _tolerances(problem)
     if problem.along_bounds:
         ended = descend_along(point, begin, bounds, problem.scale, settled)
     else:
@@ -307,9 +308,13 @@ def _least_squares(evaluator: Evaluator, at: At, start: Array, stiffened: int) -
     x = on_bounds(problem, ended.x)
     at_bound, evaluation = bounds_reached(problem, x), at(x)
     level = _stationary(problem, evaluation, at_bound)
-    status, message = _verdict(problem, ended.arrived or level, at_bound)
-    if status.usable and not level:
+    status, message = Status.CONVERGED, ""
+    if not (ended.arrived or level):
+        status, message = Status.NOT_CONVERGED, settled.given_up
+    elif not level:
         status, message = Status.NOT_CONVERGED, AT_THE_BRINK
+    elif at_bound.any():
+        status, message = Status.CONVERGED_AT_BOUND, names_at_bound(problem, at_bound)
     return Optimum(
         x,
         at_bound,
@@ -340,14 +345,13 @@ def _on_record(evaluator: Evaluator, optima: Sequence[Optimum]) -> list[Optimum]
 
 
 def _twin(earlier: Sequence[Optimum], optimum: Optimum, scale: Array) -> Optimum | None:
-    """The first of earlier optima that ties with one."""
-    return next((one for one in earlier if _ties(one, optimum, scale)), None)
-
-
-def _ties(one: Optimum, other: Optimum, scale: Array) -> bool:
-    """Whether one would be taken for the best in place of another that is the same."""
-    close = np.abs(one.x - other.x).max(initial=0.0) < SAME_OPTIMUM * scale.min(initial=1.0)
-    return other.status.usable and close and not _worse(one, other.cost)
+    """The first of earlier optima that would be taken for best in place of one that is usable."""
+    near = SAME_OPTIMUM * scale.min(initial=1.0)
+    for one in earlier if optimum.status.usable else ():
+        close = np.abs(one.x - optimum.x).max(initial=0.0) < near
+        if close and not _worse(one, optimum.cost):
+            return one
+    return None
 
 
 def _worse(optimum: Optimum, least: float) -> bool:
@@ -362,40 +366,33 @@ def _stationary(problem: Problem, evaluation: Evaluation, at_bound: Array) -> bo
     residual, jacobian = evaluation.residual, evaluation.jacobian
     assert residual is not None
     assert jacobian is not None
+    # gradient 2 J'r and the diagonal of the Gauss-Newton Hessian 2 J'J, per typical change: near is
+    # where a Newton step would be shorter than a few of the last steps that a descent takes
     slope = 2.0 * np.abs(residual @ jacobian * problem.scale)
     bend = 2.0 * np.sum((jacobian * problem.scale) ** 2, axis=0)
     near = (
-        slope <= CLOSE * _settled(problem).step * bend
+        slope <= CLOSE * _tolerances(problem).step * bend
     )  # where nothing is left, a slope is no share
     level = near | (slope <= LEVEL * (residual @ residual) + 1e-9)
     return bool(level[at_bound == 0].all())
 
 
-def _settled(problem: Problem) -> DescentTolerances:
-    return SETTLED if problem.course is None else replace(SETTLED, step=LAST_SETTLING_STEP)
-
-
-def _verdict(problem: Problem, success: bool, at_bound: Array) -> tuple[Status, str]:
-    if not success:
-        return Status.NOT_CONVERGED, _settled(problem).given_up
-    if not at_bound.any():
-        return Status.CONVERGED, ""
-    return Status.CONVERGED_AT_BOUND, names_at_bound(problem, at_bound)
+def _tolerances(problem: Problem) -> DescentTolerances:
+    return TOLERANCES if problem.course is None else replace(TOLERANCES, step=LAST_SETTLING_STEP)
 
 
 def _distinct(optima: Sequence[Optimum], identifiable: NDArray[np.bool_], scale: Array) -> int:
     """Number of different optima among the starts that ended, told by what is identifiable."""
     kept: list[Optimum] = []
-    for optimum in (o for o in optima if o.status.usable):
-        if not any(_same(optimum, other, identifiable, scale) for other in kept):
-            kept.append(optimum)
+    for one in (o for o in optima if o.status.usable):
+        for other in kept:
+            close = (np.abs(one.x - other.x) / scale)[identifiable] < SAME_OPTIMUM
+            tie = abs(one.cost - other.cost) <= COST_TIE * max(one.cost, other.cost, 1e-12)
+            if close.all() and tie:
+                break
+        else:
+            kept.append(one)
     return len(kept)
-
-
-def _same(one: Optimum, other: Optimum, identifiable: NDArray[np.bool_], scale: Array) -> bool:
-    close = (np.abs(one.x - other.x) / scale)[identifiable] < SAME_OPTIMUM
-    tie = abs(one.cost - other.cost) <= COST_TIE * max(one.cost, other.cost, 1e-12)
-    return bool(close.all()) and tie
 
 
 def stand_up(problem: Problem, at: At, start: Array) -> tuple[Array | None, int]:

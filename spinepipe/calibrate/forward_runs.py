@@ -41,6 +41,7 @@ from scipy.differentiate import jacobian
 from scipy.integrate import ode
 from scipy.optimize import Bounds, OptimizeResult, approx_fprime, minimize
 
+from spinepipe.calibrate.fit import values
 from spinepipe.calibrate.problem import Evaluator, Problem
 from spinepipe.calibrate.solvers import steps_alone
 from spinepipe.effects.contract import Array
@@ -96,7 +97,7 @@ class _Motion:
         """(2n,) rate of change of pose and rate."""
         q, rate = state.reshape(2, 1, -1, 6)
         self._place(q)
-        force = self._missing - self._moving.inertial(rate) - self.damping * rate
+        force = self._missing - self._moving.velocity_product_forces(rate) - self.damping * rate
         acceleration = self._moving.accelerations(force.reshape(1, -1))
         return np.concatenate([state[self.n :], acceleration[0]])
 
@@ -104,7 +105,7 @@ class _Motion:
         """What depends on the pose alone; asked for again when only rates have been varied."""
         if q.tobytes() == self._pose:
             return
-        held = self.bound.held(q)
+        held = self.bound.joint_forces(q)
         seen = forward_kinematics(self.stack.chains, self.stack.loads, q, held.tangent)
         self._missing = seen.applied - held.load
         self._moving = Moving.of(self.stack.chains, self.stack.loads.chain, seen)
@@ -243,7 +244,7 @@ def fit_by_cost(runs: ForwardCost, relative_step: float, raw_units: bool) -> For
     problem = runs.problem
     if not all(parameter.logarithmic for parameter in problem.free):
         raise ValueError("forward runs fit stiffness, not parameters that may be negative")
-    start = np.array([_first_value(problem, index) for index in range(len(problem.free))])
+    start = values(problem, np.zeros(len(problem.free)))
     search = _OptimiserRun(runs, start if raw_units else np.ones_like(start), relative_step)
     if runs.cost(np.zeros_like(start)) >= LOST:
         message = "the forward run with the start's stiffness is lost"
@@ -266,13 +267,6 @@ def _ended(
     cost = search.runs.costs[x.tobytes()]
     count = len(search.runs.costs)
     return ForwardFit(x, start * np.exp(x), cost, count, claims, status, message, gradient)
-
-
-def _first_value(problem: Problem, index: int) -> float:
-    parameter = problem.free[index]
-    return float(
-        problem.model.effects[parameter.effect].values[parameter.rows[0], parameter.column]
-    )
 
 
 class _OptimiserRun:

@@ -72,10 +72,11 @@ class HierarchicalPosterior:
     effective_parameters: Array
 
 
-def condensed(designs: Sequence[Array], targets: Sequence[Array], m: int) -> LinearReadings:
+def condense_readings(designs: Sequence[Array], targets: Sequence[Array], m: int) -> LinearReadings:
     """Readings (N_s, m) and (N_s,) of each specimen, turned into m rows that say the same."""
     rows = np.zeros((len(designs), m + 1, m + 1))
     for row, design, target in zip(rows, designs, targets, strict=True):
+        # R of a QR decomposition says of x what all rows say: R x = Q' target, and what is left
         triangle = np.linalg.qr(np.column_stack([design, target]), mode="r")
         row[: len(triangle)] = triangle
     left_over = float(np.sum(rows[:, m, m] ** 2))
@@ -89,7 +90,9 @@ class Hierarchy:
         """``dof`` (m,): degree of freedom of each unknown, 0 to D - 1; each has its own level."""
         self._readings, self.spreads = readings, spreads
         self._of = np.eye(dof.max() + 1)[dof]  # (m, D)
-        self.own = own_covariance(dof, spreads)
+        # (m, m) prior covariance of a specimen's unknowns about mean and levels of the cohort
+        same = dof[:, None] == dof
+        self.own = same * spreads.specimen[dof] ** 2 + np.diag(spreads.rest[dof] ** 2)
         self._root = np.linalg.cholesky(self.own)
         self._unroot = np.linalg.inv(self._root)
         self._see(readings.design / spreads.scatter, readings.target / spreads.scatter)
@@ -117,6 +120,8 @@ class Hierarchy:
 
     def _share(self, factor: Array) -> None:
         """Mean and levels: the specimens' own parts count as errors of their readings."""
+        # posterior precision of mean and levels, in their prior SDs, with the specimens' own parts
+        # integrated out
         told = self.information.sum(axis=0)
         gain = self._size * self._unseen
         pull = np.einsum("skm,sk->m", self._towards, gain * self._aim)
@@ -142,6 +147,8 @@ class Hierarchy:
     def slopes(self) -> Spreads:
         """Derivative of the log likelihood by the logarithm of each spread."""
         told, score, of = self.information, self._score, self._of
+        # by a variance (score' score - trace of the information) / 2; by the logarithm of its root
+        # that is the variance times the bracket
         each = told - told @ self.common_covariance @ told  # of each specimen with itself
         total = told.sum(axis=0)
         between = total - total @ self.common_covariance @ total
@@ -150,18 +157,16 @@ class Hierarchy:
             "ad,sab,bd->d", of, each, of, optimize=True
         )
         by_rest = (np.sum(score**2, axis=0) - np.einsum("saa->a", each)) @ of
+        # by the scatter: zero where its square is the sum of squares over readings less parameters
         spreads = self.spreads
+        squares = self._squares + self._readings.left_over / spreads.scatter**2
+        by_scatter = float(squares + self.effective_parameters.sum() - self._readings.count)
         return Spreads(
             spreads.level**2 * by_level,
             spreads.specimen**2 * by_specimen,
             spreads.rest**2 * by_rest,
-            self._scatter_slope(),
+            by_scatter,
         )
-
-    def _scatter_slope(self) -> float:
-        """Zero where scatter squared is the sum of squares over readings less parameters."""
-        squares = self._squares + self._readings.left_over / self.spreads.scatter**2
-        return float(squares + self.effective_parameters.sum() - self._readings.count)
 
     @property
     def effective_parameters(self) -> Array:
@@ -195,13 +200,6 @@ class Hierarchy:
         )
 
 
-def own_covariance(dof: Indices, spreads: Spreads) -> Array:
-    """(m, m) prior covariance of a specimen's unknowns about mean and levels of the cohort."""
-    same = dof[:, None] == dof
-    own: Array = same * spreads.specimen[dof] ** 2 + np.diag(spreads.rest[dof] ** 2)
-    return own
-
-
 PRIOR_RATE = 2.0
 """Of the Gamma(2, rate) prior on an SD, which keeps estimates from few groups off zero.
 
@@ -229,7 +227,7 @@ class SpreadEstimate:
     trouble: str
 
 
-def estimated(
+def estimate_spreads(
     readings: LinearReadings, dof: Indices, scatter: float | None, start: Spreads | None = None
 ) -> SpreadEstimate:
     """Spreads at the mode of marginal likelihood and prior; what cannot be told apart is dropped.
@@ -241,7 +239,7 @@ def estimated(
     ----------
     scatter : SD of a reading; None estimates it along.
     """
-    told = tellable(readings, dof)
+    told = tellable_spreads(readings, dof)
     size = np.full(dof.max() + 1, START)
     first = start or Spreads(size, size, size, _first_scatter(readings))
 
@@ -274,7 +272,7 @@ def estimated(
     return SpreadEstimate(_unpacked(found.x, told, scatter), trouble if lost else "")
 
 
-def tellable(readings: LinearReadings, dof: Indices) -> NDArray[np.bool_]:
+def tellable_spreads(readings: LinearReadings, dof: Indices) -> NDArray[np.bool_]:
     """(3, D) which spreads, of level, specimen and rest, the readings can tell apart."""
     information = np.sum(readings.design**2, axis=1)
     seen = information > SEEN * information.max(initial=0.0)
@@ -286,7 +284,7 @@ def tellable(readings: LinearReadings, dof: Indices) -> NDArray[np.bool_]:
     return told
 
 
-def between(one: Spreads, other: Spreads, share: float) -> Spreads:
+def interpolate_spreads(one: Spreads, other: Spreads, share: float) -> Spreads:
     """Spreads a share of the way from one to the other, in logarithms; dropped ones stay so."""
     first, second = _stacked(one), _stacked(other)
     both = (first > 0.0) & (second > 0.0)
@@ -296,7 +294,7 @@ def between(one: Spreads, other: Spreads, share: float) -> Spreads:
     return Spreads(level, specimen, rest, float(scatter[0]))
 
 
-def change(one: Spreads, other: Spreads) -> float:
+def largest_change(one: Spreads, other: Spreads) -> float:
     """Largest difference of logarithms of spreads that both have."""
     first, second = _stacked(one), _stacked(other)
     both = (first > 0.0) & (second > 0.0)

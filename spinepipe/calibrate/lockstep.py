@@ -26,6 +26,7 @@ class _Strand(Generic[Question, Answer, Result]):
     """
 
     def __init__(self, search: Callable[[Callable[[Question], Answer]], Result]) -> None:
+        # two locks as a baton: the search's thread runs between `_go` and `_back`, its owner else
         self._search = search
         self._go, self._back = threading.Lock(), threading.Lock()
         self._go.acquire()

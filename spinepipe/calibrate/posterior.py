@@ -216,8 +216,10 @@ def _climbed(target: Target, starts: Array) -> list[tuple[Point | None, str]]:
         for number in going:
             point = here[number]
             assert point is not None
+            # Levenberg-Marquardt on the energy: its Gauss-Newton curvature, damped by the prior's
             damped = point.bend + damping[number] * np.eye(len(point.z))
             step = -np.linalg.solve(damped, point.gradient)
+            # arrived where a step, not one cut short by damping, would gain too little
             if damping[number] <= 1.0 and -0.5 * float(step @ point.gradient) < ARRIVED:
                 ended[number] = (point, "")
                 continue
@@ -263,6 +265,8 @@ def _mode(point: Point | None, message: str, curved: Array | None) -> Mode:
     values, axes = eigh(curved)
     if values.min() <= 0.0:
         return Mode(None, nothing, nothing, -np.inf, SADDLE)
+    # Laplace: log of the integral of exp(-energy) over a normal density, whose (2 pi)^(m/2) is the
+    # prior's, so that it cancels
     root = axes / np.sqrt(values)
     evidence = -point.energy - 0.5 * float(np.sum(np.log(values)))
     return Mode(point, root @ root.T, root, evidence)

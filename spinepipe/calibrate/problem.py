@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.solvers import AtRest, CaseResiduals, Settling, held_against
+from spinepipe.calibrate.solvers import AtRest, CaseResiduals, Settling, compare_with_record
 from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase, RefusedModel, SpineModel
@@ -208,7 +208,7 @@ class Evaluator:
             with_parameters(problem.model, problem.free, x),
             [c.case for c in problem.cases],
         )
-        poses = held_against(
+        poses = compare_with_record(
             self._solver.record(x, problem.model), model, cases, found.poses, SAME_POSE
         )
         if poses is None:
@@ -353,6 +353,7 @@ def whitened(errors: Array, used: NDArray[np.bool_]) -> Array:
     """
     there = used.reshape(*used.shape, *[1] * (errors.ndim - used.ndim))
     errors = np.where(there, errors, 0.0)
+    # I - c 1 1' along the steps, see the head of this file
     n = np.maximum(there.sum(axis=0), 1)
     shared: Array = (1.0 - 1.0 / np.sqrt(1.0 + n)) / n * errors.sum(axis=0)
     result: Array = errors - shared

@@ -298,6 +298,7 @@ def _end(best: Best, unknown: int, rise: _Rise, side: int, point: Point) -> _End
     value = _no_further(_from(origin, side * best.ahead * rise.way, bent), bound, side)
     alike = 0  # looks in a row that fell on the same side of the end, once it is between two
     direction, there = best.follow(unknown), best.x
+    # a bracket of the end: inner, where the cost has risen less, and outer, where it has risen more
     for number in range(1, MOST_FITS + 1):
         start = best.x + (value - origin) * direction
         found, fitted = _refitted(best, unknown, value, (start, there), rise, point)
@@ -315,6 +316,7 @@ def _end(best: Best, unknown: int, rise: _Rise, side: int, point: Point) -> _End
             alike = min(alike, 0) - 1 if between else 0
             inner, there = (value, share), fitted
             direction = (fitted - best.x) / (value - origin)
+        # regula falsi on the root of the rise, bisected where it stalls on one side
         far = outer is None and number >= AFAR
         value = bound if far else _next(origin, inner, outer, bound, bent, abs(alike) > 1)
     return _End(bound, True, least) if outer is None else _End(outer[0], False, least)

@@ -18,7 +18,6 @@ from arviz_stats.base.array import array_stats
 from mici.adapters import DualAveragingStepSizeAdapter
 from mici.integrators import LeapfrogIntegrator
 from mici.samplers import RandomMetropolisHMC
-from mici.states import ChainState
 from mici.systems import EuclideanMetricSystem
 from scipy.interpolate import PchipInterpolator
 from scipy.special import ndtr
@@ -151,6 +150,7 @@ class _Chart:
 
     def density(self, y: Array, point: Point) -> tuple[Array, float]:
         """Gradient (m,) by y, and value, of the energy of y at the point that it is."""
+        # change of variables: energy less log det dz/dt, which is diagonal
         _, slope, bend = self._at(y)
         by_t = slope * point.gradient - bend / slope
         return self.root.T @ by_t, point.energy - float(np.sum(np.log(slope)))
@@ -181,27 +181,38 @@ def _chart(target: Target, mode: Mode) -> _Chart:
 def _quantiles(target: Target, mode: Mode, unknown: int) -> PchipInterpolator:
     """An unknown as a function of standard normal numbers, as the density beside the mode has it.
 
-    No approximation enters the draws by it: it only decides in which coordinates chains move.
+    The marginal density along the unknown is estimated on a line through the mode, along which the
+    others follow as in the normal density there (a profile); its distribution function P gives
+    z(t) = P^-1(Phi(t)), in which the unknown is standard normal: inverse transform sampling, as a
+    transport map of one unknown at a time (Parno and Marzouk 2018, doi:10.1137/17M1134640). No
+    approximation enters the draws by it: it only decides in which coordinates chains move.
     """
     top = mode.point
     assert top is not None
     sd = float(np.sqrt(mode.covariance[unknown, unknown]))
+    # where to look: near the mode in its SDs, and over all of the prior, which ends at 4
     far = np.concatenate([-sd * LOOKS, [0.0], sd * LOOKS, PRIOR_LOOKS - top.z[unknown]])
     away = np.unique(far[np.abs(far + top.z[unknown]) <= PRIOR_LOOKS[-1] + 1e-9])
+    # the others' regression on the unknown, so far as the normal density at the mode is to be
+    # believed: further out they would be led to where nothing stands
     way = mode.covariance[:, unknown] / sd**2
     points = top.z + np.clip(away, -FOLLOWED * sd, FOLLOWED * sd)[:, None] * way
     points[:, unknown] = top.z[unknown] + away
     seen = target.together([(0, point) for point in points])
     stands = np.array([one is not None for one in seen])
     energy = np.array([one.energy - top.energy for one in seen if one is not None])
+    # a grid over all that stands, and a finer one about the mode, which may be narrow
     z = points[stands, unknown]
     fine = np.linspace(z[0], z[-1], FINE)
     fine = np.unique(np.concatenate([fine, np.linspace(-6, 6, FINE) * sd + top.z[unknown]]))
     fine = fine[(fine >= z[0]) & (fine <= z[-1])]
+    # monotone cubics between the looks invent no peaks; where a look lies below the mode's energy,
+    # as beside a mode that is not the deepest, e^5 of its density is enough to go there
     density = np.exp(-np.maximum(PchipInterpolator(z, energy)(fine), -5.0))
     share = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
     share /= share[-1]
     t = np.linspace(-OUTERMOST, OUTERMOST, KNOTS)
+    # strictly rising, by a millionth of the SD: a map that stands still has no density
     rising = np.maximum.accumulate(np.interp(ndtr(t), share, fine))
     return PchipInterpolator(t, rising + 1e-6 * sd * t)
 
@@ -213,6 +224,7 @@ def _chain(
 
     def slope(y: Array) -> tuple[Array, float]:
         point = ask(chart.z(y))
+        # nothing stands there: of density zero, so that no trajectory ends there
         return (np.zeros_like(y), np.inf) if point is None else chart.density(y, point)
 
     system = EuclideanMetricSystem(
@@ -223,16 +235,12 @@ def _chain(
         *length,
         [_start(rng, len(chart.origin), slope)],
         adapters=[DualAveragingStepSizeAdapter(ACCEPTED)],
-        trace_funcs=[_position],
+        trace_funcs=[lambda state: {"pos": state.pos}],
         display_progress=False,
     )
     y = np.asarray(found.traces["pos"][0], dtype=float)
     accepted = np.asarray(found.statistics["accept_stat"][0], dtype=float)
     return np.array([chart.z(one) for one in y]), float(accepted.mean())
-
-
-def _position(state: ChainState) -> dict[str, Array]:
-    return {"pos": state.pos}
 
 
 def _start(

@@ -89,10 +89,7 @@ class AtRest:
         models : of each point, where they are not all of this one; they differ from it in numbers.
         """
         models = models or [self._model] * len(points)
-        there = [
-            with_parameters(model, self._free, x)
-            for model, (_, x) in zip(models, points, strict=True)
-        ]
+        there = _at_points(models, self._free, points)
         stack, unknowns = self._stacks.of(models, there), [self._free] * len(points)
         found = stack.solve(self._guesses(points, models, stack), why=False)
         q = np.where(np.isnan(found.q), 0.0, found.q)
@@ -121,6 +118,7 @@ class AtRest:
         nothing = np.full((len(stack.run) // len(points), stack.joints, 6), np.nan)
         guesses = []
         for model, (number, x) in zip(models, points, strict=True):
+            # the pose at its last point and how it goes on from there, no further than trusted
             known = self._last.get(number, self._first.get(id(model)))
             if known is None:
                 guesses.append(nothing)
@@ -142,6 +140,14 @@ class AtRest:
             return by_record(there, self._cases)
         ends = np.cumsum([len(case.steps) for case in self._cases[:-1]])
         return by_record(there, self._cases, np.split(first[1], ends))
+
+
+def _at_points(
+    models: Sequence[SpineModel], free: Sequence[FreeParameter], points: Sequence[tuple[int, Array]]
+) -> list[SpineModel]:
+    """Each model with its unknowns where its search's point (number, x) has them."""
+    each = zip(models, points, strict=True)
+    return [with_parameters(model, free, x) for model, (_, x) in each]
 
 
 class _Stacks:
@@ -203,10 +209,7 @@ class Settling:
         models : of each point, where they are not all of this one; they differ from it in numbers.
         """
         models = models or [self._model] * len(points)
-        bases = [
-            with_parameters(model, self._free, x)
-            for model, (_, x) in zip(models, points, strict=True)
-        ]
+        bases = _at_points(models, self._free, points)
         steps = STEP * np.eye(len(self._free))
         runs = [
             one
@@ -231,6 +234,7 @@ class Settling:
 
     def _seen(self, base: SpineModel, model: SpineModel, every: Array) -> CaseResiduals:
         """What is seen of a model, from its ends (1 + m, cases, J, 6) and the changed ones."""
+        # internal numerical differentiation: forward differences over the same steps of time
         dq = np.moveaxis((every[1:] - every[0]) / STEP, 0, -1)
         there = self._stacks.of([model], [base])
         seen, by_x = readings(there, every[0]), readings_by(there, every[0], dq, [self._free])
@@ -300,12 +304,12 @@ def on_record(
 ) -> tuple[Array, ...] | None:
     """The poses (T, n) of a stack as the engine of record has them, from the neutral pose.
 
-    See `held_against`.
+    See `compare_with_record`.
     """
-    return held_against(by_record(model, cases), model, cases, poses, same)
+    return compare_with_record(by_record(model, cases), model, cases, poses, same)
 
 
-def held_against(
+def compare_with_record(
     record: tuple[Array, ...] | str,
     model: SpineModel,
     cases: Sequence[LoadCase],

@@ -1,11 +1,12 @@
-"""How sure a fit is of each unknown: covariance, standard errors, identifiability."""
+"""How sure a fit is of each unknown: covariance, standard errors, identifiability, rank."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr
 
-from spinepipe.calibrate.problem import OF_PRIOR, Evaluation, Problem, shared_sums
+from spinepipe.calibrate.problem import OF_PRIOR, Evaluation, Evaluator, Problem, shared_sums
 from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array
 from spinepipe.units import DISPLAY_PER_SI
@@ -95,17 +96,12 @@ def uncertainty(
         covariance[np.ix_(inside, inside)] = inner
         error[inside] = np.where(known, np.sqrt(np.diagonal(inner)), np.inf)
     known = error < identifiable_below * problem.scale
-    return Uncertainty(covariance, error, known, freedom, _held_by_priors(evaluation, inside))
-
-
-def _held_by_priors(evaluation: Evaluation, inside: NDArray[np.bool_]) -> float:
-    """Trace of the priors' part of the matrix that makes fitted values of readings and priors."""
-    of_priors = evaluation.coordinate == OF_PRIOR
-    if not of_priors.any():
-        return 0.0
-    assert evaluation.jacobian is not None
-    left, _, _ = _seen(evaluation.jacobian[:, inside])
-    return float(np.sum(left[of_priors] ** 2))
+    # leverage of the priors: their part of the trace of the hat matrix, left left'
+    of_priors, by_priors = evaluation.coordinate == OF_PRIOR, 0.0
+    if of_priors.any():
+        left, _, _ = _visible(evaluation.jacobian[:, inside])
+        by_priors = float(np.sum(left[of_priors] ** 2))
+    return Uncertainty(covariance, error, known, freedom, by_priors)
 
 
 def _deviation(
@@ -126,13 +122,15 @@ def _deviation(
         return declared_deviation(problem, evaluation.coordinate, noise)
     if freedom <= 0:
         return None
-    left, _, _ = _seen(jacobian[:, inside])
-    everything = len(residual) + np.count_nonzero(evaluation.sharing >= 0)  # trace of I + S
+    # expected sum of squares in units of the scatter: trace of (I + S) less what is fitted of it,
+    # trace of left' (I + S) left
+    left, _, _ = _visible(jacobian[:, inside])
+    everything = len(residual) + np.count_nonzero(evaluation.sharing >= 0)
     fitted = np.sum(left**2) + np.sum(shared_sums(left, evaluation.sharing) ** 2)
     return np.full(len(residual), np.sqrt(residual @ residual / (everything - fitted)))
 
 
-def _seen(jacobian: Array) -> tuple[Array, Array, Array]:
+def _visible(jacobian: Array) -> tuple[Array, Array, Array]:
     """Directions that leave a trace: left vectors (N, k), singular values (k,), right (k, m)."""
     left, singular, right = svd(jacobian)
     seen = singular > RANK_TOLERANCE * max(singular.max(initial=0.0), np.finfo(float).tiny)
@@ -144,7 +142,8 @@ def _covariance(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Covariance (m, m) of the unknowns and which of them (m,) the data determine at all."""
     assert evaluation.jacobian is not None
-    left, singular, right = _seen(evaluation.jacobian[:, inside])
+    # pseudo-inverse of J times the readings' SDs: G G' + (G s)(G s)' for errors that are shared
+    left, singular, right = _visible(evaluation.jacobian[:, inside])
     gain = (right.T / singular) @ left.T * deviation
     shared = shared_sums(gain.T, evaluation.sharing)
     covariance = gain @ gain.T + shared.T @ shared
@@ -152,3 +151,50 @@ def _covariance(
     known = unseen < UNSEEN_SHARE
     covariance[~known], covariance[:, ~known] = np.inf, np.inf
     return covariance, known
+
+
+@dataclass(frozen=True)
+class Rank:
+    """What the data tell of the unknowns at the start of a fit.
+
+    Attributes
+    ----------
+    rank : number of independent combinations that are told; None where the start has no pose.
+    silent : (m,) which unknowns to leave out so that as many stay as are told, the best told ones.
+    message : why there is no rank.
+    """
+
+    rank: int | None
+    silent: tuple[bool, ...]
+    message: str = ""
+
+
+def rank_at_start(problem: Problem, noise: Array | None, told_below: float) -> Rank:
+    """The rank of the Jacobian at the start, in the noise of the readings.
+
+    A combination is told where its standard error is below ``told_below`` typical changes of an
+    unknown (of the natural logarithm of a stiffness: 1 is a factor of 2.7). Errors that zeroed
+    readings share are left out: they lower a rank nowhere but at its edge.
+
+    Parameters
+    ----------
+    noise : (6,) m and rad, SD of one reading; None: whatever leaves a trace is told.
+
+    Raises
+    ------
+    RefusedModel
+        Where nothing that was measured has a weight, or the engine refuses the model.
+    """
+    found = Evaluator(problem).at(np.zeros(len(problem.free)))
+    if found.jacobian is None:
+        return Rank(None, (False,) * len(problem.free), found.message)
+    seen = found.jacobian * problem.scale
+    if noise is None:
+        least = RANK_TOLERANCE * max(float(np.abs(seen).max(initial=0.0)), np.finfo(float).tiny)
+    else:
+        seen = seen / declared_deviation(problem, found.coordinate, noise)[:, None]
+        least = 1.0 / told_below
+    rank = int((svd(seen)[1] > least).sum())
+    order = qr(seen, mode="r", pivoting=True)[1]  # the best told first, each beside those before
+    silent = np.isin(np.arange(len(order)), order[rank:])
+    return Rank(rank, tuple(map(bool, silent)))

@@ -17,9 +17,9 @@ from spinepipe.effects.contract import (
     Parameter,
     Wrench,
 )
+from spinepipe.effects.dead_load import centres, upper_ends
 from spinepipe.effects.registry import PlaceSpread, TriedValues, register
 from spinepipe.effects.turning import turning
-from spinepipe.effects.vertebra_points import centres, upper_ends
 
 
 def _at_joints(neutral: Neutral) -> Array:

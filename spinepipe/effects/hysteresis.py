@@ -1,6 +1,5 @@
 """Hysteresis: dry friction in a joint, so that loading and unloading branches differ."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,14 +8,12 @@ from scipy.special import ndtri
 
 from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import TRIED, Advance, Array, EffectKind, JointResponse, Parameter
-from spinepipe.effects.friction import Stepped, dahl, jenkins
 from spinepipe.effects.registry import PER_JOINT, TriedValues, register
+from spinepipe.effects.rounding import ramp
 from spinepipe.facts import several
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 LAWS = ("dahl", "jenkins")
-
-_STEPS: dict[str, Callable[[Array, Array], Stepped]] = {"dahl": dahl, "jenkins": jenkins}
 
 ELEMENTS = 7
 """Of the law of Jenkins, each with the same part of the friction."""
@@ -27,6 +24,16 @@ _DEVIATES = {"dahl": np.zeros(1), "jenkins": _NORMAL / np.std(_NORMAL)}
 
 _FRICTION = several(__name__, "joint_friction")
 """N, and mm in which it yields, of a joint in shear and in compression."""
+
+
+ROUNDING = 1e-4
+"""Share of the yield over which the corner at the start of a step is rounded."""
+
+CORNER = 0.05
+"""Share of what is left to yield over which an elastic-plastic element's corner is rounded."""
+
+_NONE_LEFT = 1e-12
+"""An element with less left to yield has yielded."""
 
 
 @register("hysteresis")
@@ -108,8 +115,8 @@ class Hysteresis:
         """Load (J, 6) and tangent (J, 6, 6); state is q0 and all h0 of each joint."""
         at, step = self._at, self._step(q, parameters, state)
         load, tangent = np.zeros_like(q), np.zeros((*q.shape, 6))
-        load[:, at] = parameters[:, 0] * step.mean.h
-        tangent[:, at, at] = parameters[:, 0] * step.mean.by_motion
+        load[:, at] = parameters[:, 0] * step.h
+        tangent[:, at, at] = parameters[:, 0] * step.by_motion
         return JointResponse(load, tangent)
 
     def by_parameter_on_path(
@@ -118,7 +125,7 @@ class Hysteresis:
         """(J, 6, P): the friction itself, and its slopes by the yield and the spread."""
         step, strength = self._step(q, parameters, state), parameters[:, :1]
         derivative = np.zeros((*q.shape, parameters.shape[1]))
-        derivative[:, self._at, 0] = step.mean.h
+        derivative[:, self._at, 0] = step.h
         derivative[:, self._at, 1:] = strength * step.by_shapes.mean(axis=1)
         return derivative
 
@@ -128,7 +135,7 @@ class Hysteresis:
         """(J, 6, S): by where the step started and by the friction there."""
         step, strength = self._step(q, parameters, state), parameters[:, :1]
         derivative = np.zeros((*q.shape, self.n_states))
-        derivative[:, self._at, 0] = -parameters[:, 0] * step.mean.by_motion
+        derivative[:, self._at, 0] = -parameters[:, 0] * step.by_motion
         derivative[:, self._at, 1:] = strength * step.own.by_start / step.own.h.shape[1]
         return derivative
 
@@ -162,9 +169,8 @@ class Hysteresis:
         spread = parameters[:, 2:] if self.law == "jenkins" else 0.0
         yields = parameters[:, 1:2] * np.exp(spread * deviates)
         x = (q[:, self._at, None] - state[:, :1]) / yields
-        return _SliderStep(
-            _STEPS[self.law](state[:, 1:], x), x, yields, parameters[:, 1:2], deviates
-        )
+        law = jenkins if self.law == "jenkins" else dahl
+        return _SliderStep(law(state[:, 1:], x), x, yields, parameters[:, 1:2], deviates)
 
 
 _SPREAD = Parameter(
@@ -182,27 +188,82 @@ _SPREAD = Parameter(
 
 
 @dataclass(frozen=True)
-class _Mean:
-    """Mean of the elements' h (J,), and its derivative by the motion."""
+class ElementStep:
+    """Shares h (J, N), from -1 to 1, of N elements of J joints, and derivatives by x and by h0.
+
+    An element knows h0, at which the step began, and x, how far the joint has moved since over the
+    element's own yield. Its step is closed: how finely a way is cut into steps changes little.
+    """
 
     h: Array
-    by_motion: Array
+    by_x: Array
+    by_start: Array
+
+
+def dahl(start: Array, x: Array) -> ElementStep:
+    """``h = s - (s - h0) exp(-|x|)`` with s = sign(x), its corner at x = 0 rounded."""
+    rounded = np.hypot(x, ROUNDING)
+    kept = np.exp(ROUNDING - rounded)
+    h = start * kept - np.sign(x) * np.expm1(-np.abs(x))
+    return ElementStep(h, np.exp(-np.abs(x)) - start * kept * x / rounded, kept)
+
+
+def jenkins(start: Array, x: Array) -> ElementStep:
+    """``h = h0 + x`` within ±1: a spring in line with a slider.
+
+    An element that has yielded has another slope on each side of x = 0. There ``min(x, 0)`` is
+    rounded to ``(x - sqrt(x^2 + e^2) + e) / 2``, e = `ROUNDING`; h may pass 1 by half of that.
+    """
+    up, down = 1.0 - start, 1.0 + start
+    no_more_up, no_more_down = up < _NONE_LEFT, down < _NONE_LEFT
+    rounded = np.hypot(x, ROUNDING)
+    size, slope = rounded - ROUNDING, x / rounded
+    rising = _room(
+        np.where(no_more_down, 0.5 * (size + x), np.maximum(x, 0.0)),
+        np.where(no_more_down, 0.5 * (slope + 1.0), x >= 0.0),
+        np.where(no_more_up, 0.0, up),
+    )
+    falling = _room(
+        np.where(no_more_up, 0.5 * (size - x), np.maximum(-x, 0.0)),
+        np.where(no_more_up, 0.5 * (1.0 - slope), x < 0.0),
+        np.where(no_more_down, 0.0, down),
+    )
+    return ElementStep(
+        start + rising[0] - falling[0],
+        rising[1] + falling[1],
+        1.0 - rising[2] - falling[2],
+    )
+
+
+def _room(x: Array, by_x: Array, room: Array) -> tuple[Array, Array, Array]:
+    """``min(x, room)``, rounded, its derivative by the motion, and by the room."""
+    left = room > 0.0
+    t = np.where(left, x / np.where(left, room, 1.0), 2.0)
+    over, slope = ramp(t - 1.0, CORNER)
+    share, kept = t - over, 1.0 - slope
+    by_room = np.where(left, share - t * kept, x > 0.0)
+    return np.where(left, room * share, 0.0), np.where(left, kept * by_x, 0.0), by_room
 
 
 @dataclass(frozen=True)
 class _SliderStep:
     """Elements (J, N) after a step; x is how far they were moved over their yields."""
 
-    own: Stepped
+    own: ElementStep
     x: Array
     yields: Array
     middle: Array
     deviates: Array
 
     @property
-    def mean(self) -> _Mean:
-        """What all of them hold together."""
-        return _Mean(self.own.h.mean(axis=1), (self.own.by_x / self.yields).mean(axis=1))
+    def h(self) -> Array:
+        """(J,) what all of them hold together, their mean."""
+        return np.asarray(self.own.h.mean(axis=1))
+
+    @property
+    def by_motion(self) -> Array:
+        """(J,) its derivative by the motion."""
+        return np.asarray((self.own.by_x / self.yields).mean(axis=1))
 
     @property
     def by_shapes(self) -> Array:

@@ -7,9 +7,8 @@ import numpy as np
 
 from spinepipe.effects.carried_share import require
 from spinepipe.effects.contract import Array, EffectKind, Indices, Neutral, Parameter
-from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
+from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes, centres
 from spinepipe.effects.registry import PlaceSpread, TriedValues, register
-from spinepipe.effects.vertebra_points import centres
 from spinepipe.units import TRANSLATIONS
 
 TYPICAL_NM, LARGEST_NM = 0.3, 10.0

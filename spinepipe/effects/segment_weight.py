@@ -6,9 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from spinepipe.effects.contract import Array, EffectKind, Indices, Neutral, Parameter
-from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes
+from spinepipe.effects.dead_load import DeadLoad, Wrenches, WrenchSlopes, centres
 from spinepipe.effects.registry import PlaceSpread, TriedValues, register
-from spinepipe.effects.vertebra_points import centres
 from spinepipe.units import STANDARD_GRAVITY
 
 WHERE = ("each", "top")

@@ -11,7 +11,7 @@ further derivatives follow from these two by the product rule.
 import numpy as np
 
 from spinepipe.effects.contract import Array, Parameter, Placement, PlacementByParameter
-from spinepipe.effects.turning import angles_by_angles, divided, turning
+from spinepipe.effects.turning import angles_by_angles, solve_axes, turning
 from spinepipe.frames import zxy_angles
 
 LARGEST_TILT_RAD = 0.5
@@ -55,8 +55,8 @@ def tilted_by_tilt(q: Array, tilts: Array) -> PlacementByParameter:
     true, tilt = turning(q[:, 3:]), turning(tilts)
     back = tilt.rotation.swapaxes(-1, -2)
     seen = turning(zxy_angles(back @ true.rotation @ tilt.rotation))
-    by_angle = divided(seen.axes, back @ true.axes)
-    by_tilt = divided(seen.axes, back @ (true.rotation - np.eye(3)) @ tilt.axes)
+    by_angle = solve_axes(seen.axes, back @ true.axes)
+    by_tilt = solve_axes(seen.axes, back @ (true.rotation - np.eye(3)) @ tilt.axes)
     back_by_tilt = tilt.first.swapaxes(-1, -2)
     moved = np.einsum("jpxy,jya->jxap", back_by_tilt, true.axes)
     moved -= np.einsum("jxkl,jlp,jka->jxap", seen.axes_by_angle, by_tilt, by_angle)
@@ -64,5 +64,5 @@ def tilted_by_tilt(q: Array, tilts: Array) -> PlacementByParameter:
     by_q[:, :3] = np.einsum("jpxy,jy->jxp", back_by_tilt, q[:, :3])
     by_q[:, 3:] = by_tilt
     first[:, :3, :3] = back_by_tilt.transpose(0, 2, 3, 1)
-    first[:, 3:, 3:] = divided(seen.axes, moved)
+    first[:, 3:, 3:] = solve_axes(seen.axes, moved)
     return PlacementByParameter(by_q, first)

@@ -82,12 +82,12 @@ def angles_by_angles(seen: Turning, axes: Array, axes_by_angle: Array) -> tuple[
     The others make the same motion by turning about ``axes`` (J, 3, 3). Both give one angular
     velocity, ``E(seen) d(seen) = axes d(others)``; its derivative gives the second.
     """
-    first = divided(seen.axes, axes)
+    first = solve_axes(seen.axes, axes)
     moved = axes_by_angle - np.einsum("jxkl,jlb,jka->jxab", seen.axes_by_angle, first, first)
-    return first, divided(seen.axes, moved)
+    return first, solve_axes(seen.axes, moved)
 
 
-def divided(axes: Array, by: Array) -> Array:
+def solve_axes(axes: Array, by: Array) -> Array:
     """(J, 3, …) the inverse of axes (J, 3, 3) times each column of (J, 3, …)."""
     columns = by.reshape(*by.shape[:2], -1)
     return np.array(np.linalg.solve(axes, columns), dtype=float).reshape(by.shape)

@@ -1,8 +1,7 @@
 """Statics: equilibria of a spine model, their stability and sensitivities, and settling in time."""
 
 from spinepipe.statics.equilibrium import Equilibrium
-from spinepipe.statics.path import SolvedStep, follow
-from spinepipe.statics.reactions import reaction, reactions_by
+from spinepipe.statics.path import SolvedStep, follow, reaction
 from spinepipe.statics.sensitivity import (
     FreeParameter,
     by_parameters,
@@ -10,6 +9,7 @@ from spinepipe.statics.sensitivity import (
     free_parameters,
     observe,
     observed_by_parameters,
+    reactions_by,
     with_parameters,
 )
 from spinepipe.statics.system import Balance, Loading, Slots, System

@@ -170,7 +170,7 @@ def solve(
         after = loading_to if target == 1.0 else loading_from.towards(loading_to, target)
         result = newton(system, q if start is None else start, after, states)
         iterations += result.iterations
-        verdict = certified(system, q, before, after, states, result, start is not None)
+        verdict = certify(system, q, before, after, states, result, start is not None)
         if verdict is not None:
             q, before, reached, increment = result.q, after, target, 2.0 * increment
             if reached == 1.0:
@@ -192,7 +192,7 @@ def solve(
         start = None
 
 
-def certified(
+def certify(
     system: System,
     origin: Array,
     before: Loading,
@@ -207,12 +207,14 @@ def certified(
     ----------
     origin : (n,) equilibrium under ``before``. guessed : whether Newton did not start there.
     """
+    # 1: the end is stable
     if not (result.arrived and result.within_motion):
         return None
     assert result.factored is not None
     verdict = stability(system.chain, result.q, result.tangent, result.factored.sign, system.free)
     if not verdict.stable:
         return None
+    # 2: the tangent is positive at the origin under the load after the step
     begin, first, tangent = system.start(origin, after), result.first, result.at_start
     if guessed:
         balance = system.balance(begin, after, states)
@@ -223,6 +225,7 @@ def certified(
             return None
     if not stands(system, tangent):
         return None
+    # 3: in between under both loads, and at the end under the load before
     effects = [active.effect for active in (*system.laws, *system.geometry)]
     spacing = np.array([min([SPACING, *map(straight_over, effects)])])
     begun, ended, told = (one.reshape(1, -1, 6) for one in (begin, result.q, first))
@@ -310,6 +313,7 @@ def _lost(
         factored = factor(system.balance(q, before, states).tangent)
     except SingularTangent:
         return f"tips over or snaps under the load of step {step}: it loses stability"
+    # inverse iteration for the right and the left null vector of the tangent, from any start
     motion, work = np.random.default_rng(0).normal(size=(2, len(q)))
     for _ in range(8):
         motion, work = factored.solve(motion), factored.solve(work, transposed=True)
@@ -341,6 +345,7 @@ def newton(system: System, start: Array, loading: Loading, states: States) -> Ne
     for iteration in range(1, MOST_ITERATIONS + 1):
         balance = system.balance(q, loading, states)
         work = float(balance.residual @ step)
+        # line search: the work along the last step was -drive at its start and is this at its end
         if not work <= OVERSHOT * drive:
             if drive <= 0.0:
                 break
@@ -437,6 +442,7 @@ def decays(mass: Array, stiffness: Array) -> bool:
     if not mass.any():
         return float(eigvals(stiffness).real.min()) > 0.0
     identity, nothing = np.eye(n), np.zeros((n, n))
+    # first-order form, b d/dt (x, x') = a (x, x'): M may be singular, so that it is not inverted
     a = np.block([[nothing, identity], [-stiffness, -identity]])
     b = np.block([[identity, nothing], [nothing, mass]])
     rates, size = eigvals(a, b), float(np.linalg.norm(stiffness))

@@ -6,13 +6,12 @@ derivatives of earlier laws pass through later ones.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from spinepipe.effects import Advance, JointLaw, JointResponse, PathLaw
-from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.joint_kinematics import JointKinematics
+from spinepipe.effects.contract import Array
+from spinepipe.statics.joint_kinematics import Active, JointKinematics
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class States:
     of: Mapping[int, Array]
     seconds: float | Mapping[int, Array] = 0.0
 
-    def lasting(self, law: int) -> float | Array:
+    def step_seconds(self, law: int) -> float | Array:
         """Duration of the step, for a path law; of each of its joints where these differ."""
         return self.seconds[law] if isinstance(self.seconds, Mapping) else self.seconds
 
@@ -37,29 +36,9 @@ class States:
 NO_STATES = States({})
 
 
-class _OnJoints:
-    """What acts on some joints."""
-
-    joints: Indices
-
-    @cached_property
-    def rows(self) -> Indices | slice:
-        """Its joints; as a slice where they follow each other, so that no row is copied."""
-        joints = self.joints
-        if len(joints) and (np.diff(joints) == 1).all():
-            return slice(int(joints[0]), int(joints[-1]) + 1)
-        return joints
-
-
 @dataclass(frozen=True)
-class ActiveLaw(_OnJoints):
-    """A joint law at work: its place in the model's effects, its joints and values."""
-
-    effect: JointLaw
-    index: int
-    joints: Indices
-    values: Array
-    per_joint: bool
+class ActiveLaw(Active[JointLaw]):
+    """A joint law at work."""
 
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
@@ -71,37 +50,31 @@ class ActiveLaw(_OnJoints):
 
 
 @dataclass(frozen=True)
-class ActivePath(_OnJoints):
+class ActivePath(Active[PathLaw]):
     """A path law at work; it responds with the state that the last load step left."""
-
-    effect: PathLaw
-    index: int
-    joints: Indices
-    values: Array
-    per_joint: bool
 
     def respond(self, q: Array, carried: Array, states: States) -> JointResponse:
         """Response of the joints in scope."""
         return self.effect.respond_on_path(
-            q, self.values, states.of[self.index], states.lasting(self.index), carried
+            q, self.values, states.of[self.index], states.step_seconds(self.index), carried
         )
 
     def by_parameter(self, q: Array, carried: Array, states: States) -> Array:
         """(J, 6, P) derivative by the parameters of each joint in scope."""
         return self.effect.by_parameter_on_path(
-            q, self.values, states.of[self.index], states.lasting(self.index), carried
+            q, self.values, states.of[self.index], states.step_seconds(self.index), carried
         )
 
     def by_state(self, q: Array, carried: Array, states: States) -> Array:
         """(J, 6, S) derivative by the state of each joint in scope."""
         return self.effect.by_state(
-            q, self.values, states.of[self.index], states.lasting(self.index), carried
+            q, self.values, states.of[self.index], states.step_seconds(self.index), carried
         )
 
     def advance(self, q: Array, carried: Array, states: States) -> Advance:
         """State of the joints in scope after a step that ended at q (J, 6)."""
         return self.effect.advance(
-            q, self.values, states.of[self.index], states.lasting(self.index), carried
+            q, self.values, states.of[self.index], states.step_seconds(self.index), carried
         )
 
 
@@ -109,7 +82,7 @@ Law = ActiveLaw | ActivePath
 
 
 @dataclass(frozen=True)
-class Holding:
+class JointForces:
     """Generalised load (J, 6) that holds the joints and its tangent blocks (J, 6, 6)."""
 
     load: Array
@@ -117,23 +90,24 @@ class Holding:
 
 
 def assemble_joint_forces(
-    placed: JointKinematics, laws: Sequence[Law], states: States, moved: bool
-) -> Holding:
+    kinematics: JointKinematics, laws: Sequence[Law], states: States, moved: bool
+) -> JointForces:
     """Sum of the laws, pulled back to the joints' own coordinates where geometry moved them."""
-    load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
+    load, tangent = np.zeros_like(kinematics.q), np.zeros((*kinematics.q.shape, 6))
     for law in laws:
         j = law.rows
-        response = law.respond(placed.q[j], load[j], states)
-        if response.by_carried is not None:
+        response = law.respond(kinematics.q[j], load[j], states)
+        if response.by_carried is not None:  # by the chain rule, of what those before it hold
             tangent[j] += response.by_carried @ tangent[j]
         tangent[j] += response.tangent
         load[j] += response.load
     if not moved:
-        return Holding(load, tangent)
-    first = placed.by_coordinate
+        return JointForces(load, tangent)
+    # virtual work: with s(q) what the laws see, the load is s' F, its slope s' K s' + s'' F
+    first = kinematics.by_coordinate
     pulled = np.einsum("jka,jk->ja", first, load)
     stiff = np.einsum("jka,jkl,jlb->jab", first, tangent, first)
-    return Holding(pulled, stiff + np.einsum("jk,jkab->jab", load, placed.by_coordinates))
+    return JointForces(pulled, stiff + np.einsum("jk,jkab->jab", load, kinematics.by_coordinates))
 
 
 def states_after(q: Array, laws: Sequence[Law], states: States) -> dict[int, Advance]:
@@ -148,7 +122,7 @@ def states_after(q: Array, laws: Sequence[Law], states: States) -> dict[int, Adv
 
 
 @dataclass(frozen=True)
-class HoldingDerivatives:
+class JointForceDerivatives:
     """Derivatives of the holding load at fixed coordinates.
 
     Attributes
@@ -160,18 +134,20 @@ class HoldingDerivatives:
     by_state: dict[int, Array]
 
 
-def differentiate(
-    placed: JointKinematics, laws: Sequence[Law], states: States
-) -> HoldingDerivatives:
+def differentiate_joint_forces(
+    kinematics: JointKinematics, laws: Sequence[Law], states: States
+) -> JointForceDerivatives:
     """Derivatives by every parameter and internal state, geometry effects included."""
-    load, tangent = np.zeros_like(placed.q), np.zeros((*placed.q.shape, 6))
+    load, tangent = np.zeros_like(kinematics.q), np.zeros((*kinematics.q.shape, 6))
     by_parameter: dict[int, Array] = {}
     by_state: dict[int, Array] = {}
     for law in laws:
-        j, here, carried = law.joints, placed.q[law.joints], load[law.joints]
+        j, here, carried = law.joints, kinematics.q[law.joints], load[law.joints]
         response = law.respond(here, carried, states)
         if response.by_carried is not None:
-            _pass_on(by_parameter, by_state, j, response.by_carried)
+            # earlier laws' derivatives also act through one that reads the carried load
+            for earlier in (*by_parameter.values(), *by_state.values()):
+                earlier[j] += np.einsum("jkl,jlrp->jkrp", response.by_carried, earlier[j])
             tangent[j] += response.by_carried @ tangent[j]
         own = _spread(law, law.by_parameter(here, carried, states), len(load))
         by_parameter[law.index] = own if law.per_joint else own.sum(axis=2, keepdims=True)
@@ -180,23 +156,14 @@ def differentiate(
             by_state[law.index] = _spread(law, own, len(load))
         tangent[j] += response.tangent
         load[j] += response.load
-    pull = placed.by_coordinate
+    pull = kinematics.by_coordinate
     by_parameter = {i: np.einsum("jka,jkrp->jarp", pull, d) for i, d in by_parameter.items()}
     by_state = {i: np.einsum("jka,jkrp->jarp", pull, d) for i, d in by_state.items()}
-    for index, (dq, dfirst) in placed.by_parameter.items():
+    for index, (dq, dfirst) in kinematics.by_parameter.items():
         by_parameter[index] = np.einsum("jkarp,jk->jarp", dfirst, load) + np.einsum(
             "jka,jkl,jlrp->jarp", pull, tangent, dq
         )
-    return HoldingDerivatives(by_parameter, by_state)
-
-
-def _pass_on(
-    by_parameter: dict[int, Array], by_state: dict[int, Array], joints: Indices, by_carried: Array
-) -> None:
-    """Earlier laws' derivatives also act through a later law that reads the carried load."""
-    for derivatives in (by_parameter, by_state):
-        for derivative in derivatives.values():
-            derivative[joints] += np.einsum("jkl,jlrp->jkrp", by_carried, derivative[joints])
+    return JointForceDerivatives(by_parameter, by_state)
 
 
 def _spread(law: Law, own: Array, n_joints: int) -> Array:

@@ -13,7 +13,7 @@ from spinepipe.model import LoadCase
 Instrument = MeasurementEffect | MeasurementBeside
 
 
-def passed(case: LoadCase) -> Array:
+def share_passed(case: LoadCase) -> Array:
     """(T,) share of a test that has passed at each load step: of its time, else of its steps."""
     clock, times = 0.0, []
     for step in case.steps:
@@ -26,7 +26,7 @@ def passed(case: LoadCase) -> Array:
     return found
 
 
-def beside(motion: Array, passed_at: Array | float) -> MeasurementContext:
+def measurement_context(motion: Array, passed_at: Array | float) -> MeasurementContext:
     """What stands beside every joint of lanes, of motion (..., J, 6); flat, (N J, 6) and (N J,).
 
     Parameters
@@ -63,7 +63,7 @@ def read_by(
     return effect.by_parameter_beside(q, values, _known(effect, around))
 
 
-def followed(seen: Observation, by_x: Array, around: tuple[Array, Array] | None) -> Array:
+def reading_derivative(seen: Observation, by_x: Array, around: tuple[Array, Array] | None) -> Array:
     """(K, 6, m) what is reported by unknowns, from what those do to the true motion.
 
     Parameters

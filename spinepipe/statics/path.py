@@ -69,18 +69,26 @@ def follow(system: System, guesses: list[Array] | None = None) -> list[SolvedSte
             continue
         guess = None if guesses is None else guesses[number]
         equilibrium = solve(system, q, before, loading, states, guess, step.step)
-        advances = _advance(system, equilibrium.q, states)
+        # path states after the step, at the coordinates that the laws see
+        advances: dict[int, Advance] = {}
+        if system.paths:
+            joints = equilibrium.q.reshape(-1, 6)
+            if system.geometry:
+                joints = system.joint_kinematics(equilibrium.q, by_parameters=False).q
+            advances = states_after(joints, system.laws, states)
         solved.append(SolvedStep(step, loading, equilibrium, states, advances))
         q, before = equilibrium.q, loading
         states = States({index: advance.state for index, advance in advances.items()})
     return solved
 
 
-def _advance(system: System, q: Array, states: States) -> dict[int, Advance]:
-    """States after a step that ended at q (n,)."""
-    if not system.paths:
-        return {}
-    joints = q.reshape(-1, 6)
-    if system.geometry:
-        joints = system.placed(q, by_parameters=False).q
-    return states_after(joints, system.laws, states)
+def reaction(system: System, step: SolvedStep) -> Array:
+    """(n,) load of the rig on each coordinate that it fixes, zero on the others.
+
+    Positive in the direction of its coordinate: N on a translation, N m on a rotation. The listed
+    loads act besides: where the rig's load was measured and is listed, the true model leaves none.
+    """
+    found = np.zeros(system.chain.n)
+    balance = system.unsupported(step.equilibrium.q, step.loading, step.states)
+    found[system.fixed] = balance.residual[system.fixed]
+    return found

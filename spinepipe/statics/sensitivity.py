@@ -14,9 +14,17 @@ from spinepipe.effects import Parameter
 from spinepipe.effects.contract import Array, MeasurementContext
 from spinepipe.model import SpineModel
 from spinepipe.statics.joint_forces import ActivePath, Law
-from spinepipe.statics.measurement_model import beside, followed, passed, read, read_by
+from spinepipe.statics.joint_kinematics import Active
+from spinepipe.statics.measurement_model import (
+    Instrument,
+    measurement_context,
+    read,
+    read_by,
+    reading_derivative,
+    share_passed,
+)
 from spinepipe.statics.path import SolvedStep
-from spinepipe.statics.system import ActiveMeasurement, System
+from spinepipe.statics.system import System
 
 
 @dataclass(frozen=True)
@@ -117,22 +125,31 @@ def step_by_step(
     starts = system.initial_states().of
     state_by_x = {index: np.zeros((*s.shape, len(free))) for index, s in starts.items()}
     for step in solved:
-        residual = residual_by_parameters(system, step, free, state_by_x)
+        residual = unsupported_by_parameters(system, step, free, state_by_x)
+        residual[system.fixed] = 0.0  # a coordinate that a rig fixes stays, whatever is missing
         dq = -step.factored.solve(residual)
         yield step, dq, state_by_x
         state_by_x = _advance(system, step, free, dq, state_by_x)
 
 
-def residual_by_parameters(
-    system: System,
-    step: SolvedStep,
-    free: Sequence[FreeParameter],
-    state_by_x: dict[int, Array],
-) -> Array:
-    """(n, m) derivative of the residual at fixed pose; zero where a rig fixes a coordinate."""
-    columns = unsupported_by_parameters(system, step, free, state_by_x)
-    columns[system.fixed] = 0.0
-    return columns
+def reactions_by(
+    system: System, solved: Sequence[SolvedStep], free: Sequence[FreeParameter]
+) -> list[Array]:
+    """(n, m) derivative of each step's reaction by the m unknowns.
+
+    Raises
+    ------
+    ValueError
+        When a step has no equilibrium.
+    """
+    result = []
+    for step, dq, state_by_x in step_by_step(system, solved, free):
+        found = np.zeros(dq.shape)
+        tangent = system.unsupported(step.equilibrium.q, step.loading, step.states).tangent
+        own = unsupported_by_parameters(system, step, free, state_by_x)
+        found[system.fixed] = (own + tangent @ dq)[system.fixed]
+        result.append(found)
+    return result
 
 
 def unsupported_by_parameters(
@@ -144,6 +161,7 @@ def unsupported_by_parameters(
     """(n, m) derivative, at fixed pose, of what the joints hold less what is applied."""
     q = step.equilibrium.q
     derivatives = system.derivatives(q, step.states)
+    # derivative by every parameter of every effect, (n, R, P) of each; unknowns pick from them
     table = {
         i: d.reshape(system.chain.n, *d.shape[2:]) for i, d in derivatives.by_parameter.items()
     }
@@ -171,12 +189,12 @@ def _advance(
     """Derivatives of the states after the step: by pose, parameter, earlier state and carried."""
     if not step.advances:
         return {}
-    placed = system.placed(step.equilibrium.q, by_parameters=True)
+    kinematics = system.joint_kinematics(step.equilibrium.q, by_parameters=True)
     joints_by_x = np.einsum(
-        "jab,jbm->jam", placed.by_coordinate, dq.reshape(len(dq) // 6, 6, len(free))
+        "jab,jbm->jam", kinematics.by_coordinate, dq.reshape(len(dq) // 6, 6, len(free))
     )
-    joints_by_x += _placement_by_x(system, placed.by_parameter, free)
-    carried_by_x = _carried(system, step, free, placed.q, joints_by_x, state_by_x)
+    joints_by_x += _kinematics_by_x(system, kinematics.by_parameter, free)
+    carried_by_x = _carried(system, step, free, kinematics.q, joints_by_x, state_by_x)
     following = {}
     for law in system.paths:
         after = step.advances[law.index]
@@ -226,7 +244,7 @@ def _add_own(by_x: Array, by_parameter: Array, law: Law, free: Sequence[FreePara
             by_x[rows, :, column] += own * parameter.derivative(law.values)[:, None]
 
 
-def _placement_by_x(
+def _kinematics_by_x(
     system: System, by_parameter: dict[int, tuple[Array, Array]], free: Sequence[FreeParameter]
 ) -> Array:
     """(J, 6, m) derivative of the coordinates seen by the laws by geometry parameters."""
@@ -260,12 +278,12 @@ def observe(system: System, q: Array, place: int | None = None) -> Array:
 
 
 def _beside(
-    system: System, active: ActiveMeasurement, joints: Array, place: int | None
+    system: System, active: Active[Instrument], joints: Array, place: int | None
 ) -> MeasurementContext | None:
     """What stands beside the joints in scope (J, 6); None where no load step is told."""
     if place is None:
         return None
-    every = beside(joints, passed(system.case)[place])
+    every = measurement_context(joints, share_passed(system.case)[place])
     at = active.joints
     return MeasurementContext(every.above[at], every.below[at], every.passed[at])
 
@@ -283,7 +301,7 @@ def observed_by_parameters(
         neighbours = np.zeros((2, len(joints), *by_x.shape[1:]))
         neighbours[0, :-1], neighbours[1, 1:] = by_x[1:], by_x[:-1]
         above, below = neighbours[:, active.joints]
-        by_x[active.joints] = followed(seen, by_x[active.joints], (above, below))
+        by_x[active.joints] = reading_derivative(seen, by_x[active.joints], (above, below))
         for column, parameter in enumerate(free):
             if parameter.effect == active.index:
                 rows = _joints_moved(parameter, active.per_joint)

@@ -7,7 +7,7 @@ load that takes; that load, the reaction, is what its balance misses then.
 
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -25,14 +25,14 @@ from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics.joint_forces import (
     ActiveLaw,
     ActivePath,
-    Holding,
-    HoldingDerivatives,
+    JointForceDerivatives,
+    JointForces,
     Law,
     States,
     assemble_joint_forces,
+    differentiate_joint_forces,
 )
-from spinepipe.statics.joint_forces import differentiate as differentiate_holding
-from spinepipe.statics.joint_kinematics import ActiveGeometry, JointKinematics, place
+from spinepipe.statics.joint_kinematics import Active, JointKinematics, place
 from spinepipe.statics.measurement_model import Instrument
 from spinepipe.statics.motion import ChainMotion, cross_matrix, dead_tangent
 from spinepipe.world import Chain
@@ -118,28 +118,6 @@ class Balance:
     tangent: Array
 
 
-@dataclass(frozen=True)
-class ActiveLoad:
-    """A load effect at work: its place in the model's effects, its joints and values."""
-
-    effect: LoadEffect
-    index: int
-    joints: Indices
-    values: Array
-    per_joint: bool
-
-
-@dataclass(frozen=True)
-class ActiveMeasurement:
-    """A measurement effect at work: its place in the model's effects, its joints and values."""
-
-    effect: Instrument
-    index: int
-    joints: Indices
-    values: Array
-    per_joint: bool
-
-
 class System:
     """Effects of a model that are in scope of a case, on a loaded chain."""
 
@@ -147,14 +125,17 @@ class System:
         self.chain, self.model, self.case = chain, model, case
         self.slots = Slots.of(case)
         self.local_points = [chain.local_point(b, np.array(p)) for b, p in self.slots.places]
-        self.geometry: list[ActiveGeometry] = []
+        self.geometry: list[Active[GeometryEffect]] = []
         self.laws: list[Law] = []
-        self.load_effects: list[ActiveLoad] = []
-        self.measurement: list[ActiveMeasurement] = []
+        self.load_effects: list[Active[LoadEffect]] = []
+        self.measurement: list[Active[Instrument]] = []
         for index, scoped in enumerate(model.effects):
             if scoped.in_scope(case.test):
                 self._activate(index, scoped)
-        self._blocks = _block_indices(model.n_joints)
+        # (J, 6, 6) rows and columns of the diagonal blocks of an (n, n) matrix
+        at = np.arange(6 * model.n_joints).reshape(-1, 6)
+        shape = (model.n_joints, 6, 6)
+        self._blocks = np.broadcast_to(at[:, :, None], shape), np.broadcast_to(at[:, None], shape)
         self._heavy = bool(np.any(model.gravity))
         self.fixed: Indices = np.array(case.fixed, dtype=np.int64)
 
@@ -167,11 +148,11 @@ class System:
             case EffectKind.PATH:
                 self.laws.append(ActivePath(cast(PathLaw, effect), *shared))
             case EffectKind.GEOMETRY:
-                self.geometry.append(ActiveGeometry(cast(GeometryEffect, effect), *shared))
+                self.geometry.append(Active(cast(GeometryEffect, effect), *shared))
             case EffectKind.LOAD:
-                self.load_effects.append(ActiveLoad(cast(LoadEffect, effect), *shared))
+                self.load_effects.append(Active(cast(LoadEffect, effect), *shared))
             case EffectKind.MEASUREMENT:
-                self.measurement.append(ActiveMeasurement(cast(Instrument, effect), *shared))
+                self.measurement.append(Active(cast(Instrument, effect), *shared))
             case _:
                 raise TypeError(f"{effect.name}: {effect.kind!r} is not a kind of effect")
 
@@ -235,22 +216,22 @@ class System:
     def unsupported(self, q: Array, loading: Loading, states: States) -> Balance:
         """Residual and tangent at q (n,) without any support: what supports hold is missing."""
         motion = ChainMotion(self.chain, q)
-        holding = self._hold(q, states)
+        held = self._joint_forces(q, states)
         applied, tangent = self._apply(motion, loading)
         stiffness = -tangent
-        stiffness[self._blocks] += holding.tangent
-        return Balance(holding.load.ravel() - applied, stiffness)
+        stiffness[self._blocks] += held.tangent
+        return Balance(held.load.ravel() - applied, stiffness)
 
-    def placed(self, q: Array, by_parameters: bool) -> JointKinematics:
+    def joint_kinematics(self, q: Array, by_parameters: bool) -> JointKinematics:
         """Coordinates seen by the laws at q (n,)."""
         return place(q.reshape(-1, 6), self.geometry, by_parameters)
 
-    def _hold(self, q: Array, states: States) -> Holding:
+    def _joint_forces(self, q: Array, states: States) -> JointForces:
         if not self.geometry:
-            unmoved = JointKinematics(q.reshape(-1, 6), _NOTHING, _NOTHING, {})
+            unmoved = JointKinematics.unmoved(q.reshape(-1, 6))
             return assemble_joint_forces(unmoved, self.laws, states, moved=False)
         return assemble_joint_forces(
-            self.placed(q, by_parameters=False), self.laws, states, moved=True
+            self.joint_kinematics(q, by_parameters=False), self.laws, states, moved=True
         )
 
     def residual(self, q: Array, loading: Loading, states: States) -> Array:
@@ -269,7 +250,7 @@ class System:
         applied = self._wrenches(motion, loading, self._slot_velocities(motion, loading))
         for active in self.load_effects:
             applied += loading.share * self._effect(active, motion, loading).load
-        return self._hold(q, states).load.ravel() - applied
+        return self._joint_forces(q, states).load.ravel() - applied
 
     def _slot_velocities(self, motion: ChainMotion, loading: Loading) -> list[Array | None]:
         """(n, 3) velocities of the slots that carry a force, None for the others."""
@@ -328,16 +309,20 @@ class System:
                 moments += angular @ (angular @ cross_matrix(moment).T).T
         return dead_tangent(forces, moments)
 
-    def _effect(self, active: ActiveLoad, motion: ChainMotion, loading: Loading) -> AppliedLoad:
+    def _effect(
+        self, active: Active[LoadEffect], motion: ChainMotion, loading: Loading
+    ) -> AppliedLoad:
         return active.effect.apply(
             motion, self.slots.wrenches(loading), active.joints, active.values
         )
 
-    def derivatives(self, q: Array, states: States) -> HoldingDerivatives:
-        """Derivatives of the holding loads by all parameters and states, at fixed q (n,)."""
-        return differentiate_holding(self.placed(q, by_parameters=True), self.laws, states)
+    def derivatives(self, q: Array, states: States) -> JointForceDerivatives:
+        """Derivatives of the held loads by all parameters and states, at fixed q (n,)."""
+        return differentiate_joint_forces(
+            self.joint_kinematics(q, by_parameters=True), self.laws, states
+        )
 
-    def load_derivative(self, q: Array, loading: Loading, active: ActiveLoad) -> Array:
+    def load_derivative(self, q: Array, loading: Loading, active: Active[LoadEffect]) -> Array:
         """(n, R, P) derivative of the residual by a load effect's parameters."""
         motion = ChainMotion(self.chain, q)
         wrenches = self.slots.wrenches(loading)
@@ -347,19 +332,9 @@ class System:
         return -loading.share * by_parameter
 
 
-_NOTHING = np.empty(0)
-
-Active = TypeVar("Active", bound=ActiveGeometry | Law | ActiveLoad | ActiveMeasurement)
+A = TypeVar("A", bound=Active[Any])
 
 
-def _renewed(active: Active, model: SpineModel) -> Active:
+def _renewed(active: A, model: SpineModel) -> A:
     """The same effect with the values it has in another model."""
     return replace(active, values=model.effects[active.index].values)
-
-
-def _block_indices(n_joints: int) -> tuple[Indices, Indices]:
-    """Index arrays (J, 6, 6) of the diagonal blocks of an (n, n) matrix."""
-    at = np.arange(6 * n_joints).reshape(-1, 6)
-    rows = np.repeat(at[:, :, None], 6, axis=2)
-    columns = np.repeat(at[:, None, :], 6, axis=1)
-    return rows, columns

@@ -97,16 +97,13 @@ class Course:
     def corners_after(self, times: Array) -> Array:
         """The next time at which the load changes its rate, for each of the times; or infinity."""
         corners = np.append(self.corners, np.inf)
-        following: Array = corners[np.searchsorted(corners, _just_after(times), side="right")]
+        behind = times * (1.0 + 1e-12) + 1e-15  # of times that are a corner but for rounding
+        following: Array = corners[np.searchsorted(corners, behind, side="right")]
         return following
 
 
-def _just_after(time: Array) -> Array:
-    """Times that are a corner but for rounding put behind it."""
-    return time * (1.0 + 1e-12) + 1e-15
-
-
 GAMMA = 4.3586652150845900e-01
+"""Diagonal coefficient of all stages, so that one factorisation serves all four."""
 
 ALPHA = np.array(
     [
@@ -137,10 +134,14 @@ EMBEDDED = np.array(
         2.1793326075422950e-01,
     ]
 )
+"""(4,) weights of the second-order result, for the error."""
+
 ERROR_WEIGHTS = WEIGHTS - EMBEDDED
 """(4,) the third-order result less the embedded second-order one."""
 
 STAGE_TIMES = ALPHA.sum(axis=1)
+"""(4,) when a stage is evaluated, as a share of the step."""
+
 TIME_WEIGHTS = COUPLING.sum(axis=1) + GAMMA
 """(4,) weight of the load's rate of change in each stage."""
 
@@ -257,6 +258,8 @@ def no_settling(system: System) -> str | None:
 
 def new_size(size: float, error: float) -> float:
     """The step to try after one of that size and scaled error."""
+    # the error of the second-order result grows with the cube of the step: usual step control, with
+    # a safety factor, and no change to less than a fifth or more than six times (Hairer & Wanner)
     growth = 0.9 * max(error, 1e-3) ** (-1.0 / 3.0) if np.isfinite(error) else 0.2
     return size * float(np.clip(growth, 0.2, 6.0))
 
@@ -325,7 +328,20 @@ class _Run:
         return False
 
     def _try(self, size: float) -> tuple[Array, Array, float]:
-        """Pose, rate and scaled error after a step of that size."""
+        """One ROS34PW2 step of that size: pose, rate and scaled error after it.
+
+        The equations of motion M v' = F(q, v, t), q' = v are a system of twice the size with the
+        mass matrix diag(1, M) and the Jacobian ((0, 1), (-K, -C)), in which K and C are the tangent
+        and the damping; how M and the inertial loads change is left out, as a W-method allows.
+        Stage i has rates of change (a, b) of pose and rate with
+
+            a = v_i + h sum_(j<i) gamma_ij b_j + h gamma b,
+            M b = F(q_i, v_i, t_i) - K h (sum_(j<i) gamma_ij a_j + gamma a)
+                  - C h (sum_(j<i) gamma_ij b_j + gamma b) + h gamma_i F_t,
+
+        at the point (q_i, v_i, t_i) that the ALPHA of earlier stages give. With the first put into
+        the second, (M + h gamma C + (h gamma)^2 K) b is left to be solved for: size n, not 2 n.
+        """
         balance = self.system.balance(self.q, self.program.at(self.time), NO_STATES)
         mass = self.system.chain.mass_matrix(self.q)
         implicit = size * GAMMA
@@ -338,16 +354,18 @@ class _Run:
             q = self.q + size * (ALPHA[i] @ stage_q)
             rate = self.rate + size * (ALPHA[i] @ stage_v)
             coupled_q, coupled_v = COUPLING[i] @ stage_q, COUPLING[i] @ stage_v
-            if i == 0:
+            if i == 0:  # at the start, where the balance is known and the mass matrix is M itself
                 force = self._force(q, rate, balance.residual)
             else:
                 force = self._later_force(q, rate, self.time + STAGE_TIMES[i] * size, mass)
+            # what is known of the Jacobian terms: all but those with this stage's own b
             drift = rate + size * coupled_v
             force -= balance.tangent @ (implicit * drift + size * coupled_q)
             force -= self.damping * (size * coupled_v)
             force += size * TIME_WEIGHTS[i] * ramp
             stage_v[i] = dgetrs(lu, pivots, force)[0]
             stage_q[i] = drift + implicit * stage_v[i]
+        # third-order result, and how far the embedded second-order pose is from it
         error = size * (ERROR_WEIGHTS @ stage_q)
         q = self.q + size * (WEIGHTS @ stage_q)
         scale = self.absolute + self.relative * np.abs(q)
@@ -360,7 +378,10 @@ class _Run:
         return force
 
     def _later_force(self, q: Array, rate: Array, time: float, mass: Array) -> Array:
-        """The force of a later stage, for the mass matrix at the step's start: M0 M^-1 F."""
+        """The force of a later stage, for the mass matrix at the step's start: M0 M^-1 F.
+
+        The method takes M as constant; so scaled, M0 v' = M0 M^-1 F is the motion that M has there.
+        """
         system, loading = self.system, self.program.at(time)
         residual = system.weightless_residual(ChainMotion(system.chain, q), loading, NO_STATES)
         weight_and_inertia = system.chain.bias(q, rate, loading.share * system.model.gravity)

@@ -1,6 +1,7 @@
 """Derivatives that effects state, against differences: of their own values, of solved motion."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from example_effects import loaded, slope, spine
@@ -127,6 +128,21 @@ def assert_sensitivities(system: System, mixtures: int = 1) -> None:
         expected = sum(each) / (12.0 * step)
         scale = np.abs(expected).max()
         np.testing.assert_allclose(found @ along, expected, rtol=0, atol=1e-6 * scale)
+
+
+def assert_each_test_has_its_own_values(effect: ScopedEffect) -> None:
+    """Two copies in scope of a test each: the one acts and is felt, the other is not there."""
+    mine = replace(effect, tests=("all ways",))
+    other = replace(effect, tests=("another",), values=2.0 * mine.values)
+    both = system_with(mine, other)
+    np.testing.assert_array_equal(reported(both), reported(system_with(effect)))
+    renamed = system_with(mine, other, case=replace(both.case, test="another"))
+    alone = system_with(replace(other, tests=("*",)))
+    np.testing.assert_array_equal(reported(renamed), reported(alone))
+    free = unknowns(both.model)
+    for place, system in ((1, both), (2, renamed)):
+        felt = np.abs(reported_by_parameters(system, free)).max(axis=(0, 1, 2)) > 0.0
+        assert felt.tolist() == [unknown.effect == place for unknown in free]
 
 
 def _inwards(model: SpineModel, unknown: FreeParameter) -> float:

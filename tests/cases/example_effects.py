@@ -1,7 +1,7 @@
 """One small effect of each kind, and a tilted spine to try them on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -23,7 +23,9 @@ from spinepipe.effects import (
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.statics import System, follow
 from spinepipe.units import COORDINATES
+from spinepipe.world import Chain
 
 SUPERIOR, EXTENSION = COORDINATES.index("superior"), COORDINATES.index("extension")
 NOWHERE = np.zeros(3)
@@ -347,3 +349,23 @@ def slope(function: Callable[[float], Array], step: float) -> Array:
     """Derivative at zero by a central difference of fourth order."""
     near, far = function(step) - function(-step), function(2 * step) - function(-2 * step)
     return (8.0 * near - far) / (12.0 * step)
+
+
+def massless() -> SpineModel:
+    """A weightless joint under a body without mass: it stands, and cannot move in time."""
+    model = spine(1, gravity=False)
+    body = replace(model.bodies[0], mass=0.0, inertia=np.zeros((3, 3)))
+    return replace(model, bodies=(body,))
+
+
+def top_heavy() -> SpineModel:
+    """A joint that 60 kg a hand above it tip over."""
+    model = spine(1)
+    above = model.frames[0].origin + np.array([0.002, 0.1, 0.0])
+    return replace(model, bodies=(replace(model.bodies[0], mass=60.0, com=above),))
+
+
+def solved_poses(model: SpineModel, case: LoadCase) -> Array:
+    """(T, J, 6) of a model in a case, by the engine of record."""
+    solved = follow(System(Chain(model), model, case))
+    return np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])

@@ -1,12 +1,15 @@
 """Random models with random effects in random tests, for comparing engines."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from spinepipe.effects import Effect, EffectKind, create, registered
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.statics import FreeParameter, SolvedStep, System, follow, free_parameters
+from spinepipe.statics.equilibrium import factor
 from tests.cases.sweeps import one_of_each
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
@@ -77,3 +80,24 @@ def timed(case: LoadCase) -> LoadCase:
 def stackable(effect: Effect) -> bool:
     """Whether the stack takes it."""
     return effect.kind is not EffectKind.LOAD
+
+
+def unknowns(model: SpineModel) -> tuple[FreeParameter, ...]:
+    """All parameters of all effects, joint by joint."""
+    return tuple(
+        unknown
+        for number, here in enumerate(model.effects)
+        for unknown in free_parameters(
+            model, number, [p.name for p in here.effect.parameters], "per_joint"
+        )
+    )
+
+
+def solved(system: System) -> list[SolvedStep]:
+    """Steps with the tangent at their pose; Newton leaves that of one tiny step before."""
+    found = []
+    for step in follow(system):
+        tangent = system.balance(step.equilibrium.q, step.loading, step.states).tangent
+        there = replace(step.equilibrium, factored=factor(tangent))
+        found.append(replace(step, equilibrium=there))
+    return found

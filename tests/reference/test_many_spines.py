@@ -13,7 +13,8 @@ from example_effects import ExtraWeight
 from spinepipe.effects import Wrench, create
 from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
 from spinepipe.statics import System, follow
-from spinepipe.statics.batched import Cases, Spines, solve, solve_many
+from spinepipe.statics.batched import Cases, Spines, solve_many
+from spinepipe.statics.batched import spines as batched_spines
 from spinepipe.statics.joint_forces import assemble_joint_forces
 from spinepipe.status import Status
 from spinepipe.world import Chain
@@ -65,7 +66,7 @@ def by_engine(model: SpineModel, case: LoadCase) -> tuple[np.ndarray, np.ndarray
     load = np.array(
         [
             assemble_joint_forces(
-                system.placed(step.equilibrium.q, False), system.laws, step.states, False
+                system.joint_kinematics(step.equilibrium.q, False), system.laws, step.states, False
             ).load
             for step in solved
         ]
@@ -210,7 +211,7 @@ def test_steps_that_nobody_asks_for_are_passed_as_if_solved(
     chain = chains.random_chain(rng, n_joints)
     spines = varied(bridge.spine_model(chain), rng)
     cases = Cases.of(bent(bridge.load_case(chain, share), 6, beside), COUNT)
-    whole, asked, own = solve_many(spines, cases), [0, 3, 6], solve._passed
+    whole, asked, own = solve_many(spines, cases), [0, 3, 6], batched_spines._passed
     at_once: list[bool] = []
 
     def counted(*rest: Any) -> np.ndarray:
@@ -218,7 +219,7 @@ def test_steps_that_nobody_asks_for_are_passed_as_if_solved(
         at_once.extend(found.tolist())
         return found
 
-    monkeypatch.setattr(solve, "_passed", counted)
+    monkeypatch.setattr(batched_spines, "_passed", counted)
     found = solve_many(spines, cases, asked)
     assert least <= np.mean(at_once) <= most
     np.testing.assert_allclose(found.q, whole.q[:, asked], rtol=0, atol=AGREEMENT)

@@ -18,11 +18,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import (
     FreeParameter,
-    SolvedStep,
     System,
     by_parameters,
     follow,
-    free_parameters,
     observe,
     observed_by_parameters,
 )
@@ -35,9 +33,8 @@ from spinepipe.statics.batched import (
     readings,
     readings_by,
 )
-from spinepipe.statics.batched.forward_kinematics import Flags
-from spinepipe.statics.batched.lanes import acting
-from spinepipe.statics.equilibrium import factor
+from spinepipe.statics.batched.lanes import bind_effects
+from spinepipe.statics.batched.loads import Flags
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -56,28 +53,10 @@ EVERY = pytest.mark.parametrize(
 Run = tuple[SpineModel, LoadCase]
 
 
-def unknowns(model: SpineModel) -> tuple[FreeParameter, ...]:
-    """All parameters of all effects, joint by joint."""
-    return tuple(
-        unknown
-        for number, here in enumerate(model.effects)
-        for unknown in free_parameters(
-            model, number, [p.name for p in here.effect.parameters], "per_joint"
-        )
-    )
-
-
-def with_tangent_there(system: System, step: SolvedStep) -> SolvedStep:
-    """The step with the tangent at its pose; Newton leaves that of one tiny step before."""
-    q = step.equilibrium.q
-    tangent = system.balance(q, step.loading, step.states).tangent
-    return replace(step, equilibrium=replace(step.equilibrium, factored=factor(tangent)))
-
-
 def by_engine(model: SpineModel, case: LoadCase, free: Sequence[FreeParameter]) -> list[np.ndarray]:
     """Poses (T, J, 6), what is reported, and derivatives of both by the unknowns."""
     system = System(Chain(model), model, case)
-    solved = [with_tangent_there(system, step) for step in follow(system)]
+    solved = draw.solved(system)
     poses, shape = [step.equilibrium.q for step in solved], (len(solved), model.n_joints, 6)
     dq = by_parameters(system, solved, free)
     by_x = [
@@ -106,7 +85,7 @@ def stack_of(runs: Sequence[Run]) -> Stack:
 
 def compare(runs: Sequence[Run]) -> None:
     """All that the stack says of the runs is what the engine says of each."""
-    stack, free = stack_of(runs), [unknowns(model) for model, _ in runs]
+    stack, free = stack_of(runs), [draw.unknowns(model) for model, _ in runs]
     q = stack.solve().q
     dq = poses_by(stack, q, free)
     found = (q, readings(stack, q), dq, readings_by(stack, q, dq, free))
@@ -319,7 +298,7 @@ def test_effects_are_bound_as_a_double_loop_over_runs_and_joints_binds_them() ->
         models.append(replace(plain, effects=()).with_effects(tuple(effects[: rng.integers(1, 5)])))
     runs = [(int(rng.integers(7)), test) for test in ("bend", "turn") * 8]
     found: dict[tuple[int, int, int], tuple[Effect, list[float]]] = {}
-    for one in acting(models, runs):
+    for one in bind_effects(models, runs):
         places, at = one.on(np.arange(len(runs)))
         np.testing.assert_array_equal(places, np.arange(len(one.joint)))
         for run, joint, row in zip(at.tolist(), one.joint.tolist(), one.row.tolist(), strict=True):

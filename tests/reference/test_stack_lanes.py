@@ -16,7 +16,7 @@ from spinepipe.model import LoadCase, ScopedEffect, SpineModel
 from spinepipe.statics import free_parameters
 from spinepipe.statics.batched import Stack, poses_by
 from spinepipe.statics.batched.dynamics import tangents_of
-from spinepipe.statics.batched.elimination import Changes, answers, eliminated
+from spinepipe.statics.batched.elimination import Changes, eliminate, solve_rates
 from spinepipe.statics.batched.forward_kinematics import forward_kinematics
 from spinepipe.statics.batched.vectors import blocks, lanes
 from tests.reference import bridge
@@ -83,18 +83,18 @@ def test_bad_pivots_cost_no_digits(n_joints: int, small: float) -> None:
     q, tangents = np.zeros((5, n_joints, 6)), stiff(rng, 5, n_joints)
     plain = forward_kinematics(stack.chains, stack.loads, q, tangents)
     sources = rng.normal(size=(5, n_joints, 6, 3))
-    before, _ = eliminated(plain, Changes(sources))
+    before, _ = eliminate(plain, Changes(sources))
     tangents[2, -1, :2] = tangents[2, -1, :, :2] = 0.0
     tangents[2, -1, 0, 1], tangents[2, -1, 1, 0] = 30.0, 40.0
     tangents[2, -1, 0, 0] = tangents[2, -1, 1, 1] = small
     seen = forward_kinematics(stack.chains, stack.loads, q, tangents)
-    found, good = answers(seen, Changes(sources))
+    found, good = solve_rates(seen, Changes(sources))
     assert good.all()
     whole = tangents_of(seen)[2]
     missing = whole @ found[2].reshape(-1, 3) - sources[2].reshape(-1, 3)
     scale = np.abs(whole).max() * np.abs(found[2]).max()
     assert np.abs(missing).max() < 1e-14 * len(whole) * scale
-    _, signs = eliminated(seen, Changes(sources[..., :0]), asked=True)
+    _, signs = eliminate(seen, Changes(sources[..., :0]), asked=True)
     assert signs[2] == np.sign(np.linalg.det(whole))
     others = [0, 1, 3, 4]
     np.testing.assert_array_equal(found[others], before[others])

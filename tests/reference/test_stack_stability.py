@@ -14,8 +14,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.statics import System
 from spinepipe.statics.batched import stability
 from spinepipe.statics.batched.dynamics import BatchedLUFactors, Moving
-from spinepipe.statics.batched.forward_kinematics import forward_kinematics, part
-from spinepipe.statics.batched.newton import newton
+from spinepipe.statics.batched.equilibrium import newton
+from spinepipe.statics.batched.forward_kinematics import forward_kinematics
+from spinepipe.statics.batched.loads import part
 from spinepipe.statics.batched.stability_certificate import respond
 from spinepipe.statics.batched.stack import Stack
 from spinepipe.statics.batched.vectors import lanes as unblocked
@@ -58,7 +59,7 @@ def test_tangents_and_mass_matrices_are_pybullet_s(n_joints: int) -> None:
     chain = loaded(rng, n_joints, 1.0, 1.0)
     stack = stack_of([chain])
     q = rng.normal(0.0, 0.05, (1, n_joints, 6)) * np.array([0.02] * 3 + [1.0] * 3)
-    tangents = stack.bound(np.array([0]), {}).held(q).tangent
+    tangents = stack.bound(np.array([0]), {}).joint_forces(q).tangent
     lanes = stability.lanes_of(stack.chains, stack.loads, q, tangents)
     mass, tangent = stability.matrices(lanes)
     expected_mass, expected_tangent = by_pybullet(chain, q[0])
@@ -77,10 +78,10 @@ def test_inertia_is_pybullet_s(n_joints: int) -> None:
     stack = stack_of(made)
     q = rng.normal(0.0, 0.05, (3, n_joints, 6)) * np.array([0.02] * 3 + [1.0] * 3)
     rates, forces = rng.normal(size=q.shape), rng.normal(size=(3, 6 * n_joints))
-    tangents = stack.bound(np.arange(3), {}).held(q).tangent
+    tangents = stack.bound(np.arange(3), {}).joint_forces(q).tangent
     seen = forward_kinematics(stack.chains, stack.loads, q, tangents)
     moving = Moving.of(stack.chains, stack.loads.chain, seen)
-    inertial, accelerations = moving.inertial(rates), moving.accelerations(forces)
+    inertial, accelerations = moving.velocity_product_forces(rates), moving.accelerations(forces)
     solved = BatchedLUFactors(moving.mass).solve(forces)
     for lane, chain in enumerate(made):
         engine = Chain(bridge.spine_model(chain))
@@ -212,7 +213,7 @@ def posed(rng: np.random.Generator, made: list[chains.Chain]) -> tuple[Stack, Ar
     """A stack of chains, bent poses of theirs, and the joints' tangents there."""
     stack, shape = stack_of(made), (len(made), made[0].n_joints, 6)
     q = rng.normal(0.0, 0.1, shape) * np.array([0.02] * 3 + [1.0] * 3)
-    return stack, q, stack.bound(np.arange(len(made)), {}).held(q).tangent
+    return stack, q, stack.bound(np.arange(len(made)), {}).joint_forces(q).tangent
 
 
 def growth(mass: Array, tangent: Array) -> float:
@@ -268,7 +269,7 @@ def test_what_flutters_is_never_proven(n_joints: int, share: float) -> None:
     assert len(made) >= 3
     stack = Stack.of(models, [(n, bridge.load_case(chain)) for n, chain in enumerate(made)])
     all_q = np.array(places)
-    tangents = stack.bound(np.arange(len(made)), {}).held(all_q).tangent
+    tangents = stack.bound(np.arange(len(made)), {}).joint_forces(all_q).tangent
     assert not stability.surely_stable(stack.chains, stack.loads, all_q, tangents).any()
     lanes = stability.lanes_of(stack.chains, stack.loads, all_q, tangents)
     assert not stability.proven_by_forms(lanes).any()

@@ -28,7 +28,6 @@ from spinepipe.statics import (
     System,
     by_parameters,
     follow,
-    free_parameters,
     no_settling,
     reaction,
     reactions_by,
@@ -47,7 +46,6 @@ from spinepipe.statics.batched import (
     reactions_by as stack_reactions_by,
 )
 from spinepipe.statics.batched.derive import answered
-from spinepipe.statics.equilibrium import factor
 from spinepipe.status import Status
 from spinepipe.world import Chain
 
@@ -212,24 +210,10 @@ def with_rig(rng: np.random.Generator, run: Run, read_as: float | None = None) -
     return model, replace(case, steps=tuple(steps))
 
 
-def unknowns(model: SpineModel) -> tuple[FreeParameter, ...]:
-    return tuple(
-        unknown
-        for number, here in enumerate(model.effects)
-        for unknown in free_parameters(
-            model, number, [p.name for p in here.effect.parameters], "per_joint"
-        )
-    )
-
-
 def by_engine(model: SpineModel, case: LoadCase, free: Sequence[FreeParameter]) -> list[Array]:
     """Poses, reactions (T, J, 6) and their derivatives."""
     system = System(Chain(model), model, case)
-    steps = []
-    for step in follow(system):
-        tangent = system.balance(step.equilibrium.q, step.loading, step.states).tangent
-        there = replace(step.equilibrium, factored=factor(tangent))
-        steps.append(replace(step, equilibrium=there))
+    steps = draw.solved(system)
     shape = (len(steps), model.n_joints, 6)
     return [
         np.reshape([step.equilibrium.q for step in steps], shape),
@@ -257,7 +241,7 @@ def as_the_engine_says(effect: Effect) -> None:
     rng = np.random.default_rng(70 + len(str(effect)))
     drawn = [draw.model(rng, 3, [effect], 0.5) for _ in range(3)]
     runs = [with_rig(rng, run) if n else run for n, run in enumerate(drawn)]
-    free = [unknowns(model) for model, _ in runs]
+    free = [draw.unknowns(model) for model, _ in runs]
     stack = Stack.of([model for model, _ in runs], [(n, case) for n, (_, case) in enumerate(runs)])
     solution = stack.solve()
     standing = np.logical_and.reduceat(solution.status == "converged", stack.first[:-1])
@@ -286,7 +270,7 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
     rng = np.random.default_rng(len(name))
     effect = next(one for one in VARIANTS if one.name == name)
     model, case = with_rig(rng, draw.model(rng, 2, [effect], 0.4), read_as=1e-4)
-    free = unknowns(model)
+    free = draw.unknowns(model)
     stack = Stack.of([model], [(0, case)])
     q = stack.solve().q
     dq = poses_by(stack, q, [free])

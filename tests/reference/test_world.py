@@ -17,7 +17,7 @@ from sweeps import sweep
 from spinepipe.model import RefusedModel
 from spinepipe.world import Chain as LoadedChain
 from spinepipe.world import StaleChain
-from tests.reference.bridge import spine_model, system
+from tests.reference.bridge import spine_model
 from tests.reference.peers import chain as chains
 from tests.reference.peers import pinocchio_peer
 from tests.reference.peers.chain import Array, Chain
@@ -159,12 +159,3 @@ def test_a_chain_replaced_by_another_is_refused(ask) -> None:
     with pytest.raises(StaleChain, match="another model"):
         ask(first)
     ask(second)
-
-
-def test_an_equilibrium_on_a_replaced_chain_is_refused() -> None:
-    chain = chains.random_chain(np.random.default_rng(10), 2)
-    first = system(chain)
-    system(chain)
-    loading = first.slots.loading(first.case.steps[0].wrenches)
-    with pytest.raises(StaleChain):
-        first.balance(np.zeros(12), loading, first.initial_states())

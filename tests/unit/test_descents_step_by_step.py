@@ -1,10 +1,11 @@
-"""Descents whose every look is worked out by hand: damping, promises, ends.
+"""Descents look by look by hand (damping, promises, ends), and against scipy's bounded solvers.
 
-Catches a damping, promise or end of a descent that is off by one rule.
+Catches a damping, promise or end that is off by one rule, and a descent that leaves its bounds.
 """
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear, minimize
 from sweeps import sweep
 
 from spinepipe.calibrate.descent import DescentTolerances, damped_step, descend, descend_along, once
@@ -180,3 +181,50 @@ def test_inside_bounds_it_turns_back_from_where_nothing_stands() -> None:
         return None if known else (x - 1.0, np.eye(1))
 
     assert descend(forgetful, np.zeros(1), FAR, ONE, 1, settled).x[0] == pytest.approx(1.0)
+
+
+# Along bounds, against scipy
+
+TIGHT = DescentTolerances(cost=1e-13, step=1e-10, slope=0.0, evaluations=200)
+
+
+def test_a_linear_problem_ends_on_the_bounds_that_scipy_finds() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        matrix, target = rng.normal(size=(15, 8)), rng.normal(size=15)
+        bounds = (np.full(8, -0.05), np.full(8, 0.2))
+        expected = lsq_linear(matrix, target, bounds, "bvls")
+        ended = descend_along(
+            lambda x, a=matrix, b=target: (a @ x - b, a), np.zeros(8), bounds, np.ones(8), TIGHT
+        )
+        assert ended.arrived
+        assert ended.half_cost == pytest.approx(expected.cost, rel=1e-9)
+        np.testing.assert_allclose(ended.x, expected.x, atol=1e-5)
+        assert ((expected.active_mask != 0) == ((ended.x == -0.05) | (ended.x == 0.2))).all()
+
+
+def rosenbrock(x: Array) -> tuple[Array, Array]:
+    """Chained, a curved valley; (2 (m - 1),) residuals."""
+    m = len(x)
+    curve, off = 10.0 * (x[1:] - x[:-1] ** 2), 1.0 - x[:-1]
+    jacobian = np.zeros((2 * (m - 1), m))
+    for k in range(m - 1):
+        jacobian[k, k], jacobian[k, k + 1] = -20.0 * x[k], 10.0
+        jacobian[m - 1 + k, k] = -1.0
+    return np.append(curve, off), jacobian
+
+
+@pytest.mark.parametrize("most", [0.5, 0.9, 3.0])
+def test_a_curved_valley_cut_off_by_bounds(most: float) -> None:
+    bounds, scale = (np.full(4, -0.2), np.full(4, most)), np.array([1.0, 0.3, 2.0, 1.0])
+    ended = descend_along(rosenbrock, np.zeros(4), bounds, scale, TIGHT)
+    expected = minimize(
+        lambda x: 0.5 * float(rosenbrock(x)[0] @ rosenbrock(x)[0]),
+        np.zeros(4),
+        method="L-BFGS-B",
+        bounds=list(zip(*bounds, strict=True)),
+        options={"ftol": 1e-15, "gtol": 1e-10, "maxiter": 5000},
+    )
+    assert ended.arrived
+    np.testing.assert_allclose(ended.x, expected.x, atol=1e-4)
+    assert ended.half_cost <= expected.fun + 1e-9

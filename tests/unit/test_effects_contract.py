@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from effect_slopes import reported, reported_by_parameters, system_with, unknowns
 from example_effects import (
     POINTS,
     CubicStiffening,
@@ -40,17 +41,13 @@ from spinepipe.effects import (
     registry,
 )
 from spinepipe.effects.contract import Array
-from spinepipe.model import ScopedEffect, SpineModel
+from spinepipe.model import SpineModel
 from spinepipe.statics import (
     FreeParameter,
     System,
-    by_parameters,
     declared,
     follow,
     free_parameters,
-    observe,
-    observed_by_parameters,
-    with_parameters,
 )
 from spinepipe.statics.joint_forces import States
 from spinepipe.status import Status
@@ -103,30 +100,6 @@ CASES = [
 ]
 
 
-def system_of(effects: tuple[ScopedEffect, ...]) -> System:
-    """Three tilted joints under gravity and three load steps, with effects."""
-    model = spine(3, effects=effects)
-    return System(Chain(model), model, loaded(model))
-
-
-def every_parameter(model: SpineModel) -> tuple[FreeParameter, ...]:
-    """All parameters of all effects but the springs', joint by joint."""
-    return tuple(
-        unknown
-        for number, here in enumerate(model.effects)
-        if number
-        for unknown in free_parameters(
-            model, number, [p.name for p in here.effect.parameters], "per_joint"
-        )
-    )
-
-
-def reported(system: System, free: tuple[FreeParameter, ...], x: Array) -> Array:
-    """(T, J, 6) solved afresh and reported, with the unknowns moved by x."""
-    other = system.with_model(with_parameters(system.model, free, x))
-    return np.stack([observe(other, step.equilibrium.q) for step in follow(other)])
-
-
 @sweep("effects", CASES)
 def test_examples_satisfy_exactly_their_own_protocol(effects) -> None:
     for scope in effects:
@@ -136,7 +109,7 @@ def test_examples_satisfy_exactly_their_own_protocol(effects) -> None:
 
 @sweep("effects", CASES)
 def test_tangent_is_the_slope_of_the_residual(effects) -> None:
-    system, rng = system_of(effects), np.random.default_rng(1)
+    system, rng = system_with(*effects), np.random.default_rng(1)
     q = np.tile([1e-3] * 3 + [0.15] * 3, 3) * rng.normal(size=18)
     empty = system.initial_states().of
     states = States({index: rng.normal(0, 0.05, s.shape) for index, s in empty.items()})
@@ -155,17 +128,9 @@ def test_tangent_is_the_slope_of_the_residual(effects) -> None:
 
 @sweep("effects", CASES)
 def test_parameter_sensitivities_are_slopes_of_solved_motion(effects) -> None:
-    system = system_of(effects)
-    free = every_parameter(system.model)
-    solved = follow(system)
-    assert all(step.usable for step in solved)
-    dq = by_parameters(system, solved, free)
-    found = np.stack(
-        [
-            observed_by_parameters(system, step.equilibrium.q, by_x, free)
-            for step, by_x in zip(solved, dq, strict=True)
-        ]
-    )
+    system = system_with(*effects)
+    free = unknowns(system.model)
+    found = reported_by_parameters(system, free)
     for direction in directions(system.model, free):
 
         def motion(h: float, along: Array = direction) -> Array:
@@ -188,14 +153,14 @@ def directions(model: SpineModel, free: tuple[FreeParameter, ...]) -> Array:
 
 
 def test_effects_change_the_motion_they_are_meant_to_change() -> None:
-    plain = reported(system_of(()), (), np.zeros(0))
+    plain = reported(system_with())
     for name, effects in ALONE.items():
-        change = np.abs(reported(system_of(effects), (), np.zeros(0)) - plain)
+        change = np.abs(reported(system_with(*effects)) - plain)
         assert change[..., 3].max() > np.deg2rad(0.02), name
 
 
 def test_path_state_of_a_step_comes_from_the_steps_before() -> None:
-    steps = follow(system_of(ALONE["path"]))
+    steps = follow(system_with(*ALONE["path"]))
     first, second = steps[0], steps[1]
     assert not first.states.of[1].any()
     angle = first.equilibrium.q.reshape(-1, 6)[[1, 2], 3]
@@ -204,7 +169,7 @@ def test_path_state_of_a_step_comes_from_the_steps_before() -> None:
 
 def test_geometry_without_offset_leaves_the_motion_alone() -> None:
     still = scoped(JointCentreOffset(), (0, 1, 2), (0.0, 0.0))
-    plain, found = (reported(system_of(e), (), np.zeros(0)) for e in ((), (still,)))
+    plain, found = (reported(system_with(*e)) for e in ((), (still,)))
     np.testing.assert_allclose(found, plain, rtol=0, atol=1e-13)
 
 
@@ -218,19 +183,16 @@ def test_laws_about_a_displaced_centre_are_a_joint_frame_displaced_alike() -> No
     solved = [follow(System(Chain(m), m, case)) for m in (model, other)]
     for about, moved_frame in zip(*solved, strict=True):
         system = System(Chain(model), model, case)
-        placed = system.placed(about.equilibrium.q, by_parameters=False).q
+        placed = system.joint_kinematics(about.equilibrium.q, by_parameters=False).q
         expected = moved_frame.equilibrium.q.reshape(-1, 6)
         np.testing.assert_allclose(placed, expected, rtol=0, atol=1e-12)
 
 
 def test_effects_out_of_a_tests_scope_do_nothing() -> None:
     away = tuple(replace(scope, tests=("another",)) for scope in TOGETHER)
-    plain = reported(system_of(()), (), np.zeros(0))
-    system = system_of(away)
-    np.testing.assert_array_equal(reported(system, (), np.zeros(0)), plain)
-    solved = follow(system)
-    for by_x in by_parameters(system, solved, every_parameter(system.model)):
-        assert not by_x.any()
+    system = system_with(*away)
+    np.testing.assert_array_equal(reported(system), reported(system_with()))
+    assert not reported_by_parameters(system, unknowns(system.model)).any()
 
 
 MOVED = {

@@ -10,7 +10,7 @@ import pytest
 
 from spinepipe.calibrate import MeasuredCase, Problem, fit
 from spinepipe.calibrate.fit import TIPPED, _start_points
-from spinepipe.calibrate.pooled_specimen import PoolMember
+from spinepipe.calibrate.pooling import PoolMember
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel

@@ -17,6 +17,7 @@ from example_effects import (
     MarkerError,
     loaded,
     scoped,
+    solved_poses,
     spine,
 )
 from path_effect_cases import branches, creeping, friction, turning
@@ -24,9 +25,8 @@ from path_effect_cases import branches, creeping, friction, turning
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
-from spinepipe.statics import FreeParameter, System, follow, free_parameters, with_parameters
+from spinepipe.statics import FreeParameter, free_parameters, with_parameters
 from spinepipe.status import Status
-from spinepipe.world import Chain
 
 EVERYWHERE = (0, 1, 2)
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
@@ -124,8 +124,7 @@ def with_friction(moment: float, yield_deg: float, stiffer: float = 1.0) -> Spin
 def friction_problem(start: SpineModel, truth: SpineModel, noise: Array) -> Problem:
     """Loading, unloading and loading again of one model, to be fitted by another."""
     case = turning(truth, branches(7.5, 10))
-    solved = follow(System(Chain(truth), truth, case))
-    poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
+    poses = solved_poses(truth, case)
     measured = poses + noise * np.random.default_rng(11).normal(size=poses.shape)
     free = free_parameters(start, 0, ROTATIONS, "per_specimen")
     free += free_parameters(start, 1, ("moment", "yield_angle"), "per_specimen")

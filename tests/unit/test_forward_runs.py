@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
+from example_effects import NOWHERE, Relaxation, loaded, massless, scoped, spine
 from study_cases import STUDY, Size, project, results
 
 from spinepipe.calibrate import MeasuredCase, Problem, forward_runs
-from spinepipe.calibrate import forward_runs as forward_cost
 from spinepipe.calibrate.forward_runs import (
     ForwardFit,
     differenced_gradient,
@@ -157,7 +156,7 @@ def test_a_fit_that_runs_out_of_runs_says_so() -> None:
 
 
 def test_a_lost_start_is_unstable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(forward_cost, "forward_run", lambda *_: None)
+    monkeypatch.setattr(forward_runs, "forward_run", lambda *_: None)
     found = fit_by_forward_runs(problem(), 1.5)
     assert (found.status, found.claims_success) == (Status.UNSTABLE, False)
     assert found.start_gradient is None
@@ -170,17 +169,11 @@ def test_a_lost_run_turns_the_optimiser_back(monkeypatch: pytest.MonkeyPatch) ->
         ratio = model.effects[0].values[0, 1] / spine(1).effects[0].values[0, 1]
         return None if ratio > 1.4 else forward_run(model, *rest)
 
-    monkeypatch.setattr(forward_cost, "forward_run", run)
+    monkeypatch.setattr(forward_runs, "forward_run", run)
     found = fit_by_forward_runs(problem(), 1.5, SANE, most_evaluations=40)
     start = fit_by_forward_runs(problem(), 1.5, SANE, most_evaluations=3)
     assert found.cost < start.cost
     assert found.x[0] < np.log(1.4)
-
-
-def massless() -> SpineModel:
-    model = spine(1, gravity=False)
-    body = replace(model.bodies[0], mass=0.0, inertia=np.zeros((3, 3)))
-    return replace(model, bodies=(body,))
 
 
 def relaxing() -> SpineModel:

@@ -24,7 +24,7 @@ from spinepipe.effects.contract import MeasurementContext
 from spinepipe.model import LoadCase, ScopedEffect
 from spinepipe.statics import System, follow, observe
 from spinepipe.statics.batched import Stack, poses_by, readings, readings_by
-from spinepipe.statics.measurement_model import passed
+from spinepipe.statics.measurement_model import share_passed
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 
@@ -72,7 +72,7 @@ def with_times(times: tuple[float | None, ...]) -> LoadCase:
 def test_a_test_passes_by_its_time_else_by_its_steps(
     times: tuple[float | None, ...], expected: tuple[float, ...]
 ) -> None:
-    assert passed(with_times(times)).tolist() == pytest.approx(expected, abs=1e-15)
+    assert share_passed(with_times(times)).tolist() == pytest.approx(expected, abs=1e-15)
 
 
 def test_skin_slips_as_the_neighbour_moves_and_no_further_than_its_reach() -> None:

@@ -54,12 +54,6 @@ def test_tangent_of_a_spring() -> None:
     assert of_a_spring(law, 0.2, 100.0) == pytest.approx(straight, rel=1e-14)
 
 
-def test_cube_of_a_spring() -> None:
-    law = law_of(("nonlinear_stiffening", {"shape": "cubic"}))
-    assert of_a_spring(law, 0.1, 50.0) == pytest.approx(7.5)
-    assert of_a_spring(law, -0.2, 50.0) == pytest.approx(-30.0)
-
-
 def test_a_spring_with_a_neutral_zone() -> None:
     law = law_of(("neutral_zone", {}))
     corner = (0.3, 0.02, 50.0)  # far from a corner its sharpness says nothing: 0.5^50

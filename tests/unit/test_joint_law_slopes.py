@@ -19,9 +19,9 @@ from joint_law_cases import (
 )
 from sweeps import sweep
 
-from spinepipe.effects import JointLaw, Parameter, create, knee
+from spinepipe.effects import JointLaw, Parameter, create
 from spinepipe.effects.contract import Array
-from spinepipe.effects.knee import chord, inside
+from spinepipe.effects.neutral_zone import NEAR, chord, inside
 from spinepipe.effects.nonlinear_stiffening import exponential_rise
 from spinepipe.units import COORDINATES
 
@@ -225,9 +225,7 @@ def test_short_chords_of_a_knee_join_long_ones(sharpness: float, offset: float) 
     """Where the mean of slopes takes over from the difference, in value and derivatives."""
     n, at = np.array([sharpness]), np.array([offset])
     for side in (-1.0, 1.0):
-        just = [
-            chord(np.array([side * knee.NEAR * share]), n, at) for share in (1 - 1e-9, 1 + 1e-9)
-        ]
+        just = [chord(np.array([side * NEAR * share]), n, at) for share in (1 - 1e-9, 1 + 1e-9)]
         np.testing.assert_allclose(*just, rtol=0, atol=2e-7)
 
 

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from effect_slopes import (
+    assert_each_test_has_its_own_values,
     assert_sensitivities,
     assert_tangent,
     reported,
-    reported_by_parameters,
     system_with,
-    unknowns,
 )
 from example_effects import NOWHERE, loaded, scoped, slope, spine
 from scipy.spatial.transform import Rotation
@@ -106,30 +105,6 @@ def test_off_leaves_the_motion_alone(name: str) -> None:
     assert {p.off for p in effect.parameters} <= {0.0, None}
     plain, found = (reported(system_with(*e)) for e in ((), (effect_of(name, on=False),)))
     np.testing.assert_allclose(found, plain, rtol=0, atol=1e-13)
-
-
-def heavier(model: SpineModel, mass: float, bodies: tuple[int, ...]) -> SpineModel:
-    more = tuple(
-        replace(body, mass=body.mass + mass * (number in bodies))
-        for number, body in enumerate(model.bodies)
-    )
-    return replace(model, bodies=more)
-
-
-@pytest.mark.parametrize(
-    ("name", "bodies"), [("weight of each", (0, 1, 2)), ("weight on top", (TOP,))]
-)
-def test_segment_weight_is_heavier_bodies(name: str, bodies: tuple[int, ...]) -> None:
-    """Under gravity along -y, which the mass of the bodies feels too."""
-    down = np.array([0.0, -9.81, 0.0])
-    model = replace(spine(3), gravity=down)
-    heavy = heavier(model, EFFECTS[name][2][0], bodies)
-    light = replace(model, effects=(*model.effects, effect_of(name)))
-    expected, found, plain = (
-        reported(System(Chain(m), m, loaded(m))) for m in (heavy, light, model)
-    )
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-    assert np.rad2deg(np.abs(expected - plain).max()) > 0.1
 
 
 def test_weight_of_vertebrae_without_stated_mass() -> None:
@@ -291,14 +266,6 @@ def test_what_turns_is_known() -> None:
         create("load_misalignment", {"turns": "all"})
 
 
-def test_gain_is_a_larger_load() -> None:
-    def larger(wrenches):
-        return (replace(w, force=1.05 * w.force, moment=1.05 * w.moment) for w in wrenches)
-
-    case = with_wrenches(loaded(spine(3)), larger)
-    assert_same_motion("gain", instead=system_with(case=case))
-
-
 def test_offset_is_one_more_moment_also_without_load() -> None:
     case = loaded(spine(3))
     case = replace(case, steps=(LoadStep(0, (), 1.0), *case.steps[1:]))
@@ -325,19 +292,7 @@ def test_a_force_offset_is_one_more_force_at_the_centre_of_the_top() -> None:
 
 @sweep("name", EFFECTS)
 def test_each_test_has_its_own_values(name: str) -> None:
-    """Two copies in scope of a test each: the one acts and is felt, the other is not there."""
-    mine = replace(effect_of(name), tests=("all ways",))
-    other = replace(effect_of(name), tests=("another",), values=2.0 * mine.values)
-    both = system_with(mine, other)
-    np.testing.assert_array_equal(reported(both), reported(system_with(effect_of(name))))
-    free = unknowns(both.model)
-    felt = np.abs(reported_by_parameters(both, free)).max(axis=(0, 1, 2)) > 0.0
-    assert felt.tolist() == [unknown.effect == 1 for unknown in free]
-    renamed = system_with(mine, other, case=replace(both.case, test="another"))
-    alone = system_with(replace(other, tests=("*",)))
-    np.testing.assert_array_equal(reported(renamed), reported(alone))
-    felt = np.abs(reported_by_parameters(renamed, free)).max(axis=(0, 1, 2)) > 0.0
-    assert felt.tolist() == [unknown.effect == 2 for unknown in free]
+    assert_each_test_has_its_own_values(effect_of(name))
 
 
 def test_spreads_of_what_is_looked_for() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.calibrate.profile import Best, Profile, _next, _one_step, profile_in_turn
+from spinepipe.calibrate.profile import Best, Profile, _one_step, profile_in_turn
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric
@@ -319,21 +319,3 @@ def test_one_linear_step_ends_where_the_cost_is_least_within_bounds() -> None:
     assert (cost, *there) == pytest.approx((0.25, 2.5, 0.5), rel=1e-6)
     cost, there = _one_step(np.array([3.0, 4.0]), np.zeros((2, 0)), np.zeros(0), None)
     assert (cost, len(there)) == (25.0, 0)
-
-
-@sweep("side", [-1.0, 1.0])
-def test_the_next_look_mirrors_on_the_other_side(side: float) -> None:
-    at = 5.0
-    steps = [
-        (_next(at, (at + side, 0.25), None, at + side * 20.0, False), 2.04),
-        (_next(at, (at + side, 0.0), None, at + side * 20.0, False), 3.0),
-        (_next(at, (at + side, -0.3), None, at + side * 2.0, False), 2.0),
-        (_next(at, (at + side, 0.25), (at + side * 2.0, np.inf), at + side * 20.0, False), 1.5),
-        (_next(at, (at + side, 0.25), (at + side * 2.0, 2.25), at + side * 20.0, False), 1.5),
-        (_next(at, (at + side, 0.0), (at + side * 2.0, 4.0), at + side * 9.0, False, True), 1.5),
-        (_next(at, (at + side, 0.0), (at + side * 2.0, 16.0), at + side * 9.0, False), 1.25),
-        (_next(at, (at + side, 0.98), (at + side * 2.0, 900.0), at + side * 9.0, False), 1.05),
-        (_next(at, (at + side, 0.0), (at + side * 2.0, 1.02), at + side * 9.0, False), 1.95),
-    ]
-    for found, expected in steps:
-        assert side * (found - at) == pytest.approx(expected)

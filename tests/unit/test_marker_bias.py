@@ -3,22 +3,18 @@
 Catches a bias turned about the wrong axis, or reported outside of its tests.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from effect_slopes import (
+    assert_each_test_has_its_own_values,
     assert_sensitivities,
     assert_tangent,
     poses,
     reported,
-    reported_by_parameters,
     slopes,
     system_with,
-    unknowns,
 )
 from example_effects import scoped
-from scipy.spatial.transform import Rotation
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread, create
@@ -39,15 +35,6 @@ def test_offsets_are_added() -> None:
     q = poses()
     seen = create("marker_bias").observe(q, np.tile(BIAS, (len(q), 1)))
     np.testing.assert_array_equal(seen.q, q + np.array(BIAS))
-
-
-def test_a_tilted_registration_frame_sees_the_same_motion() -> None:
-    q, tilt = poses(), Rotation.from_euler("ZXY", TILTS)
-    seen = create("marker_bias", {"form": "tilt"}).observe(q, np.tile(TILTS, (len(q), 1))).q
-    expected = (tilt.inv() * Rotation.from_euler("ZXY", q[:, 3:]) * tilt).as_euler("ZXY")
-    np.testing.assert_allclose(seen[:, 3:], expected, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(seen[:, :3], tilt.inv().apply(q[:, :3]), rtol=0, atol=1e-16)
-    np.testing.assert_allclose(seen[-1], 0.0, rtol=0, atol=1e-16)  # neutral reads zero
 
 
 @sweep("on", [True, False])
@@ -91,16 +78,7 @@ def test_only_readings_of_joints_in_scope_change() -> None:
 
 @sweep("form", FORMS)
 def test_each_test_has_its_own_values(form: str) -> None:
-    mine = replace(biased(form), tests=("all ways",))
-    other = replace(biased(form), tests=("another",), values=2.0 * mine.values)
-    both = system_with(mine, other)
-    np.testing.assert_array_equal(reported(both), reported(system_with(biased(form))))
-    free = unknowns(both.model)
-    felt = np.abs(reported_by_parameters(both, free)).max(axis=(0, 1, 2)) > 0.0
-    assert felt.tolist() == [unknown.effect == 1 for unknown in free]
-    renamed = system_with(mine, other, case=replace(both.case, test="another"))
-    alone = system_with(replace(other, tests=("*",)))
-    np.testing.assert_array_equal(reported(renamed), reported(alone))
+    assert_each_test_has_its_own_values(biased(form))
 
 
 def test_forms_and_spreads() -> None:

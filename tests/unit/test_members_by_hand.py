@@ -15,10 +15,10 @@ from spinepipe.calibrate.hierarchy import (
     LinearReadings,
     Spreads,
     _first_scatter,
-    change,
-    tellable,
+    largest_change,
+    tellable_spreads,
 )
-from spinepipe.calibrate.pooled_specimen import PoolMember
+from spinepipe.calibrate.pooling import PoolMember
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric
@@ -64,10 +64,10 @@ def test_a_step_is_as_long_as_one_linearisation_is_trusted(
     target: list[float], step: list[float]
 ) -> None:
     one = member(2)
-    one.aim(np.array(target), np.full(2, 0.1), around(1.0))
+    one.plan_step(np.array(target), np.full(2, 0.1), around(1.0))
     np.testing.assert_allclose(one.step, step)
     assert not one.arrived
-    assert not one.at_rest
+    assert not one.stuck
 
 
 @sweep(
@@ -81,9 +81,9 @@ def test_it_has_arrived_within_a_ten_thousandth_or_a_hundredth_of_its_sd(
     way: float, deviation: float, arrived: bool
 ) -> None:
     one = member(2)
-    one.aim(np.array([0.0, way]), np.full(2, deviation), around(1.0))
+    one.plan_step(np.array([0.0, way]), np.full(2, deviation), around(1.0))
     assert one.arrived is arrived
-    assert one.at_rest is arrived
+    assert one.arrived is arrived
 
 
 def test_beyond_a_bound_the_best_inside_is_aimed_at() -> None:
@@ -92,12 +92,12 @@ def test_beyond_a_bound_the_best_inside_is_aimed_at() -> None:
         one = member(2)
         one.problem.upper[0] = 0.5
         one.evaluation = seen(np.array([-2.0]), np.ones((1, 2)))
-        one.aim(np.array([0.9, 0.9]), np.ones(2), around(1.0, scatter, 2))
+        one.plan_step(np.array([0.9, 0.9]), np.ones(2), around(1.0, scatter, 2))
         np.testing.assert_allclose(one.step, best, rtol=1e-6)
     for target in ([0.5, 0.9], [-5.0, 5.0]):
         one = member(2)
         one.problem.upper[0] = 0.5
-        one.aim(np.array(target), np.ones(2), around(1.0, 1.0, 2))
+        one.plan_step(np.array(target), np.ones(2), around(1.0, 1.0, 2))
         np.testing.assert_allclose(one.step, np.array(target) / max(1.0, np.abs(target).max()))
 
 
@@ -121,7 +121,7 @@ def test_without_a_way_on_it_stays_and_is_stuck() -> None:
     one.try_share(1.0)
     np.testing.assert_allclose(one.evaluator.x, 0.5 ** np.arange(10))
     one.accept()
-    assert (one.x[0], one.stuck, one.at_rest) == (0.0, True, True)
+    assert (one.x[0], one.stuck) == (0.0, True)
 
 
 @sweep("own, scatter, end", [(1e6, 1.0, 0.5), (0.01, 1.0, 2.0**-8), (0.01, 0.1, 0.25)])
@@ -154,7 +154,7 @@ def test_less_than_a_hundred_millionth_of_the_information_is_no_reading(
 ) -> None:
     """The information is the square of the design."""
     design = np.array([np.eye(2), np.diag([share, 1.0])])
-    found = tellable(readings(design), np.zeros(2, dtype=int))
+    found = tellable_spreads(readings(design), np.zeros(2, dtype=int))
     assert found[:, 0].tolist() == [told, True, True] if told else [False, False, True]
 
 
@@ -170,9 +170,9 @@ def test_what_is_left_over_is_shared_among_readings_less_unknowns() -> None:
 def test_a_change_is_the_largest_factor_of_what_both_have() -> None:
     one = Spreads(np.array([0.1, 0.0]), np.array([0.2, 0.2]), np.array([0.3, 0.3]), 1.0)
     other = Spreads(np.array([0.2, 9.0]), np.array([0.2, 0.2]), np.array([0.3, 0.1]), 1.5)
-    assert change(one, other) == pytest.approx(np.log(3.0))
-    assert change(other, one) == pytest.approx(np.log(3.0))
-    assert change(one, one) == 0.0
+    assert largest_change(one, other) == pytest.approx(np.log(3.0))
+    assert largest_change(other, one) == pytest.approx(np.log(3.0))
+    assert largest_change(one, one) == 0.0
 
 
 def test_the_distance_of_specimens_is_that_of_their_common_normal() -> None:

@@ -53,13 +53,6 @@ def test_factors_tell_the_sign_of_the_determinant_and_solve(matrix: np.ndarray, 
     np.testing.assert_allclose(matrix @ found.solve(right), right, rtol=1e-14)
 
 
-def test_signs_are_those_of_determinants() -> None:
-    rng = np.random.default_rng(20021)
-    for _ in range(50):
-        matrix = rng.normal(size=(5, 5))
-        assert factor(matrix).sign == np.sign(np.linalg.det(matrix))
-
-
 @sweep("matrix, why", [(np.diag([1.0, 0.0]), "singular"), (np.diag([1.0, np.inf]), "not finite")])
 def test_a_tangent_without_an_inverse_has_no_factors(matrix: np.ndarray, why: str) -> None:
     with pytest.raises(SingularTangent, match=why):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from example_effects import NOWHERE, loaded, spine
+from example_effects import NOWHERE, loaded, solved_poses, spine
 from scipy.linalg import block_diag
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal, norm
@@ -22,17 +22,16 @@ from spinepipe.calibrate.hierarchy import (
     Hierarchy,
     LinearReadings,
     Spreads,
-    between,
-    condensed,
-    estimated,
-    tellable,
+    condense_readings,
+    estimate_spreads,
+    interpolate_spreads,
+    tellable_spreads,
 )
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadStep
-from spinepipe.statics import System, follow, free_parameters, with_parameters
+from spinepipe.statics import free_parameters, with_parameters
 from spinepipe.status import Status
-from spinepipe.world import Chain
 
 pytestmark = pytest.mark.numeric
 
@@ -85,7 +84,7 @@ def density(designs: list[Array], targets: list[Array], dof: Array, spreads: Spr
 def known_exactly(table: Array) -> LinearReadings:
     """Readings of (S, J) unknowns that leave next to nothing open; NaN is not read at all."""
     rows = [np.eye(table.shape[1])[np.isfinite(row)] * 1e5 for row in table]
-    return condensed(
+    return condense_readings(
         rows, [r @ np.nan_to_num(t) for r, t in zip(rows, table, strict=True)], table.shape[1]
     )
 
@@ -99,14 +98,14 @@ def drawn(rng: np.random.Generator, s: int, j: int, spreads: Spreads, mean: floa
 
 def test_the_marginal_likelihood_is_that_of_the_full_covariance() -> None:
     designs, targets = random_readings(np.random.default_rng(0))
-    found = Hierarchy(condensed(designs, targets, 6), TWO_DOF, SPREADS)
+    found = Hierarchy(condense_readings(designs, targets, 6), TWO_DOF, SPREADS)
     expected = density(designs, targets, TWO_DOF, SPREADS)
     assert found.log_likelihood == pytest.approx(expected, rel=1e-10)
 
 
 def test_the_posterior_is_that_of_the_full_covariance() -> None:
     designs, targets = random_readings(np.random.default_rng(1))
-    found = Hierarchy(condensed(designs, targets, 6), TWO_DOF, SPREADS).posterior()
+    found = Hierarchy(condense_readings(designs, targets, 6), TWO_DOF, SPREADS).posterior()
     prior, design = prior_covariance(TWO_DOF, 4, SPREADS), block_diag(*designs)
     information = design.T @ design / SPREADS.scatter**2
     covariance = np.linalg.inv(np.linalg.inv(prior) + information)
@@ -121,7 +120,7 @@ def test_the_posterior_is_that_of_the_full_covariance() -> None:
 
 def test_slopes_are_those_of_the_likelihood() -> None:
     designs, targets = random_readings(np.random.default_rng(2))
-    slopes = Hierarchy(condensed(designs, targets, 6), TWO_DOF, SPREADS).slopes()
+    slopes = Hierarchy(condense_readings(designs, targets, 6), TWO_DOF, SPREADS).slopes()
 
     def along(name: str, direction: Array) -> float:
         ends = [
@@ -194,7 +193,7 @@ def test_estimates_are_the_mode_of_likelihood_and_prior() -> None:
     x = np.column_stack([drawn(rng, 4, 3, one_dof(0.4, 0.5, 0.3), m) for m in (0.3, -0.2)])
     designs = [3.0 * rng.normal(size=(n, 6)) for n in (20, 9, 5, 30)]
     targets = [d @ row + 0.2 * rng.normal(size=len(d)) for d, row in zip(designs, x, strict=True)]
-    best = estimated(condensed(designs, targets, 6), TWO_DOF, None).spreads
+    best = estimate_spreads(condense_readings(designs, targets, 6), TWO_DOF, None).spreads
 
     def height(spreads: Spreads) -> float:
         """With Gamma(2, 2) on each spread: log spread - 2 spread."""
@@ -216,15 +215,19 @@ def test_estimates_are_the_mode_of_likelihood_and_prior() -> None:
 def test_what_cannot_be_told_apart_is_dropped(shape: tuple[int, int], told: list[int]) -> None:
     table = drawn(np.random.default_rng(6), *shape, one_dof(0.3, 0.3, 0.3), 0.2)
     readings, dof = known_exactly(table), np.zeros(shape[1], dtype=int)
-    assert tellable(readings, dof)[:, 0].tolist() == told
-    found = estimated(readings, dof, 1.0).spreads
+    assert tellable_spreads(readings, dof)[:, 0].tolist() == told
+    found = estimate_spreads(readings, dof, 1.0).spreads
     assert [found.level[0] > 0, found.specimen[0] > 0, found.rest[0] > 0] == told
     assert found.rest[0] < 2.0
 
 
 def test_two_specimens_that_share_no_level_tell_no_level() -> None:
     table = np.array([[0.1, 0.3, np.nan, np.nan], [np.nan, np.nan, 0.2, -0.3]])
-    assert tellable(known_exactly(table), np.zeros(4, dtype=int))[:, 0].tolist() == [0, 1, 1]
+    assert tellable_spreads(known_exactly(table), np.zeros(4, dtype=int))[:, 0].tolist() == [
+        0,
+        1,
+        1,
+    ]
 
 
 @pytest.mark.full
@@ -237,8 +240,8 @@ def test_true_spreads_come_back_and_newcomers_are_where_expected() -> None:
         cohort, newcomer = table[:10], table[10]
         designs = [rng.normal(size=(25, 10)) for _ in cohort]
         targets = [d @ x + 0.1 * rng.normal(size=25) for d, x in zip(designs, cohort, strict=True)]
-        readings = condensed(designs, targets, 10)
-        found = estimated(readings, dof, None).spreads
+        readings = condense_readings(designs, targets, 10)
+        found = estimate_spreads(readings, dof, None).spreads
         variances.append([found.level[0], found.specimen[0], found.rest[0], found.scatter])
         expected = Hierarchy(readings, dof, found).posterior()
         away = newcomer - expected.common
@@ -256,7 +259,9 @@ def newcomers(seeds: int, n: int, j: int) -> Array:
         rng, dof = np.random.default_rng(seed), np.zeros(j, dtype=int)
         table = drawn(rng, n + 1, j, one_dof(0.1, 0.5, 0.15), 0.0)
         readings = known_exactly(table[:n])
-        expected = Hierarchy(readings, dof, estimated(readings, dof, 1.0).spreads).posterior()
+        expected = Hierarchy(
+            readings, dof, estimate_spreads(readings, dof, 1.0).spreads
+        ).posterior()
         off.append((table[n] - expected.common) / np.sqrt(np.diag(expected.newcomer_covariance)))
     return np.abs(off)
 
@@ -281,8 +286,7 @@ def measured_problem(truth: Array, seed: int, sd: Array = READING_SD, steps: int
     model = spine(2)
     free = free_parameters(model, 0, ROTATIONS, "per_joint")
     case, true_model = loaded(model, steps), with_parameters(model, free, truth)
-    solved = follow(System(Chain(true_model), true_model, case))
-    poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
+    poses = solved_poses(true_model, case)
     read = poses + sd * np.random.default_rng(seed).normal(size=poses.shape)
     return Problem(
         model, (MeasuredCase(case, read),), free, ANGLES, -np.full(6, 3.0), np.full(6, 3.0)
@@ -310,9 +314,7 @@ def penalised_cost(x: Array, problems: list[Problem], prior: Array, scatter: flo
     for problem, own in zip(problems, x.reshape(len(problems), -1), strict=True):
         model = with_parameters(problem.model, problem.free, own)
         for case in problem.cases:
-            solved = follow(System(Chain(model), model, case.case))
-            poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
-            error = np.rad2deg(poses - case.measured)[:, :, 3:]
+            error = np.rad2deg(solved_poses(model, case.case) - case.measured)[:, :, 3:]
             total += np.sum(error**2) / scatter**2
     return float(total)
 
@@ -518,7 +520,7 @@ def test_a_search_for_spreads_that_ends_early_is_said_to(monkeypatch: pytest.Mon
     assert pool(cohort()).message == ""
     monkeypatch.setattr(spreads, "minimize", early)
     readings, dof = known_exactly(np.random.default_rng(3).normal(size=(4, 3))), np.zeros(3, int)
-    assert "LIMIT" in estimated(readings, dof, 1.0).trouble
+    assert "LIMIT" in estimate_spreads(readings, dof, 1.0).trouble
     monkeypatch.setattr(pooling, "MOST_ROUNDS", 1)
     found = pool(cohort())
     assert found.status is Status.NOT_CONVERGED
@@ -528,8 +530,8 @@ def test_a_search_for_spreads_that_ends_early_is_said_to(monkeypatch: pytest.Mon
 def test_a_spread_that_could_not_be_told_before_starts_anew() -> None:
     table = drawn(np.random.default_rng(6), 5, 5, one_dof(0.3, 0.3, 0.3), 0.2)
     readings, dof = known_exactly(table), np.zeros(5, dtype=int)
-    found = estimated(readings, dof, 1.0, one_dof(0.0, 0.0, 0.4)).spreads
-    expected = estimated(readings, dof, 1.0).spreads
+    found = estimate_spreads(readings, dof, 1.0, one_dof(0.0, 0.0, 0.4)).spreads
+    expected = estimate_spreads(readings, dof, 1.0).spreads
     for name in ("level", "specimen", "rest"):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-3)
 
@@ -588,7 +590,7 @@ def test_spreads_between_two_are_so_in_logarithms_and_dropped_ones_stay_dropped(
     sizes = (np.array([0.1, 0.0]), np.array([0.2, 2.0]), np.array([0.3, 0.5]), 0.01)
     others = (np.array([0.4, 0.0]), np.array([0.8, 0.5]), np.array([3.0, 0.0]), 0.04)
     one, other = Spreads(*sizes), Spreads(*others)
-    found = between(one, other, share)
+    found = interpolate_spreads(one, other, share)
     for name in ("level", "specimen", "rest"):
         first, second = (getattr(spreads, name) for spreads in (one, other))
         expected = np.zeros(2)

@@ -15,7 +15,6 @@ from sweeps import sweep
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem
 from spinepipe.calibrate.posterior import (
-    TIPPED,
     Point,
     Target,
     _mode,
@@ -203,19 +202,6 @@ def test_effective_size_of_an_autoregressive_chain() -> None:
         chains[:, step] = a * chains[:, step - 1] + np.sqrt(1 - a * a) * rng.normal(size=4)
     found = convergence([chains])
     assert found.ess_bulk[0] == pytest.approx(4 * n * (1 - a) / (1 + a), rel=0.1)
-
-
-def test_neither_error_nor_scatter_is_refused() -> None:
-    target, _ = lever(measured(20.0, 0.0))
-    with pytest.raises(ValueError, match="neither an error"):
-        noise_of(target.evaluator, np.zeros(6), 0.0)
-
-
-def test_where_nothing_stands_there_is_no_mode() -> None:
-    target, _ = lever(measured(20.0, 0.0))
-    outside = np.array([[0.0, 20.0]])  # 0.2 m: beyond what an offset may be
-    assert target.together([(0, outside[0])]) == [None]
-    assert modes(target, outside)[0].message == TIPPED
 
 
 @sweep("along", [-9.0, -3.9, 0.3, 3.9, 9.0])

@@ -17,14 +17,13 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import Body, ScopedEffect, SpineModel
 from spinepipe.statics.motion import ChainMotion
-from spinepipe.statics.prescribed import (
-    HeldChain,
+from spinepipe.statics.prescribed import PrescribedResult, hold_at
+from spinepipe.statics.prescribed_chain import (
     NewtonTrial,
+    PrescribedChain,
     PrescribedPlace,
-    PrescribedResult,
     Prescription,
     Tilt,
-    hold_at,
     newton_steps,
 )
 from spinepipe.status import PrescribedStatus
@@ -89,8 +88,8 @@ def rotations(n: int = COUNT) -> Array:
     return np.tile([False] * 3 + [True] * 3, n)
 
 
-def chain(made: SpineModel, side: float = 1.0) -> HeldChain:
-    return HeldChain(made, grips(side), rotations())
+def chain(made: SpineModel, side: float = 1.0) -> PrescribedChain:
+    return PrescribedChain(made, grips(side), rotations())
 
 
 def held(wanted: Array, mirrored: bool = False) -> PrescribedResult:
@@ -255,7 +254,7 @@ PRESCRIBED: tuple[Prescription, ...] = (
 def test_slopes_and_bends_are_those_of_the_value(prescription: Prescription) -> None:
     """Also PyBullet's, which knows nothing of twists."""
     plain, rng = spine(3, gravity=False), np.random.default_rng(3)
-    own = HeldChain(plain, (prescription,), np.ones(18, dtype=bool))
+    own = PrescribedChain(plain, (prescription,), np.ones(18, dtype=bool))
     q, push = np.tile([2e-3] * 3 + [0.2] * 3, 3) * rng.normal(size=18), 300.0
 
     def matrix(at: Array, pushed: float) -> Array:
@@ -298,7 +297,7 @@ def test_steps_that_stand_together_are_those_of_each_alone() -> None:
         assert (one is None) == (alone is None)
         if one is not None and alone is not None:
             np.testing.assert_allclose(one.step, alone.step, rtol=1e-9, atol=1e-12)
-    singular = HeldChain(model(), nothing, rotations())
+    singular = PrescribedChain(model(), nothing, rotations())
     none, one = newton_steps([NewtonTrial(singular, poses[3], pushes[3], wanted, 0.0), trials[0]])
     assert none is not None
     assert np.isnan(none.step).all()
@@ -309,7 +308,7 @@ def test_steps_that_stand_together_are_those_of_each_alone() -> None:
 def test_effects_other_than_joint_laws_are_refused() -> None:
     moved = spine(3, effects=(scoped(create("joint_centre_offset", {}), (1,)),))
     with pytest.raises(ValueError, match="joint laws alone"):
-        HeldChain(moved, PRESCRIBED, rotations(3))
+        PrescribedChain(moved, PRESCRIBED, rotations(3))
 
 
 def test_answers_are_the_derivatives_of_the_pose() -> None:

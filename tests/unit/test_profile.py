@@ -14,7 +14,6 @@ from sweeps import sweep
 
 from spinepipe.calibrate import Evaluator, Fit, MeasuredCase, Problem, fit
 from spinepipe.calibrate.profile import NEAR, Best, Profile, profile_in_turn
-from spinepipe.calibrate.uncertainty import uncertainty
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
@@ -111,6 +110,7 @@ def test_a_joint_too_stiff_for_its_readings_is_open_above() -> None:
     problem = one_spring(theta, 8.0)
     found = fit(problem, profiled=True)
     seen = region(found)
+    assert np.isfinite(found.uncertainty.standard_error[0])
     assert (seen.open_below[0], seen.open_above[0]) == (False, True)
     assert seen.high[0] == problem.upper[0]
     assert np.isfinite(seen.low[0])
@@ -223,19 +223,6 @@ def scanned(evaluator: Evaluator, unknown: int, value: float, near: Array) -> fl
     return float(found.fun)
 
 
-def test_a_fit_that_was_not_asked_for_regions_has_none() -> None:
-    assert fit(one_spring(noisy(0, 60.0), 8.0)).profile is None
-
-
-def test_a_local_error_is_no_region() -> None:
-    """Where the spring is nearly rigid there is a standard error, but no upper end."""
-    problem = one_spring(noisy(3, 800.0), 8.0)
-    found = fit(problem, profiled=True)
-    local = uncertainty(problem, Evaluator(problem).at(found.x), found.at_bound, 1.0, None)
-    assert np.isfinite(local.standard_error[0])
-    assert region(found).open_above[0]
-
-
 def test_a_stiffness_reaches_from_one_end_of_its_region_to_the_other() -> None:
     """k = 1 / u, so its ends are 1 / (u + way) and, where the data have one, 1 / (u - way)."""
     size = float(MOMENTS_NM @ MOMENTS_NM)
@@ -257,6 +244,7 @@ def test_a_stiffness_reaches_from_one_end_of_its_region_to_the_other() -> None:
 
 def test_a_fit_without_regions_identifies_nothing() -> None:
     found = fit(one_spring(noisy(0, 60.0), 8.0))
+    assert found.profile is None
     assert found.reach(0, 60.0) is None
     assert not found.identifiable(0)
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from example_effects import NOWHERE, Relaxation, loaded, scoped, spine
+from example_effects import NOWHERE, Relaxation, loaded, massless, scoped, spine, top_heavy
 
 from spinepipe.effects import Wrench
-from spinepipe.model import LoadCase, LoadStep, SpineModel
+from spinepipe.model import LoadCase, LoadStep
 from spinepipe.statics import Program, System, follow, settle
 from spinepipe.statics.transient import ALPHA, COUPLING, ERROR_WEIGHTS, GAMMA, WEIGHTS
 from spinepipe.status import Status
@@ -82,8 +82,7 @@ def test_path_effects_and_massless_chains_are_refused() -> None:
     refused = settle(system, full(system), 1.0, (0.5,))
     assert refused.status is Status.REFUSED
     assert "load step" in refused.message
-    bare = spine(1, gravity=False)
-    bare = replace(bare, bodies=(replace(bare.bodies[0], mass=0.0, inertia=np.zeros((3, 3))),))
+    bare = massless()
     system = System(Chain(bare), bare, loaded(bare))
     refused = settle(system, full(system), 1.0)
     assert refused.status is Status.REFUSED
@@ -91,16 +90,13 @@ def test_path_effects_and_massless_chains_are_refused() -> None:
     assert refused.remaining is None
 
 
-def tipping() -> tuple[System, SpineModel]:
-    model = spine(1)
-    above = model.frames[0].origin + np.array([0.002, 0.1, 0.0])
-    heavy = replace(model.bodies[0], mass=60.0, com=above)
-    model = replace(model, bodies=(heavy,))
-    return System(Chain(model), model, loaded(model, 1)), model
+def tipping() -> System:
+    model = top_heavy()
+    return System(Chain(model), model, loaded(model, 1))
 
 
 def test_a_chain_that_tips_over_ends_unstable() -> None:
-    system, _ = tipping()
+    system = tipping()
     soon, late = settle(system, full(system), 0.002), settle(system, full(system), 5.0)
     for found in (soon, late):
         assert found.status is Status.UNSTABLE
@@ -111,7 +107,7 @@ def test_a_chain_that_tips_over_ends_unstable() -> None:
 
 
 def test_times_that_a_falling_chain_never_reached_are_not_neutral_poses() -> None:
-    system, _ = tipping()
+    system = tipping()
     found = settle(system, full(system), 5.0, (0.01, 4.9))
     assert found.history[1].any() or np.isnan(found.history[1]).all()
 

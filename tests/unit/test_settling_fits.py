@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from example_effects import loaded, spine
+from example_effects import loaded, massless, spine, top_heavy
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit, fit_alike
 from spinepipe.calibrate.solvers import CaseResiduals, Settling
@@ -104,16 +104,9 @@ def test_the_derivative_of_the_end_is_that_of_fine_runs(course: Course) -> None:
         assert np.abs(there - wanted).max() < 1e-3 * np.abs(wanted).max()
 
 
-def tipping() -> tuple[SpineModel, LoadCase]:
-    """A joint under 60 kg a hand above it."""
-    model = spine(1)
-    above = model.frames[0].origin + np.array([0.002, 0.1, 0.0])
-    model = replace(model, bodies=(replace(model.bodies[0], mass=60.0, com=above),))
-    return model, loaded(model, 1)
-
-
 def test_a_run_that_cannot_take_the_steps_of_another_is_lost() -> None:
-    standing, (tipping_over, case) = spine(1), tipping()
+    standing, tipping_over = spine(1), top_heavy()
+    case = loaded(tipping_over, 1)
     stack = Stack.of([standing, tipping_over], [(0, case), (1, case)])
     found = batched.settle(stack, Course(3.0), np.array([0, 0]))
     assert list(found.trouble) == [1]
@@ -125,9 +118,9 @@ def test_a_run_that_cannot_take_the_steps_of_another_is_lost() -> None:
 
 
 def test_a_chain_that_tips_over_has_no_solution() -> None:
-    model, case = tipping()
+    model = top_heavy()
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
-    found = Settling(model, [case], free, Course(3.0)).solve([(0, np.zeros(3))])[0]
+    found = Settling(model, [loaded(model, 1)], free, Course(3.0)).solve([(0, np.zeros(3))])[0]
     assert isinstance(found, str)
     assert "tips over" in found
 
@@ -292,9 +285,7 @@ def test_no_more_readings_than_unknowns_are_met_exactly() -> None:
 
 
 def test_a_chain_without_mass_is_refused_before_any_run() -> None:
-    model = spine(1, gravity=False)
-    bare = replace(model.bodies[0], mass=0.0, inertia=np.zeros((3, 3)))
-    model = replace(model, bodies=(bare,))
+    model = massless()
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
     problem = problem_of(model, loaded(model, 1), np.full((1, 1, 6), 0.01), free)
     assert np.isfinite(Evaluator(problem).at(np.zeros(3)).residual).all()

@@ -23,7 +23,6 @@ from spinepipe.model.file import (
     write_model,
 )
 from spinepipe.statics import System, follow
-from spinepipe.statics.batched import Stack
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 
@@ -158,16 +157,6 @@ def test_a_joint_turns_as_far_as_the_table_says(moment_nm: float) -> None:
     (found,) = follow(System(Chain(model), model, case))
     assert found.usable, found.equilibrium.message
     assert found.equilibrium.q[EXTENSION] == pytest.approx(turned, abs=1e-9)
-
-
-def test_stacks_of_it_end_where_the_engine_of_record_ends() -> None:
-    runs = [bent(moment) for moment in (-12.0, 1.0, 20.0)]
-    stack = Stack.of([model for model, _ in runs], [(n, case) for n, (_, case) in enumerate(runs)])
-    found = stack.solve()
-    assert not found.by_engine.any()
-    for (model, case), q in zip(runs, found.q, strict=True):
-        (record,) = follow(System(Chain(model), model, case))
-        np.testing.assert_allclose(q.ravel(), record.equilibrium.q, rtol=0, atol=1e-11)
 
 
 def test_a_model_file_carries_it(tmp_path: Any) -> None:

@@ -12,7 +12,6 @@ from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, SpineModel
 from spinepipe.statics import System, follow
-from spinepipe.statics.batched import Stack
 from spinepipe.units import COORDINATES
 from spinepipe.world import Chain
 
@@ -134,16 +133,6 @@ def test_a_joint_turns_as_far_as_the_law_says(moment_nm: float) -> None:
     turned = np.sign(moment_nm) * np.log1p(abs(moment_nm) * rate / STIFFNESS) / rate
     # the spring beside it holds 1e-4 of 27 N m/rad at most
     assert found.equilibrium.q[EXTENSION] == pytest.approx(turned, rel=1e-5)
-
-
-def test_stacks_of_it_end_where_the_engine_of_record_ends() -> None:
-    runs = [bent(moment) for moment in (-40.0, 3.0, 90.0)]
-    stack = Stack.of([model for model, _ in runs], [(n, case) for n, (_, case) in enumerate(runs)])
-    found = stack.solve()
-    assert not found.by_engine.any()
-    for (model, case), q in zip(runs, found.q, strict=True):
-        (record,) = follow(System(Chain(model), model, case))
-        np.testing.assert_allclose(q.ravel(), record.equilibrium.q, rtol=0, atol=1e-11)
 
 
 def test_an_unknown_coordinate_is_refused() -> None:

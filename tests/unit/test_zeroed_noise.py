@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import statsmodels.api as sm
-from example_effects import loaded, spine
+from example_effects import loaded, solved_poses, spine
 
 from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
 from spinepipe.calibrate.problem import whitened
 from spinepipe.effects.contract import Array
-from spinepipe.statics import System, follow, free_parameters
-from spinepipe.world import Chain
+from spinepipe.statics import free_parameters
 
 ROTATIONS = ("extension_nm_per_rad", "right_bending_nm_per_rad", "left_rotation_nm_per_rad")
 READING_SD = np.array([2e-5] * 3 + [1e-3] * 3)
@@ -34,8 +33,7 @@ def zeroed_problem(
     free = free_parameters(model, 0, ROTATIONS, "per_specimen")
     cases = []
     for case in (loaded(model, steps), replace(loaded(model, steps - 1), test="shorter")):
-        solved = follow(System(Chain(model), model, case))
-        poses = np.stack([step.equilibrium.q.reshape(-1, 6) for step in solved])
+        poses = solved_poses(model, case)
         read = poses + READING_SD * rng.normal(size=poses.shape)
         cases.append(MeasuredCase(case, read - read[0], zeroed=True))
     bounds = np.full(len(free), 2.0)

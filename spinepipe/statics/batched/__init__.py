@@ -11,8 +11,7 @@ from spinepipe.statics.batched.derive import (
 from spinepipe.statics.batched.dynamics import Moving
 from spinepipe.statics.batched.forward_kinematics import forward_kinematics
 from spinepipe.statics.batched.inactive_sensitivity import Acting, Answering, Idle, acts_here
-from spinepipe.statics.batched.solve import ManySolved, solve_many
-from spinepipe.statics.batched.spines import Cases, Spines
+from spinepipe.statics.batched.spines import Cases, ManySolved, Spines, solve_many
 from spinepipe.statics.batched.stack import Stack, StepPoses
 from spinepipe.statics.batched.transient import CourseEnds, settle
 

@@ -7,27 +7,29 @@ Unknowns are a model's own, `FreeParameter`; arrays have as many columns as the 
 them, and the columns that a model does not have stay zero.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from spinepipe.effects import MeasurementEffect
 from spinepipe.effects.contract import Array, Indices, MeasurementBeside, MeasurementContext
-from spinepipe.statics.batched.dead_loads import pushes
 from spinepipe.statics.batched.effects import Bound, Slopes
-from spinepipe.statics.batched.elimination import NONE, Changes, answers, missing
-from spinepipe.statics.batched.forward_kinematics import (
-    KinematicsAndLoads,
-    forward_kinematics,
-    part,
-)
+from spinepipe.statics.batched.elimination import NONE, Changes, missing, solve_rates
+from spinepipe.statics.batched.forward_kinematics import KinematicsAndLoads, forward_kinematics
 from spinepipe.statics.batched.lanes import Acting
+from spinepipe.statics.batched.loads import Flags, dead_loads_by, part
 from spinepipe.statics.batched.stack import Stack
-from spinepipe.statics.measurement_model import Instrument, beside, followed, passed, read, read_by
-from spinepipe.statics.path import follow
-from spinepipe.statics.reactions import reaction
-from spinepipe.statics.reactions import reactions_by as engine_reactions_by
+from spinepipe.statics.measurement_model import (
+    Instrument,
+    measurement_context,
+    read,
+    read_by,
+    reading_derivative,
+    share_passed,
+)
+from spinepipe.statics.path import follow, reaction
 from spinepipe.statics.sensitivity import FreeParameter, by_parameters
+from spinepipe.statics.sensitivity import reactions_by as engine_reactions_by
 from spinepipe.statics.system import System
 from spinepipe.world import Chain
 
@@ -48,19 +50,19 @@ def answered(stack: Stack, q: Array, sources: Array, observed: bool = False) -> 
     for runs in stack.chunks(np.arange(len(stack.remembers))):
         lanes = stack.lanes(runs)
         bound = stack.bound(lanes, stack.initial_states())
-        tangents = bound.held(q[lanes]).tangent
+        tangents = bound.joint_forces(q[lanes]).tangent
         seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q[lanes], tangents)
-        found[lanes], _ = answers(seen, Changes(sources[lanes]))
+        found[lanes], _ = solve_rates(seen, Changes(sources[lanes]))
         if stack.loads.supports.there:
             held[lanes] = missing(seen, found[lanes], Changes(sources[lanes]))
     if observed:
         found = _observed(stack, q, found, None)
     if stack.loads.supports.there:
-        found = _with_reactions(stack, np.arange(len(q)), found, held)
+        found = _with_reactions(stack, found, held)
     return found
 
 
-def answered_on_path(stack: Stack, q: Array, own: Array, shift: Array | None) -> Array:
+def path_responses(stack: Stack, q: Array, own: Array, shift: Array | None) -> Array:
     """(L, J, 6, m) how what is read at poses q answers loads, laws that remember led along.
 
     Parameters
@@ -73,44 +75,40 @@ def answered_on_path(stack: Stack, q: Array, own: Array, shift: Array | None) ->
     for runs in stack.chunks(np.arange(len(stack.remembers)), stepwise=True):
         for _, lanes in stack.steps(runs):
             bound, there = stack.bound(lanes, states), q[lanes]
-            before = {
-                n: states_by_x[n][places] for n, places in bound.places.items() if n in states
-            }
-            loads = own[lanes] + bound.held_by(there, still, before)
+            before = bound.states_of(states_by_x)
+            loads = own[lanes] + bound.joint_forces_by(there, still, before)
             seen = forward_kinematics(
-                stack.chains, part(stack.loads, lanes), there, bound.held(there).tangent
+                stack.chains, part(stack.loads, lanes), there, bound.joint_forces(there).tangent
             )
-            dq = answers(seen, Changes(-loads))[0]
+            dq = solve_rates(seen, Changes(-loads))[0]
             found[lanes] = dq
             if stack.loads.supports.there:
                 held[lanes] = missing(seen, dq, Changes(-loads))
             moved = None if shift is None else shift[lanes]
-            stack.remember(states_by_x, bound, bound.after_by(there, dq, still, before, moved))
-            stack.remember(states, bound, bound.after(there))
+            stack.remember(
+                states_by_x, bound, bound.states_after_by(there, dq, still, before, moved)
+            )
+            stack.remember(states, bound, bound.states_after(there))
     found = _observed(stack, q, found, None)
     if stack.loads.supports.there:
-        found = _with_reactions(stack, np.arange(len(q)), found, held)
+        found = _with_reactions(stack, found, held)
     return found
 
 
-def _with_reactions(stack: Stack, lanes: Indices, read: Array, reactions: Array) -> Array:
-    """What is read on lanes (N, J, 6, ...), with reactions where they are read."""
-    read_as = stack.loads.supports.read_as[lanes]
+def _with_reactions(stack: Stack, read: Array, reactions: Array) -> Array:
+    """What is read on all lanes (L, J, 6, ...), with reactions where they are read."""
+    read_as = stack.loads.supports.read_as
     read_as = read_as.reshape(read_as.shape + (1,) * (read.ndim - 3))
     return np.where(read_as > 0.0, read_as * reactions, read)
 
 
-def _supported(stack: Stack) -> Iterator[Indices]:
-    """Lanes of runs whose rigs fix anything, in portions in which states may be advanced."""
+def _supported(stack: Stack) -> Flags:
+    """(R,) runs of the stack whose rigs fix anything."""
     if not stack.loads.supports.there:
-        return
+        return np.zeros(len(stack.alone), dtype=bool)
     fixed = np.logical_or.reduceat(stack.loads.supports.fixed.any(axis=(1, 2)), stack.first[:-1])
-    runs = fixed & ~stack.alone
-    for some in stack.chunks(np.flatnonzero(runs & ~stack.remembers)):
-        yield stack.lanes(some)
-    for some in stack.chunks(np.flatnonzero(runs & stack.remembers), stepwise=True):
-        for _, lanes in stack.steps(some):
-            yield lanes
+    found: Flags = fixed & ~stack.alone
+    return found
 
 
 def reactions(stack: Stack, q: Array) -> Array:
@@ -119,12 +117,12 @@ def reactions(stack: Stack, q: Array) -> Array:
     Positive in the direction of the coordinate.
     """
     found, states = np.zeros(q.shape), stack.initial_states()
-    for lanes in _supported(stack):
+    for lanes in stack.portions(_supported(stack)):
         bound = stack.bound(lanes, states)
-        held = bound.held(q[lanes])
+        held = bound.joint_forces(q[lanes])
         seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q[lanes], held.tangent)
         found[lanes] = np.where(seen.fixed, held.load - seen.applied, 0.0)
-        stack.remember(states, bound, bound.after(q[lanes]))
+        stack.remember(states, bound, bound.states_after(q[lanes]))
     for run in np.flatnonzero(stack.alone).tolist():
         system = _system(stack, run)
         for lane, step in enumerate(follow(system), int(stack.first[run])):
@@ -137,14 +135,14 @@ def reactions_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array
     moved = _DerivedEffects(stack, unknowns)
     found = np.zeros(dq.shape)
     states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
-    for lanes in _supported(stack):
+    for lanes in stack.portions(_supported(stack)):
         bound = stack.bound(lanes, states)
         slopes = moved.on(bound)
-        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
+        before = bound.states_of(states_by_x)
         found[lanes] = moved.reactions(lanes, bound, (q[lanes], dq[lanes]), slopes, before)
-        after = bound.after_by(q[lanes], dq[lanes], slopes, before)
+        after = bound.states_after_by(q[lanes], dq[lanes], slopes, before)
         stack.remember(states_by_x, bound, after)
-        stack.remember(states, bound, bound.after(q[lanes]))
+        stack.remember(states, bound, bound.states_after(q[lanes]))
     for run in np.flatnonzero(stack.alone).tolist():
         system, free = _system(stack, run), unknowns[int(stack.loads.chain[stack.first[run]])]
         every = engine_reactions_by(system, follow(system), free)
@@ -164,40 +162,20 @@ def poses_by(stack: Stack, q: Array, unknowns: Unknowns) -> Array:
     moved = _DerivedEffects(stack, unknowns)
     found = np.zeros((*q.shape, moved.m))
     states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
-    for runs in stack.chunks(np.flatnonzero(~stack.remembers & ~stack.alone)):
-        lanes = stack.lanes(runs)
-        bound = stack.bound(lanes, states)
-        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
-        found[lanes] = moved.poses(lanes, bound, q[lanes], moved.on(bound), before)
-    for runs in stack.chunks(np.flatnonzero(stack.remembers & ~stack.alone), stepwise=True):
-        _step_by_step(stack, runs, q, moved, found)
-    for run in np.flatnonzero(stack.alone).tolist():
-        _by_engine(stack, run, unknowns, found)
-    return found
-
-
-def _by_engine(stack: Stack, run: int, unknowns: Unknowns, found: Array) -> None:
-    """Enter the derivatives of a run with an effect that takes no stack."""
-    free = unknowns[int(stack.loads.chain[stack.first[run]])]
-    system = _system(stack, run)
-    by_x = by_parameters(system, follow(system), free)
-    for lane, dq in enumerate(by_x, int(stack.first[run])):
-        found[lane, ..., : len(free)] = dq.reshape(stack.joints, 6, len(free))
-
-
-def _step_by_step(
-    stack: Stack, runs: Indices, q: Array, moved: "_DerivedEffects", found: Array
-) -> None:
-    """Enter the derivatives of runs with laws that remember, step by step."""
-    states, states_by_x = stack.initial_states(), stack.initial_states(moved.m)
-    for _, lanes in stack.steps(runs):
+    for lanes in stack.portions(~stack.alone):
         bound = stack.bound(lanes, states)
         slopes = moved.on(bound)
-        before = {n: by_x[bound.places[n]] for n, by_x in states_by_x.items() if n in bound.places}
-        dq = moved.poses(lanes, bound, q[lanes], slopes, before)
-        found[lanes] = dq
-        stack.remember(states_by_x, bound, bound.after_by(q[lanes], dq, slopes, before))
-        stack.remember(states, bound, bound.after(q[lanes]))
+        before = bound.states_of(states_by_x)
+        dq = found[lanes] = moved.poses(lanes, bound, q[lanes], slopes, before)
+        if before:  # some of these remember: so do the derivatives of what they do
+            stack.remember(states_by_x, bound, bound.states_after_by(q[lanes], dq, slopes, before))
+            stack.remember(states, bound, bound.states_after(q[lanes]))
+    for run in np.flatnonzero(stack.alone).tolist():
+        system, free = _system(stack, run), unknowns[int(stack.loads.chain[stack.first[run]])]
+        every = by_parameters(system, follow(system), free)
+        for lane, dq in enumerate(every, int(stack.first[run])):
+            found[lane, ..., : len(free)] = dq.reshape(stack.joints, 6, len(free))
+    return found
 
 
 class _DerivedEffects:
@@ -235,9 +213,11 @@ class _DerivedEffects:
     ) -> Array:
         """(N, J, 6, m) derivative of the poses of some lanes."""
         stack = self.stack
-        sources = np.negative(bound.held_by(q, slopes, states_by_x))
-        seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
-        return answers(seen, Changes(sources, self._pushes(lanes, seen)))[0]
+        sources = np.negative(bound.joint_forces_by(q, slopes, states_by_x))
+        seen = forward_kinematics(
+            stack.chains, part(stack.loads, lanes), q, bound.joint_forces(q).tangent
+        )
+        return solve_rates(seen, Changes(sources, self._pushes(lanes, seen)))[0]
 
     def _pushes(self, lanes: Indices, seen: KinematicsAndLoads) -> Array:
         """(N, J, 6, m) derivative of the wrench on each vertebra, or none."""
@@ -245,7 +225,7 @@ class _DerivedEffects:
             return NONE
         stack = self.stack
         run, listed = stack.run[lanes], part(stack.listed, lanes)
-        return pushes(self.dead, stack.chains, listed, run, seen.turned, seen.shifted)
+        return dead_loads_by(self.dead, stack.chains, listed, run, seen.turned, seen.shifted)
 
     def reactions(
         self,
@@ -262,15 +242,16 @@ class _DerivedEffects:
         there : poses q (N, J, 6) and their derivatives (N, J, 6, m).
         """
         stack, (q, dq) = self.stack, there
-        seen = forward_kinematics(stack.chains, part(stack.loads, lanes), q, bound.held(q).tangent)
-        own = bound.held_by(q, slopes, states_by_x)
+        seen = forward_kinematics(
+            stack.chains, part(stack.loads, lanes), q, bound.joint_forces(q).tangent
+        )
+        own = bound.joint_forces_by(q, slopes, states_by_x)
         by_x = missing(seen, dq, Changes(-own, self._pushes(lanes, seen)))
         found: Array = np.where(seen.fixed[..., None], by_x, 0.0)
         return found
 
 
-def observing(one: Acting) -> Instrument:
-    """The effect on what is measured."""
+def _instrument(one: Acting) -> Instrument:
     assert isinstance(one.effect, MeasurementEffect | MeasurementBeside)
     return one.effect
 
@@ -282,8 +263,8 @@ def _beside(
     if not isinstance(effect, MeasurementBeside):
         return None
     runs = range(len(stack.remembers))
-    along = np.concatenate([passed(stack.case(run)) for run in runs])
-    every = beside(seen.reshape(-1, stack.joints, 6), along)
+    along = np.concatenate([share_passed(stack.case(run)) for run in runs])
+    every = measurement_context(seen.reshape(-1, stack.joints, 6), along)
     return MeasurementContext(every.above[flat], every.below[flat], every.passed[flat])
 
 
@@ -297,25 +278,25 @@ def _neighbours(stack: Stack, by_x: Array, flat: Indices) -> tuple[Array, Array]
 
 def readings(stack: Stack, q: Array) -> Array:
     """(L, J, 6) what is read at poses q (L, J, 6)."""
-    seen = reported(stack, q)
+    seen = instrument_readings(stack, q)
     if not stack.loads.supports.there:
         return seen
-    return _with_reactions(stack, np.arange(len(q)), seen, reactions(stack, q))
+    return _with_reactions(stack, seen, reactions(stack, q))
 
 
-def reported(stack: Stack, q: Array) -> Array:
+def instrument_readings(stack: Stack, q: Array) -> Array:
     """(L, J, 6) what the instruments make of poses q (L, J, 6)."""
     seen = q.reshape(-1, 6).copy()
     for one in stack.effects.measurement:
         places, lanes = one.on(stack.run)
         flat = stack.joints * lanes + one.joint[places]
-        effect = observing(one)
+        effect = _instrument(one)
         around = _beside(stack, effect, seen, flat)
         seen[flat] = read(effect, seen[flat], one.values[one.row[places]], around).q
     return seen.reshape(q.shape)
 
 
-def reported_by(stack: Stack, seen: Array, effect: Instrument, values: Array) -> Array:
+def instrument_readings_by(stack: Stack, seen: Array, effect: Instrument, values: Array) -> Array:
     """(S, L J, 6, P) how one more instrument, that is off, would change what is reported.
 
     Parameters
@@ -339,8 +320,7 @@ def readings_by(stack: Stack, q: Array, dq: Array, unknowns: Unknowns) -> Array:
     by_x = _observed(stack, q, dq, unknowns)
     if not stack.loads.supports.there:
         return by_x
-    every, held = np.arange(len(q)), reactions_by(stack, q, dq, unknowns)
-    return _with_reactions(stack, every, by_x, held)
+    return _with_reactions(stack, by_x, reactions_by(stack, q, dq, unknowns))
 
 
 def _observed(stack: Stack, q: Array, dq: Array, unknowns: Unknowns | None) -> Array:
@@ -354,11 +334,11 @@ def _observed(stack: Stack, q: Array, dq: Array, unknowns: Unknowns | None) -> A
     for one in stack.effects.measurement:
         places, lanes = one.on(stack.run)
         flat, rows = stack.joints * lanes + one.joint[places], one.row[places]
-        effect = observing(one)
+        effect = _instrument(one)
         around = _beside(stack, effect, seen, flat)
         observed = read(effect, seen[flat], one.values[rows], around)
         neighbours = None if around is None else _neighbours(stack, by_x, flat)
-        by_x[flat] = followed(observed, by_x[flat], neighbours)
+        by_x[flat] = reading_derivative(observed, by_x[flat], neighbours)
         if unknowns is not None:
             slope = one.by_unknowns(unknowns, dq.shape[3])[rows]
             by_x[flat] += read_by(effect, seen[flat], one.values[rows], around) @ slope

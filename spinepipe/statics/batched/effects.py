@@ -1,7 +1,8 @@
 """Effects bound to lanes: what the joints of many chains hold at once, and its derivatives.
 
-Derivatives are carried forward: every array has a last axis of m unknowns, those of the model that
-the lane belongs to.
+Laws and geometry are summed and composed as for one chain (`statics.joint_forces`), over the joints
+of all lanes as one long list. Derivatives are carried forward: every array has a last axis of m
+unknowns, those of the model that the lane belongs to.
 """
 
 from collections.abc import Mapping
@@ -9,21 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.effects import EffectKind
+from spinepipe.effects import EffectKind, GeometryEffect
 from spinepipe.effects.contract import AcrossJoints, Array, Indices, Neutral
 from spinepipe.statics.batched.lanes import Acting, Effects
 from spinepipe.statics.joint_forces import (
     ActiveLaw,
     ActivePath,
-    Holding,
+    JointForces,
     Law,
     States,
     assemble_joint_forces,
     states_after,
 )
-from spinepipe.statics.joint_kinematics import ActiveGeometry, JointKinematics, place
-
-NOTHING = np.empty(0)
+from spinepipe.statics.joint_kinematics import NOTHING, Active, JointKinematics, place
 
 PathStates = Mapping[int, Array]
 """State (K, S), or its derivatives (K, S, m), of each path law, by its number among the laws."""
@@ -97,16 +96,16 @@ class Bound:
         self.places: dict[int, Indices] = {}
         self.geometry_places: dict[int, Indices] = {}
         self.laws: list[Law] = []
-        self.geometry: list[ActiveGeometry] = []
+        self.geometry: list[Active[GeometryEffect]] = []
         of: dict[int, Array] = {}
-        lasting: dict[int, Array] = {}
+        durations: dict[int, Array] = {}
         for number, one in enumerate(effects.laws):
             places, at, there = self._there(one, number, runs)
             if not len(places):
                 continue
             self.places[number] = places
             if one.effect.kind is EffectKind.PATH:
-                of[number], lasting[number] = states[number][places], seconds[at]
+                of[number], durations[number] = states[number][places], seconds[at]
                 self.laws.append(ActivePath(one.effect, *there))  # type: ignore[arg-type]
             else:
                 self.laws.append(ActiveLaw(one.effect, *there))  # type: ignore[arg-type]
@@ -115,10 +114,10 @@ class Bound:
             if not len(places):
                 continue
             self.geometry_places[number] = places
-            self.geometry.append(ActiveGeometry(one.effect, *there))  # type: ignore[arg-type]
+            self.geometry.append(Active(one.effect, *there))  # type: ignore[arg-type]
         cables = (self._cable(one, neutral, chain, runs) for one in effects.cables)
         self.cables = {n: cable for n, cable in enumerate(cables) if len(cable.lanes)}
-        self.states = States(of, lasting)
+        self.states = States(of, durations)
 
     def _there(
         self, one: Acting, number: int, runs: Indices
@@ -138,41 +137,45 @@ class Bound:
         own = neutral.part(chain[lanes])
         return _Cable(one.effect, places[first], lanes, there[lanes], values, own)
 
-    def placed(self, q: Array) -> JointKinematics:
+    def joint_kinematics(self, q: Array) -> JointKinematics:
         """What the laws see at q (N, J, 6)."""
         flat = q.reshape(-1, 6)
         if not self.geometry:
-            return JointKinematics(flat, NOTHING, NOTHING, {})
+            return JointKinematics.unmoved(flat)
         return place(flat, self.geometry, by_parameters=False)
 
-    def held(self, q: Array) -> Holding:
+    def joint_forces(self, q: Array) -> JointForces:
         """Loads (N, J, 6) and tangents (N, J, 6, 6) of the joints at q (N, J, 6)."""
-        found = self.held_by_laws(q)
+        found = self.law_forces(q)
         load, tangent = found.load.reshape(q.shape), found.tangent.reshape(*q.shape, 6)
         if not self.cables:
-            return Holding(load, tangent)
+            return JointForces(load, tangent)
         load, tangent = load.copy(), tangent.copy()
         for one in self.cables.values():
             own = one.effect.across(q[one.lanes], one.neutral, one.values)
             on = one.there * self.share[one.lanes, None]
             load[one.lanes] += own.load * on[..., None]
             tangent[one.lanes] += own.tangent * on[..., None, None]
-        return Holding(load, tangent)
+        return JointForces(load, tangent)
 
-    def held_by_laws(self, q: Array) -> Holding:
+    def law_forces(self, q: Array) -> JointForces:
         """Loads (N J, 6) and tangents (N J, 6, 6) but for those of loads across joints."""
         return assemble_joint_forces(
-            self.placed(q), self.laws, self.states, moved=bool(self.geometry)
+            self.joint_kinematics(q), self.laws, self.states, moved=bool(self.geometry)
         )
 
-    def after(self, q: Array) -> dict[int, Array]:
+    def states_of(self, every: PathStates) -> dict[int, Array]:
+        """Of the states of all places, or their derivatives, those of the lanes."""
+        return {n: every[n][places] for n, places in self.places.items() if n in every}
+
+    def states_after(self, q: Array) -> dict[int, Array]:
         """State (K, S) of each path law after steps that ended at q (N, J, 6)."""
-        advances = states_after(self.placed(q).q, self.laws, self.states)
+        advances = states_after(self.joint_kinematics(q).q, self.laws, self.states)
         return {number: one.state for number, one in advances.items()}
 
-    def held_by(self, q: Array, slopes: Slopes, states_by_x: PathStates) -> Array:
+    def joint_forces_by(self, q: Array, slopes: Slopes, states_by_x: PathStates) -> Array:
         """(N, J, 6, m) derivative of the loads by the unknowns at fixed q (N, J, 6)."""
-        by_x = self._laws_by(q, slopes, states_by_x).reshape(*q.shape, slopes.m)
+        by_x = self._law_forces_by(q, slopes, states_by_x).reshape(*q.shape, slopes.m)
         for number, one in self.cables.items():
             slope = slopes.cables.get(number)
             if slope is None:
@@ -181,15 +184,16 @@ class Bound:
             by_x[one.lanes] += one.there[..., None, None] * (own @ slope[:, None])
         return by_x
 
-    def _laws_by(self, q: Array, slopes: Slopes, states_by_x: PathStates) -> Array:
+    def _law_forces_by(self, q: Array, slopes: Slopes, states_by_x: PathStates) -> Array:
         """(N J, 6, m) derivative of what the laws hold."""
-        seen = self._seen_by(q, slopes)
+        seen = self._kinematics_by(q, slopes)
         load, tangent = np.zeros_like(seen.q), np.zeros((self.count, 6, 6))
         by_x = np.zeros((self.count, 6, slopes.m))
         for law in self.laws:
             j, here, carried = law.joints, seen.q[law.joints], load[law.joints]
             response = law.respond(here, carried, self.states)
             if response.by_carried is not None:
+                # chain rule over what is carried; a law changes few of the six loads
                 rows = np.flatnonzero(response.by_carried.any(axis=(0, 2)))
                 by_carried, at = response.by_carried[:, rows], j[:, None]
                 by_x[at, rows] += by_carried @ by_x[j]
@@ -199,6 +203,7 @@ class Bound:
             )
             tangent[j] += response.tangent
             load[j] += response.load
+        # back to the joints' own coordinates: s' F, and s itself moves with geometry's unknowns
         if seen.first is None:
             return by_x
         if not slopes.geometry:
@@ -228,7 +233,7 @@ class Bound:
             assert state_by_x is not None
             by_x[law.joints] += law.by_state(here, carried, self.states) @ state_by_x
 
-    def after_by(
+    def states_after_by(
         self,
         q: Array,
         dq: Array,
@@ -243,7 +248,8 @@ class Bound:
         q, dq : (N, J, 6) and (N, J, 6, m). shift : (N, J, 6, m) by how much what the laws see moves
             besides.
         """
-        seen = self._seen_by(q, slopes)
+        # how what the laws see moves: with the pose, with geometry's unknowns, and by the shift
+        seen = self._kinematics_by(q, slopes)
         moved = dq.reshape(self.count, 6, slopes.m)
         if seen.first is not None:
             moved = seen.first @ moved
@@ -257,6 +263,7 @@ class Bound:
             j, here = law.joints, seen.q[law.joints]
             carried, carried_by_x = load[j], load_by_x[j]
             if isinstance(law, ActivePath):
+                # by coordinate, earlier state, own unknowns and what is carried
                 after = law.advance(here, carried, self.states)
                 by_x = after.by_coordinate @ moved[j] + after.by_state @ states_by_x[law.index]
                 if law.index in slopes.laws:
@@ -264,6 +271,7 @@ class Bound:
                 if after.by_carried is not None:
                     by_x += after.by_carried @ carried_by_x
                 found[law.index] = by_x
+            # what later laws are carried moves along
             response = law.respond(here, carried, self.states)
             load_by_x[j] += response.tangent @ moved[j]
             if response.by_carried is not None:
@@ -274,14 +282,14 @@ class Bound:
             load[j] += response.load
         return found
 
-    def _seen_by(self, q: Array, slopes: Slopes) -> "_Seen":
+    def _kinematics_by(self, q: Array, slopes: Slopes) -> "_KinematicsBy":
         """What the laws see, and its derivatives by the geometry's unknowns."""
         flat = q.reshape(-1, 6)
         if not self.geometry:
-            return _Seen(flat, None, NOTHING, NOTHING)
+            return _KinematicsBy(flat, None, NOTHING, NOTHING)
         if not slopes.geometry:
-            placed = self.placed(q)
-            return _Seen(placed.q, placed.by_coordinate, NOTHING, NOTHING)
+            placed = self.joint_kinematics(q)
+            return _KinematicsBy(placed.q, placed.by_coordinate, NOTHING, NOTHING)
         m = slopes.m
         seen, first = flat.copy(), np.tile(np.eye(6), (self.count, 1, 1))
         q_by_x, first_by_x = np.zeros((self.count, 6, m)), np.zeros((self.count, 6, 6, m))
@@ -296,11 +304,11 @@ class Bound:
             q_by_x[j] = step.by_coordinate @ q_by_x[j] + own.q @ slope
             first[j] = step.by_coordinate @ first[j]
             seen[j] = step.q
-        return _Seen(seen, first, q_by_x, first_by_x)
+        return _KinematicsBy(seen, first, q_by_x, first_by_x)
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _KinematicsBy:
     """What the laws see (N J, 6), how it follows the joints, and both by the unknowns.
 
     Attributes

@@ -1,6 +1,8 @@
 """How chains of joints answer small changes: one 6 x 6 elimination per joint, in compiled loops.
 
-With rates u_j of joint j the twists (see `survey`) are
+The tangent of a chain is solved as the articulated-body algorithm solves for accelerations: load
+slopes stand in place of inertias. With rates u_j of joint j the twists (see `forward_kinematics`)
+are
 
     xi_j = xi_(j-1) + a_j + S_j u_j + b_j,
 
@@ -27,14 +29,17 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.batched.dynamics import tangents_of
-from spinepipe.statics.batched.forward_kinematics import (
-    KinematicsAndLoads,
+from spinepipe.statics.batched.forward_kinematics import KinematicsAndLoads, flat
+from spinepipe.statics.batched.vectors import (
+    WIDTH,
     Plain,
+    add_product,
     compiled,
-    flat,
+    gather,
     inner,
+    scatter,
+    vectors,
 )
-from spinepipe.statics.batched.vectors import WIDTH, add_product, gather, scatter, vectors
 
 Flags = NDArray[np.bool_]
 
@@ -66,7 +71,7 @@ class Changes(NamedTuple):
 
 @inner
 def _eliminate(matrix: Array, right: Array, pivots: Array) -> None:
-    """Solve a (6, 6) for the right-hand sides (6, m) in place, rows in their order.
+    """Gauss: solve a (6, 6) for the right-hand sides (6, m) in place, rows in their order.
 
     ``pivots`` (2, 6) are filled with the diagonal as it was and as it is divided by.
     """
@@ -92,8 +97,11 @@ def _eliminate(matrix: Array, right: Array, pivots: Array) -> None:
 
 
 @inner
-def _halve(matrix: Array, lower: Array, pivots: Array) -> None:
-    """Pivots (6,) of the symmetric part of a matrix (6, 6): L D L', with L D in ``lower``."""
+def _symmetric_pivots(matrix: Array, lower: Array, pivots: Array) -> None:
+    """Pivots (6,) of the symmetric part of a matrix (6, 6): L D L', with L D in ``lower``.
+
+    It is positive definite where all of them are positive (Sylvester's law of inertia).
+    """
     for k in range(6):
         pivot = matrix[k, k]
         for i in range(k):
@@ -107,7 +115,7 @@ def _halve(matrix: Array, lower: Array, pivots: Array) -> None:
 
 
 @inner
-def _below(
+def _joint_equations(
     axes: Array, rows: Array, stiff: Array, slope: Array, matrix: Array, right: Array
 ) -> None:
     """A joint's matrix (6, 6) of u, and how the twist below enters, (6, 6) of the right side."""
@@ -126,8 +134,11 @@ def _below(
 
 
 @inner
-def _hand_down(axes: Array, right: Array, slope: Array, passed: Array, along: Array) -> None:
-    """Make slope (3, 6) and passed (3, m) those of all that hangs on the twist below the joint."""
+def _condense(axes: Array, right: Array, slope: Array, passed: Array, along: Array) -> None:
+    """Make slope (3, 6) and passed (3, m) those of all that hangs on the twist below the joint.
+
+    The joint's rates are put in, u = gains (xi, 1): the articulated body's step to its parent.
+    """
     along[:] = 0.0
     add_product(slope, axes.T, along)
     add_product(along, right[:, :6], slope)
@@ -143,7 +154,7 @@ def _add(values: Array, out: Array) -> None:
 
 
 @inner
-def _hold(free: Array, matrix: Array, right: Array) -> None:
+def _fix(free: Array, matrix: Array, right: Array) -> None:
     """Make rows of fixed coordinates say that these do not move, and others not ask.
 
     ``free`` (6,) is one where a coordinate moves and zero elsewhere.
@@ -151,7 +162,7 @@ def _hold(free: Array, matrix: Array, right: Array) -> None:
     for k in range(6):
         for c in range(6):
             matrix[k, c] *= free[k] * free[c]
-        matrix[k, k] += 1.0 - free[k]
+        matrix[k, k] += 1.0 - free[k]  # 1 u = 0
         for c in range(right.shape[1]):
             right[k, c] *= free[k]
 
@@ -165,6 +176,7 @@ def _signs(
     ``lost`` (4,) is not zero where rates are not finite. Whether all is well with them.
     """
     well = True
+    # sign of the determinant: of the product of all pivots, rows staying in their order
     for lane in range(min(WIDTH, len(signs) - first)):
         sign, positive, bad = 1, asked, lost[lane] != 0.0
         for j in range(len(pivots)):
@@ -180,10 +192,10 @@ def _signs(
 
 
 @compiled
-def _carry(
+def _solve_chains(
     seen: Plain, free: Array, changes: Plain, asked: bool, rates: Array, signs: Indices
 ) -> bool:
-    """Fill rates (N, n) and the signs (N,), see `eliminated`; whether no sign is `BAD`.
+    """Fill rates (N, n) and the signs (N,), see `eliminate`; whether no sign is `BAD`.
 
     Parameters
     ----------
@@ -215,10 +227,12 @@ def _carry(
                 gather(one, own, first, given[n])
         if held:
             gather(free, own, first, move)
+        # from the top down: each joint's rates in terms of the twist below it
         slope[:] = 0.0
         passed[:] = 0.0
         for j in range(joints - 1, -1, -1):
             right = gains[j]
+            # slopes are sums over all vertebrae beyond: the difference is this vertebra's own
             for r in range(3):
                 for i in range(6):
                     slope[r, i] += slopes[j, r, i]
@@ -228,19 +242,20 @@ def _carry(
                 _add(push[j], passed)
             if displaced:
                 add_product(slope, high[j], passed[:3])
-            _below(axes[j], rows[j], stiff[j], slope, matrix, right)
+            _joint_equations(axes[j], rows[j], stiff[j], slope, matrix, right)
             for k in range(6):
                 for c in range(m):
                     right[k, 6 + c] = source[j, k, c]
             add_product(axes[j], passed, right[:, 6:])
             if held:
-                _hold(moves[j], matrix, right)
+                _fix(moves[j], matrix, right)
             if asked:
-                _halve(matrix, root, halves[j])
+                _symmetric_pivots(matrix, root, halves[j])
             _eliminate(matrix, right, pivots[j])
-            _hand_down(axes[j], right, slope, passed, along)
+            _condense(axes[j], right, slope, passed, along)
             if displaced:
                 add_product(slope, low[j], passed[:3])
+        # from the base up: twists, and the rates that they decide
         twist[:] = 0.0
         lost[0] = 0.0
         for j in range(joints):
@@ -251,7 +266,7 @@ def _carry(
                     rate[j, k, c] = gains[j, k, 6 + c]
             add_product(gains[j, :, :6], twist, rate[j])
             for k in range(6):
-                for c in range(m):
+                for c in range(m):  # x - x is zero unless x is infinite or no number
                     lost[0] += rate[j, k, c] - rate[j, k, c]
             add_product(axes[j].T, rate[j], twist)
             if displaced:
@@ -284,7 +299,7 @@ def missing(seen: KinematicsAndLoads, rates: Array, changes: Changes) -> Array:
     return found
 
 
-def eliminated(
+def eliminate(
     seen: KinematicsAndLoads, changes: Changes, asked: bool = False
 ) -> tuple[Array, Indices]:
     """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; and signs (N,).
@@ -298,7 +313,7 @@ def eliminated(
     rates, signs = np.empty(sources.shape), np.empty(len(sources), dtype=np.int64)
     free = flat(np.where(seen.fixed, 0.0, 1.0)) if len(seen.fixed) else EMPTY
     pushes, lower, upper = [flat(one) if one.shape[3] else EMPTY for one in changes[1:]]
-    well = _carry(seen.numbers, free, (sources, pushes, lower, upper), asked, rates, signs)
+    well = _solve_chains(seen.numbers, free, (sources, pushes, lower, upper), asked, rates, signs)
     rates = rates.reshape(changes.sources.shape)
     if not well:
         bad = np.flatnonzero(signs == BAD)
@@ -329,7 +344,7 @@ def _by_whole(seen: KinematicsAndLoads, changes: Changes, asked: bool) -> tuple[
     return rates.reshape(changes.sources.shape), signs
 
 
-def answers(seen: KinematicsAndLoads, changes: Changes) -> tuple[Array, Flags]:
+def solve_rates(seen: KinematicsAndLoads, changes: Changes) -> tuple[Array, Flags]:
     """Rates (N, J, 6, m) that answer the changes, zero where there is no answer; where there is."""
-    rates, signs = eliminated(seen, changes)
+    rates, signs = eliminate(seen, changes)
     return rates, signs != 0

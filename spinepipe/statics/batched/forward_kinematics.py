@@ -1,5 +1,9 @@
 """Chains of joints at one pose each, in compiled loops: where they are and what their loads do.
 
+Forward kinematics from the base up, sums of wrenches from the top down, in the spatial vectors of
+Featherstone (2008, doi 10.1007/978-1-4899-7560-7), all about the origin of ground, so that nothing
+has to be carried from one body's frame to the next.
+
 A vertebra's small displacement is a twist xi = (omega, v at the origin of ground). A joint moves by
 its six axes S. W_b is the wrench (moment about the origin, force) on vertebra b, and L_b its
 derivative by xi_b: forces do not turn and moments do not move, so that it has three rows that are
@@ -9,137 +13,27 @@ with the twist below.
 What PyBullet does for one chain is done here for many; tests hold the two against each other.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import prod
-from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
+from spinepipe.statics.batched.loads import Chains, Loads
 from spinepipe.statics.batched.vectors import (
-    SOURCE,
     WIDTH,
+    Plain,
     add_product,
     blocks,
+    compiled,
     gather,
+    inner,
     lanes,
     vectors,
 )
 
-Plain = tuple[NDArray[Any], ...]
-"""Arrays as compiled code takes them: what is kept of a compilation must not name our classes,
-for it is read again before one knows whether they have changed."""
-
-P = ParamSpec("P")
-R = TypeVar("R")
-
 Flags = NDArray[np.bool_]
-
-
-def inner(function: Callable[P, R]) -> Callable[P, R]:
-    """A function for compiled ones of the same file: these keep it along with themselves."""
-    result: Callable[P, R] = njit(error_model="numpy")(function)
-    return result
-
-
-def compiled(function: Callable[P, R]) -> Callable[P, R]:
-    """The function as machine code, kept beside this file; division by zero is no exception.
-
-    Entries are copied and added one by one in loops: for `a[:] = b` or `a += b` of arrays a message
-    about shapes is compiled each time, which takes longer than all the rest.
-    """
-    result: Any = njit(cache=True, error_model="numpy")(function)
-    kept = result._cache._cache_file  # numba looks at the function's own file alone
-    kept._source_stamp = (kept._source_stamp, SOURCE)
-    return cast(Callable[P, R], result)
-
-
-class Chains(NamedTuple):
-    """M chains of J joints; SI, ground axes, neutral pose.
-
-    Attributes
-    ----------
-    rotations, origins : (M, J, 3, 3) and (M, J, 3) m, joint frames.
-    masses, coms, inertias : (M, J) kg, (M, J, 3) m, (M, J, 3, 3) kg m2 about it.
-    damping : (M, J, 6) N s/m and N m s/rad. gravity : (M, 3) m/s2.
-    """
-
-    rotations: Array
-    origins: Array
-    masses: Array
-    coms: Array
-    inertias: Array
-    damping: Array
-    gravity: Array
-
-
-class Supports(NamedTuple):
-    """Which joint coordinates of each of N lanes a rig fixes; none anywhere when N is 0.
-
-    Attributes
-    ----------
-    fixed : (N, J, 6). values : (N, J, 6) m and rad, where they are fixed.
-    read_as : (N, J, 6) m per N or rad per N m by which the reaction is read, 0 where it is not.
-    """
-
-    fixed: Flags
-    values: Array
-    read_as: Array
-
-    @property
-    def there(self) -> bool:
-        """Whether any lane may have one."""
-        return len(self.fixed) > 0
-
-    def part(self, chosen: Indices) -> "Supports":
-        """Those of some lanes."""
-        if not self.there:
-            return self
-        return Supports(self.fixed[chosen], self.values[chosen], self.read_as[chosen])
-
-    def towards(self, later: "Supports", share: Array) -> "Supports":
-        """The values a share (N,) of the way to those of a later step."""
-        if not self.there:
-            return self
-        part = share[:, None, None]
-        return later._replace(values=self.values + part * (later.values - self.values))
-
-    def on(self, q: Array) -> Array:
-        """The poses q (N, J, 6) with fixed coordinates where they are fixed."""
-        return np.where(self.fixed, self.values, q) if self.there else q.copy()
-
-
-FREE = Supports(np.zeros((0, 0, 6), dtype=bool), np.zeros((0, 0, 6)), np.zeros((0, 0, 6)))
-"""No supports."""
-
-
-class Loads(NamedTuple):
-    """What acts on each of N lanes; a lane is a chain under one set of loads.
-
-    Attributes
-    ----------
-    chain : (N,) which chain it is.
-    bodies : (N, W) vertebra of each wrench, -1 for none. points : (N, W, 3) m, neutral pose.
-    forces, moments : (N, W, 3) N and N m, fixed in ground.
-    supports : joint coordinates that a rig fixes.
-    """
-
-    chain: Indices
-    bodies: Indices
-    points: Array
-    forces: Array
-    moments: Array
-    supports: Supports = FREE
-
-
-def part(loads: Loads, chosen: Indices) -> Loads:
-    """The loads of some lanes."""
-    chain, bodies, points, forces, moments, supports = loads
-    wrenches = (bodies[chosen], points[chosen], forces[chosen], moments[chosen])
-    return Loads(chain[chosen], *wrenches, supports.part(chosen))
 
 
 @inner
@@ -158,8 +52,12 @@ def turned_into(matrix: Array, vector: Array, out: Array) -> None:
 
 
 @inner
-def _move(frames: Plain, q: Array, width: int, axes: Array, turned: Array, shifted: Array) -> None:
-    """Four chains at q (J, 6, 4), m and rad; entries of all other arrays are four lanes.
+def _place_vertebrae(
+    frames: Plain, q: Array, width: int, axes: Array, turned: Array, shifted: Array
+) -> None:
+    """Forward kinematics: four chains at q (J, 6, 4), m and rad, from the base up.
+
+    Entries of all other arrays are four lanes.
 
     Parameters
     ----------
@@ -172,6 +70,7 @@ def _move(frames: Plain, q: Array, width: int, axes: Array, turned: Array, shift
     below, final = work[:9].reshape((3, 3)), work[9:18].reshape((3, 3))
     slid, pivot, back, turns = work[18:21], work[21:24], work[24:27], work[27:33]
     for j in range(len(q)):
+        # the joint's lower frame, carried by the vertebra below it
         if j:
             turned_into(turned[j - 1], origins[j], pivot)
             for c in range(3):
@@ -181,19 +80,22 @@ def _move(frames: Plain, q: Array, width: int, axes: Array, turned: Array, shift
                 pivot[r] = origins[j, r]
                 for c in range(3):
                     below[r, c] = rotations[j, r, c]
+        # translations along its axes bring the pivot to where the rotations happen
         turned_into(below, coordinates[j, :3], slid)
         for r in range(3):
             pivot[r] += slid[r]
             if j:
                 pivot[r] += shifted[j - 1, r]
         for k in range(3):
-            for lane in range(width):  # these functions are called lane by lane
+            # libm is called lane by lane; what fills up a block is copied, not computed again
+            for lane in range(width):
                 numbers[27 + k, lane] = np.cos(q[j, 3 + k, lane])
                 numbers[30 + k, lane] = np.sin(q[j, 3 + k, lane])
             for lane in range(width, WIDTH):
                 numbers[27 + k, lane] = numbers[27 + k, width - 1]
                 numbers[30 + k, lane] = numbers[30 + k, width - 1]
-        _turn(below, turns, pivot, axes[j], final)
+        _axes_and_frame(below, turns, pivot, axes[j], final)
+        # displacement of the vertebra from the neutral pose: X_joint now times its inverse then
         turned[j][:] = 0.0
         add_product(final, rotations[j].T, turned[j])
         turned_into(turned[j], origins[j], back)
@@ -202,12 +104,13 @@ def _move(frames: Plain, q: Array, width: int, axes: Array, turned: Array, shift
 
 
 @inner
-def _turn(below: Array, turns: Array, pivot: Array, axes: Array, final: Array) -> None:
+def _axes_and_frame(below: Array, turns: Array, pivot: Array, axes: Array, final: Array) -> None:
     """Twists (6, 6) of a joint's coordinates and its frame (3, 3) after turning by Z, X', Y''.
 
     ``turns`` (6,): the cosines of the three angles, and their sines.
     """
     cz, cx, cy, sz, sx, sy = turns[0], turns[1], turns[2], turns[3], turns[4], turns[5]
+    # each rotation is about an axis that the ones before it have turned: z, then x', then y''
     for r in range(3):
         x, y, z = below[r, 0], below[r, 1], below[r, 2]
         by_z, across = cz * x + sz * y, cz * y - sz * x
@@ -216,12 +119,12 @@ def _turn(below: Array, turns: Array, pivot: Array, axes: Array, final: Array) -
         final[r, 0], final[r, 1], final[r, 2] = cy * by_z - sy * along, by_x, sy * by_z + cy * along
         for k in range(3):
             axes[k, r], axes[k, 3 + r] = 0.0, below[r, k]
-    for k in range(3, 6):
+    for k in range(3, 6):  # a line through the pivot moves the origin by pivot x axis
         cross_into(pivot, axes[k, :3], axes[k, 3:])
 
 
 @inner
-def _push(
+def _add_force(
     turned: Array,
     shifted: Array,
     neutral: Array,
@@ -239,6 +142,8 @@ def _push(
     for r in range(3):
         point[r] += shifted[r]
     cross_into(point, force, moment)
+    # a twist (w, v) moves the point p by w x p + v, so the moment p x f changes by
+    # (w x p) x f + v x f = p (f . w) - w (f . p) + v x f: three rows, by w and by v
     inner = point[0] * force[0] + point[1] * force[1] + point[2] * force[2]
     for r in range(3):
         wrench[r] += moment[r]
@@ -255,7 +160,7 @@ def _push(
 
 
 @inner
-def _load(
+def _load_vertebrae(
     weighing: Plain, listed: Plain, first: int, turned: Array, shifted: Array, found: Plain
 ) -> None:
     """Wrench on each vertebra (J, 6) and its slope by the vertebra's twist, (J, 3, 6), of a block.
@@ -275,33 +180,40 @@ def _load(
             wrenches[j, r] = 0.0
             for k in range(3):
                 slopes[j, k, r] = 0.0
-        for r in range(3):
+        for r in range(3):  # the weight, at the centre of mass
             force[r] = masses[j] * gravity[r]
-        _push(turned[j], shifted[j], coms[j], force, work, wrenches[j], slopes[j])
+        _add_force(turned[j], shifted[j], coms[j], force, work, wrenches[j], slopes[j])
     rows = np.minimum(np.arange(first, first + WIDTH), len(bodies) - 1)
     for w in range(bodies.shape[1]):
         for lane in range(WIDTH):
+            # lanes may load different vertebrae: each of these once, with zeros in other lanes
             body = bodies[rows[lane], w]
             fresh = body >= 0
             for earlier in range(lane):
                 fresh = fresh and bodies[rows[earlier], w] != body
             if not fresh:
                 continue
-            for other in range(WIDTH):  # at once for all lanes with a wrench on that vertebra
+            for other in range(WIDTH):
                 row = rows[other]
                 on = 1.0 if bodies[row, w] == body else 0.0
                 for r in range(3):
                     numbers[r, other] = on * forces[row, w, r]
                     numbers[3 + r, other] = points[row, w, r]
                     numbers[6 + r, other] = on * moments[row, w, r]
-            _push(turned[body], shifted[body], point, force, work, wrenches[body], slopes[body])
+            _add_force(
+                turned[body], shifted[body], point, force, work, wrenches[body], slopes[body]
+            )
             for r in range(3):
                 wrenches[body, r] += moment[r]
 
 
 @inner
-def _turning_rows(axes: Array, beyond: Array, rows: Array) -> None:
-    """C (6, 6): what turning a joint under the wrench beyond (6,) adds to its axes' loads."""
+def _crossed_rows(axes: Array, beyond: Array, rows: Array) -> None:
+    """C (6, 6): what turning a joint under the wrench beyond (6,) adds to its axes' loads.
+
+    With a twist t the axis S becomes S + t x S, so its load S . W grows by (t x S) . W, which is
+    t . (S x* W): row k is the spatial force cross product of axis k with the wrench.
+    """
     m0, m1, m2 = beyond[0], beyond[1], beyond[2]
     f0, f1, f2 = beyond[3], beyond[4], beyond[5]
     for k in range(6):
@@ -356,7 +268,7 @@ class KinematicsAndLoads:
 
 
 @inner
-def _add_up(
+def _sum_from_the_top(
     axes: Array,
     tangents: Array,
     wrenches: Array,
@@ -366,6 +278,7 @@ def _add_up(
     stiff: Array,
 ) -> None:
     """From the top down: loads of the axes, C and stiffness; slopes and wrenches become sums."""
+    # as the backward pass of recursive Newton-Euler, with no inertia in it
     for j in range(len(axes) - 1, -1, -1):
         s, beyond = axes[j], wrenches[j]
         if j + 1 < len(axes):
@@ -374,7 +287,7 @@ def _add_up(
             for r in range(3):
                 for c in range(6):
                     slopes[j, r, c] += slopes[j + 1, r, c]
-        _turning_rows(s, beyond, rows[j])
+        _crossed_rows(s, beyond, rows[j])
         for k in range(6):
             load = s[k, 0] * beyond[0]
             for i in range(1, 6):
@@ -382,15 +295,15 @@ def _add_up(
             applied[j, k] = load
             for c in range(6):
                 value = tangents[j, k, c]
-                if c < k:
+                if c < k:  # a joint's earlier coordinates carry its later axes along
                     for i in range(6):
                         value -= rows[j, k, i] * s[c, i]
                 stiff[j, k, c] = value
 
 
 @compiled
-def _look(chains: Plain, loads: Plain, q: Array, tangents: Array, found: Plain) -> None:
-    """Fill the parts of a survey, block by block.
+def _fill_blocks(chains: Plain, loads: Plain, q: Array, tangents: Array, found: Plain) -> None:
+    """Fill the numbers of `KinematicsAndLoads`, block by block.
 
     Parameters
     ----------
@@ -399,6 +312,7 @@ def _look(chains: Plain, loads: Plain, q: Array, tangents: Array, found: Plain) 
     """
     (chain_of, bodies, points, forces, moments), joints = loads, q.shape[1] // 6
     listed, own = (bodies, points, forces, moments), np.arange(len(q))
+    # of a joint 9 + 3 numbers of its frame, 1 + 3 of its body; gravity behind all of them
     given = np.empty((16 * joints + 3, WIDTH))
     frames = vectors(given)
     rotations = frames[: 9 * joints].reshape((joints, 3, 3))
@@ -410,6 +324,7 @@ def _look(chains: Plain, loads: Plain, q: Array, tangents: Array, found: Plain) 
     wrenches = vectors(np.empty((joints, 6, WIDTH)))
     axes, applied, rows, stiff, slopes, turned, shifted = found
     for block in range(len(axes)):
+        # numbers of each lane's own chain, its pose and its joints' tangents, four side by side
         first, at = WIDTH * block, 0
         for one in chains:
             gather(one, chain_of, first, given[at : at + one.shape[1]])
@@ -419,10 +334,12 @@ def _look(chains: Plain, loads: Plain, q: Array, tangents: Array, found: Plain) 
         s, turn, shift = vectors(axes[block]), vectors(turned[block]), vectors(shifted[block])
         slope = vectors(slopes[block])
         width = min(WIDTH, len(q) - first)
-        _move((rotations, origins), pose.reshape((joints, 6, WIDTH)), width, s, turn, shift)
-        _load(weighing, listed, first, turn, shift, (wrenches, slope))
+        _place_vertebrae(
+            (rotations, origins), pose.reshape((joints, 6, WIDTH)), width, s, turn, shift
+        )
+        _load_vertebrae(weighing, listed, first, turn, shift, (wrenches, slope))
         load, row, own_stiff = vectors(applied[block]), vectors(rows[block]), vectors(stiff[block])
-        _add_up(s, tangent, wrenches, slope, load, row, own_stiff)
+        _sum_from_the_top(s, tangent, wrenches, slope, load, row, own_stiff)
 
 
 def forward_kinematics(
@@ -433,7 +350,7 @@ def forward_kinematics(
     shapes = ((6, 6), (6,), (6, 6), (6, 6), (3, 6), (3, 3), (3,))
     numbers = tuple([np.empty((-(-count // WIDTH), joints, *one, WIDTH)) for one in shapes])
     given = (*chains[:4], chains.gravity)
-    _look(tuple(map(flat, given)), loads[:-1], flat(q), flat(tangents), numbers)
+    _fill_blocks(tuple(map(flat, given)), loads[:-1], flat(q), flat(tangents), numbers)
     return KinematicsAndLoads(numbers, count, loads.supports.fixed)
 
 
@@ -442,7 +359,7 @@ def flat(numbers: Array) -> Array:
     return np.ascontiguousarray(numbers).reshape(len(numbers), prod(numbers.shape[1:]))
 
 
-def placed(rotations: Array, origins: Array, q: Array) -> tuple[Array, Array, Array]:
+def unloaded_kinematics(rotations: Array, origins: Array, q: Array) -> tuple[Array, Array, Array]:
     """Axes (N, J, 6, 6) and displacements of N chains at q (N, J, 6), as of `KinematicsAndLoads`.
 
     Parameters

@@ -15,7 +15,12 @@ import numpy as np
 
 from spinepipe.effects import Effect, EffectKind
 from spinepipe.effects.contract import Array, GeometryEffect, JointLaw, PathLaw
-from spinepipe.statics.batched.derive import answered, answered_on_path, reported, reported_by
+from spinepipe.statics.batched.derive import (
+    answered,
+    instrument_readings,
+    instrument_readings_by,
+    path_responses,
+)
 from spinepipe.statics.batched.stack import Stack
 from spinepipe.statics.joint_forces import assemble_joint_forces
 from spinepipe.statics.measurement_model import Instrument
@@ -112,7 +117,7 @@ class Answering:
 
     def _reported(self, effect: Instrument, values: Array) -> Array:
         """(L, J, n, S P) what each joint's own instrument would change of what it reports."""
-        own = reported_by(self.stack, self.reported, effect, values)
+        own = instrument_readings_by(self.stack, self.instrument_readings, effect, values)
         of_joints = _shapes_last(own.reshape(-1, *own.shape[2:]), len(values))
         alone = _alone(of_joints.reshape(*self.q.shape, -1))
         lanes, joints, _ = self.q.shape
@@ -120,9 +125,9 @@ class Answering:
         return np.moveaxis(by_joint, 2, 1)
 
     @cached_property
-    def reported(self) -> Array:
+    def instrument_readings(self) -> Array:
         """(L, J, 6) what the instruments report."""
-        return reported(self.stack, self.q)
+        return instrument_readings(self.stack, self.q)
 
     def _on_path(self, every: Sequence[_Own]) -> list[Array]:
         """(L, J, n, m) of each, where laws remember: all that is not zero, led through at once."""
@@ -136,7 +141,7 @@ class Answering:
             shifts = (np.zeros(one.load.shape) if one.shift is None else one.shift for one in every)
             moved = [_alone(s[..., some]) for s, some in zip(shifts, used, strict=True)]
             shift = np.concatenate(moved, axis=-1)
-        found = answered_on_path(self.stack, self.q, loads, shift).reshape(lanes, 6 * joints, -1)
+        found = path_responses(self.stack, self.q, loads, shift).reshape(lanes, 6 * joints, -1)
         result = []
         ends = np.cumsum([joints * len(some) for some in used])[:-1]
         for one, some, part in zip(every, used, np.split(found, ends, axis=-1), strict=True):
@@ -154,7 +159,7 @@ class Answering:
         load, tangent = np.zeros((count, 6)), np.zeros((count, 6, 6))
         for lanes, bound in self.stack.walked(self.q):
             at = (joints * lanes[:, None] + np.arange(joints)).ravel()
-            placed = bound.placed(self.q[lanes])
+            placed = bound.joint_kinematics(self.q[lanes])
             found = assemble_joint_forces(placed, bound.laws, bound.states, moved=False)
             q[at], load[at], tangent[at] = placed.q, found.load, found.tangent
             first[at] = placed.by_coordinate if bound.geometry else np.eye(6)

@@ -100,7 +100,7 @@ class Effects:
     def of(cls, models: Sequence[SpineModel], runs: Sequence[tuple[int, str]]) -> "Effects":
         """The effects of M models in R runs, each a model's number and its test."""
         groups: dict[str, list[Acting]] = {field.name: [] for field in fields(cls)}
-        for one in acting(models, runs):
+        for one in bind_effects(models, runs):
             groups[_group(one.effect)].append(one)
         return cls(**{name: tuple(group) for name, group in groups.items()})
 
@@ -131,7 +131,7 @@ def _group(effect: Effect) -> str:
             return "laws"
 
 
-def acting(models: Sequence[SpineModel], runs: Sequence[tuple[int, str]]) -> Iterator[Acting]:
+def bind_effects(models: Sequence[SpineModel], runs: Sequence[tuple[int, str]]) -> Iterator[Acting]:
     """The effects of M models in R runs, each a model's number and its test; in their order.
 
     At one place models may have different effects, or the same with different options.

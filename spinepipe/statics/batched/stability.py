@@ -27,14 +27,13 @@ from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.statics.batched.dynamics import inertias_of, masses_of, momenta_of, tangents_of
-from spinepipe.statics.batched.forward_kinematics import (
-    Chains,
-    KinematicsAndLoads,
-    Loads,
-    forward_kinematics,
-    part,
+from spinepipe.statics.batched.forward_kinematics import KinematicsAndLoads, forward_kinematics
+from spinepipe.statics.batched.loads import Chains, Loads, part
+from spinepipe.statics.batched.stability_certificate import (
+    fill_skew_bounds,
+    is_positive_definite,
+    respond,
 )
-from spinepipe.statics.batched.stability_certificate import is_positive_definite, respond, twists
 from spinepipe.statics.batched.vectors import blocks, lanes
 from spinepipe.statics.equilibrium import decays
 
@@ -58,7 +57,7 @@ def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Fl
     """(N,) which lanes are stable at q (N, J, 6) with the joints' tangents (N, J, 6, 6)."""
     every = lanes_of(chains, loads, q, tangents)
     proven = proven_by_forms(every)
-    for lane in np.flatnonzero(~proven):
+    for lane in np.flatnonzero(~proven):  # few: by the rates of all their modes
         mass, stiffness = matrices(every.part(np.array([lane])))
         sign, _ = np.linalg.slogdet(stiffness)
         proven[lane] = sign > 0.0 and decays(mass, stiffness)
@@ -67,25 +66,19 @@ def surely_stable(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Fl
 
 def lanes_of(chains: Chains, loads: Loads, q: Array, tangents: Array) -> "DynamicLanes":
     """Lanes at q (N, J, 6) with all that decides their stability."""
-    seen, chain = forward_kinematics(chains, loads, q, _held(loads, tangents)), loads.chain
+    sprung, chain = tangents, loads.chain
+    if loads.supports.there:
+        # stiff springs on what a rig fixes: a form that is positive with them is so in all rates
+        # that leave fixed coordinates at rest, where the springs add nothing; what they prove is
+        # proven however stiff they are
+        sprung = tangents.copy()
+        stiff = STIFF * np.abs(tangents).max(axis=(1, 2, 3), initial=1.0)
+        springs = np.where(loads.supports.fixed, stiff[:, None, None], 0.0)
+        sprung[:, :, range(6), range(6)] += springs
+    seen = forward_kinematics(chains, loads, q, sprung)
     bent = np.abs(tangents - tangents.swapaxes(2, 3)).max(axis=(1, 2, 3))
     even = bent <= EVEN * np.abs(tangents).max(axis=(1, 2, 3))
     return DynamicLanes(seen, inertias_of(chains, chain, seen), chains.damping[chain], loads, even)
-
-
-def _held(loads: Loads, tangents: Array) -> Array:
-    """The tangents (N, J, 6, 6) with stiff springs on what a rig fixes.
-
-    A form that is positive with them is so in all rates that leave fixed coordinates at rest,
-    where the springs add nothing: what they prove is proven however stiff they are.
-    """
-    if not loads.supports.there:
-        return tangents
-    found = tangents.copy()
-    stiff = STIFF * np.abs(tangents).max(axis=(1, 2, 3), initial=1.0)
-    springs = np.where(loads.supports.fixed, stiff[:, None, None], 0.0)
-    found[:, :, range(6), range(6)] += springs
-    return found
 
 
 def proven_by_forms(every: "DynamicLanes") -> Flags:
@@ -123,7 +116,7 @@ class DynamicLanes:
     def top(self) -> Array:
         """(N,) no less than |A|."""
         squares = np.empty((len(self.inertia), self.inertia.shape[-1]))
-        twists(self.seen.numbers, blocks(self.damping), squares)
+        fill_skew_bounds(self.seen.numbers, blocks(self.damping), squares)
         return np.sqrt(lanes(squares, self.seen.count))
 
     def is_positive_definite(self, rate: Array) -> Flags:
@@ -145,7 +138,11 @@ class DynamicLanes:
 
 
 def _by_response(every: DynamicLanes, top: Array) -> Flags:
-    """(N,) which spines under a moment on one vertebra have no mode with w up to top (N,)."""
+    """(N,) which spines under a moment on one vertebra have no mode with w up to top (N,).
+
+    Nyquist's criterion on det F(w), with bounds between its samples; see the head of this file.
+    """
+    # up to low the form itself is positive: only between it and |A| is F looked at
     low = np.zeros(len(top))
     for share in FIRST:
         low = np.where((low == 0.0) & every.is_positive_definite(share * top), share * top, low)
@@ -154,15 +151,18 @@ def _by_response(every: DynamicLanes, top: Array) -> Flags:
     going = np.flatnonzero(found)
     if not len(going):
         return found
+    # two axes across the moment; the ground axis that it is least along gives the first of them
     size = np.linalg.norm(moment, axis=1)
     least = np.eye(3)[np.abs(moment).argmin(axis=1)]
     one = np.cross(moment, least)
     both = np.stack([one, np.cross(moment, one)], axis=1)
     across = both / np.maximum(np.linalg.norm(both, axis=2, keepdims=True), np.finfo(float).tiny)
     seen = (every.seen.axes, every.seen.rows, every.seen.stiff, every.seen.slopes)
+    # trace of C^-1 M bounds x* M x by x* C x, for what the change of H does to F
     inertia = lanes(every.inertia, len(top))
     momenta = momenta_of(every.seen.axes, inertia)
     trace = np.sum(np.sum(momenta * every.seen.axes, axis=3) / every.damping, axis=(1, 2))
+    # pieces of equal ratio from low to |A|, each sampled at its geometric middle
     width = np.log(top[going] / low[going])
     count = np.ceil(width / np.log(PIECE)).astype(np.int64)
     lane, ratio = np.repeat(going, count), np.exp(np.repeat(width / count, count))
@@ -178,13 +178,14 @@ def _by_response(every: DynamicLanes, top: Array) -> Flags:
         beside = squares * np.sqrt(trace[lane] * moving) + rates * np.sqrt(damped)
         off = squares * moving + rates * damped + beside**2 / begin
         gain = (0.5 * size[lane]) ** 2
+        # det F may lie this far from where it was sampled: is the ray (-inf, -1] further away?
         number = gain * np.linalg.det(compliance)
         change = gain * (np.linalg.norm(compliance, axis=(1, 2)) * off + 0.5 * off**2)
         distance = np.where(number.real < -1.0, np.abs(number.imag), np.abs(1.0 + number))
         left = np.flatnonzero(~(distance > change))
         if not len(left):
             return found
-        lane = np.repeat(lane[left], 2)
+        lane = np.repeat(lane[left], 2)  # pieces that prove nothing are halved
         ends = np.stack([begin[left], middle[left], end[left]], axis=1)
         begin, end = ends[:, :2].ravel(), ends[:, 1:].ravel()
     found[lane] = False

@@ -1,8 +1,14 @@
 """Forms of many equilibria that decide their stability, in compiled loops; see `stability`.
 
-K = S + A is the tangent in its symmetric and skew parts, M the mass matrix, C the damping. A form
-in the rates of all joints is a sum over joints. The least of what those beyond a joint add is a
-form in the twist above it, so that one small factorisation L D L' per joint decides.
+K = S + A is the tangent in its symmetric and skew parts, M the mass matrix, C the damping. The
+matrix of a form in the rates of all joints is block tridiagonal once the twists of the vertebrae
+stand beside the rates. It is factorised joint by joint from the top, L D L': the least of what the
+joints beyond add is a form in the twist (6) above the joint, so that 6 x 6 factors, each with the 6
+columns of the twist below (12 in all), decide. No matrix of the chain's size is ever made.
+
+`is_positive_definite` does so for S - v^2 M, which is real, four lanes side by side. `respond` does
+it for S - w^2 M + i w C in complex numbers as such, one lane at a time, with two more columns for
+the moments to be answered. Both go through `_least_beyond`.
 """
 
 from typing import Any
@@ -11,8 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.batched.forward_kinematics import Plain, compiled, inner
-from spinepipe.statics.batched.vectors import WIDTH, add_product, vectors
+from spinepipe.statics.batched.vectors import (
+    WIDTH,
+    Plain,
+    add_product,
+    compiled,
+    inner,
+    vectors,
+)
 
 Flags = NDArray[np.bool_]
 Entries = NDArray[Any]
@@ -41,10 +53,11 @@ def _skew(axes: Array, rows: Array, stiff: Array, slope: Array, skew: Plain) -> 
 
 
 @compiled
-def twists(seen: Plain, damping: Array, found: Array) -> None:
+def fill_skew_bounds(seen: Plain, damping: Array, found: Array) -> None:
     """Fill blocks (B, 4): no less than |A|^2 where damping is one; damping (B, J, 6, 4).
 
-    Half the squares of A, which is |A|^2 itself where a single moment is all that A is of.
+    Half the squares of A (Frobenius): singular values of a skew matrix come in pairs, so that this
+    is |A|^2 itself where there is one pair, as where a single moment is all that A is of.
     """
     every_axes, _, every_rows, every_stiff, every_slopes, _, _ = seen
     work = vectors(np.empty((24, 6, WIDTH)))
@@ -59,6 +72,8 @@ def twists(seen: Plain, damping: Array, found: Array) -> None:
         for j in range(len(axes)):
             s = axes[j]
             _skew(s, rows[j], stiff[j], slopes[j], skew)
+            # squares of C^-1/2 A C^-1/2 in this joint's rows: with all earlier axes at once through
+            # their Gram matrix, sum s s' / c, and with its own
             for k in range(6):
                 inverse = 1.0 / c_of[j, k]
                 for r in range(6):
@@ -105,6 +120,8 @@ def _least_beyond(
         twist, made those of the twist below. joined : (6, 6) work space.
     """
     m = gains.shape[1]
+    # the twist above is that below and the joint's own, xi + S' u: what hangs on it (least, passed)
+    # becomes part of the joint's matrix, of its coupling to xi, and of its loads
     joined[:] = 0.0
     gains[:, 6:] = 0.0
     add_product(axes, least, joined)
@@ -117,6 +134,8 @@ def _least_beyond(
             for c in range(6):
                 value += joined[k, c] * axes[r, c]
             pivot[k, r] = value
+    # L D L' without pivoting; each pivot's row is taken out of the form in the twist below as well
+    # (Schur complement): what is left there is the least over the joint's rates
     for k in range(6):
         inverse = 1.0 / pivot[k, k]
         for r in range(k + 1, 6):
@@ -131,7 +150,7 @@ def _least_beyond(
                 least[r, c] -= f * gains[k, c]
             for c in range(6, m):
                 passed[r, c - 6] -= f * gains[k, c]
-    for r in range(6):
+    for r in range(6):  # symmetric, not Hermitian, where complex: no conjugates anywhere
         for c in range(r):
             least[r, c] = least[c, r]
 
@@ -162,6 +181,7 @@ def is_positive_definite(seen: Plain, inertia: Array, square: Array, proven: Fla
                     pivot[k, c] = 0.5 * (stiff[j, k, c] + stiff[j, c, k])
                     gains[k, c] = -0.5 * rows[j, k, c]
             _least_beyond(pivot, gains, least, passed, axes[j], joined)
+            # positive definite if and only if all pivots are positive
             for k in range(6):
                 kept[k] = pivot[k, k]
             for k in range(6):
@@ -212,6 +232,7 @@ def respond(
                     gains[j, k, c] = -0.5 * rows[j, k, c]
                 pivots[j, k, k] += 1j * rate * damping[lane, j, k]
             _least_beyond(pivots[j], gains[j], least, passed, axes[j], joined)
+        # back substitution from the base up: D L' u = L^-1 (load - coupling xi), then the twist
         twist[:] = 0.0
         moving[n] = 0.0
         for j in range(joints):
@@ -226,7 +247,7 @@ def respond(
                 for k in range(6):
                     for i in range(6):
                         twist[i, c] += axes[j, k, i] * gains[j, k, 6 + c]
-                for r in range(6):
+                for r in range(6):  # x* M x is a sum of xi* I xi over the vertebrae
                     for i in range(6):
                         moving[n] += (
                             inertia[lane, j, r, i] * (twist[r, c].conjugate() * twist[i, c]).real

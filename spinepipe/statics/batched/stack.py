@@ -13,22 +13,31 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf
 
 from spinepipe.effects import EffectKind
-from spinepipe.effects.contract import Array, Indices, Neutral, straight_over
-from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
-from spinepipe.statics.batched.continuation import Increment, continued, scaled
-from spinepipe.statics.batched.dead_loads import with_dead_loads
+from spinepipe.effects.contract import Array, Indices, straight_over
+from spinepipe.model import LoadCase, RefusedModel, SpineModel
 from spinepipe.statics.batched.dynamics import tangents_of
 from spinepipe.statics.batched.effects import Bound, PathStates
-from spinepipe.statics.batched.forward_kinematics import (
-    FREE,
+from spinepipe.statics.batched.equilibrium import (
+    Before,
+    Increment,
+    certify,
+    continue_in_parts,
+    newton,
+    stands,
+)
+from spinepipe.statics.batched.forward_kinematics import forward_kinematics
+from spinepipe.statics.batched.lanes import Acting, Effects, ranges
+from spinepipe.statics.batched.loads import (
     Chains,
     Loads,
-    Supports,
-    forward_kinematics,
+    chains_of,
+    durations,
     part,
+    scale_loads,
+    supports_of,
+    with_dead_loads,
+    wrenches_of,
 )
-from spinepipe.statics.batched.lanes import Acting, Effects, ranges
-from spinepipe.statics.batched.newton import Before, certified, newton, stands
 from spinepipe.statics.equilibrium import NOT_POSITIVE, PAST_CRITICAL, ROUNDING, SPACING
 from spinepipe.statics.path import follow
 from spinepipe.statics.system import System
@@ -172,21 +181,22 @@ class Stack:
         guess : (L, J, 6) poses near by; runs without them, or NaN, start from the neutral pose.
         why : whether the engine of record is asked about runs without memory that have none here.
         """
+        # from poses near by first, then what is left from the neutral pose, step by step
         q = np.full((len(self.run), self.joints, 6), np.nan)
         open_ones, at_once = ~self.alone, np.zeros(len(q), dtype=bool)
         if guess is not None:
             near = open_ones & ~np.isnan(guess[self.first[:-1], 0, 0])
             for runs in self.chunks(np.flatnonzero(near & ~self.remembers)):
-                open_ones[runs] = ~self._at_once(runs, guess, q)
+                open_ones[runs] = ~self._solve_at_once(runs, guess, q)
             for runs in self.chunks(np.flatnonzero(near & self.remembers), stepwise=True):
-                open_ones[runs] = ~self._step_by_step(runs, guess, q, at_once)
+                open_ones[runs] = ~self._solve_step_by_step(runs, guess, q, at_once)
         for runs in self.chunks(np.flatnonzero(open_ones), stepwise=True):
-            open_ones[runs] = ~self._step_by_step(runs, None, q, at_once)
+            open_ones[runs] = ~self._solve_step_by_step(runs, None, q, at_once)
         status = np.full(len(self.run), Status.CONVERGED.value, dtype="U20")
         messages = self.past_critical(q, at_once) if why else {}
         by_engine = self.alone | (open_ones & (self.remembers | why))
         for number in np.flatnonzero(by_engine).tolist():
-            self._by_engine(number, q, status, messages)
+            self._solve_by_engine(number, q, status, messages)
         for number in np.flatnonzero(open_ones & ~by_engine).tolist():
             lanes = range(self.first[number], self.first[number + 1])
             status[lanes] = Status.UNSTABLE.value
@@ -214,11 +224,12 @@ class Stack:
             lanes = lanes[pressed[lanes] & ~at_once[lanes] & ~np.isnan(q[lanes, 0, 0])]
             if not len(lanes):
                 continue
+            # a hair less than the load: at the critical load itself rounding would decide
             share = np.full(len(lanes), less)
-            loads = scaled(self.loads, lanes, share)
+            loads = scale_loads(self.loads, lanes, share)
             neutral = loads.supports.on(np.zeros_like(q[lanes]))
             bound = self.bound(lanes, self.initial_states(), share)
-            stood = stands(chains, loads, neutral, bound.held(neutral).tangent)
+            stood = stands(chains, loads, neutral, bound.joint_forces(neutral).tangent)
             found |= dict.fromkeys(lanes[~stood].tolist(), PAST_CRITICAL)
         return found
 
@@ -228,7 +239,7 @@ class Stack:
         Only for runs without memory.
         """
         lanes = np.flatnonzero(~np.isnan(q[:, 0, 0]))
-        held = self.bound(lanes, self.initial_states()).held(q[lanes])
+        held = self.bound(lanes, self.initial_states()).joint_forces(q[lanes])
         tangents = tangents_of(
             forward_kinematics(self.chains, part(self.loads, lanes), q[lanes], held.tangent)
         )
@@ -255,16 +266,18 @@ class Stack:
         """All lanes of some runs, run by run."""
         return ranges(self.first[runs], self.first[runs + 1] - self.first[runs])
 
-    def _at_once(self, runs: Indices, guess: Array, q: Array) -> Flags:
+    def _solve_at_once(self, runs: Indices, guess: Array, q: Array) -> Flags:
         """Enter the poses of runs without memory, all steps together; which runs are solved."""
         lanes, states = self.lanes(runs), self.initial_states()
-        found, good = self._settled(lanes, states, guess[lanes], None)
+        found, good = self._solve_certified(lanes, states, guess[lanes], None)
         whole: Flags = np.logical_and.reduceat(good, np.searchsorted(self.run[lanes], runs))
         there = np.repeat(whole, np.diff(self.first)[runs])
         q[lanes[there]] = found[there]
         return whole
 
-    def _step_by_step(self, runs: Indices, guess: Array | None, q: Array, at_once: Flags) -> Flags:
+    def _solve_step_by_step(
+        self, runs: Indices, guess: Array | None, q: Array, at_once: Flags
+    ) -> Flags:
         """Enter the poses of runs whose steps follow each other; which runs are solved.
 
         And which lanes (L,) a single step brings there from the neutral pose.
@@ -279,7 +292,7 @@ class Stack:
                 break
             origin = last[runs[live]]
             near = None if guess is None else guess[lanes]
-            found, arrived = self._settled(lanes, states, near, origin)
+            found, arrived = self._solve_certified(lanes, states, near, origin)
             at_once[lanes] = arrived & (self.first[runs[live]] == lanes)
             lost = np.flatnonzero(~arrived)
             if len(lost):
@@ -288,7 +301,7 @@ class Stack:
             q[lanes], last[runs[live]] = found, found
             if self.remembers[runs].any():
                 bound = self.bound(lanes, states)
-                self.remember(states, bound, bound.after(found))
+                self.remember(states, bound, bound.states_after(found))
         q[self.lanes(runs[~good])] = np.nan
         return good
 
@@ -299,18 +312,26 @@ class Stack:
             live = np.flatnonzero(steps > number)
             yield live, self.first[runs[live]] + number
 
+    def portions(self, runs: Flags) -> Iterator[Indices]:
+        """Lanes of some of the runs (R,), all steps of those without memory, others step by step.
+
+        In this order states may be advanced.
+        """
+        for some in self.chunks(np.flatnonzero(runs & ~self.remembers)):
+            yield self.lanes(some)
+        for some in self.chunks(np.flatnonzero(runs & self.remembers), stepwise=True):
+            for _, lanes in self.steps(some):
+                yield lanes
+
     def walked(self, q: Array) -> Iterator[tuple[Indices, Bound]]:
         """Lanes with a pose q (L, J, 6), in portions, with what acts and what that remembers."""
         good, states = ~np.isnan(q[:, 0, 0]), self.initial_states()
-        for runs in self.chunks(np.flatnonzero(~self.remembers)):
-            lanes = self.lanes(runs)
-            yield lanes[good[lanes]], self.bound(lanes[good[lanes]], states)
-        for runs in self.chunks(np.flatnonzero(self.remembers), stepwise=True):
-            for _, lanes in self.steps(runs):
-                there = lanes[good[lanes]]
-                bound = self.bound(there, states)
-                yield there, bound
-                self.remember(states, bound, bound.after(q[there]))
+        for lanes in self.portions(np.ones(len(self.remembers), dtype=bool)):
+            there = lanes[good[lanes]]
+            bound = self.bound(there, states)
+            yield there, bound
+            if bound.states.of:
+                self.remember(states, bound, bound.states_after(q[there]))
 
     def initial_states(self, *unknowns: int) -> dict[int, Array]:
         """States of all path laws before the first step, zero; or their derivatives."""
@@ -322,6 +343,7 @@ class Stack:
 
     @staticmethod
     def remember(states: dict[int, Array], bound: Bound, after: Mapping[int, Array]) -> None:
+        """Enter the states of path laws, or their derivatives, after a step of some lanes."""
         for number, state in after.items():
             states[number][bound.places[number]] = state
 
@@ -330,18 +352,13 @@ class Stack:
         chain = self.loads.chain[lanes]
         return Bound(
             self.effects,
-            self.neutral,
+            self.chains.neutral,
             (chain, self.run[lanes], self.seconds[lanes]),
             states,
             np.ones(len(lanes)) if share is None else share,
         )
 
-    @property
-    def neutral(self) -> Neutral:
-        """Where the M chains are in their neutral pose."""
-        return Neutral(self.chains.rotations, self.chains.origins, self.chains.coms)
-
-    def _settled(
+    def _solve_certified(
         self, lanes: Indices, states: PathStates, guess: Array | None, origin: Array | None
     ) -> tuple[Array, Flags]:
         """Poses (N, J, 6) of lanes, and which are certified to be where the loads lead.
@@ -355,8 +372,7 @@ class Stack:
         def laws(some: Indices) -> Bound:
             return self.bound(lanes[some], states)
 
-        loads = part(self.loads, lanes)
-        start = origin if guess is None else guess
+        loads, start = part(self.loads, lanes), origin if guess is None else guess
         assert start is not None
         results = newton(self.chains, loads, laws, start)
         if origin is None:
@@ -364,9 +380,8 @@ class Stack:
             origin = np.where(follows[:, None, None], np.roll(results.q, 1, axis=0), 0.0)
         before = Before(self.chains, self.loads, np.where(self.released[lanes], lanes - 1, -1))
         spacing = self.spacing[self.run[lanes]]
-        guessed = guess is not None
-        good = certified(self.chains, before, loads, laws, spacing, origin, results, guessed)
-        return results.q, good
+        given = (spacing, origin, results, guess is not None)
+        return results.q, certify(self.chains, before, loads, laws, *given)
 
     def _continued(self, lanes: Indices, start: Array, states: PathStates) -> tuple[Array, Flags]:
         """The same from the steps before, the load in fractions."""
@@ -380,9 +395,9 @@ class Stack:
         def laws(some: Indices, share: Array) -> Bound:
             return self.bound(lanes[some], states, share)
 
-        return continued(self.chains, increment, laws, self.spacing[self.run[lanes]], start)
+        return continue_in_parts(self.chains, increment, laws, self.spacing[self.run[lanes]], start)
 
-    def _by_engine(
+    def _solve_by_engine(
         self, number: int, q: Array, status: NDArray[np.str_], messages: dict[int, str]
     ) -> None:
         """Enter what the engine of record says of one run."""
@@ -402,60 +417,6 @@ class Stack:
                 q[lane] = step.equilibrium.q.reshape(-1, 6)
 
 
-def chains_of(models: Sequence[SpineModel]) -> Chains:
-    """The numbers of models with equally many joints."""
-    frames, bodies = [one.frames for one in models], [one.bodies for one in models]
-    numbers = (
-        [[frame.rotation for frame in own] for own in frames],
-        [[frame.origin for frame in own] for own in frames],
-        [[body.mass for body in own] for own in bodies],
-        [[body.com for body in own] for own in bodies],
-        [[body.inertia for body in own] for own in bodies],
-        [model.damping for model in models],
-        [model.gravity for model in models],
-    )
-    return Chains(*(np.array(one, dtype=float) for one in numbers))
-
-
-def wrenches_of(steps: Sequence[LoadStep]) -> tuple[Indices, Array, Array, Array]:
-    """Bodies (N, W) and points, forces, moments (N, W, 3) of load steps, as of `Loads`."""
-    count = np.array([len(step.wrenches) for step in steps], dtype=np.int64)
-    wrenches = [wrench for step in steps for wrench in step.wrenches]
-    vectors = [vector for one in wrenches for vector in (one.point, one.force, one.moment)]
-    at = np.repeat(np.arange(len(steps)), count), ranges(np.zeros_like(count), count)
-    bodies = np.full((len(steps), count.max(initial=0)), -1)
-    numbers = np.zeros((3, *bodies.shape, 3))
-    bodies[at] = [wrench.body for wrench in wrenches]
-    numbers[:, *at] = np.reshape(vectors, (-1, 3, 3)).swapaxes(0, 1)
-    points, forces, moments = numbers
-    return bodies, points, forces, moments
-
-
-def supports_of(steps: Sequence[LoadStep], joints: int) -> Supports:
-    """What rigs fix in load steps on chains of J joints."""
-    if not any(step.supports for step in steps):
-        return FREE
-    found = Supports(
-        np.zeros((len(steps), joints, 6), dtype=bool), *np.zeros((2, len(steps), joints, 6))
-    )
-    for lane, step in enumerate(steps):
-        for one in step.supports:
-            at = (lane, one.joint, one.coordinate)
-            found.fixed[at], found.values[at] = True, one.value
-            found.read_as[at] = one.read_as or 0.0
-    return found
-
-
-def durations(case: LoadCase) -> Array:
-    """(T,) duration of each step; zero where the test records no time."""
-    clock, found = 0.0, []
-    for step in case.steps:
-        time = clock if step.time is None else step.time
-        found.append(time - clock)
-        clock = time
-    return np.array(found)
-
-
 def _released(listed: Loads, chains: Chains, run: Indices, dead: bool) -> Flags:
     """(L,) see `Stack`; ``dead``: whether effects add loads that stay."""
     found = np.zeros(len(run), dtype=bool)
@@ -463,10 +424,11 @@ def _released(listed: Loads, chains: Chains, run: Indices, dead: bool) -> Flags:
     now, last = listed.forces[lanes], listed.forces[lanes - 1]
     same_places = (listed.bodies[lanes] == listed.bodies[lanes - 1]).all(axis=1)
     same_places &= (listed.points[lanes] == listed.points[lanes - 1]).all(axis=(1, 2))
+    # more of the same: the last forces are a share, from none to all, of those now
     squares = np.sum(now * now, axis=(1, 2))
     share = np.sum(now * last, axis=(1, 2)) / np.where(squares > 0.0, squares, 1.0)
     more = (last == share[:, None, None] * now).all(axis=(1, 2)) & (share >= 0.0) & (share <= 1.0)
-    if dead or chains.gravity.any():
+    if dead or chains.gravity.any():  # beside loads that stay, only the same are no others
         more &= share == 1.0
     found[lanes] = ~(same_places & (more | ~last.any(axis=(1, 2))))
     return found

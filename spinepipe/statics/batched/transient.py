@@ -1,20 +1,19 @@
-"""Many runs that settle, in lockstep: the integrator of `statics.settling`, lane by lane.
+"""Many runs that settle, in lockstep: the integrator of `statics.transient`, lane by lane.
 
 A lane that others follow chooses its steps of time by its own error; the others take the very same
 steps, so that their ends are smooth functions of what they differ in.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.statics.batched.dead_loads import with_dead_loads
 from spinepipe.statics.batched.dynamics import BatchedLUFactors, Moving, tangents_of
 from spinepipe.statics.batched.effects import Bound
-from spinepipe.statics.batched.forward_kinematics import Loads, forward_kinematics, part
+from spinepipe.statics.batched.forward_kinematics import forward_kinematics
+from spinepipe.statics.batched.loads import Loads, part, with_dead_loads
 from spinepipe.statics.batched.stack import Stack
 from spinepipe.statics.equilibrium import LARGEST_ROTATION
 from spinepipe.statics.transient import (
@@ -68,8 +67,8 @@ def settle(stack: Stack, course: Course, leads: Indices) -> CourseEnds:
     if stack.loads.supports.there:
         raise ValueError("a rig that fixes joint coordinates holds no spine that moves")
     runs = _Runs(stack, course, leads)
-    while runs.left:
-        runs.advance()
+    while len(lanes := runs.on_their_way()):
+        runs.advance(lanes)
     q = runs.q.copy()
     q[list(runs.trouble)] = np.nan
     sizes = {lane: tuple(runs.sizes[lane]) for lane in np.unique(leads).tolist()}
@@ -110,42 +109,36 @@ class _Runs:
         self.sizes: dict[int, list[float]] = {lane: [] for lane in np.unique(leads).tolist()}
         self.tolerance = END_ONLY * ABSOLUTE_TOLERANCE
         self._now: _Acting | None = None
+        # what acts when none of the listed loads does
+        forces, moments = 0.0 * stack.listed.forces, 0.0 * stack.listed.moments
+        off = stack.listed._replace(forces=forces, moments=moments)
+        self._bare = with_dead_loads(stack.effects.dead, stack.chains, off, stack.run)
 
-    @cached_property
-    def _bare(self) -> Loads:
-        """What acts when none of the listed loads does."""
-        listed = self.stack.listed
-        off = listed._replace(forces=0.0 * listed.forces, moments=0.0 * listed.moments)
-        return with_dead_loads(self.stack.effects.dead, self.stack.chains, off, self.stack.run)
-
-    @property
-    def left(self) -> bool:
-        """Whether any leading lane is on its way."""
-        return len(self._lanes()) > 0
-
-    def _lanes(self) -> Indices:
-        """Lanes on their way."""
+    def on_their_way(self) -> Indices:
+        """Lanes that have not arrived, are in no trouble, and whose leading lanes are neither."""
         going = self.time < self.course.duration_s * (1.0 - 1e-12)
         going[list(self.trouble)] = False
         alone = np.ones(len(going), dtype=bool)
         alone[list(self.trouble)] = False
         return np.flatnonzero(going[self.leads] & alone)
 
-    def _acting(self, lanes: Indices) -> _Acting:
+    def acting(self, lanes: Indices) -> _Acting:
+        """What acts on lanes; bound anew only where others are on their way than before."""
         if self._now is None or not np.array_equal(self._now.lanes, lanes):
             bound = self.stack.bound(lanes, {})
             bare, full = part(self._bare, lanes), part(self.stack.loads, lanes)
             self._now = _Acting(lanes, bare, full, bound)
         return self._now
 
-    def advance(self) -> None:
+    def advance(self, lanes: Indices) -> None:
         """One try of a step by every lane on its way."""
-        lanes = self._lanes()
         leads = self.leads[lanes]
         self.tries += 1
         corner = np.minimum(self.course.corners_after(self.time[leads]), self.course.duration_s)
         size = np.minimum(self.size[leads], corner - self.time[leads])
-        q, rates, error = self._try(lanes, self.time[leads], size)
+        with np.errstate(all="ignore"):  # lanes that are lost are told by their errors
+            q, rates, error = _RosenbrockStep(self, lanes, self.time[leads], size).taken()
+        # those that follow take what their leading lane accepts
         own = np.full(len(self.leads), np.inf)
         own[lanes] = error
         accepted = own[leads] <= 1.0
@@ -154,7 +147,13 @@ class _Runs:
         for lane, step, good in zip(lanes.tolist(), size.tolist(), accepted.tolist(), strict=True):
             if lane == self.leads[lane]:
                 self._arrive(lane, step, float(own[lane]), good)
-        self._enter_trouble(there, error[accepted])
+        # lanes that the step led nowhere, or beyond joint motion
+        turned = np.abs(self.q[there][..., 3:]).max(axis=(1, 2), initial=0.0)
+        for lane in there[~np.isfinite(error[accepted])].tolist():
+            self.trouble[lane] = LOST
+        for lane in there[~(turned < LARGEST_ROTATION)].tolist():
+            when = self.time[self.leads[lane]]
+            self.trouble.setdefault(lane, f"tips over: beyond 80 degrees at {when:.3f} s")
 
     def _arrive(self, lane: int, size: float, error: float, accepted: bool) -> None:
         """A leading lane's time and next step size."""
@@ -169,27 +168,13 @@ class _Runs:
         elif self.size[lane] < SMALLEST_STEP_S:
             self.trouble[lane] = TOO_SMALL
 
-    def _enter_trouble(self, lanes: Indices, error: Array) -> None:
-        """Lanes that a step led nowhere or beyond joint motion."""
-        turned = np.abs(self.q[lanes][..., 3:]).max(axis=(1, 2), initial=0.0)
-        for lane in lanes[~np.isfinite(error)].tolist():
-            self.trouble[lane] = LOST
-        for lane in lanes[~(turned < LARGEST_ROTATION)].tolist():
-            when = self.time[self.leads[lane]]
-            self.trouble.setdefault(lane, f"tips over: beyond 80 degrees at {when:.3f} s")
-
-    def _try(self, lanes: Indices, time: Array, size: Array) -> tuple[Array, Array, Array]:
-        """Poses, rates (N, J, 6) and scaled errors (N,) after steps of these sizes (N,)."""
-        with np.errstate(all="ignore"):
-            return _RosenbrockStep(self, lanes, time, size).taken()
-
 
 class _RosenbrockStep:
     """One step of N lanes by the four stages of ROS34PW2."""
 
     def __init__(self, runs: _Runs, lanes: Indices, time: Array, size: Array) -> None:
         self.runs, self.time = runs, time
-        self.acting = runs._acting(lanes)
+        self.acting = runs.acting(lanes)
         self.chain = self.acting.full.chain
         self.damping = runs.stack.chains.damping[self.chain].reshape(len(lanes), -1)
         self.q0, self.v0 = (
@@ -198,7 +183,7 @@ class _RosenbrockStep:
         self.size = size[:, None]
 
     def taken(self) -> tuple[Array, Array, Array]:
-        """Poses, rates and errors at its end."""
+        """Poses, rates and errors at its end; the equations are told in `statics.transient`."""
         size, implicit = self.size, self.size * GAMMA
         moving, force = self._force(self.q0, self.v0, self.time)
         tangents, identity = tangents_of(moving.seen), np.eye(self.q0.shape[1])
@@ -216,6 +201,7 @@ class _RosenbrockStep:
             if i:
                 time = self.time + STAGE_TIMES[i] * size[:, 0]
                 force = self._later_force(self.q0 + along, rate, time, moving)
+            # the Jacobian's terms of earlier stages, and of this one's own known part
             drift = rate + coupled_v
             pulled = (tangents @ (implicit * drift + coupled_q)[..., None])[..., 0]
             load = force - pulled - self.damping * coupled_v
@@ -228,19 +214,15 @@ class _RosenbrockStep:
         scale = self.runs.tolerance + END_ONLY * RELATIVE_TOLERANCE * np.abs(q)
         return q, v, (error / scale).max(axis=(1, 2))
 
-    def _seen(self, q: Array, time: Array) -> tuple[Moving, Array]:
-        """Lanes at q (N, n), and what is applied less what is held there (N, n)."""
-        stack, pose = self.runs.stack, q.reshape(len(q), -1, 6)
-        held = self.acting.bound.held(pose)
-        loads = self.acting.at(self.runs.course.shares(time))
-        seen = forward_kinematics(stack.chains, loads, pose, held.tangent)
-        missing = (seen.applied - held.load).reshape(q.shape)
-        return Moving.of(stack.chains, self.chain, seen), missing
-
     def _force(self, q: Array, rate: Array, time: Array) -> tuple[Moving, Array]:
         """Lanes at q (N, n) and the generalised force (N, n) that accelerates them."""
-        moving, missing = self._seen(q, time)
-        inertial = moving.inertial(rate.reshape(len(q), -1, 6)).reshape(q.shape)
+        stack, pose = self.runs.stack, q.reshape(len(q), -1, 6)
+        held = self.acting.bound.joint_forces(pose)
+        loads = self.acting.at(self.runs.course.shares(time))
+        seen = forward_kinematics(stack.chains, loads, pose, held.tangent)
+        moving = Moving.of(stack.chains, self.chain, seen)
+        missing = (seen.applied - held.load).reshape(q.shape)
+        inertial = moving.velocity_product_forces(rate.reshape(len(q), -1, 6)).reshape(q.shape)
         return moving, missing - inertial - self.damping * rate
 
     def _later_force(self, q: Array, rate: Array, time: Array, start: Moving) -> Array:
@@ -255,6 +237,7 @@ class _RosenbrockStep:
         ramp = np.zeros_like(self.q0)
         if (course.shares(self.time) == 1.0).all():
             return ramp
+        # difference to what is applied at the next corner, at the same pose
         corner = course.corners_after(self.time)
         on = np.isfinite(corner)
         if not on.any():

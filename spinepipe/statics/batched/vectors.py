@@ -12,9 +12,10 @@ Arrays of N lanes are laid out for this in blocks (B, ..., 4); the last block re
 # (the interface of numba's compiler has no types)
 
 import operator
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
@@ -32,9 +33,38 @@ WIDTH = 4
 """Lanes: the doubles of an AVX2 register. A lone lane so costs what it does in scalar code."""
 
 SOURCE = sha256(Path(__file__).read_bytes()).hexdigest()
-"""What is kept of compilations hangs on."""
+"""Part of the key of every compilation that is cached: `inner` functions of this file are compiled
+into those of others."""
 
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+
+Plain = tuple[NDArray[Any], ...]
+"""Arrays as compiled code takes them: a cached compilation must not name our classes, for it is
+read again before one knows whether they have changed."""
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def inner(function: Callable[P, R]) -> Callable[P, R]:
+    """A function for compiled ones of the same file: these are cached along with it.
+
+    Division by zero is no exception (``error_model``): lanes that run away are given up later.
+    """
+    result: Callable[P, R] = njit(error_model="numpy")(function)
+    return result
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """The function as machine code, cached beside its file; division by zero is no exception.
+
+    Entries are copied and added one by one in loops: for `a[:] = b` or `a += b` of arrays a message
+    about shapes is compiled each time, which takes longer than all the rest.
+    """
+    result: Any = njit(cache=True, error_model="numpy")(function)
+    cache = result._cache._cache_file  # numba looks at the function's own file alone
+    cache._source_stamp = (cache._source_stamp, SOURCE)
+    return cast(Callable[P, R], result)
 
 
 def blocks(lanes: NDArray[Any]) -> NDArray[Any]:
@@ -49,7 +79,7 @@ def blocks(lanes: NDArray[Any]) -> NDArray[Any]:
 def lanes(found: NDArray[Any], count: int) -> NDArray[Any]:
     """(N, ...) of blocks (B, ..., 4)."""
     last = found.ndim - 1
-    apart = found.transpose(0, last, *range(1, last))
+    apart = found.transpose(0, last, *range(1, last))  # the lanes of a block behind its number
     return apart.reshape(WIDTH * len(found), *found.shape[1:last])[:count]
 
 
@@ -82,7 +112,11 @@ def _equal(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> An
 
 
 def _define(function: Any, instruction: str) -> None:
-    """Make an arithmetic operator act on four lanes, or on these and a number."""
+    """Make an arithmetic operator act on four lanes, or on these and a number.
+
+    The typing rule first (which argument types it takes, and what comes out), then the LLVM
+    instruction that does it.
+    """
 
     class Typed(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
@@ -93,7 +127,7 @@ def _define(function: Any, instruction: str) -> None:
     infer_global(function)(Typed)
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return getattr(builder, instruction)(*args)
+        return getattr(builder, instruction)(*args)  # no fast-math: products and sums stay apart
 
     lower_builtin(function, *[LaneType] * (1 if function is operator.neg else 2))(lower)
 
@@ -115,6 +149,7 @@ def _vectors(typingctx: Any, array: Any) -> Any:
     """The same memory (..., 4) as an array (...) of four lanes each."""
     if not isinstance(array, types.Array) or array.layout != "C":
         return None
+    # unaligned: numpy allocates on 16 bytes, an AVX2 vector's own alignment is 32
     view = types.Array(LANES, array.ndim - 1, "C", aligned=False)
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -131,7 +166,7 @@ def _vectors(typingctx: Any, array: Any) -> Any:
             old.meminfo,
             old.parent,
         )
-        if context.enable_nrt:
+        if context.enable_nrt:  # the view holds the memory alive as the array does
             context.nrt.incref(builder, view, new._getvalue())
         return new._getvalue()
 
@@ -141,16 +176,19 @@ def _vectors(typingctx: Any, array: Any) -> Any:
 vectors: Any = intrinsic(_vectors)
 
 
-@njit(error_model="numpy")
+@inner
 def gather(rows: Array, chosen: Indices, first: int, out: Array) -> None:
-    """Fill out (n, 4) with rows (N, n) of the lanes from the first on, as ``chosen`` (L,) says."""
+    """Fill out (n, 4) with rows (N, n) of the lanes from the first on, as ``chosen`` (L,) says.
+
+    Where the last block has fewer than four lanes, its last one is repeated.
+    """
     for lane in range(WIDTH):
         row = chosen[min(first + lane, len(chosen) - 1)]
         for c in range(len(out)):
             out[c, lane] = rows[row, c]
 
 
-@njit(error_model="numpy")
+@inner
 def scatter(block: Array, first: int, rows: Array) -> None:
     """Enter a block (n, 4) in rows (N, n), from the first on."""
     for lane in range(min(WIDTH, len(rows) - first)):
@@ -158,7 +196,7 @@ def scatter(block: Array, first: int, rows: Array) -> None:
             rows[first + lane, c] = block[c, lane]
 
 
-@njit(error_model="numpy")
+@inner
 def add_product(matrix: NDArray[Any], columns: NDArray[Any], out: NDArray[Any]) -> None:
     """Add matrix (r, k) times columns (k, m) to out (r, m), of whatever entries."""
     for r in range(matrix.shape[0]):

@@ -24,7 +24,8 @@ from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
-from spinepipe.statics.prescribed import Ask, PrescribedResult, alone, answered
+from spinepipe.statics.prescribed import PrescribedResult, alone, answered
+from spinepipe.statics.prescribed_chain import Ask
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.fixed_end_spine import BENDING, with_laws

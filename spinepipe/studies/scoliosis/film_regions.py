@@ -14,7 +14,8 @@ from spinepipe.calibrate.descent import DescentTolerances, Point, descend, once
 from spinepipe.calibrate.lockstep import in_lockstep
 from spinepipe.calibrate.profile import Best, RegionEnds, profile_in_turn
 from spinepipe.effects.contract import Array
-from spinepipe.statics.prescribed import Ask, alone, answered
+from spinepipe.statics.prescribed import alone, answered
+from spinepipe.statics.prescribed_chain import Ask
 from spinepipe.studies.scoliosis.film_fit import FARTHEST, FilmFit, FilmFitResult, prior
 from spinepipe.studies.scoliosis.population import Population
 

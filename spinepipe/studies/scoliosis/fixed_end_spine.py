@@ -16,15 +16,13 @@ from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import Body, ScopedEffect, SpineModel
-from spinepipe.statics.prescribed import (
+from spinepipe.statics.prescribed import PrescribedResult, alone, hold_at
+from spinepipe.statics.prescribed_chain import (
     Ask,
-    HeldChain,
+    PrescribedChain,
     PrescribedPlace,
-    PrescribedResult,
     Prescription,
     Tilt,
-    alone,
-    hold_at,
 )
 from spinepipe.studies.scoliosis.films import Film
 from spinepipe.studies.scoliosis.settings import SagittalProfile
@@ -147,7 +145,7 @@ class FixedEndSpine:
     ask : who answers Newton's questions.
     """
 
-    chain: HeldChain
+    chain: PrescribedChain
     erect: Film
     ask: Ask = alone
 
@@ -165,7 +163,7 @@ class FixedEndSpine:
             grips = (*grips, Tilt(top, ANTERIOR, ANTERIOR, UP))
         # translations are locked, rotations free
         free = np.tile([False] * 3 + [True] * 3, model.n_joints)
-        return cls(HeldChain(model, grips, free), erect)
+        return cls(PrescribedChain(model, grips, free), erect)
 
     def with_values(self, *values: Array) -> "FixedEndSpine":
         """The same spine with other values of its laws."""

@@ -21,7 +21,7 @@ from spinepipe.statics.batched import (
     readings,
     readings_by,
 )
-from spinepipe.statics.batched.solve import carried
+from spinepipe.statics.batched.spines import carried
 from spinepipe.units import COORDINATES, subtract_baseline
 
 BUSHING = "linear_bushing"
