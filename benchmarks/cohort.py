@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.engine import Result, off, with_moments
 from benchmarks.study import ROOT, Run, copy_of_project, run_workflow
 from benchmarks.timing import cpu_seconds
-from spinepipe.calibrate import MeasuredCase, Problem, fit, pool
+from spinepipe.calibration import MeasuredCase, Problem, fit, pool
 from spinepipe.model import LoadCase
 from spinepipe.statics import System, follow, free_parameters, with_parameters
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.timing import cpu_seconds
-from spinepipe.calibrate import Problem, fit
-from spinepipe.calibrate.forward_runs import (
+from spinepipe.calibration import Problem, fit
+from spinepipe.calibration.forward_runs import (
     DEFAULT_STEP,
     MOST_EVALUATIONS,
     ForwardCost,

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.identification import PERCENT, OpenSimCost, problems
-from spinepipe.calibrate import fit
-from spinepipe.calibrate.forward_runs import DEFAULT_STEP, fit_by_cost
+from spinepipe.calibration import fit
+from spinepipe.calibration.forward_runs import DEFAULT_STEP, fit_by_cost
 from spinepipe.studies.joint_pose_sensitivity.filters import near_start
 
 POSES = tuple(range(40))

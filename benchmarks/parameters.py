@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from benchmarks.engine import Result, off, with_moments
 from benchmarks.timing import cpu_seconds
-from spinepipe.calibrate import MeasuredCase, Problem, fit
+from spinepipe.calibration import MeasuredCase, Problem, fit
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.statics import FreeParameter, System, follow, with_parameters
 from spinepipe.units import STIFFNESS_COLUMNS

@@ -10,7 +10,7 @@ from pyarrow import parquet
 from benchmarks.memory import per_row
 from benchmarks.study import Run, copy_of_project, run_workflow
 from spinepipe.marks import read_mark
-from spinepipe.sensitivity.global_indices.spread import values_of
+from spinepipe.sensitivity_analysis.global_indices.spread import values_of
 from spinepipe.statics.batched import solve_many
 from spinepipe.studies.global_sensitivity.batch import start_of_specimen
 from spinepipe.studies.global_sensitivity.sampling import design_of, spreads_of

@@ -40,7 +40,7 @@ class MissingEffects(Result):
         cannot show, and the test that would. next_tests : tests that would tell more.
     misfit : measured and predicted motion, with and without the effects.
     left_out : errors on tests and specimens that the fits did not see.
-    model : the base with its effects; it can be the ``base`` of `spinepipe.calibrate`.
+    model : the base with its effects; it can be the ``base`` of `spinepipe.calibration`.
     """
 
     verdict: str

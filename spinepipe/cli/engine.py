@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from spinepipe.calibrate import Problem, fit
+from spinepipe.calibration import Problem, fit
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, MeasuredCase, ScopedEffect, SpineModel

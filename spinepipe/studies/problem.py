@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spinepipe.calibrate import Problem
+from spinepipe.calibration import Problem
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose

@@ -20,9 +20,9 @@ from tests.mutants.lines import ROOT
 AREAS = {
     "statics": ("spinepipe/statics",),
     "effects": ("spinepipe/effects",),
-    "calibrate": ("spinepipe/calibrate",),
+    "calibrate": ("spinepipe/calibration",),
     "statistics": ("spinepipe/statistics",),
-    "sensitivity": ("spinepipe/sensitivity",),
+    "sensitivity": ("spinepipe/sensitivity_analysis",),
     "search": ("spinepipe/studies/discrepancy/search", "spinepipe/studies/discrepancy/proof"),
     "films": ("spinepipe/studies/scoliosis",),
     "trunk": ("spinepipe/muscles",),

@@ -6,7 +6,7 @@ Catches a fit that does not find back stiffness of motion made elsewhere.
 import numpy as np
 import pytest
 
-from spinepipe.calibrate import MeasuredCase, Problem, fit
+from spinepipe.calibration import MeasuredCase, Problem, fit
 from spinepipe.statics import free_parameters
 from spinepipe.status import Status
 from spinepipe.units import STIFFNESS_COLUMNS

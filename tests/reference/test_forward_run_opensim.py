@@ -6,7 +6,7 @@ Catches an emulated run that ends elsewhere than OpenSim's own.
 import numpy as np
 import pytest
 
-from spinepipe.calibrate.forward_runs import forward_run
+from spinepipe.calibration.forward_runs import forward_run
 from tests.reference import bridge
 from tests.reference.peers import chain as chains
 from tests.reference.peers import opensim_peer as peer

@@ -20,9 +20,9 @@ from example_effects import (
 )
 from sweeps import sweep
 
-from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
-from spinepipe.calibrate.fit import stand_up
-from spinepipe.calibrate.uncertainty import uncertainty
+from spinepipe.calibration import Evaluator, MeasuredCase, Problem, fit
+from spinepipe.calibration.fit import stand_up
+from spinepipe.calibration.uncertainty import uncertainty
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, SpineModel

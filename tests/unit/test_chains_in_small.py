@@ -12,8 +12,8 @@ import pytest
 from scipy.stats import norm
 from sweeps import sweep
 
-from spinepipe.calibrate.posterior import Mode, Point, Target, _mode
-from spinepipe.calibrate.sampler import Convergence, _chart, _start, convergence, sample
+from spinepipe.calibration.posterior import Mode, Point, Target, _mode
+from spinepipe.calibration.sampler import Convergence, _chart, _start, convergence, sample
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric

@@ -8,7 +8,13 @@ import pytest
 from scipy.optimize import lsq_linear, minimize
 from sweeps import sweep
 
-from spinepipe.calibrate.descent import DescentTolerances, damped_step, descend, descend_along, once
+from spinepipe.calibration.descent import (
+    DescentTolerances,
+    damped_step,
+    descend,
+    descend_along,
+    once,
+)
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric

@@ -26,7 +26,7 @@ from example_effects import (
 )
 from sweeps import sweep
 
-from spinepipe.calibrate import MeasuredCase, Problem, fit
+from spinepipe.calibration import MeasuredCase, Problem, fit
 from spinepipe.effects import (
     EffectKind,
     GeometryEffect,

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinepipe.calibrate import MeasuredCase, Problem, fit
-from spinepipe.calibrate.fit import TIPPED, _start_points
-from spinepipe.calibrate.pooling import PoolMember
+from spinepipe.calibration import MeasuredCase, Problem, fit
+from spinepipe.calibration.fit import TIPPED, _start_points
+from spinepipe.calibration.pooling import PoolMember
 from spinepipe.effects import Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, RefusedModel, ScopedEffect, SpineModel

@@ -22,7 +22,7 @@ from example_effects import (
 )
 from path_effect_cases import branches, creeping, friction, turning
 
-from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
+from spinepipe.calibration import Evaluator, MeasuredCase, Problem, fit
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.statics import FreeParameter, free_parameters, with_parameters

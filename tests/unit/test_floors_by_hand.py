@@ -9,22 +9,25 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.sensitivity.global_indices.convergence import convergence
-from spinepipe.sensitivity.global_indices.design import DUMMY, Design, draw
-from spinepipe.sensitivity.global_indices.estimates import (
+from spinepipe.sensitivity_analysis.global_indices.convergence import convergence
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY, Design, draw
+from spinepipe.sensitivity_analysis.global_indices.estimates import (
     IndexStatus,
     SensitivityIndex,
     Settings,
     masked,
 )
-from spinepipe.sensitivity.global_indices.floor import (
+from spinepipe.sensitivity_analysis.global_indices.floor import (
     Floor,
     above_floor,
     negligible,
     noise_floor,
 )
-from spinepipe.sensitivity.global_indices.indices import complete_blocks, indices, names_of
-from spinepipe.sensitivity.global_indices.structured import elementary_effects, fast_indices
+from spinepipe.sensitivity_analysis.global_indices.indices import complete_blocks, indices, names_of
+from spinepipe.sensitivity_analysis.global_indices.structured import (
+    elementary_effects,
+    fast_indices,
+)
 
 QUICK = Settings(bootstraps=5, delta_bootstraps=4)
 ALONE = ("a", "b")

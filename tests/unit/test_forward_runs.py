@@ -12,8 +12,8 @@ import pytest
 from example_effects import NOWHERE, Relaxation, loaded, massless, scoped, spine
 from study_cases import STUDY, Size, project, results
 
-from spinepipe.calibrate import MeasuredCase, Problem, forward_runs
-from spinepipe.calibrate.forward_runs import (
+from spinepipe.calibration import MeasuredCase, Problem, forward_runs
+from spinepipe.calibration.forward_runs import (
     ForwardFit,
     differenced_gradient,
     exact_gradient,

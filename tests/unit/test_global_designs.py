@@ -9,8 +9,8 @@ from scipy.special import erf, erfinv
 from scipy.stats import spearmanr
 from sweeps import sweep
 
-from spinepipe.sensitivity.global_indices.design import DUMMY, design_problems, draw
-from spinepipe.sensitivity.global_indices.spread import (
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY, design_problems, draw
+from spinepipe.sensitivity_analysis.global_indices.spread import (
     LogNormal,
     LogUniform,
     Normal,

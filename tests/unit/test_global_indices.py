@@ -12,10 +12,14 @@ from scipy.integrate import dblquad
 from scipy.stats import ks_2samp, norm
 from sweeps import sweep
 
-from spinepipe.sensitivity.global_indices.convergence import convergence
-from spinepipe.sensitivity.global_indices.design import Design, draw
-from spinepipe.sensitivity.global_indices.estimates import IndexStatus, SensitivityIndex, Settings
-from spinepipe.sensitivity.global_indices.indices import indices
+from spinepipe.sensitivity_analysis.global_indices.convergence import convergence
+from spinepipe.sensitivity_analysis.global_indices.design import Design, draw
+from spinepipe.sensitivity_analysis.global_indices.estimates import (
+    IndexStatus,
+    SensitivityIndex,
+    Settings,
+)
+from spinepipe.sensitivity_analysis.global_indices.indices import indices
 
 G = FUNCTIONS["g"]
 QUICK = Settings(bootstraps=20, delta_bootstraps=5)

@@ -39,11 +39,11 @@ ROOMS = (
         "marks",
         "anatomy",
     ),
-    *("effects", "model", "world", "statics", "calibrate", "muscles", "motion"),
+    *("effects", "model", "world", "statics", "calibration", "muscles", "motion"),
     *(
         "designs",
         "statistics",
-        "sensitivity",
+        "sensitivity_analysis",
         "cohort",
         "testing_machine",
         "plausibility",

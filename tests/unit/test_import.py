@@ -18,7 +18,7 @@ import yaml
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
-from spinepipe.calibrate import Problem, fit
+from spinepipe.calibration import Problem, fit
 from spinepipe.cli import main
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.cohort.specimen import joint_frames, on_bushings

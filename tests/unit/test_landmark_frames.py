@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from example_effects import spine
 
-from spinepipe.calibrate.solvers import AtRest
+from spinepipe.calibration.solvers import AtRest
 from spinepipe.cohort.landmark_frames import LandmarkFrames, displacement
 from spinepipe.cohort.specimen import frames_from_landmarks
 from spinepipe.effects import Wrench, create

@@ -9,7 +9,7 @@ from functools import partial
 
 import pytest
 
-from spinepipe.calibrate.lockstep import in_lockstep
+from spinepipe.calibration.lockstep import in_lockstep
 
 Ask = Callable[[int], int]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.calibrate.profile import Best, Profile, _one_step, profile_in_turn
+from spinepipe.calibration.profile import Best, Profile, _one_step, profile_in_turn
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.calibrate.hierarchy import (
+from spinepipe.calibration.hierarchy import (
     Hierarchy,
     LinearReadings,
     Spreads,
@@ -18,7 +18,7 @@ from spinepipe.calibrate.hierarchy import (
     largest_change,
     tellable_spreads,
 )
-from spinepipe.calibrate.pooling import PoolMember
+from spinepipe.calibration.pooling import PoolMember
 from spinepipe.effects.contract import Array
 
 pytestmark = pytest.mark.numeric

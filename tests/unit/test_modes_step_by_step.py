@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from spinepipe.calibrate import posterior
-from spinepipe.calibrate.posterior import (
+from spinepipe.calibration import posterior
+from spinepipe.calibration.posterior import (
     NOT_LEVEL,
     SADDLE,
     TIPPED,

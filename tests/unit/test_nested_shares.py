@@ -13,7 +13,7 @@ from statsmodels.stats.anova import anova_lm
 from sweeps import sweep
 
 from spinepipe.designs import latin_hypercube_normal, sample_factors
-from spinepipe.sensitivity.shares import components, nested_shares, variance_shares
+from spinepipe.sensitivity_analysis.shares import components, nested_shares, variance_shares
 from spinepipe.statistics import ComputationStatus
 
 PARTS = ("specimen", "draw", "treatment", "rest")

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from known_indices import FUNCTIONS
 
-from spinepipe.sensitivity.global_indices.design import DUMMY, draw
-from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
-from spinepipe.sensitivity.global_indices.floor import (
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY, draw
+from spinepipe.sensitivity_analysis.global_indices.estimates import SensitivityIndex, Settings
+from spinepipe.sensitivity_analysis.global_indices.floor import (
     REPLICATES,
     Floor,
     above_floor,
     noise_floor,
 )
-from spinepipe.sensitivity.global_indices.indices import indices
+from spinepipe.sensitivity_analysis.global_indices.indices import indices
 
 ISHIGAMI, G = FUNCTIONS["ishigami"], FUNCTIONS["g"]
 NAMES = (*ISHIGAMI.factors, "inert")

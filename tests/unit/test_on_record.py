@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from example_effects import loaded, spine
 
-from spinepipe.calibrate.fit import Optimum, _on_record
-from spinepipe.calibrate.solvers import Disagreement, by_record, on_record
+from spinepipe.calibration.fit import Optimum, _on_record
+from spinepipe.calibration.solvers import Disagreement, by_record, on_record
 from spinepipe.status import Status
 
 

@@ -16,9 +16,9 @@ from scipy.stats import multivariate_normal, norm
 from scipy.stats import t as student_t
 from statsmodels.regression.mixed_linear_model import MixedLM
 
-from spinepipe.calibrate import Evaluator, MeasuredCase, Pooled, Problem, fit, pool, pooling
-from spinepipe.calibrate import hierarchy as spreads
-from spinepipe.calibrate.hierarchy import (
+from spinepipe.calibration import Evaluator, MeasuredCase, Pooled, Problem, fit, pool, pooling
+from spinepipe.calibration import hierarchy as spreads
+from spinepipe.calibration.hierarchy import (
     Hierarchy,
     LinearReadings,
     Spreads,

@@ -13,8 +13,8 @@ from scipy.interpolate import PchipInterpolator
 from scipy.stats import norm
 from sweeps import sweep
 
-from spinepipe.calibrate import Evaluator, MeasuredCase, Problem
-from spinepipe.calibrate.posterior import (
+from spinepipe.calibration import Evaluator, MeasuredCase, Problem
+from spinepipe.calibration.posterior import (
     Point,
     Target,
     _mode,
@@ -23,7 +23,7 @@ from spinepipe.calibrate.posterior import (
     noise_of,
     normal_of,
 )
-from spinepipe.calibrate.sampler import OUTERMOST, _Chart, convergence, sample
+from spinepipe.calibration.sampler import OUTERMOST, _Chart, convergence, sample
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose

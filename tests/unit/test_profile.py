@@ -12,8 +12,8 @@ from scipy import stats
 from scipy.optimize import brentq, minimize_scalar
 from sweeps import sweep
 
-from spinepipe.calibrate import Evaluator, Fit, MeasuredCase, Problem, fit
-from spinepipe.calibrate.profile import NEAR, Best, Profile, profile_in_turn
+from spinepipe.calibration import Evaluator, Fit, MeasuredCase, Problem, fit
+from spinepipe.calibration.profile import NEAR, Best, Profile, profile_in_turn
 from spinepipe.effects import Wrench
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose

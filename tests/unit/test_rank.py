@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from study_cases import STUDY, Size, project
 
-from spinepipe.calibrate.uncertainty import rank_at_start
+from spinepipe.calibration.uncertainty import rank_at_start
 from spinepipe.studies.free import loaded_and_measured
 from spinepipe.studies.joint_pose_sensitivity.inputs import specimen_inputs, study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem

@@ -9,7 +9,7 @@ from sklearn.base import clone
 from sklearn.model_selection import GroupKFold
 from sweeps import sweep
 
-from spinepipe.sensitivity.tree import (
+from spinepipe.sensitivity_analysis.tree import (
     BEYOND_ROOT,
     _cross_validated,
     _cut_back,

@@ -12,9 +12,9 @@ from SALib.analyze import delta, rbd_fast
 from scipy.stats import ks_2samp
 from sweeps import sweep
 
-from spinepipe.sensitivity.global_indices import estimates, given_data, structured
-from spinepipe.sensitivity.global_indices.design import draw
-from spinepipe.sensitivity.global_indices.estimates import (
+from spinepipe.sensitivity_analysis.global_indices import estimates, given_data, structured
+from spinepipe.sensitivity_analysis.global_indices.design import draw
+from spinepipe.sensitivity_analysis.global_indices.estimates import (
     Settings,
     masked,
     normal_interval,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from example_effects import loaded, massless, spine, top_heavy
 
-from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit, fit_alike
-from spinepipe.calibrate.solvers import CaseResiduals, Settling
+from spinepipe.calibration import Evaluator, MeasuredCase, Problem, fit, fit_alike
+from spinepipe.calibration.solvers import CaseResiduals, Settling
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, LoadStep, RefusedModel, SpineModel
 from spinepipe.statics import (

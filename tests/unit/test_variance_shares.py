@@ -12,7 +12,7 @@ from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 from sweeps import sweep
 
-from spinepipe.sensitivity.shares import share_intervals, variance_shares
+from spinepipe.sensitivity_analysis.shares import share_intervals, variance_shares
 from spinepipe.statistics import ComputationStatus
 
 PARTS = ("row", "column", "interaction", "total_row", "total_column")

@@ -10,8 +10,8 @@ import pytest
 import statsmodels.api as sm
 from example_effects import loaded, solved_poses, spine
 
-from spinepipe.calibrate import Evaluator, MeasuredCase, Problem, fit
-from spinepipe.calibrate.problem import whitened
+from spinepipe.calibration import Evaluator, MeasuredCase, Problem, fit
+from spinepipe.calibration.problem import whitened
 from spinepipe.effects.contract import Array
 from spinepipe.statics import free_parameters
 

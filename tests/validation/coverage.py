@@ -15,7 +15,7 @@ import pandas as pd
 from scipy.stats import t
 
 from spinepipe import cohort as cohorts
-from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.calibration import Fit, Problem, fit
 from spinepipe.cohort import Cohort
 from spinepipe.statics import with_parameters
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests

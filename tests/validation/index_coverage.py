@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 from SALib.analyze import fast
 
-from spinepipe.sensitivity.global_indices.design import Design, draw
-from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
-from spinepipe.sensitivity.global_indices.indices import indices
+from spinepipe.sensitivity_analysis.global_indices.design import Design, draw
+from spinepipe.sensitivity_analysis.global_indices.estimates import SensitivityIndex, Settings
+from spinepipe.sensitivity_analysis.global_indices.indices import indices
 from tests.cases.known_indices import FUNCTIONS, KnownFunction, morris_truth
 
 SEEDS = 40

@@ -14,7 +14,7 @@ import pandas as pd
 from scipy.stats import t
 
 from spinepipe import cohort as cohorts
-from spinepipe.calibrate import pool
+from spinepipe.calibration import pool
 from spinepipe.statics import with_parameters
 from spinepipe.studies.cohort_stiffness.problem import calibration_problem, specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness

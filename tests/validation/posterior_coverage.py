@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
-from spinepipe.calibrate import fit
-from spinepipe.calibrate.posterior import between, modes, normal_of
-from spinepipe.calibrate.sampler import sample
+from spinepipe.calibration import fit
+from spinepipe.calibration.posterior import between, modes, normal_of
+from spinepipe.calibration.sampler import sample
 from spinepipe.jobs.code import code_digest
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.landmarks import landmarks_of

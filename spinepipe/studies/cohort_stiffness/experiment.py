@@ -13,9 +13,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from spinepipe.calibrate import Evaluator, Problem
-from spinepipe.calibrate.solvers import AtRest
-from spinepipe.calibrate.uncertainty import uncertainty
+from spinepipe.calibration import Evaluator, Problem
+from spinepipe.calibration.solvers import AtRest
+from spinepipe.calibration.uncertainty import uncertainty
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.cohort.load_tests import DRIVEN, moments

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, Problem, fit
-from spinepipe.calibrate.profile import RegionEnds
+from spinepipe.calibration import Fit, Problem, fit
+from spinepipe.calibration.profile import RegionEnds
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array

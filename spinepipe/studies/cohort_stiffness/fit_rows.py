@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from spinepipe.calibrate import Problem
-from spinepipe.calibrate.profile import RegionEnds
+from spinepipe.calibration import Problem
+from spinepipe.calibration.profile import RegionEnds
 from spinepipe.effects.contract import Array
 from spinepipe.studies.cohort_stiffness.stiffening import AT_BOUND, LINEAR, Growth
 from spinepipe.units import COORDINATES, STIFFNESS_UNITS

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from spinepipe.calibrate.problem import whitened
+from spinepipe.calibration.problem import whitened
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, Problem
+from spinepipe.calibration import Fit, Problem
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel

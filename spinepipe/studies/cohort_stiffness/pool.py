@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from spinepipe.calibrate import Pooled, PooledSpecimen, Problem, pool
+from spinepipe.calibration import Pooled, PooledSpecimen, Problem, pool
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.inputs import study_of_kind

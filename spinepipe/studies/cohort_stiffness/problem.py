@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from spinepipe.calibrate import MeasuredCase, Problem
+from spinepipe.calibration import MeasuredCase, Problem
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.load_tests import coupled_range
 from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen, measured_specimen

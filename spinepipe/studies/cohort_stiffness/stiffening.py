@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate import Fit, Pooled, Problem
-from spinepipe.calibrate.fit import names_at_bound
+from spinepipe.calibration import Fit, Pooled, Problem
+from spinepipe.calibration.fit import names_at_bound
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect, SpineModel

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate.profile import NORMAL_95
+from spinepipe.calibration.profile import NORMAL_95
 from spinepipe.effects import Effect
 from spinepipe.effects.contract import Array, JointLaw, PathLaw
 from spinepipe.effects.field_numbers import NUMBERS, load_over, numbers_of, usual_load

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.sensitivity.global_indices.convergence import convergence
-from spinepipe.sensitivity.global_indices.design import Design
-from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
-from spinepipe.sensitivity.global_indices.floor import (
+from spinepipe.sensitivity_analysis.global_indices.convergence import convergence
+from spinepipe.sensitivity_analysis.global_indices.design import Design
+from spinepipe.sensitivity_analysis.global_indices.estimates import SensitivityIndex, Settings
+from spinepipe.sensitivity_analysis.global_indices.floor import (
     Floor,
     above_floor,
     negligible,
     noise_floor,
 )
-from spinepipe.sensitivity.global_indices.indices import indices
+from spinepipe.sensitivity_analysis.global_indices.indices import indices
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.failed_runs import failed_rows, read_blocks
 from spinepipe.studies.global_sensitivity.sampling import design_of, factor_values

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, fit
+from spinepipe.calibration import Fit, fit
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import measured_cycles
 from spinepipe.designs import specimen_seed

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from spinepipe.calibrate import fit
+from spinepipe.calibration import fit
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.inputs import study_of_kind

@@ -8,8 +8,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.problems import InputProblem, did_you_mean, one_of
-from spinepipe.sensitivity.global_indices.design import DUMMY, Method
-from spinepipe.sensitivity.global_indices.estimates import INDICES
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY, Method
+from spinepipe.sensitivity_analysis.global_indices.estimates import INDICES
 from spinepipe.studies.global_sensitivity.factors import FactorChange, Of
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import frame_landmarks, given_joints, moved_by

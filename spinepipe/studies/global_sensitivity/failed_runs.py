@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import Design
-from spinepipe.sensitivity.global_indices.indices import complete_blocks
+from spinepipe.sensitivity_analysis.global_indices.design import Design
+from spinepipe.sensitivity_analysis.global_indices.indices import complete_blocks
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.tables import read

@@ -9,8 +9,8 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.report.words import capital, count, fixed, listed, number
-from spinepipe.sensitivity.global_indices.design import DUMMY
-from spinepipe.sensitivity.global_indices.floor import NEGLIGIBLE
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY
+from spinepipe.sensitivity_analysis.global_indices.floor import NEGLIGIBLE
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
     NAME,

@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import Document, ResultTables, Sortable, page_tables, sortable
 from spinepipe.report.words import fixed, number
 from spinepipe.schema import Column
-from spinepipe.sensitivity.global_indices.design import DUMMY
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY
 from spinepipe.studies.global_sensitivity.figures.panels import (
     DONE,
     NAME,

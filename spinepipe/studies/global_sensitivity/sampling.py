@@ -6,8 +6,8 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
-from spinepipe.sensitivity.global_indices.design import Design, draw
-from spinepipe.sensitivity.global_indices.spread import (
+from spinepipe.sensitivity_analysis.global_indices.design import Design, draw
+from spinepipe.sensitivity_analysis.global_indices.spread import (
     Distribution,
     LogNormal,
     LogUniform,

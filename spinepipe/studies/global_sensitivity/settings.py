@@ -15,8 +15,8 @@ from pydantic import (
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.names import distinct
-from spinepipe.sensitivity.global_indices.design import DUMMY, Method
-from spinepipe.sensitivity.global_indices.estimates import INDICES
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY, Method
+from spinepipe.sensitivity_analysis.global_indices.estimates import INDICES
 from spinepipe.studies.global_sensitivity.factors import AnyFactor, FactorChange, Of
 from spinepipe.studies.parts import (
     AUTO,

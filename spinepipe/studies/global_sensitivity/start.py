@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate import Problem
+from spinepipe.calibration import Problem
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.measured import measured_cycles
 from spinepipe.cohort.specimen import (

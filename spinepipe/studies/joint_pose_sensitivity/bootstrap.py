@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Evaluator, Fit, Problem, fit_alike, side_by_side
+from spinepipe.calibration import Evaluator, Fit, Problem, fit_alike, side_by_side
 from spinepipe.cohort import Cohort
 from spinepipe.designs import sample_log_uniform, specimen_seed
 from spinepipe.effects.contract import Array

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from spinepipe.calibrate import Fit, Problem, fit_alike
+from spinepipe.calibration import Fit, Problem, fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import mark_of, provenance
 from spinepipe.model import RefusedModel

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from spinepipe.calibrate import fit
+from spinepipe.calibration import fit
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array

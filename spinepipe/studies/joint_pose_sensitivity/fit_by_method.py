@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, Problem, fit
-from spinepipe.calibrate.forward_runs import (
+from spinepipe.calibration import Fit, Problem, fit
+from spinepipe.calibration.forward_runs import (
     DEFAULT_STEP,
     ForwardFit,
     differenced_gradient,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from spinepipe.calibrate.uncertainty import Rank, rank_at_start
+from spinepipe.calibration.uncertainty import Rank, rank_at_start
 from spinepipe.cohort import Cohort
 from spinepipe.model import RefusedModel
 from spinepipe.problems import InputProblem

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, MeasuredCase, Problem, by_record, fit, needed
+from spinepipe.calibration import Fit, MeasuredCase, Problem, by_record, fit, needed
 from spinepipe.cohort.specimen import frames_from_landmarks
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance

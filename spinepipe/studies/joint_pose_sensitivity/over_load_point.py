@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import f
 
-from spinepipe.calibrate import fit
+from spinepipe.calibration import fit
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.designs import specimen_seed
 from spinepipe.jobs.digest import provenance

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from spinepipe.calibrate import fit
-from spinepipe.calibrate.posterior import Mode, Target, between, modes, normal_of
-from spinepipe.calibrate.sampler import MarkovChains, convergence, sample
-from spinepipe.calibrate.solvers import AtRest, CaseResiduals
+from spinepipe.calibration import fit
+from spinepipe.calibration.posterior import Mode, Target, between, modes, normal_of
+from spinepipe.calibration.sampler import MarkovChains, convergence, sample
+from spinepipe.calibration.solvers import AtRest, CaseResiduals
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.landmark_frames import displacement
 from spinepipe.designs import specimen_seed

@@ -7,9 +7,9 @@ from typing import Any, Self
 import numpy as np
 from scipy.special import ndtri
 
-from spinepipe.calibrate import Problem
-from spinepipe.calibrate.posterior import ResidualNoise, between
-from spinepipe.calibrate.solvers import CaseResiduals
+from spinepipe.calibration import Problem
+from spinepipe.calibration.posterior import ResidualNoise, between
+from spinepipe.calibration.solvers import CaseResiduals
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
 from spinepipe.status import Status

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate import Evaluator, Fit, Problem
-from spinepipe.calibrate.posterior import ResidualNoise, Target, between, noise_of
+from spinepipe.calibration import Evaluator, Fit, Problem
+from spinepipe.calibration.posterior import ResidualNoise, Target, between, noise_of
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.landmark_frames import Displaced, LandmarkFrames
 from spinepipe.effects import create

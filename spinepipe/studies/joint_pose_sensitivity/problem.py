@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.calibrate import Fit, Problem
+from spinepipe.calibration import Fit, Problem
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import MeasuredCase

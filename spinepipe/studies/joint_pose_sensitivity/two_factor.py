@@ -11,8 +11,8 @@ from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.marks import read_json
-from spinepipe.sensitivity.shares import VarianceShare, VarianceShares, variance_shares
-from spinepipe.sensitivity.tree import Tree, regression_tree
+from spinepipe.sensitivity_analysis.shares import VarianceShare, VarianceShares, variance_shares
+from spinepipe.sensitivity_analysis.tree import Tree, regression_tree
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import IMPORTANCE, VARIANCE_SHARES

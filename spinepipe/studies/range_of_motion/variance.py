@@ -10,7 +10,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.report.words import count
-from spinepipe.sensitivity.shares import VarianceShare, nested_shares, variance_shares
+from spinepipe.sensitivity_analysis.shares import VarianceShare, nested_shares, variance_shares
 from spinepipe.statistics import ComputationStatus
 from spinepipe.status import joined
 from spinepipe.studies.range_of_motion.grid import MotionGrid, read_grid

@@ -19,8 +19,8 @@ from itertools import islice
 import numpy as np
 from scipy.stats import norm, qmc
 
-from spinepipe.calibrate.descent import DescentTolerances, Point
-from spinepipe.calibrate.lockstep import in_lockstep
+from spinepipe.calibration.descent import DescentTolerances, Point
+from spinepipe.calibration.lockstep import in_lockstep
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel

@@ -10,9 +10,9 @@ from functools import partial
 
 import numpy as np
 
-from spinepipe.calibrate.descent import DescentTolerances, Point, descend, once
-from spinepipe.calibrate.lockstep import in_lockstep
-from spinepipe.calibrate.profile import Best, RegionEnds, profile_in_turn
+from spinepipe.calibration.descent import DescentTolerances, Point, descend, once
+from spinepipe.calibration.lockstep import in_lockstep
+from spinepipe.calibration.profile import Best, RegionEnds, profile_in_turn
 from spinepipe.effects.contract import Array
 from spinepipe.statics.prescribed import alone, answered
 from spinepipe.statics.prescribed_chain import Ask

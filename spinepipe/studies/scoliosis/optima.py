@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from spinepipe.calibrate.descent import Descent, DescentTolerances, Point, descend, once
+from spinepipe.calibration.descent import Descent, DescentTolerances, Point, descend, once
 from spinepipe.effects.contract import Array
 from spinepipe.statics.prescribed import PrescribedResult
 from spinepipe.status import Status

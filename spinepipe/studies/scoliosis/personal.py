@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.descent import DescentTolerances
-from spinepipe.calibrate.profile import RegionEnds
+from spinepipe.calibration.descent import DescentTolerances
+from spinepipe.calibration.profile import RegionEnds
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel

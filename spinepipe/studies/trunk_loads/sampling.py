@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import Design, draw
-from spinepipe.sensitivity.global_indices.spread import Normal, values_of
+from spinepipe.sensitivity_analysis.global_indices.design import Design, draw
+from spinepipe.sensitivity_analysis.global_indices.spread import Normal, values_of
 from spinepipe.studies.trunk_loads.settings import FACTOR_UNITS, NOMINAL, TrunkLoads
 
 SMALLEST_FACTOR = 0.3

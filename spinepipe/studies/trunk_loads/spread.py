@@ -7,8 +7,8 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.sensitivity.global_indices.estimates import Settings
-from spinepipe.sensitivity.global_indices.indices import indices
+from spinepipe.sensitivity_analysis.global_indices.estimates import Settings
+from spinepipe.sensitivity_analysis.global_indices.indices import indices
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.rows import Row
 from spinepipe.studies.trunk_loads.sampling import design_of

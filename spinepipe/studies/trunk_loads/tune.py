@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t
 
-from spinepipe.calibrate.descent import DescentTolerances, Point, descend, once
-from spinepipe.calibrate.profile import LEVEL, Best, Profile, profile_in_turn
+from spinepipe.calibration.descent import DescentTolerances, Point, descend, once
+from spinepipe.calibration.profile import LEVEL, Best, Profile, profile_in_turn
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance

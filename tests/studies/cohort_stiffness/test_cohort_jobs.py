@@ -16,8 +16,8 @@ from cohort_edge_cases import TRUTH, A
 from scipy import stats
 from statsmodels.tools import eval_measures
 
-from spinepipe.calibrate import fit as calibrate
-from spinepipe.calibrate.profile import NEAR
+from spinepipe.calibration import fit as calibrate
+from spinepipe.calibration.profile import NEAR
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.load_tests import coupled_range, loaded_coordinate, peak_step
 from spinepipe.effects import Wrench

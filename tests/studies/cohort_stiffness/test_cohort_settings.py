@@ -25,7 +25,7 @@ from chain_cases import (
 )
 from cohort_edge_cases import TESTS, TRUTH, A, joined_jobs
 
-from spinepipe.calibrate import pool as pooled
+from spinepipe.calibration import pool as pooled
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness import findings, mae, pool, ranking

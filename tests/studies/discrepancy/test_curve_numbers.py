@@ -8,7 +8,7 @@ import pytest
 from search_cases import exponential, grounds_of, one_sided, readings
 from spring_chain_cases import Yield
 
-from spinepipe.calibrate.profile import NORMAL_95
+from spinepipe.calibration.profile import NORMAL_95
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.curve_numbers import (
     LoadRange,

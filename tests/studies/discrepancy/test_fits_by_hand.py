@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.calibrate.descent import OFF_THE_PATH
+from spinepipe.calibration.descent import OFF_THE_PATH
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import baseline as grounded
 from spinepipe.studies.discrepancy.search import joint_fit as fits

@@ -12,7 +12,7 @@ import pytest
 import spring_chain_cases as chains
 from spring_chain_cases import SD, Array
 
-from spinepipe.calibrate.profile import NEAR, RegionEnds
+from spinepipe.calibration.profile import NEAR, RegionEnds
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.search.baseline import base_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import (

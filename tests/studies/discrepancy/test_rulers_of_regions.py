@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import chi2 as chi2_of
 from sweeps import sweep
 
-from spinepipe.calibrate.descent import Point
-from spinepipe.calibrate.profile import Best, profile_in_turn
+from spinepipe.calibration.descent import Point
+from spinepipe.calibration.profile import Best, profile_in_turn
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search import regions

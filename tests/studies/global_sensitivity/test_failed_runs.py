@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from sweeps import sweep
 
-from spinepipe.sensitivity.global_indices.design import Design, draw
+from spinepipe.sensitivity_analysis.global_indices.design import Design, draw
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.failed_runs import (
     WAYS,

@@ -13,7 +13,7 @@ from scipy import stats
 from sweeps import sweep
 
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.sensitivity.global_indices.estimates import INDICES, IndexStatus
+from spinepipe.sensitivity_analysis.global_indices.estimates import INDICES, IndexStatus
 from spinepipe.studies import read as studies
 from spinepipe.studies.global_sensitivity import factors as varied
 from spinepipe.studies.global_sensitivity.sampling import spreads_of

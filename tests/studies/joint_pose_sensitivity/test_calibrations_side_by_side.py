@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from spinepipe.calibrate import fit_alike
+from spinepipe.calibration import fit_alike
 from spinepipe.designs import specimen_seed
 from spinepipe.model import RefusedModel
 from spinepipe.studies.joint_pose_sensitivity import calibrate, poses

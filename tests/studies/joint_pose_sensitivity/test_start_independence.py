@@ -10,7 +10,7 @@ import numpy as np
 from sweeps import sweep
 
 from spinepipe.anatomy import published
-from spinepipe.calibrate import Fit, Problem, fit
+from spinepipe.calibration import Fit, Problem, fit
 from spinepipe.cohort import read
 from spinepipe.cohort.measured import measured_cycles
 from spinepipe.cohort.specimen import (

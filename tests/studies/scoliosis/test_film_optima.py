@@ -13,7 +13,7 @@ import pytest
 from scoliosis_cases import SHIPPED, STUDY, shipped
 
 from spinepipe import cohort as cohorts
-from spinepipe.calibrate.descent import DescentTolerances
+from spinepipe.calibration.descent import DescentTolerances
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress

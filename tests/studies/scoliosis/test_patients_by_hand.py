@@ -14,7 +14,7 @@ import pytest
 from scoliosis_cases import STUDY, scaled
 from sweeps import sweep
 
-from spinepipe.calibrate.profile import RegionEnds
+from spinepipe.calibration.profile import RegionEnds
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis import personal, personalise
 from spinepipe.studies.scoliosis.curve_angles import SpinalCurve

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.descent import OFF_THE_PATH, DescentTolerances, descend
+from spinepipe.calibration.descent import OFF_THE_PATH, DescentTolerances, descend
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import with_parameters

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from spinepipe.calibrate.solvers import on_record
+from spinepipe.calibration.solvers import on_record
 from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, SpineModel

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spinepipe.calibrate.descent import DescentTolerances, Point, descend, once
-from spinepipe.calibrate.profile import NORMAL_95, Best, RegionEnds, profile_in_turn
+from spinepipe.calibration.descent import DescentTolerances, Point, descend, once
+from spinepipe.calibration.profile import NORMAL_95, Best, RegionEnds, profile_in_turn
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.joint_fit import SETTLED, JointFit, Points, Setting
 from spinepipe.studies.discrepancy.search.model_files import FittedValue, fitted_values, in_tables

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from spinepipe.cohort import Cohort
 from spinepipe.report.panels import explain_marks, log_ticks
 from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, SMALL_PT, VERMILLION, saying
-from spinepipe.sensitivity.global_indices.design import DUMMY
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY
 from spinepipe.studies.global_sensitivity.figures.panels import (
     NAME,
     OUTPUT,

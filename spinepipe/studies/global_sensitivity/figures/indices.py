@@ -13,8 +13,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.panels import MOST_ACROSS, explain_marks
 from spinepipe.report.style import BLACK, GREY, INK, TALLEST_MM, WHITE
 from spinepipe.report.words import count, number
-from spinepipe.sensitivity.global_indices.design import DUMMY
-from spinepipe.sensitivity.global_indices.floor import NEGLIGIBLE
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY
+from spinepipe.sensitivity_analysis.global_indices.floor import NEGLIGIBLE
 from spinepipe.studies.global_sensitivity.figures.panels import (
     COLORS,
     NAME,

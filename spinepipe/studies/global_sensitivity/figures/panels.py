@@ -12,7 +12,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.panels import lettered, sections
 from spinepipe.report.style import BLUE, GREEN, VERMILLION, saying
 from spinepipe.report.words import AXIS, capital, case, count, plain, short, unit
-from spinepipe.sensitivity.global_indices.design import DUMMY
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY
 from spinepipe.studies.global_sensitivity.largest_moment import largest_moment
 from spinepipe.studies.global_sensitivity.tables import EVERY
 from spinepipe.units import COORDINATES, TRANSLATIONS

@@ -16,7 +16,7 @@ from spinepipe.report.glyphs import Array
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
 from spinepipe.report.style import BLUE, GREY, VERMILLION, blank, saying
 from spinepipe.report.words import capital, count, fixed, number
-from spinepipe.sensitivity.global_indices.design import DUMMY
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY
 from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.figures.panels import (
     NAME,

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from SALib.analyze import fast
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import DUMMY, Design, Method
-from spinepipe.sensitivity.global_indices.estimates import (
+from spinepipe.sensitivity_analysis.global_indices.design import DUMMY, Design, Method
+from spinepipe.sensitivity_analysis.global_indices.estimates import (
     INDICES,
     IndexStatus,
     Masked,
@@ -30,14 +30,18 @@ from spinepipe.sensitivity.global_indices.estimates import (
     normal_interval,
     percentile_interval,
 )
-from spinepipe.sensitivity.global_indices.given_data import (
+from spinepipe.sensitivity_analysis.global_indices.given_data import (
     delta_indices,
     pawn,
     rbd_fast_resampled,
     regional,
     tail_of,
 )
-from spinepipe.sensitivity.global_indices.indices import ROUNDING, complete_blocks, without_lost
+from spinepipe.sensitivity_analysis.global_indices.indices import (
+    ROUNDING,
+    complete_blocks,
+    without_lost,
+)
 
 REPLICATES = 100
 """Factors without effect."""

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from spinepipe.calibrate.problem import Evaluation, Evaluator
+from spinepipe.calibration.problem import Evaluation, Evaluator
 from spinepipe.decomposition import eigh
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.units import DISPLAY_PER_SI

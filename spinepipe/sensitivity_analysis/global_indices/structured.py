@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from SALib.analyze import fast
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import Design
-from spinepipe.sensitivity.global_indices.estimates import (
+from spinepipe.sensitivity_analysis.global_indices.design import Design
+from spinepipe.sensitivity_analysis.global_indices.estimates import (
     IndexEstimates,
     Settings,
     percentile_interval,

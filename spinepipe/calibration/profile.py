@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from spinepipe.calibrate.descent import (
+from spinepipe.calibration.descent import (
     LEAST_DAMPING,
     DescentTolerances,
     Point,
@@ -29,9 +29,9 @@ from spinepipe.calibrate.descent import (
     descend_along,
     once,
 )
-from spinepipe.calibrate.lockstep import in_lockstep
-from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, among, lead
-from spinepipe.calibrate.uncertainty import UNSEEN_SHARE, uncertainty
+from spinepipe.calibration.lockstep import in_lockstep
+from spinepipe.calibration.problem import Evaluation, Evaluator, Problem, among, lead
+from spinepipe.calibration.uncertainty import UNSEEN_SHARE, uncertainty
 from spinepipe.decomposition import lstsq
 from spinepipe.effects.contract import Array, Indices
 

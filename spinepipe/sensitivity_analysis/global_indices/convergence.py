@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from spinepipe.sensitivity.global_indices.design import Design, Method
-from spinepipe.sensitivity.global_indices.estimates import SensitivityIndex, Settings
-from spinepipe.sensitivity.global_indices.indices import FEWEST, indices, names_of
+from spinepipe.sensitivity_analysis.global_indices.design import Design, Method
+from spinepipe.sensitivity_analysis.global_indices.estimates import SensitivityIndex, Settings
+from spinepipe.sensitivity_analysis.global_indices.indices import FEWEST, indices, names_of
 
 
 @dataclass(frozen=True)

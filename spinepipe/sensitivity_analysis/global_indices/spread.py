@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import Design, Method
+from spinepipe.sensitivity_analysis.global_indices.design import Design, Method
 
 SMALLEST_SHARE = 2.0**-31
 """Shares are kept this far from 0 and 1, where a normal is infinite: half a step of scipy's Sobol

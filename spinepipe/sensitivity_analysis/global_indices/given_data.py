@@ -21,8 +21,8 @@ from SALib.analyze import delta, rbd_fast
 from scipy.fft import rfft
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import Design
-from spinepipe.sensitivity.global_indices.estimates import (
+from spinepipe.sensitivity_analysis.global_indices.design import Design
+from spinepipe.sensitivity_analysis.global_indices.estimates import (
     INDICES,
     IndexEstimates,
     Settings,

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import norm
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import Method
+from spinepipe.sensitivity_analysis.global_indices.design import Method
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spinepipe.effects.contract import Array
-from spinepipe.sensitivity.global_indices.design import Design, Method
-from spinepipe.sensitivity.global_indices.estimates import (
+from spinepipe.sensitivity_analysis.global_indices.design import Design, Method
+from spinepipe.sensitivity_analysis.global_indices.estimates import (
     INDICES,
     NOTHING,
     IndexEstimates,
@@ -22,8 +22,8 @@ from spinepipe.sensitivity.global_indices.estimates import (
     Settings,
     masked,
 )
-from spinepipe.sensitivity.global_indices.given_data import given_data_indices
-from spinepipe.sensitivity.global_indices.structured import (
+from spinepipe.sensitivity_analysis.global_indices.given_data import given_data_indices
+from spinepipe.sensitivity_analysis.global_indices.structured import (
     fast_indices,
     morris_indices,
     sobol_indices,

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from spinepipe.calibrate.descent import OFF_THE_PATH, DescentTolerances, descend, descend_along
-from spinepipe.calibrate.lockstep import in_lockstep
-from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem, among, lead
-from spinepipe.calibrate.profile import Profile, RegionEnds, profiles
-from spinepipe.calibrate.solvers import by_record
-from spinepipe.calibrate.uncertainty import Uncertainty, refuse_correlated, uncertainty
+from spinepipe.calibration.descent import OFF_THE_PATH, DescentTolerances, descend, descend_along
+from spinepipe.calibration.lockstep import in_lockstep
+from spinepipe.calibration.problem import Evaluation, Evaluator, Problem, among, lead
+from spinepipe.calibration.profile import Profile, RegionEnds, profiles
+from spinepipe.calibration.solvers import by_record
+from spinepipe.calibration.uncertainty import Uncertainty, refuse_correlated, uncertainty
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase
 from spinepipe.statics import with_parameters

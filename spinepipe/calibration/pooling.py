@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.calibrate.descent import OFF_THE_PATH
-from spinepipe.calibrate.fit import (
+from spinepipe.calibration.descent import OFF_THE_PATH
+from spinepipe.calibration.fit import (
     AT_THE_BRINK,
     bounds_reached,
     names_at_bound,
@@ -20,15 +20,15 @@ from spinepipe.calibrate.fit import (
     tipped,
     values,
 )
-from spinepipe.calibrate.hierarchy import (
+from spinepipe.calibration.hierarchy import (
     Hierarchy,
     condense_readings,
     estimate_spreads,
     interpolate_spreads,
     largest_change,
 )
-from spinepipe.calibrate.problem import Evaluation, Evaluator, Problem
-from spinepipe.calibrate.uncertainty import declared_deviation, refuse_correlated
+from spinepipe.calibration.problem import Evaluation, Evaluator, Problem
+from spinepipe.calibration.uncertainty import declared_deviation, refuse_correlated
 from spinepipe.decomposition import bounded_lstsq
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import MeasuredCase, RefusedModel

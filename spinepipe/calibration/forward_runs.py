@@ -41,9 +41,9 @@ from scipy.differentiate import jacobian
 from scipy.integrate import ode
 from scipy.optimize import Bounds, OptimizeResult, approx_fprime, minimize
 
-from spinepipe.calibrate.fit import values
-from spinepipe.calibrate.problem import Evaluator, Problem
-from spinepipe.calibrate.solvers import steps_alone
+from spinepipe.calibration.fit import values
+from spinepipe.calibration.problem import Evaluator, Problem
+from spinepipe.calibration.solvers import steps_alone
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
 from spinepipe.statics import Course, no_settling, observe, with_parameters

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.calibrate.solvers import AtRest, CaseResiduals, Settling, compare_with_record
+from spinepipe.calibration.solvers import AtRest, CaseResiduals, Settling, compare_with_record
 from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array
 from spinepipe.model import MeasuredCase, RefusedModel, SpineModel

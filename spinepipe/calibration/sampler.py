@@ -22,8 +22,8 @@ from mici.systems import EuclideanMetricSystem
 from scipy.interpolate import PchipInterpolator
 from scipy.special import ndtr
 
-from spinepipe.calibrate.lockstep import in_lockstep
-from spinepipe.calibrate.posterior import Mode, Point, Target
+from spinepipe.calibration.lockstep import in_lockstep
+from spinepipe.calibration.posterior import Mode, Point, Target
 from spinepipe.effects.contract import Array
 
 LARGEST_R_HAT = 1.01

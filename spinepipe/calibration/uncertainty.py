@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from spinepipe.calibrate.problem import OF_PRIOR, Evaluation, Evaluator, Problem, shared_sums
+from spinepipe.calibration.problem import OF_PRIOR, Evaluation, Evaluator, Problem, shared_sums
 from spinepipe.decomposition import svd
 from spinepipe.effects.contract import Array
 from spinepipe.units import DISPLAY_PER_SI
