@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.calibration.loss import counted
 from spinepipe.calibration.solvers import AtRest, CaseResiduals, Settling, compare_with_record
 from spinepipe.effects import EffectKind
 from spinepipe.effects.contract import Array
@@ -187,12 +188,11 @@ class Evaluator:
         if isinstance(seen, str):
             return Evaluation(None, None, (), self.coordinate, self.sharing, seen)
         residual = self._residuals(x, seen.readings)
-        jacobian = np.concatenate(
-            [
-                *(self._jacobian(number, one) for number, one in enumerate(seen.by_x)),
-                self.problem.by_priors,
-            ]
-        )
+        of_readings = [
+            counted(self._errors(number, one))[1][:, None] * self._jacobian(number, by_x)
+            for number, (one, by_x) in enumerate(zip(seen.readings, seen.by_x, strict=True))
+        ]
+        jacobian = np.concatenate([*of_readings, self.problem.by_priors])
         return Evaluation(residual, jacobian, seen.poses, self.coordinate, self.sharing)
 
     def on_record(self, x: Array) -> Evaluation | None:
@@ -226,13 +226,17 @@ class Evaluator:
         return np.concatenate([*of_readings, self.problem.by_priors @ x])
 
     def _residual(self, number: int, seen: Array) -> Array:
-        """(N,) weighted residuals of the readings (T, J, 6) of one case that enter the cost."""
+        """(N,) what counts of the readings (T, J, 6) of one case, see `counted`."""
+        return counted(self._errors(number, seen))[0]
+
+    def _errors(self, number: int, seen: Array) -> Array:
+        """(N,) weighted errors of the readings (T, J, 6) of one case that enter the cost."""
         measured = self.problem.cases[number]
         errors = subtract_baseline(seen, measured.zeroed) - measured.measured
         return self._entering(number, errors * self._scale)
 
     def _jacobian(self, number: int, by_x: Array) -> Array:
-        """(N, m) derivative of the residuals of one case, from that of its readings."""
+        """(N, m) derivative of the errors of one case, from that of its readings."""
         seen = subtract_baseline(by_x, self.problem.cases[number].zeroed)
         return self._entering(number, seen * self._scale[:, None])
 

@@ -21,6 +21,7 @@ from scipy.stats import norm, qmc
 
 from spinepipe.calibration.descent import DescentTolerances, Point
 from spinepipe.calibration.lockstep import in_lockstep
+from spinepipe.calibration.loss import counted
 from spinepipe.effects.bounded_tangent import BoundedTangent, argument
 from spinepipe.effects.contract import Array
 from spinepipe.model import SpineModel
@@ -288,7 +289,8 @@ class FilmFit:
             by = posed.film_by[:, :-1] @ change / self.sd[:, None, None]
             errors.append(off.ravel())
             slopes.append(by.reshape(len(errors[-1]), -1))
-        return np.concatenate(errors), np.vstack(slopes)
+        residuals, by_errors = counted(np.concatenate(errors))
+        return residuals, by_errors[:, None] * np.vstack(slopes)
 
     def _model(self, numbers: Array) -> SpineModel:
         laws = laws_of(numbers, self.size)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t
 
+from spinepipe.calibration import loss
 from spinepipe.calibration.descent import DescentTolerances, Point, descend, once
 from spinepipe.calibration.profile import LEVEL, Best, Profile, profile_in_turn
 from spinepipe.cohort import Cohort
@@ -245,7 +246,8 @@ def _errors(who: Volunteer, names: Sequence[str], counted: Sequence[PairedPressu
     _, high, step = _ranges(names)
 
     def errors(x: Array) -> Array | None:
-        return who.errors(_named(names, x), counted)
+        found = who.errors(_named(names, x), counted)
+        return None if found is None else loss.counted(found)[0]
 
     def point(x: Array) -> tuple[Array, Array] | None:
         here = errors(x)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.calibration.descent import OFF_THE_PATH, DescentTolerances, descend
+from spinepipe.calibration.loss import counted
 from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel, SpineModel
 from spinepipe.statics import with_parameters
@@ -112,8 +113,9 @@ class Points:
         residuals, jacobians = {}, {}
         for name, predicted in predictions.items():
             white = self.setting.whitenings[name]
-            residuals[name] = white(self.setting.readings[name].errors(predicted.readings))
-            jacobians[name] = white(predicted.by_x)
+            errors = white(self.setting.readings[name].errors(predicted.readings))
+            residuals[name], slopes = counted(errors)
+            jacobians[name] = slopes[:, None] * white(predicted.by_x)
         self.known = {key: (residuals, jacobians, predictions)}
         return self.known[key]
 
