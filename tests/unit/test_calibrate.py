@@ -400,6 +400,30 @@ def test_the_jacobian_is_the_slope_of_the_residuals() -> None:
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
+def test_a_loss_is_changed_in_one_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One reading of the stack's extension is wrong by 40 deg: a Cauchy loss gives it no say."""
+
+    def cauchy(residuals: Array) -> tuple[Array, Array]:
+        size = np.maximum(np.abs(residuals), 1e-12)
+        counts = np.sqrt(np.log1p(size**2))
+        return np.sign(residuals) * counts, size / ((1.0 + size**2) * counts)
+
+    model = spine(3)
+    free, truth = rotations(model), np.full(3, 0.2)
+    problem = problem_of(model, free, truth)
+    wrong = problem.cases[0].measured.copy()
+    wrong[-1, 1, 3] += np.deg2rad(40.0)
+    problem = replace(problem, cases=(replace(problem.cases[0], measured=wrong),))
+    assert abs(fit(problem).x[0] - truth[0]) > 0.1
+    monkeypatch.setattr("spinepipe.calibration.problem.counted", cauchy)
+    robust = fit(problem)
+    assert robust.x == pytest.approx(truth, abs=5e-3)
+    evaluator, step = Evaluator(problem), np.array([1e-4, 0.0, 0.0])
+    ends = [evaluator.at(0.3 + side * step).residual for side in (-1.0, 1.0)]
+    slope = evaluator.at(np.full(3, 0.3)).jacobian[:, 0]
+    assert slope == pytest.approx((ends[1] - ends[0]) / 2e-4, rel=1e-4, abs=1e-6)
+
+
 def test_uncertainty_of_a_known_jacobian_in_closed_form() -> None:
     """Two readings, one unknown: weighted least squares by hand."""
     model = spine(1)
