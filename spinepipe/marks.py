@@ -103,7 +103,12 @@ def marked(content: str | bytes, suffix: str, digest: str) -> bytes:
         return raw
     assert len(digest) == _LENGTH
     if suffix == _PNG:
-        return _sealed_png(_with_chunk(_with_chunk(raw, CONTENT, BLANK), KEY, digest))
+        whole = sealed(_with_chunk(_with_chunk(raw, CONTENT, BLANK), KEY, digest), _PNG)
+        found = _marks_in(BytesIO(whole), _PNG)
+        assert found is not None
+        # the content digest is part of a chunk, whose checksum (CRC-32) is another one with it
+        checksum = _chunk(CONTENT, found.content)[-_PNG_FIELD_BYTES:]
+        return whole[: found.start + _LENGTH] + checksum + whole[found.end :]
     if suffix == _MOTION:
         lines = f"{CONTENT}={BLANK}\n{KEY}={digest}\n".encode()
         return sealed(raw.replace(_HEAD_END, lines + _HEAD_END, 1), suffix)
@@ -137,15 +142,6 @@ def _chunk(name: str, digest: str) -> bytes:
     chunk = f"tEXt{name}\0{digest}".encode()
     size = struct.pack(">I", len(chunk) - _PNG_FIELD_BYTES)
     return size + chunk + struct.pack(">I", zlib.crc32(chunk))
-
-
-def _sealed_png(raw: bytes) -> bytes:
-    """With the content digest, and with the checksum that its chunk has then."""
-    whole = sealed(raw, _PNG)
-    found = _marks_in(BytesIO(whole), _PNG)
-    assert found is not None
-    checksum = _chunk(CONTENT, found.content)[-_PNG_FIELD_BYTES:]
-    return whole[: found.start + _LENGTH] + checksum + whole[found.end :]
 
 
 def write_marked(content: str | bytes, path: str | Path, digest: str) -> None:

@@ -108,18 +108,12 @@ def _joint_problems(
     if wrong_unit:
         yield from wrong_unit
         return
-    yield from _frame_problems(place, joint, lower, upper, behind)
-
-
-def _frame_problems(
-    place: Place,
-    joint: str,
-    lower: Mapping[str, Array],
-    upper: Mapping[str, Array],
-    behind: Suspect | None,
-) -> Iterator[InputProblem]:
+    # the frame itself: whether there is one, and whether its axes point where ground's do
+    in_metres = (
+        {name: point / MM_PER_M for name, point in side.items()} for side in (lower, upper)
+    )
     try:
-        pose = joint_pose(_metres(lower), _metres(upper))
+        pose = joint_pose(*in_metres)
     except ValueError as error:
         yield _no_pose(place, joint, str(error))
         return
@@ -130,10 +124,6 @@ def _frame_problems(
         if behind is not None:
             place, remedy = (*place[:2], behind.column), behind.words
         yield InputProblem(*place, found, allowed, remedy)
-
-
-def _metres(points: Mapping[str, Array]) -> dict[str, Array]:
-    return {name: point / MM_PER_M for name, point in points.items()}
 
 
 def _no_pose(place: Place, joint: str, reason: str, behind: Suspect | None = None) -> InputProblem:

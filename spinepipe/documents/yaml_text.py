@@ -105,7 +105,8 @@ def _document(text: str, file: str) -> tuple[YamlDocument | None, list[InputProb
     try:
         node = loader.get_single_node()
         if not isinstance(node, yaml.MappingNode):
-            return None, [_no_keys(file)]
+            allowed, remedy = "lines of the form `key: value`", "see the format's documentation"
+            return None, [InputProblem(file, None, None, "no keys", allowed, remedy)]
         problems = list(_no_names(node, file))
         if problems:
             return None, problems
@@ -211,11 +212,6 @@ def _key_fault(node: yaml.Node) -> tuple[str, str, str] | None:
         found = f"a key of {len(node.value)} characters"
         return found, f"at most {LONGEST_CELL}", "shorten it"
     return None
-
-
-def _no_keys(file: str) -> InputProblem:
-    allowed = "lines of the form `key: value`"
-    return InputProblem(file, None, None, "no keys", allowed, "see the format's documentation")
 
 
 def _no_yaml(file: str, error: Exception) -> InputProblem:

@@ -12,8 +12,7 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.collect import joined_digest
-from spinepipe.jobs.digest import digest_of, figure_digest, report_digest
-from spinepipe.jobs.model_mark import base_marks
+from spinepipe.jobs.digest import base_marks, digest_of, figure_digest, report_digest
 from spinepipe.studies.base_model import made_by
 from spinepipe.studies.kind import Job
 from spinepipe.studies.read import check

@@ -26,7 +26,7 @@ LEAST_SHARE = 0.1
 or rotation is, at usual stiffness."""
 
 
-def freed(calibration: Any, cohort: Cohort, tests: Sequence[str] | None) -> Any:
+def free_coordinates(calibration: Any, cohort: Cohort, tests: Sequence[str] | None) -> Any:
     """The settings of a calibration with coordinates in place of `auto`.
 
     A free coordinate whose weight the study does not give counts as the settings say, or, where
@@ -83,9 +83,9 @@ def _moves(loads: Array) -> Array:
     return share
 
 
-def calibration_settled(study: Any, cohort: Cohort) -> Any:
+def settle_calibration(study: Any, cohort: Cohort) -> Any:
     """A study with ``calibration`` and ``tests`` whose `auto` is put into coordinates."""
-    calibration = freed(study.calibration, cohort, study.tests)
+    calibration = free_coordinates(study.calibration, cohort, study.tests)
     same = calibration is study.calibration
     return study if same else study.model_copy(update={"calibration": calibration})
 

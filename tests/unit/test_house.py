@@ -24,33 +24,12 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "spinepipe"
 
 ROOMS = (
-    *(
-        "status",
-        "units",
-        "problems",
-        "schema",
-        "documents",
-        "facts",
-        "files",
-        "progress",
-        "frames",
-        "decomposition",
-        "experiment",
-        "marks",
-        "anatomy",
-    ),
+    *("status", "units", "problems", "schema", "documents", "facts", "files"),
+    *("progress", "frames", "decomposition", "experiment", "marks", "anatomy"),
     *("effects", "model", "world", "statics", "calibrate", "muscles", "motion"),
-    *(
-        "designs",
-        "statistics",
-        "sensitivity",
-        "cohort",
-        "testing_machine",
-        "plausibility",
-        "tables",
-        "comparison",
-    ),
-    *("studies", "report", "jobs", "kinds", "api", "reference", "cli"),
+    *("designs", "statistics", "sensitivity", "cohort", "testing_machine"),
+    *("plausibility", "tables", "comparison", "studies", "report", "jobs", "kinds"),
+    *("api", "reference", "cli"),
 )
 """Ground floor first; a room imports only itself and rooms before it.
 

@@ -12,7 +12,7 @@ from straight_chains import TESTS, write_cohort
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.memoize import kept_with_cohort
+from spinepipe.cohort.cohort import memoize_per_cohort
 from spinepipe.cohort.specimen import bodies
 from spinepipe.studies.cohort_stiffness.problem import specimen_tests
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
@@ -27,7 +27,7 @@ def folder(tmp_path: Path) -> Path:
 def test_an_answer_is_worked_out_once_for_each_cohort_and_question(folder: Path) -> None:
     asked: list[tuple[int, str]] = []
 
-    @kept_with_cohort
+    @memoize_per_cohort
     def answer(cohort: Cohort, question: str) -> str:
         asked.append((id(cohort), question))
         return question.upper()

@@ -7,7 +7,7 @@ from math import pi
 
 from sweeps import sweep
 
-from spinepipe.plausibility.motion_size import implausible, unit_of
+from spinepipe.plausibility.score import implausible, unit_of
 
 
 @sweep("slope", [0.2, 0.6, 1.0, 5.0, -3.0, None])

@@ -18,7 +18,7 @@ from mistaken_cohorts import good, told
 from spinepipe.cohort import read
 from spinepipe.plausibility import score
 from spinepipe.plausibility.score import hypotheses, suspect, table, usual
-from spinepipe.plausibility.warnings.readings import feeble
+from spinepipe.plausibility.warnings.readings import too_small
 from spinepipe.plausibility.warnings.warning import PACKAGE
 
 ROOT = Path(__file__).resolve().parents[2] / "spinepipe"
@@ -161,6 +161,6 @@ def test_moments_too_small_for_any_joint_to_be_judged(tmp_path: Path) -> None:
     loads["fy_n"] *= 0.0
     loads["mz_nm"] *= 5e-3
     loads.to_csv(folder / "loads.csv", index=False)
-    (one,) = feeble(read(folder))
+    (one,) = too_small(read(folder))
     assert (one.problem.row, one.problem.column) == (4, "mz_nm")
     assert one.problem.remedy == "suspected: kN m and not N m"

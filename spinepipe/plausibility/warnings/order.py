@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.load_response import LoadedCycle
 from spinepipe.cohort.load_tests import DRIVEN
-from spinepipe.cohort.loaded_cycles import LoadedCycle
 from spinepipe.effects.contract import Array
 from spinepipe.plausibility.score import AGAINST
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, first_row, warn
@@ -40,7 +40,7 @@ Cycles = Mapping[Where, Sequence[LoadedCycle]]
 
 
 @dataclass(frozen=True)
-class Explained:
+class OrderFindings:
     """Warnings, and the specimens and tests of which units and signs need not be asked."""
 
     warnings: tuple[PlausibilityWarning, ...]
@@ -57,7 +57,7 @@ class _Order:
     names: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
 
-def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
+def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> OrderFindings:
     """What another order would explain, one line for each."""
     of_place: dict[Where, list[LoadedCycle]] = defaultdict(list)
     for cycle in cycles:
@@ -71,18 +71,15 @@ def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
     rest = {place: own for place, own in of_place.items() if place not in seen}
     for key, places in (*_columns(rest), *_in_ground(rest)):
         told[key] += places
-    return Explained(
-        tuple(_warning(cohort, key, places) for key, places in told.items()),
-        frozenset(place for places in told.values() for place in places),
+    warnings = []
+    for key, places in told.items():
+        first = dict(zip(("specimen", "test"), places[0], strict=True))
+        cell = TableCell(key.stem, first_row(cohort, key.stem, **first), key.column)
+        words = {"tests": tests_of(places), **key.names}
+        warnings.append(warn(cohort, key.warning, cell, whose=dict(places), **words))
+    return OrderFindings(
+        tuple(warnings), frozenset(place for places in told.values() for place in places)
     )
-
-
-def _warning(cohort: Cohort, key: _Order, places: Sequence[Where]) -> PlausibilityWarning:
-    specimen, test = places[0]
-    place = TableCell(
-        key.stem, first_row(cohort, key.stem, specimen=specimen, test=test), key.column
-    )
-    return warn(cohort, key.warning, place, whose=dict(places), tests=tests_of(places), **key.names)
 
 
 def tests_of(places: Sequence[Sequence[Any]]) -> str:

@@ -11,7 +11,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.model import ScopedEffect
-from spinepipe.plausibility.motion_size import implausible, unit_of
+from spinepipe.plausibility.score import implausible, unit_of
 from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.predict import predicted
 from spinepipe.studies.cohort_stiffness.problem import SpecimenTests, driven

@@ -8,7 +8,7 @@ from typing import Any
 from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.schema import all_declared
-from spinepipe.studies.free import calibration_settled
+from spinepipe.studies.free import settle_calibration
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.ranking import judging
@@ -462,6 +462,6 @@ KIND = Kind(
     ignored_by_figures=("block",),
     makes_models="start_model",
     exports="export:exported",
-    settled=calibration_settled,
+    settled=settle_calibration,
     told_by_check="identifiability_preview:told",
 )

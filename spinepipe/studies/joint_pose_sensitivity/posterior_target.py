@@ -21,7 +21,7 @@ from spinepipe.calibrate.posterior import (
     noise_of,
 )
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.landmark_frames import Displaced, LandmarkFrames
+from spinepipe.cohort.landmark_frames import FrameDisplacements, LandmarkFrames
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import ScopedEffect
@@ -84,7 +84,7 @@ class StiffnessAndLandmarks:
         moved = z[:, len(self.low) :].reshape(len(z), -1, 3)
         return moved * self.landmarks.sd[self.free, None]
 
-    def placed(self, z: Array) -> Displaced:
+    def placed(self, z: Array) -> FrameDisplacements:
         """The joints' frames at points z (P, m)."""
         points = np.tile(self.landmarks.points, (len(z), 1, 1))
         points[:, self.free] += self.displaced(z)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from spinepipe.cohort import Cohort
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning
-from spinepipe.studies.implausible_subjects import subject_doubts
+from spinepipe.studies.plausibility import subject_doubts
 
 
 def doubts(cohort: Cohort) -> Iterator[PlausibilityWarning]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spinepipe.cohort.load_response import LoadResponse, answers_of_test, joint_loads
+from spinepipe.cohort.load_response import LoadResponse, joint_loads, load_responses
 from spinepipe.effects.contract import Array
 from spinepipe.plausibility.score import CLEAR
 from spinepipe.studies.discrepancy.mistakes.bad_markers import (
@@ -85,5 +85,5 @@ def answers(
     for name, one in readings.items():
         for test in one.tests:
             loads = joint_loads(one.frames, test.case)
-            found += answers_of_test(name, test.case.test, loads, test.mean, zeroed)
+            found += load_responses(name, test.case.test, loads, test.mean, zeroed)
     return [a for a in found if a.rms > clear * sd[COORDINATES.index(a.coordinate)]]

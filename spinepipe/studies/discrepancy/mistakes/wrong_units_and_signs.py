@@ -23,8 +23,7 @@ from spinepipe.cohort.load_response import (
     typical,
 )
 from spinepipe.effects.contract import Array
-from spinepipe.plausibility.motion_size import geometric_mean, is_plausible, unit_like
-from spinepipe.plausibility.score import AGAINST
+from spinepipe.plausibility.score import AGAINST, geometric_mean, is_plausible, unit_like
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES, MM_PER_M, ROTATIONS, TRANSLATIONS
 

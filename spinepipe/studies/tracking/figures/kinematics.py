@@ -14,9 +14,8 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
 from spinepipe.motion.measures import between_neighbours
 from spinepipe.motion.skeleton import JOINTS, PELVIS, body_poses
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, lettered
-from spinepipe.report.style import BLACK, blank, saying
+from spinepipe.report.style import BLACK, LineStyle, blank, saying
 from spinepipe.report.words import capital, listed
 from spinepipe.studies.tracking.error_metrics import bones_of
 from spinepipe.studies.tracking.figures.line_styles import (

@@ -7,8 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from spinepipe.report.line_styles import PURPLE, SKY, LineStyle
-from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILLION, LineStyle
 from spinepipe.report.words import plain
 from spinepipe.status import Status
 from spinepipe.studies.tracking.reload_motions import AXIS

@@ -11,9 +11,8 @@ from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
-from spinepipe.report.style import BLACK, BLUE, GREY, VERMILLION, WHITE, blank, saying
+from spinepipe.report.style import BLACK, BLUE, GREY, VERMILLION, WHITE, LineStyle, blank, saying
 from spinepipe.report.words import AXIS
 from spinepipe.studies.tracking.figures.line_styles import persons_words
 from spinepipe.studies.tracking.profile import REGIONS

@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
-from spinepipe.report.style import BLACK, GREY, SMALL_PT, WHITE, blank, saying
+from spinepipe.report.style import BLACK, GREY, SMALL_PT, WHITE, LineStyle, blank, saying
 from spinepipe.report.words import AXIS, capital, plain, short, tick
 from spinepipe.studies.tracking.figures.line_styles import looks_of, scale
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS
