@@ -14,7 +14,6 @@ import json
 import re
 import struct
 import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -272,18 +271,13 @@ def _from(file: BinaryIO, start: int) -> bytes:
 def _digest(file: BinaryIO, marks: _Marks) -> str:
     """sha256 of all bytes but those of the content digest."""
     found = hashlib.sha256()
-    for piece in _pieces(file, marks.start, marks.end):
-        found.update(piece)
-    return found.hexdigest()
-
-
-def _pieces(file: BinaryIO, start: int, end: int) -> Iterator[bytes]:
-    """The bytes before the start and from the end on, some MB at a time."""
+    # what is before it and what is behind it, some MB at a time
     file.seek(0)
-    left = start
+    left = marks.start
     while left and (piece := file.read(min(left, _PIECE_BYTES))):
         left -= len(piece)
-        yield piece
-    file.seek(end)
+        found.update(piece)
+    file.seek(marks.end)
     while piece := file.read(_PIECE_BYTES):
-        yield piece
+        found.update(piece)
+    return found.hexdigest()

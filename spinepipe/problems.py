@@ -64,16 +64,11 @@ class InputProblem:
             f"allowed: {_cut(self.allowed, LONGEST_ALLOWED)}",
             _cut(self.remedy, LONGEST_ALLOWED),
         ]
-        if self.others:
-            parts.append(self._more())
+        if self.others:  # how many there are, and in which lines
+            rows = f" row{'' if self.others == 1 else 's'} more: {_spans(self.rows)}"
+            parts.append(f"and {self.others}{rows if self.rows else ' more'}")
         text = "; ".join(parts)
         return " ".join(text.split())
-
-    def _more(self) -> str:
-        """How many others there are, and in which lines."""
-        if not self.rows:
-            return f"and {self.others} more"
-        return f"and {self.others} row{'' if self.others == 1 else 's'} more: {_spans(self.rows)}"
 
 
 MOST_SPANS = 5
@@ -157,18 +152,14 @@ def gathered(problems: Iterable[InputProblem]) -> tuple[InputProblem, ...]:
     )
     found = _told_in_one(found, _likeness, MOST_ALIKE, MOST_ALIKE)
     found = _told_in_one(found, lambda p: p.file, MOST_OF_A_FILE, MOST_OF_A_FILE)
-    return tuple(_short_enough(found))
-
-
-def _short_enough(problems: list[InputProblem]) -> list[InputProblem]:
-    """As many as fit into `MOST_CHARACTERS`, the last with the number of the others."""
-    ends = accumulate(len(str(problem)) for problem in problems)
+    # as many as fit into `MOST_CHARACTERS`, the last with the number of the others
+    ends = accumulate(len(str(problem)) for problem in found)
     fit = max(sum(end <= MOST_CHARACTERS for end in ends), 1)
-    if fit >= len(problems):
-        return problems
-    rest = sum(1 + one.others for one in problems[fit:])
-    last = problems[fit - 1]
-    return [*problems[: fit - 1], replace(last, others=last.others + rest, rows=())]
+    if fit < len(found):
+        rest = sum(1 + one.others for one in found[fit:])
+        last = found[fit - 1]
+        found = [*found[: fit - 1], replace(last, others=last.others + rest, rows=())]
+    return tuple(found)
 
 
 def _told_in_one(

@@ -148,25 +148,18 @@ def _times(draft: Draft) -> Iterator[InputProblem]:
     for line, (specimen, test, cycle, step, time) in draft.rows("loads", *columns):
         if not isnan(step):
             tests[specimen, test, None if isnan(cycle) else cycle].append((step, time, line))
-    for rows in tests.values():
-        if not all(isnan(time) for _, time, _ in rows):
-            yield from _times_of_one_test(draft.file("loads"), sorted(rows))
-
-
-def _times_of_one_test(file: str, rows: list[tuple[float, float, int]]) -> Iterator[InputProblem]:
-    for _, time, line in rows:
-        if isnan(time):
+    file, remedy = draft.file("loads"), "correct the time"
+    for rows in map(sorted, tests.values()):
+        timed = [row for row in rows if not isnan(row[1])]
+        for _, _, line in (row for row in rows if timed and isnan(row[1])):
             allowed = "a time in every row of a test, or in none"
             yield InputProblem(file, line, "time_s", "no time", allowed, "fill the cell")
-    timed = [row for row in rows if not isnan(row[1])]
-    for (step, time, _), (later_step, later, line) in pairwise(timed):
-        found = f"{later:g} s at step {later_step:g} after {time:g} s at step {step:g}"
-        if step == later_step and later != time:
-            yield InputProblem(file, line, "time_s", found, "one time per step", "correct the time")
-        if step < later_step and later <= time:
-            yield InputProblem(
-                file, line, "time_s", found, "times that increase", "correct the time"
-            )
+        for (step, time, _), (later_step, later, line) in pairwise(timed):
+            found = f"{later:g} s at step {later_step:g} after {time:g} s at step {step:g}"
+            if step == later_step and later != time:
+                yield InputProblem(file, line, "time_s", found, "one time per step", remedy)
+            if step < later_step and later <= time:
+                yield InputProblem(file, line, "time_s", found, "times that increase", remedy)
 
 
 def _followers(draft: Draft) -> Iterator[InputProblem]:

@@ -156,15 +156,12 @@ def _fault(event: yaml.Event) -> tuple[str, str, str] | None:
     tag = getattr(event, "tag", None)
     if tag is not None:
         return f"the tag '{tag}'", "values without tags", "delete it, or put text in quotes"
-    if isinstance(event, yaml.ScalarEvent):
-        return _length_fault(event.value)
-    return None
-
-
-def _length_fault(text: str) -> tuple[str, str, str] | None:
-    if len(text) > LONGEST_VALUE:
-        return f"a text of {len(text)} characters", f"at most {LONGEST_VALUE}", "shorten it"
-    longest = longest_word(text)
+    if not isinstance(event, yaml.ScalarEvent):
+        return None
+    if len(event.value) > LONGEST_VALUE:
+        found = f"a text of {len(event.value)} characters"
+        return found, f"at most {LONGEST_VALUE}", "shorten it"
+    longest = longest_word(event.value)
     if longest > LONGEST_CELL:
         found = f"a word or number of {longest} characters"
         return found, f"at most {LONGEST_CELL}", "shorten it, or look for a missing blank"

@@ -81,6 +81,7 @@ class Expected:
         if name in (*self.files.made_of_jobs, *self.files.by_specimen):
             return self.of_table(name)
         kind, place = kind_of(self.study.kind), {}
+        # a job may make many results of one pattern, such as `{specimen}.osim`: which place is it?
         for pattern in (made for job in kind.jobs for made in job.makes if "{" in made):
             form = re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>[^/]+)", re.escape(pattern))
             if found := re.fullmatch(form, name):

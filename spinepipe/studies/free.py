@@ -107,15 +107,12 @@ def unmeasured(root: Path, study: Any, cohort: Cohort) -> tuple[InputProblem, ..
         return ()
     file = STUDIES / f"{study.study}.yaml"
     document, _ = read_yaml(root / file, study.study)
-    if document is None or not _names_free(document.data, key):
+    named: Any = None if document is None else document.data
+    for part in key.split("."):
+        named = named.get(part) if isinstance(named, dict) else None
+    if document is None or named is None:
         return ()  # left to the default, or put there in place of `auto`
     place = (file.as_posix(), document.line_of(key), key)
     found = f"{', '.join(nobody)}, which nobody measured in cohort '{cohort.name}'"
     remedy = "take it out: its stiffness would keep its start or run to a bound"
     return (InputProblem(*place, found, one_of(known), remedy),)
-
-
-def _names_free(data: Any, key: str) -> bool:
-    for part in key.split("."):
-        data = data.get(part) if isinstance(data, dict) else None
-    return data is not None

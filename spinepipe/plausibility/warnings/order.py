@@ -143,6 +143,7 @@ def _unloaded_joints(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> _Order | 
     moved: dict[bool, list[float]] = {True: [], False: []}
     names = []
     for cycle in cycles:
+        # root mean square over the steps of the turn of each joint, about all three axes
         turned = np.nan_to_num(cycle.readings[:, :, 3:])
         sizes = np.sqrt(np.mean(np.sum(turned**2, axis=2), axis=0))
         loaded = (cycle.loads != 0.0).any(axis=(0, 2))
@@ -176,6 +177,7 @@ def _columns(of_place: Cycles) -> Iterator[tuple[_Order, list[Where]]]:
 
 def _answering(cycle: LoadedCycle) -> tuple[int, int] | None:
     """The rotation that the test drives, and the one that answers; None where nobody can tell."""
+    # moments about two axes at once tell nothing: the second must be a third of the first at most
     sizes = np.abs(cycle.loads[:, :, 3:]).max(axis=(0, 1))
     order = np.argsort(sizes)
     if sizes[order[2]] <= 0.0 or sizes[order[1]] > sizes[order[2]] / 3.0:
@@ -222,6 +224,7 @@ def _in_ground(of_place: Cycles) -> Iterator[tuple[_Order, list[Where]]]:
             slopes = np.array([x @ y / (x @ x) if x @ x > 0.0 else 0.0 for x, y in pairs])
             if np.any(slopes <= 0.0):
                 return
+            # Told in ground, joint n reads the sum of the n joints up to it: slopes grow as n does.
             numbers = np.array([joint + 1.0 for joint, _ in driven])
             alike = float(np.corrcoef(slopes, numbers)[0, 1])
             wide = float(slopes[-1] / slopes[0]) * numbers[0] / numbers[-1]
