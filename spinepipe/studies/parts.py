@@ -89,12 +89,12 @@ class _InOrder(BaseModel):
 
 
 @with_stiffness(dict(zip(STIFFNESS_COLUMNS, (24600, 110000, 13500, 37, 64, 268), strict=True)))
-class Stiffness(_InOrder):
+class DiagonalStiffness(_InOrder):
     """Diagonal stiffness of a joint."""
 
 
 @with_stiffness(published("gould_2024b")["uniform_stiffness"])
-class PublishedStiffness(Stiffness):
+class PublishedStiffness(DiagonalStiffness):
     """Diagonal stiffness of a joint; what is not named is that of Gould 2024b, Table 2, uniform."""
 
 
@@ -104,7 +104,7 @@ class LevelStiffness(_InOrder):
 
 
 def stiffness_of_joints(
-    cohort: Cohort, every: Stiffness, levels: Mapping[str, LevelStiffness]
+    cohort: Cohort, every: DiagonalStiffness, levels: Mapping[str, LevelStiffness]
 ) -> Array:
     """(J, 6) SI: one stiffness of all joints, with the rotations of levels that have their own."""
     values = np.tile(np.array(every.in_order(), dtype=float), (len(cohort.joint_names), 1))

@@ -10,10 +10,10 @@ from spinepipe.studies.parts import (
     AUTO,
     FORM,
     Damping,
+    DiagonalStiffness,
     EachOnce,
     Free,
     Shift,
-    Stiffness,
     Tests,
     Weights,
     with_stiffness,
@@ -92,12 +92,12 @@ class Bootstrap(BaseModel):
 
 
 @with_stiffness(_BOX["low"])
-class LowestStart(Stiffness):
+class LowestStart(DiagonalStiffness):
     """Smallest stiffness that a bootstrap starts from (Gould 2024a, Table 1)."""
 
 
 @with_stiffness(_BOX["high"])
-class HighestStart(Stiffness):
+class HighestStart(DiagonalStiffness):
     """Largest stiffness that a bootstrap starts from (Gould 2024a, Table 1)."""
 
 
@@ -305,8 +305,8 @@ class JointPoseSensitivity(Study):
     load_point_shift_mm: Shift = Field(
         default_factory=Shift, description="added to every load point, ground axes"
     )
-    stiffness: Stiffness = Field(
-        default_factory=Stiffness, description="stiffness the calibration starts from"
+    stiffness: DiagonalStiffness = Field(
+        default_factory=DiagonalStiffness, description="stiffness the calibration starts from"
     )
     damping: Damping = Field(default_factory=Damping, description="viscous damping")
     loading: Literal["equilibrium", "settle"] = Field(
