@@ -14,7 +14,6 @@ import json
 import re
 import struct
 import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -103,7 +102,12 @@ def marked(content: str | bytes, suffix: str, digest: str) -> bytes:
         return raw
     assert len(digest) == _LENGTH
     if suffix == _PNG:
-        return _sealed_png(_with_chunk(_with_chunk(raw, CONTENT, BLANK), KEY, digest))
+        whole = sealed(_with_chunk(_with_chunk(raw, CONTENT, BLANK), KEY, digest), _PNG)
+        found = _marks_in(BytesIO(whole), _PNG)
+        assert found is not None
+        # the content digest is part of a chunk, whose checksum (CRC-32) is another one with it
+        checksum = _chunk(CONTENT, found.content)[-_PNG_FIELD_BYTES:]
+        return whole[: found.start + _LENGTH] + checksum + whole[found.end :]
     if suffix == _MOTION:
         lines = f"{CONTENT}={BLANK}\n{KEY}={digest}\n".encode()
         return sealed(raw.replace(_HEAD_END, lines + _HEAD_END, 1), suffix)
@@ -137,15 +141,6 @@ def _chunk(name: str, digest: str) -> bytes:
     chunk = f"tEXt{name}\0{digest}".encode()
     size = struct.pack(">I", len(chunk) - _PNG_FIELD_BYTES)
     return size + chunk + struct.pack(">I", zlib.crc32(chunk))
-
-
-def _sealed_png(raw: bytes) -> bytes:
-    """With the content digest, and with the checksum that its chunk has then."""
-    whole = sealed(raw, _PNG)
-    found = _marks_in(BytesIO(whole), _PNG)
-    assert found is not None
-    checksum = _chunk(CONTENT, found.content)[-_PNG_FIELD_BYTES:]
-    return whole[: found.start + _LENGTH] + checksum + whole[found.end :]
 
 
 def write_marked(content: str | bytes, path: str | Path, digest: str) -> None:
@@ -276,18 +271,13 @@ def _from(file: BinaryIO, start: int) -> bytes:
 def _digest(file: BinaryIO, marks: _Marks) -> str:
     """sha256 of all bytes but those of the content digest."""
     found = hashlib.sha256()
-    for piece in _pieces(file, marks.start, marks.end):
-        found.update(piece)
-    return found.hexdigest()
-
-
-def _pieces(file: BinaryIO, start: int, end: int) -> Iterator[bytes]:
-    """The bytes before the start and from the end on, some MB at a time."""
+    # what is before it and what is behind it, some MB at a time
     file.seek(0)
-    left = start
+    left = marks.start
     while left and (piece := file.read(min(left, _PIECE_BYTES))):
         left -= len(piece)
-        yield piece
-    file.seek(end)
+        found.update(piece)
+    file.seek(marks.end)
     while piece := file.read(_PIECE_BYTES):
-        yield piece
+        found.update(piece)
+    return found.hexdigest()

@@ -64,16 +64,11 @@ class InputProblem:
             f"allowed: {_cut(self.allowed, LONGEST_ALLOWED)}",
             _cut(self.remedy, LONGEST_ALLOWED),
         ]
-        if self.others:
-            parts.append(self._more())
+        if self.others:  # how many there are, and in which lines
+            rows = f" row{'' if self.others == 1 else 's'} more: {_spans(self.rows)}"
+            parts.append(f"and {self.others}{rows if self.rows else ' more'}")
         text = "; ".join(parts)
         return " ".join(text.split())
-
-    def _more(self) -> str:
-        """How many others there are, and in which lines."""
-        if not self.rows:
-            return f"and {self.others} more"
-        return f"and {self.others} row{'' if self.others == 1 else 's'} more: {_spans(self.rows)}"
 
 
 MOST_SPANS = 5
@@ -152,25 +147,19 @@ def gathered(problems: Iterable[InputProblem]) -> tuple[InputProblem, ...]:
     Messages stay as long as a person reads, however many rows a file has.
     """
     found = list(problems)
-    found = _told_in_one(found, _but_for_the_row, MOST_THE_SAME, 1)
+    found = _told_in_one(
+        found, lambda p: (p.file, p.column, p.found, p.allowed, p.remedy), MOST_THE_SAME, 1
+    )
     found = _told_in_one(found, _likeness, MOST_ALIKE, MOST_ALIKE)
     found = _told_in_one(found, lambda p: p.file, MOST_OF_A_FILE, MOST_OF_A_FILE)
-    return tuple(_short_enough(found))
-
-
-def _short_enough(problems: list[InputProblem]) -> list[InputProblem]:
-    """As many as fit into `MOST_CHARACTERS`, the last with the number of the others."""
-    ends = accumulate(len(str(problem)) for problem in problems)
+    # as many as fit into `MOST_CHARACTERS`, the last with the number of the others
+    ends = accumulate(len(str(problem)) for problem in found)
     fit = max(sum(end <= MOST_CHARACTERS for end in ends), 1)
-    if fit >= len(problems):
-        return problems
-    rest = sum(1 + one.others for one in problems[fit:])
-    last = problems[fit - 1]
-    return [*problems[: fit - 1], replace(last, others=last.others + rest, rows=())]
-
-
-def _but_for_the_row(problem: InputProblem) -> Hashable:
-    return problem.file, problem.column, problem.found, problem.allowed, problem.remedy
+    if fit < len(found):
+        rest = sum(1 + one.others for one in found[fit:])
+        last = found[fit - 1]
+        found = [*found[: fit - 1], replace(last, others=last.others + rest, rows=())]
+    return tuple(found)
 
 
 def _told_in_one(
@@ -188,14 +177,11 @@ def _told_in_one(
         if len(groups[key]) <= most or met[key] < kept:
             told.append(problem)
         elif met[key] == kept:
-            told.append(_with_rest(problem, groups[key][kept:]))
+            rest = groups[key][kept:]
+            rows = [row for one in rest for row in ((one.row,) if one.row else ()) + one.rows]
+            others = problem.others + sum(1 + one.others for one in rest)
+            told.append(replace(problem, others=others, rows=(*problem.rows, *rows)))
     return told
-
-
-def _with_rest(problem: InputProblem, rest: list[InputProblem]) -> InputProblem:
-    rows = [row for one in rest for row in ((one.row,) if one.row else ()) + one.rows]
-    others = sum(1 + one.others for one in rest)
-    return replace(problem, others=problem.others + others, rows=(*problem.rows, *rows))
 
 
 _NAME_OR_NUMBER = re.compile(r"'[^']*'|[0-9][0-9.e+-]*")

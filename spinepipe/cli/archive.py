@@ -14,12 +14,10 @@ from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from spinepipe.cli.find import study_names, unknown
-from spinepipe.documents.strays import is_hidden
-from spinepipe.files import appearing
+from spinepipe.files import appearing, is_hidden
 from spinepipe.jobs.expected import Expected
-from spinepipe.jobs.project import RUNNING
+from spinepipe.jobs.project import RUNNING, AtWork, lock
 from spinepipe.jobs.report import descriptor_of
-from spinepipe.jobs.run_lock import AtWork, lock
 from spinepipe.marks import mark_in
 from spinepipe.muscles.myo_sim import origin_of_myo_sim
 from spinepipe.problems import InputError, InputProblem

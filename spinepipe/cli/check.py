@@ -109,7 +109,12 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
             [InputProblem(str(root), None, None, "no studies, no cohorts", allowed, remedy)]
         )
     if not names:
-        tasks: list[Task] = [("config/config.yaml", lambda: CheckedInput(_selection(root)))]
+
+        def chosen() -> CheckedInput:
+            selection = studies.read_selection(root)
+            return CheckedInput(f"a plain run builds {', '.join(selection.studies)}")
+
+        tasks: list[Task] = [("config/config.yaml", chosen)]
         tasks += [_study_task(root, name, read) for name in known_studies]
         return tasks + [_cohort_task(root, name, read) for name in known_cohorts]
     tasks = []
@@ -164,11 +169,6 @@ def _told_by_kind(study: Study, cohort: Cohort, root: Path) -> tuple[str, tuple[
         import_module(f"{PACKAGE}.{study.kind}.{module}"), function
     )(study, cohort, root)
     return told
-
-
-def _selection(root: Path) -> str:
-    selection = studies.read_selection(root)
-    return f"a plain run builds {', '.join(selection.studies)}"
 
 
 def _described(cohort: Cohort) -> str:

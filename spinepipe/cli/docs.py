@@ -1,10 +1,20 @@
 """`spinepipe docs`: the parts of the documentation that come from the code."""
 
 import argparse
+from collections.abc import Mapping
+from pathlib import Path
 
-from spinepipe.reference.pages import outdated, refreshed
-from spinepipe.reference.pictures import FOLDER, PICTURES, renewed
-from spinepipe.reference.result_tables import PAGE, columns_page
+from spinepipe.files import appearing
+from spinepipe.reference.pages import PAGE, columns_page, outdated_pages, refresh
+
+FOLDER = Path("docs") / "figures"
+
+PICTURES: Mapping[str, str] = {
+    "stiffness.png": "results/l1l4_joint_pose/figures/stiffness.png",
+    "missing_effect.png": "results/stiffening_spines/discrepancy/figures/gap_by_step.png",
+    "factor_indices.png": "results/l1l4_factors/figures/factor_indices.png",
+}
+"""Pictures of README and tutorial in `docs/figures`: the figure of a plain run that each copies."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,13 +33,13 @@ def run(options: argparse.Namespace) -> int:
     """Write the pages that are out of date, or name them; or copy pictures."""
     if options.figures:
         return _pictures(options)
-    pages = outdated(options.root)
+    pages = outdated_pages(options.root)
     for path in pages:
         name = path.relative_to(options.root)
         if options.check:
             print(f"FAIL  {name}: out of date; run `spinepipe docs`")
         else:
-            path.write_text(refreshed(path.read_text(encoding="utf-8"), str(name)), "utf-8")
+            path.write_text(refresh(path.read_text(encoding="utf-8"), str(name)), "utf-8")
             print(f"wrote {name}")
     if not options.check:
         (options.root / PAGE).write_text(columns_page(), "utf-8")
@@ -41,9 +51,25 @@ def run(options: argparse.Namespace) -> int:
 
 def _pictures(options: argparse.Namespace) -> int:
     """Copy what was computed, and name what was not."""
-    found = renewed(options.root)
+    found = copy_pictures(options.root)
     for name, there in found.items():
         source = PICTURES[name]
         told = f"wrote {FOLDER / name} from {source}"
         print(told if there else f"FAIL  {FOLDER / name}: no {source}; run `make all` first")
     return 0 if all(found.values()) else 1
+
+
+def copy_pictures(root: Path) -> dict[str, bool]:
+    """Copy the results that are there; by picture, whether its result was.
+
+    Parameters
+    ----------
+    root : folder of the Snakefile.
+    """
+    found = {}
+    for name, result in PICTURES.items():
+        found[name] = (root / result).is_file()
+        if found[name]:
+            with appearing(root / FOLDER / name) as temporary:
+                temporary.write_bytes((root / result).read_bytes())
+    return found

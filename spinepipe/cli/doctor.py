@@ -54,17 +54,14 @@ def run(options: argparse.Namespace) -> int:
         "cache": check_cache,
         "cores": check_cores,
     }
-    sound = [_examine(name, check, options.root) for name, check in checks.items()]
-    return 0 if all(sound) else 1
-
-
-def _examine(name: str, check: Callable[[Path], str], root: Path) -> bool:
-    try:
-        print(f"ok    {name:10} {check(root)}", flush=True)
-    except (Trouble, OSError) as trouble:
-        print(f"FAIL  {name:10} {trouble}", flush=True)
-        return False
-    return True
+    status = 0
+    for name, check in checks.items():
+        try:
+            print(f"ok    {name:10} {check(options.root)}", flush=True)
+        except (Trouble, OSError) as trouble:
+            print(f"FAIL  {name:10} {trouble}", flush=True)
+            status = 1
+    return status
 
 
 def check_python(root: Path) -> str:

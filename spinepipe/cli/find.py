@@ -5,7 +5,7 @@ from pathlib import Path
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.documents.strays import files_in, folders_in
+from spinepipe.files import files_in, folders_in
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form

@@ -6,9 +6,9 @@ from pathlib import Path
 from spinepipe.report.words import count, listed
 from spinepipe.studies.study import COHORTS
 from spinepipe.testing_machine import folder as folders
-from spinepipe.testing_machine.folder import Imported
+from spinepipe.testing_machine.folder import ImportedCohort
+from spinepipe.testing_machine.load_steps import ResampledTest
 from spinepipe.testing_machine.recording import Recording
-from spinepipe.testing_machine.thinned import ThinnedTest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,12 +47,15 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _of_test(test: ThinnedTest) -> list[str]:
+def _of_test(test: ResampledTest) -> list[str]:
     lines = []
     for one, found in zip(test.recordings, test.cuts, strict=True):
         kept = len(found.kept)
+        rows = count(len(one.lines), "row")
+        if one.spikes:
+            rows += f" without {count(one.spikes, 'row')} in which a reading jumps"
         lines.append(
-            f"{one.file}: {count(len(one.lines), 'row')}{_spikes(one)}; the load "
+            f"{one.file}: {rows}; the load "
             f"runs from {found.low:.3g} to {found.high:.3g} {_unit(one)} and turns back "
             f"{count(found.reversals, 'time')}: {count(len(found.cycles), 'cycle')}, {kept} kept."
         )
@@ -66,15 +69,11 @@ def _of_test(test: ThinnedTest) -> list[str]:
     return lines
 
 
-def _spikes(one: Recording) -> str:
-    return f" without {count(one.spikes, 'row')} in which a reading jumps" if one.spikes else ""
-
-
 def _unit(one: Recording) -> str:
     return "N" if one.driving.endswith("_n") else "N m"
 
 
-def _zero(imported: Imported) -> str:
+def _zero(imported: ImportedCohort) -> str:
     if imported.mapping.zeroed:
         return "Readings count from those of step 0 of their cycle (zeroed_at_step_0: true)."
     return "Readings stay as they are: their zero must be the neutral pose."

@@ -75,25 +75,17 @@ def _run(command: str, rest: Sequence[str], root: Path) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
-        if not _is_for_people(error):
+        from spinepipe.marks import DamagedFile
+        from spinepipe.model.spine import RefusedModel
+        from spinepipe.problems import InputError
+
+        # these say what the user can mend; any other is a fault of ours
+        if not isinstance(error, DamagedFile | InputError | RefusedModel | OSError | ImportError):
             raise
-        return _fail(command, _message(error))
+        if isinstance(error, OSError) and error.filename:
+            return _fail(command, f"{error.filename}: {error.strerror}")
+        return _fail(command, str(error))
     return code
-
-
-def _is_for_people(error: Exception) -> bool:
-    """Whether the error says what the user can mend; any other is a fault of ours."""
-    from spinepipe.marks import DamagedFile
-    from spinepipe.model.spine import RefusedModel
-    from spinepipe.problems import InputError
-
-    return isinstance(error, DamagedFile | InputError | RefusedModel | OSError | ImportError)
-
-
-def _message(error: Exception) -> str:
-    if isinstance(error, OSError) and error.filename:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
 
 
 def _fail(command: str, message: str) -> int:

@@ -40,7 +40,7 @@ def check_geometry(draft: Draft) -> Iterator[InputProblem]:
     if not draft.vertebrae:
         return
     given = {cells for _, cells in draft.rows("joints", "specimen", "joint")}
-    yield from _origin_spacing(draft)
+    yield from _spacing(draft, "joints", "joint", XYZ, draft.joint_names, "the origins")
     unreadable = {"landmarks", "joints"} - draft.absent - set(draft.tables)
     if not unreadable:
         yield from landmark_problems(draft, given)
@@ -108,18 +108,12 @@ def _joint_problems(
     if wrong_unit:
         yield from wrong_unit
         return
-    yield from _frame_problems(place, joint, lower, upper, behind)
-
-
-def _frame_problems(
-    place: Place,
-    joint: str,
-    lower: Mapping[str, Array],
-    upper: Mapping[str, Array],
-    behind: Suspect | None,
-) -> Iterator[InputProblem]:
+    # the frame itself: whether there is one, and whether its axes point where ground's do
+    in_metres = (
+        {name: point / MM_PER_M for name, point in side.items()} for side in (lower, upper)
+    )
     try:
-        pose = joint_pose(_metres(lower), _metres(upper))
+        pose = joint_pose(*in_metres)
     except ValueError as error:
         yield _no_pose(place, joint, str(error))
         return
@@ -130,10 +124,6 @@ def _frame_problems(
         if behind is not None:
             place, remedy = (*place[:2], behind.column), behind.words
         yield InputProblem(*place, found, allowed, remedy)
-
-
-def _metres(points: Mapping[str, Array]) -> dict[str, Array]:
-    return {name: point / MM_PER_M for name, point in points.items()}
 
 
 def _no_pose(place: Place, joint: str, reason: str, behind: Suspect | None = None) -> InputProblem:
@@ -149,20 +139,22 @@ def _no_pose(place: Place, joint: str, reason: str, behind: Suspect | None = Non
     return InputProblem(*place[:2], column, found, allowed, remedy)
 
 
-def _origin_spacing(draft: Draft) -> Iterator[InputProblem]:
-    rows = draft.rows("joints", "specimen", "joint", *XYZ)
-    origins = {(cells[0], cells[1]): (line, np.array(cells[2:])) for line, cells in rows}
-    names = draft.joint_names
+def _spacing(
+    draft: Draft, stem: str, key: str, columns: Sequence[str], names: Sequence[str], what: str
+) -> Iterator[InputProblem]:
+    """Points of neighbours among ``names`` (joints or vertebrae) too near or too far apart."""
+    rows = draft.rows(stem, "specimen", key, *columns)
+    points = {(cells[0], cells[1]): (line, np.array(cells[2:])) for line, cells in rows}
     for specimen in draft.specimens:
-        for below, joint in pairwise(names):
-            if (specimen, below) in origins and (specimen, joint) in origins:
-                line, origin = origins[specimen, joint]
-                apart = origin - origins[specimen, below][1]
-                place = (draft.file("joints"), line, None)
-                what = f"the origins of {below} and {joint}"
-                yield from spacing_problem(place, apart, XYZ, what)
+        for lower, upper in pairwise(names):
+            if (specimen, lower) in points and (specimen, upper) in points:
+                line, point = points[specimen, upper]
+                apart = point - points[specimen, lower][1]
+                place = (draft.file(stem), line, None)
+                yield from spacing_problem(place, apart, columns, f"{what} of {lower} and {upper}")
 
 
+COM = ("com_x_mm", "com_y_mm", "com_z_mm")
 INERTIA = tuple(f"i{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
 
 SYMMETRIC = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
@@ -187,7 +179,8 @@ def check_bodies(draft: Draft) -> Iterator[InputProblem]:
     yield from _inertias(draft)
     yield from _exchanged(draft)
     yield from _missing(draft)
-    yield from _spacing(draft)
+    centres = (COM, draft.vertebrae, "the centres of mass")
+    yield from _spacing(draft, "bodies", "vertebra", *centres)
 
 
 def _exchanged(draft: Draft) -> Iterator[InputProblem]:
@@ -255,20 +248,6 @@ def _missing(draft: Draft) -> Iterator[InputProblem]:
                     found = f"no body of specimen '{specimen}', vertebra '{vertebra}'"
                     allowed = "a body for every moving vertebra when gravity is true"
                     yield InputProblem(file, None, None, found, allowed, "add the row")
-
-
-def _spacing(draft: Draft) -> Iterator[InputProblem]:
-    columns = ("specimen", "vertebra", "com_x_mm", "com_y_mm", "com_z_mm")
-    rows = draft.rows("bodies", *columns)
-    centres = {(cells[0], cells[1]): (line, np.array(cells[2:])) for line, cells in rows}
-    for specimen in draft.specimens:
-        for lower, upper in zip(draft.vertebrae[:-1], draft.vertebrae[1:], strict=True):
-            if (specimen, lower) in centres and (specimen, upper) in centres:
-                line, centre = centres[specimen, upper]
-                apart = centre - centres[specimen, lower][1]
-                what = f"the centres of mass of {lower} and {upper}"
-                place = (draft.file("bodies"), line, None)
-                yield from spacing_problem(place, apart, columns[2:], what)
 
 
 METRES_MM = (3.0, 150.0)

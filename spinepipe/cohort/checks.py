@@ -1,20 +1,24 @@
 """Do the files of a cohort fit each other beyond what their forms declare?
 
 The vertebrae are a chain, steps count 0, 1, 2 without a gap, loads are unambiguous and act on
-something that can move, and every measured motion was caused by a load that is given.
+something that can move, every measured motion was caused by a load that is given, and
+``supports.csv`` says of a rig what can be done.
 """
 
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from itertools import pairwise
 from math import isnan
 
 from spinepipe.cohort.draft import Draft, LoadRow
+from spinepipe.cohort.supports import MEASURED, PRESCRIBED, Rig
 from spinepipe.documents.names import COHORT_NAME
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.model import MOST_JOINTS
-from spinepipe.problems import InputProblem, Spelling
+from spinepipe.problems import InputProblem, Spelling, first_of
+from spinepipe.units import COORDINATE_COLUMNS, TRANSLATIONS
 
 REGIONS = "SLTC"
 """Sacral, lumbar, thoracic, cervical: caudal to cranial."""
@@ -78,7 +82,13 @@ def check_loads(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProbl
     """Problems of ``loads.csv`` beyond its cells and names."""
     yield from _repeated_loads(draft, applied)
     for stem in ("loads", "preload"):
-        yield from _on_the_fixed_vertebra(draft, stem)
+        for line, (vertebra,) in draft.rows(stem, "vertebra"):
+            if draft.vertebrae and vertebra == draft.vertebrae[0]:
+                place = (draft.file(stem), line, "vertebra")
+                found = f"a load on '{vertebra}', which is fixed to ground"
+                allowed = "one of " + ", ".join(draft.vertebrae[1:])
+                remedy = "load a moving vertebra or delete the row"
+                yield InputProblem(*place, found, allowed, remedy)
     yield from _without_a_point(draft, applied)
     yield from _preload(draft)
     yield from _times(draft)
@@ -110,15 +120,6 @@ def _preload(draft: Draft) -> Iterator[InputProblem]:
             yield InputProblem(*place, "a force without a point", "a force with a point", remedy)
 
 
-def _on_the_fixed_vertebra(draft: Draft, stem: str) -> Iterator[InputProblem]:
-    for line, (vertebra,) in draft.rows(stem, "vertebra"):
-        if draft.vertebrae and vertebra == draft.vertebrae[0]:
-            place = (draft.file(stem), line, "vertebra")
-            found = f"a load on '{vertebra}', which is fixed to ground"
-            allowed = "one of " + ", ".join(draft.vertebrae[1:])
-            yield InputProblem(*place, found, allowed, "load a moving vertebra or delete the row")
-
-
 def _without_a_point(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProblem]:
     """A force without a point acts at the centre of mass, which must then be known."""
     rows = draft.rows("loads", *POINT, *FORCE)
@@ -147,25 +148,18 @@ def _times(draft: Draft) -> Iterator[InputProblem]:
     for line, (specimen, test, cycle, step, time) in draft.rows("loads", *columns):
         if not isnan(step):
             tests[specimen, test, None if isnan(cycle) else cycle].append((step, time, line))
-    for rows in tests.values():
-        if not all(isnan(time) for _, time, _ in rows):
-            yield from _times_of_one_test(draft.file("loads"), sorted(rows))
-
-
-def _times_of_one_test(file: str, rows: list[tuple[float, float, int]]) -> Iterator[InputProblem]:
-    for _, time, line in rows:
-        if isnan(time):
+    file, remedy = draft.file("loads"), "correct the time"
+    for rows in map(sorted, tests.values()):
+        timed = [row for row in rows if not isnan(row[1])]
+        for _, _, line in (row for row in rows if timed and isnan(row[1])):
             allowed = "a time in every row of a test, or in none"
             yield InputProblem(file, line, "time_s", "no time", allowed, "fill the cell")
-    timed = [row for row in rows if not isnan(row[1])]
-    for (step, time, _), (later_step, later, line) in pairwise(timed):
-        found = f"{later:g} s at step {later_step:g} after {time:g} s at step {step:g}"
-        if step == later_step and later != time:
-            yield InputProblem(file, line, "time_s", found, "one time per step", "correct the time")
-        if step < later_step and later <= time:
-            yield InputProblem(
-                file, line, "time_s", found, "times that increase", "correct the time"
-            )
+        for (step, time, _), (later_step, later, line) in pairwise(timed):
+            found = f"{later:g} s at step {later_step:g} after {time:g} s at step {step:g}"
+            if step == later_step and later != time:
+                yield InputProblem(file, line, "time_s", found, "one time per step", remedy)
+            if step < later_step and later <= time:
+                yield InputProblem(file, line, "time_s", found, "times that increase", remedy)
 
 
 def _followers(draft: Draft) -> Iterator[InputProblem]:
@@ -195,7 +189,9 @@ def check_motion(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProb
             file, None, None, "motion without loads", "motion with loads.csv", remedy
         )
         return
-    known = _prefixes(applied)
+    # (specimen, test), with cycle, and with cycle and step, of every load
+    keys = ((load.specimen, load.test, load.cycle, load.step) for load in applied)
+    known = {key[:length] for key in keys for length in (2, 3, 4)}
     tests = Spelling(sorted({load.test for load in applied}), "add the load or delete the motion")
     reported = set()
     rows = draft.rows("motion", "specimen", "test", "cycle", "step")
@@ -209,15 +205,6 @@ def check_motion(draft: Draft, applied: Sequence[LoadRow]) -> Iterator[InputProb
         if missing is not None and missing not in reported and not unclear:
             reported.add(missing)
             yield _problem(file, line, missing, tests)
-
-
-def _prefixes(applied: Sequence[LoadRow]) -> set[tuple[object, ...]]:
-    """(specimen, test), with cycle, and with cycle and step, of every load."""
-    known: set[tuple[object, ...]] = set()
-    for load in applied:
-        key = (load.specimen, load.test, load.cycle, load.step)
-        known |= {key[:2], key[:3], key}
-    return known
 
 
 def _problem(file: str, line: int, key: tuple[object, ...], tests: Spelling) -> InputProblem:
@@ -268,3 +255,84 @@ def _gaps(
                 allowed = "steps 0, 1, 2, … without a gap"
                 yield InputProblem(file, line, "step", found, allowed, remedy)
             before = step
+
+
+def check_supports(draft: Draft, document: YamlDocument | None) -> Iterator[InputProblem]:
+    """Problems of ``supports.csv`` beyond its cells and keys; ``document`` is ``cohort.yaml``."""
+    if "supports" not in draft.tables:
+        return
+    for found in (_support_places(draft), _without_values(draft), _without_sd(draft, document)):
+        yield from first_of(found)
+
+
+def _support_places(draft: Draft) -> Iterator[InputProblem]:
+    """Each row is of a joint and a coordinate; a vertebra by itself cannot be held yet."""
+    columns = ("joint", "coordinate", "vertebra", "direction")
+    for line, cells in draft.rows("supports", *columns):
+        there = {n: isinstance(cell, str) for n, cell in zip(columns, cells, strict=True)}
+        place = (draft.file("supports"), line)
+        if there["vertebra"] or there["direction"]:
+            found = "a vertebra held in a direction of ground, which is not yet supported"
+            allowed = "a joint and a coordinate"
+            remedy = "say it of the joints, or leave the row out if the rig does not matter"
+            yield InputProblem(*place, "vertebra", found, allowed, remedy)
+            continue
+        for name in ("joint", "coordinate"):
+            if not there[name]:
+                allowed = "a joint and a coordinate in every row"
+                yield InputProblem(*place, name, "an empty cell", allowed, f"name the {name}")
+
+
+def _without_values(draft: Draft) -> Iterator[InputProblem]:
+    """A prescribed coordinate needs a reading at every step; said once per test and coordinate."""
+    if "motion" not in draft.tables and "motion" not in draft.absent:
+        return
+    if not any(state == PRESCRIBED for _, (state,) in draft.rows("supports", "state")):
+        return
+    fixed = cache(Rig(draft.tables["supports"], draft.joint_names).fixed)
+    motion, reported = _measured(draft), set()
+    for load in draft.applied:
+        if load.step is None:
+            continue
+        for one in fixed(load.specimen, load.test):
+            joint, column = draft.joint_names[one.joint], COORDINATE_COLUMNS[one.coordinate]
+            key = (load.specimen, load.test, load.cycle, load.step, joint, column)
+            if one.state != PRESCRIBED or key in motion or (*key[:3], *key[4:]) in reported:
+                continue
+            reported.add((*key[:3], *key[4:]))
+            found = (
+                f"no {column} of {joint} at step {load.step} of test '{load.test}', specimen "
+                f"'{load.specimen}', cycle {load.cycle}, though it is prescribed"
+            )
+            allowed = "a value at every step of a test in which supports.csv prescribes it"
+            remedy = "add the value to motion.csv, or set the state to held or free"
+            yield InputProblem(draft.file("supports"), None, "state", found, allowed, remedy)
+
+
+def _measured(draft: Draft) -> set[tuple[object, ...]]:
+    """Specimen, test, cycle, step, joint and column of every value in ``motion.csv``."""
+    keys = ("specimen", "test", "cycle", "step", "joint")
+    found: set[tuple[object, ...]] = set()
+    for _, cells in draft.rows("motion", *keys, *COORDINATE_COLUMNS):
+        (specimen, test, cycle, step, joint), values = cells[:5], cells[5:]
+        if isnan(step):
+            continue
+        place = (specimen, test, 1 if isnan(cycle) else int(cycle), int(step), joint)
+        named = zip(COORDINATE_COLUMNS, values, strict=True)
+        found |= {(*place, column) for column, value in named if not isnan(value)}
+    return found
+
+
+def _without_sd(draft: Draft, document: YamlDocument | None) -> Iterator[InputProblem]:
+    """A load that was measured counts by its SD."""
+    sd = document.data.get("measurement_sd") if document else None
+    known = sd if isinstance(sd, dict) else {}
+    reported = set()
+    for line, (coordinate, reaction) in draft.rows("supports", "coordinate", "reaction"):
+        key = "force_n" if coordinate in TRANSLATIONS else "moment_nm"
+        if reaction == MEASURED and key not in known and key not in reported:
+            reported.add(key)
+            place = (draft.file("supports"), line, "reaction")
+            allowed = f"a measured reaction with measurement_sd.{key} in cohort.yaml"
+            remedy = f"add `{key}:` there, the SD of the rig's load, or set the reaction to unknown"
+            yield InputProblem(*place, f"'{MEASURED}', but no SD of it", allowed, remedy)

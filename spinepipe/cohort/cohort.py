@@ -2,12 +2,13 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, wraps
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar, TypeVarTuple
+from weakref import WeakKeyDictionary
 
 import pandas as pd
 from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
@@ -199,8 +200,32 @@ class Cohort:
         return _PartDigests(shared, {**tables, **self.further})
 
 
+Arguments = TypeVarTuple("Arguments")
+Answer = TypeVar("Answer")
+
+
+def memoize_per_cohort(
+    function: Callable[[Cohort, *Arguments], Answer],
+) -> Callable[[Cohort, *Arguments], Answer]:
+    """Keep answers by cohort object and arguments.
+
+    A cache with a number of entries would keep that many cohorts, tables and all, in a worker that
+    serves one study after the other. An answer must not hold the cohort.
+    """
+    kept: WeakKeyDictionary[Cohort, dict[tuple[*Arguments], Answer]] = WeakKeyDictionary()
+
+    @wraps(function)
+    def answer(cohort: Cohort, *arguments: *Arguments) -> Answer:
+        known = kept.setdefault(cohort, {})
+        if arguments not in known:
+            known[arguments] = function(cohort, *arguments)
+        return known[arguments]
+
+    return answer
+
+
 class _PartDigests:
-    """Digest of each specimen's rows in the tables of a cohort, taken when first asked for."""
+    """Digest of each specimen's rows in the tables of a cohort, taken when first arguments for."""
 
     def __init__(self, shared: Any, tables: Mapping[str, pd.DataFrame | None]) -> None:
         """``shared`` : what counts for every specimen, plain values."""

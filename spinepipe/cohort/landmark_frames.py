@@ -29,7 +29,7 @@ _Points = dict[str, _Complex]
 
 
 @dataclass(frozen=True)
-class Displaced:
+class FrameDisplacements:
     """Frames of J joints of P sets of landmarks, seen from the frames they are stated in.
 
     Attributes
@@ -64,13 +64,15 @@ class LandmarkFrames:
         """
         self._vertebrae, self._names, self._stated = tuple(vertebrae), tuple(names), tuple(stated)
 
-    def at(self, points: Array, free: Indices) -> Displaced:
+    def at(self, points: Array, free: Indices) -> FrameDisplacements:
         """Frames from landmarks (P, L, 3) m, ground.
 
         Parameters
         ----------
         free : (F,) landmarks by which derivatives are told.
         """
+        # Set 0 of each batch is unmoved, set 1 + 3 f + k has landmark f stepped along axis k: the
+        # imaginary part of a result, over the step, is its derivative by that coordinate.
         many, count = points.shape[:2]
         steps = np.zeros((3 * len(free), count, 3))
         steps[np.arange(3 * len(free)), np.repeat(free, 3), np.tile(np.arange(3), len(free))] = STEP
@@ -80,6 +82,7 @@ class LandmarkFrames:
         with np.errstate(divide="ignore", invalid="ignore"):  # of landmarks that define no frame
             for stated, (lower, upper) in zip(self._stated, pairwise(self._vertebrae), strict=True):
                 rotation, origin, good = _frame(sides[lower], sides[upper])
+                # seen from the stated frame: R^T (p - p0) and R^T R'
                 offset = (origin - stated.origin) @ stated.rotation
                 seen = stated.rotation.T @ rotation
                 angles, slopes = _angles(seen)
@@ -88,7 +91,7 @@ class LandmarkFrames:
                 defined &= good
         slopes = np.stack(by_points, axis=1).swapaxes(2, 3)
         shape = (many, len(by), 6, len(free), 3)
-        return Displaced(np.stack(by, axis=1), slopes.reshape(shape), defined)
+        return FrameDisplacements(np.stack(by, axis=1), slopes.reshape(shape), defined)
 
     def moving(self, points: Array) -> Indices:
         """Which of the landmarks (L, 3) move any joint."""
@@ -134,10 +137,12 @@ def _cross(one: _Complex, other: _Complex) -> _Complex:
 
 def _midway(one: _Complex, other: _Complex) -> _Complex:
     """The mean of two rotations: one, and then half of the turn from it to the other."""
+    # unit quaternion (w, v) of the turn, from its trace and skew part
     turn = one.swapaxes(-1, -2) @ other
     w = 0.5 * np.sqrt(1.0 + np.trace(turn, axis1=-2, axis2=-1))
     spin = turn - turn.swapaxes(-1, -2)
     v = np.stack([spin[..., 2, 1], spin[..., 0, 2], spin[..., 1, 0]], -1) / (4.0 * w[..., None])
+    # that of half of the angle bisects it and the identity: (1 + w, v), to length one
     half, _ = _unit(np.concatenate([1.0 + w[..., None], v], axis=-1))
     return one @ _turned(half[..., 0, None, None], half[..., 1:])
 
@@ -153,6 +158,7 @@ def _turned(w: _Complex, v: _Complex) -> _Complex:
 
 def _angles(rotation: _Complex) -> tuple[Array, Array]:
     """Z-X'-Y'' angles (P, B, 3) and their slopes, which rotations carry as imaginary parts."""
+    # arctan2 is not analytic: the slopes of the angles follow by the chain rule instead
     value, slope = rotation.real, rotation.imag / STEP
 
     def turn(y: tuple[int, int], x: tuple[int, int]) -> Array:

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.anatomy.stiffness_range import middle
+from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.measured import measured_specimen
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
@@ -84,7 +86,60 @@ def joint_loads(frames: tuple[Pose, ...], case: LoadCase) -> Array:
     return loads
 
 
-def answers_of_test(
+@dataclass(frozen=True, eq=False)
+class LoadedCycle:
+    """One cycle of a test in which no rig fixes a joint.
+
+    Attributes
+    ----------
+    loads : (T, J, 6) N and N m on each joint coordinate in the neutral pose, of the listed loads.
+    readings : (T, J, 6) m and rad, NaN where not read.
+    """
+
+    specimen: str
+    case: LoadCase
+    frames: tuple[Pose, ...]
+    loads: Array
+    readings: Array
+
+    @property
+    def test(self) -> str:
+        """Its name."""
+        return self.case.test
+
+    @property
+    def pushed(self) -> bool:
+        """Whether forces act, whose moments hang on where joints are."""
+        return any(wrench.force.any() for step in self.case.steps for wrench in step.wrenches)
+
+    @property
+    def from_rest(self) -> Array:
+        """(T, J, 6) the readings, 0 at step 0 where it was subtracted and is no reading."""
+        found = self.readings.copy()
+        if len(found) > 1 and not np.isfinite(found[0]).any():
+            found[0] = np.where(np.isfinite(found[1]), 0.0, np.nan)
+        return found
+
+    @property
+    def read_steps(self) -> int:
+        """Steps with any reading."""
+        return int(np.isfinite(self.readings).any(axis=(1, 2)).sum())
+
+
+def loaded_cycles(cohort: Cohort) -> Iterator[LoadedCycle]:
+    """All cycles whose loads and motion are told, of cohorts that tell where joints are."""
+    if cohort.loads is None or cohort.motion is None or not cohort.has_frames:
+        return
+    for specimen in cohort.specimen_names:
+        one = measured_specimen(cohort, specimen, cohort.tests)
+        for cycle in one.tested:
+            if cycle.case.steps and cycle.case.steps[0].supports:
+                continue
+            loads = joint_loads(one.frames, cycle.case)
+            yield LoadedCycle(specimen, cycle.case, one.frames, loads, cycle.readings)
+
+
+def load_responses(
     specimen: str, test: str, loads: Array, motion: Array, zeroed: bool
 ) -> Iterator[LoadResponse]:
     """All driven coordinates that were read under loads that changed.
@@ -107,6 +162,7 @@ def answers_of_test(
 
 def _driven(power: Array) -> NDArray[np.bool_]:
     """(J, 6) which coordinates a test drives, from the sums of squares (J, 6) of their loads."""
+    # forces among forces, moments among moments: large in the joint, and not small in the chain
     found = np.zeros(power.shape, dtype=bool)
     for kind in (slice(0, 3), slice(3, 6)):
         own = power[:, kind]
@@ -114,6 +170,7 @@ def _driven(power: Array) -> NDArray[np.bool_]:
             MAIN_SHARE * own.max(axis=1, keepdims=True), NEAR_OTHERS**2 * own.max(initial=0.0)
         )
         found[:, kind] = (own > least) & (own > 0.0)
+    # what an error of `UNSURE_M` in a joint centre could make of the other kind is no drive
     usual = np.array([middle(name) for name in COORDINATES])
     forces = power[:, :3].sum(axis=1, keepdims=True)
     turns = np.sum(power[:, 3:] / usual[3:] ** 2, axis=1, keepdims=True)

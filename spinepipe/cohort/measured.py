@@ -14,7 +14,7 @@ from spinepipe.cohort.load_tests import (
     pushed_coordinate,
 )
 from spinepipe.cohort.specimen import joint_frames, load_cases
-from spinepipe.cohort.supports import as_read, supported
+from spinepipe.cohort.supports import as_read, with_supports
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, reexpress
 from spinepipe.model import LoadCase, MeasuredCase
@@ -108,7 +108,7 @@ def measured_cycles(
     found = []
     for case in cases:
         motion = _motion(cohort, specimen, case, joints)
-        with_rig = supported(cohort, specimen, case, motion)
+        with_rig = with_supports(cohort, specimen, case, motion)
         read = as_read(with_rig, motion)
         found.append(MeasuredCycle(with_rig, read, cohort.zeroed_at_step_0))
     return tuple(found)

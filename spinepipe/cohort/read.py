@@ -4,31 +4,33 @@ import gc
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from difflib import SequenceMatcher
 from hashlib import sha256
+from itertools import islice
 from pathlib import Path
 
 import pandas as pd
 
 from spinepipe.cohort.check_geometry import check_bodies, check_geometry
-from spinepipe.cohort.check_supports import check_supports
 from spinepipe.cohort.checks import (
     check_header,
     check_loads,
     check_motion,
     check_steps,
+    check_supports,
     usable_vertebrae,
 )
 from spinepipe.cohort.cohort import Cohort, CohortHeader
 from spinepipe.cohort.columns import COHORT_YAML, TABLES
 from spinepipe.cohort.draft import Draft, number_of_applied_loads
-from spinepipe.cohort.misnamed import misnamed
-from spinepipe.cohort.zeroing import check_zeroing, zeroed_alike
+from spinepipe.cohort.zeroing import check_zeroing, common_zeroing
 from spinepipe.documents.csv_table import read_table
 from spinepipe.documents.form import TableForm
 from spinepipe.documents.inside import outside
 from spinepipe.documents.rules import TableCheck
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import YamlDocument, read_yaml
+from spinepipe.files import is_hidden
 from spinepipe.problems import InputError, InputProblem, first_of
 
 __all__ = ["Reader", "read"]
@@ -40,6 +42,21 @@ MOST_KEPT = 32
 
 MOST_APPLIED = 150_000
 """Rows of loads.csv with * and empty cycles written out: specimens x cycles x steps."""
+
+LIKE = 0.8
+"""Least likeness of two names without their endings: joint and joints have 0.91."""
+
+MOST_FILES = 10_000
+"""Files of a folder that are looked at."""
+
+LONGEST = 40
+"""Characters of a name that is looked at."""
+
+ENDINGS = {
+    ".csv": (".csv", ".csv.txt", ".txt", ".tsv"),
+    ".yaml": (".yaml", ".yml", ".yaml.txt", ".yml.txt"),
+}
+"""Endings that programs give the files."""
 
 
 def read(folder: Path, further: Sequence[TableForm] = ()) -> Cohort:
@@ -130,7 +147,14 @@ def _outcome(folder: Path, name: str, forms: Mapping[str, TableForm]) -> _Outcom
         problems,
     )
     problems += _broken_rules(draft, problems)
-    problems += _checks(draft)
+    for found in (
+        check_geometry(draft),
+        check_bodies(draft),
+        check_loads(draft, draft.applied),
+        check_steps(draft, draft.applied),
+        check_motion(draft, draft.applied),
+    ):
+        problems += first_of(found)
     problems += check_supports(draft, document)
     problems += check_zeroing(draft, document)
     if problems or header is None:
@@ -213,17 +237,6 @@ def _broken_rules(draft: Draft, problems: Sequence[InputProblem]) -> Iterator[In
         yield from first_of(check.problems())
 
 
-def _checks(draft: Draft) -> Iterator[InputProblem]:
-    for found in (
-        check_geometry(draft),
-        check_bodies(draft),
-        check_loads(draft, draft.applied),
-        check_steps(draft, draft.applied),
-        check_motion(draft, draft.applied),
-    ):
-        yield from first_of(found)
-
-
 def _missing(file: str) -> InputProblem:
     return InputProblem(file, None, None, "no such file", "a file of this name", "add it")
 
@@ -235,7 +248,7 @@ def _cohort(
     forms: Mapping[str, TableForm],
 ) -> Cohort:
     final = {stem: _final(table) for stem, table in tables.items() if stem in TABLES}
-    motion, zeroed = zeroed_alike(_numbered(final.get("motion")), header.zeroed_at_step_0)
+    motion, zeroed = common_zeroing(_numbered(final.get("motion")), header.zeroed_at_step_0)
     return Cohort(
         name=header.cohort,
         title=header.title,
@@ -279,3 +292,41 @@ def _digest(folder: Path, forms: Mapping[str, TableForm]) -> str:
         if (folder / file).is_file():
             digest.update(file.encode() + b"\0" + sha256((folder / file).read_bytes()).digest())
     return digest.hexdigest()
+
+
+def misnamed(folder: Path, name: str, absent: Sequence[str]) -> Iterator[InputProblem]:
+    """Files that are most likely the absent ones, which would count as tables left out.
+
+    Notes and raw data may lie beside the tables, so only names very like an absent one are told.
+
+    Parameters
+    ----------
+    folder, name : of the cohort, and how messages call it.
+    absent : names of files that are looked for and not there.
+    """
+    for path in sorted(islice(folder.iterdir(), MOST_FILES)):
+        if len(path.name) > LONGEST or is_hidden(path.name) or not path.is_file():
+            continue
+        meant = next((file for file in absent if _is_like(path.name, file)), None)
+        if meant is not None:
+            place = (f"{name}/{path.name}", None, None)
+            remedy = f"did you mean '{meant}'? Rename it; or give it a name that is not so similar"
+            yield InputProblem(*place, "a file that is not read", f"the name {meant}", remedy)
+
+
+def _is_like(name: str, file: str) -> bool:
+    """Whether a file's name is that of a table, but for case, ending or a letter or two."""
+    stem, ending = file.rpartition(".")[::2]
+    written = name.casefold()
+    for known in ENDINGS[f".{ending}"]:
+        if written.endswith(known):
+            found = written.removesuffix(known)
+            exact = known == f".{ending}"
+            return found == stem or (exact and _likeness(found, stem) >= LIKE)
+    return False
+
+
+def _likeness(one: str, other: str) -> float:
+    """1 for equal names and for singular and plural, 0 for names with nothing in common."""
+    plural = f"{one.removesuffix('y')}ies" if one.endswith("y") else f"{one}s"
+    return 1.0 if plural == other else SequenceMatcher(None, one, other).ratio()

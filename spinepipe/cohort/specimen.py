@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.memoize import kept_with_cohort
+from spinepipe.cohort.cohort import Cohort, memoize_per_cohort
 from spinepipe.decomposition import eigh
 from spinepipe.effects import Wrench, create
 from spinepipe.effects.contract import Array
@@ -86,7 +85,7 @@ def _given_frames(cohort: Cohort, specimen: str) -> dict[str, Pose]:
     return dict(zip(rows["joint"], poses, strict=True))
 
 
-@kept_with_cohort
+@memoize_per_cohort
 def bodies(cohort: Cohort, specimen: str) -> tuple[Body, ...]:
     """Moving vertebrae; massless where the cohort lists no body, points without inertia.
 
@@ -126,7 +125,7 @@ def _possible(inertia: Array) -> Array:
     return possible
 
 
-@kept_with_cohort
+@memoize_per_cohort
 def followers(cohort: Cohort, specimen: str) -> dict[str, float]:
     """Tension in N of the follower load of each test that has one."""
     table = cohort.loads

@@ -24,7 +24,7 @@ STATES = (FREE, HELD, PRESCRIBED)
 MEASURED = "measured"
 
 
-class Fixed(NamedTuple):
+class FixedCoordinate(NamedTuple):
     """A coordinate that a rig fixes in a test of a specimen; ``state`` is held or prescribed."""
 
     joint: int
@@ -41,7 +41,7 @@ class Rig:
 
     def __init__(self, supports: pd.DataFrame | None, joints: Sequence[str]) -> None:
         """``supports`` : the table; ``joints`` : names in the order of a model."""
-        self._rows: dict[tuple[str, str], dict[tuple[int, int], tuple[int, Fixed]]] = {}
+        self._rows: dict[tuple[str, str], dict[tuple[int, int], tuple[int, FixedCoordinate]]] = {}
         if supports is None:
             return
         numbers: dict[str, tuple[int, ...]] = {
@@ -58,11 +58,11 @@ class Rig:
             known = self._rows.setdefault((who, what), {})
             for number in numbers[joint]:
                 place = number, COORDINATES.index(coordinate)
-                known[place] = row, Fixed(*place, state, reaction == MEASURED)
+                known[place] = row, FixedCoordinate(*place, state, reaction == MEASURED)
 
-    def fixed(self, specimen: str, test: str) -> tuple[Fixed, ...]:
+    def fixed(self, specimen: str, test: str) -> tuple[FixedCoordinate, ...]:
         """Coordinates fixed in a test, in the order of a model; the last row that fits counts."""
-        found: dict[tuple[int, int], tuple[int, Fixed]] = {}
+        found: dict[tuple[int, int], tuple[int, FixedCoordinate]] = {}
         for who in dict.fromkeys((EVERYONE, specimen)):
             for what in dict.fromkeys((EVERYONE, test)):
                 for place, (row, one) in self._rows.get((who, what), {}).items():
@@ -71,7 +71,7 @@ class Rig:
         return tuple(found[place][1] for place in sorted(found) if found[place][1].state != FREE)
 
 
-def supported(cohort: Cohort, specimen: str, case: LoadCase, motion: Array) -> LoadCase:
+def with_supports(cohort: Cohort, specimen: str, case: LoadCase, motion: Array) -> LoadCase:
     """The case with what its rig fixes; ``motion`` (T, J, 6) m and rad as measured."""
     found = Rig(cohort.supports, cohort.joint_names).fixed(specimen, case.test)
     if not found:

@@ -56,7 +56,7 @@ def _astray(points: Points) -> Suspect | None:
     """The one landmark that lies far from the others of its vertebra, which lie together."""
     found = []
     for vertebra, of_one in points.items():
-        middle = np.median(list(of_one.values()), axis=0)
+        middle = np.median(list(of_one.values()), axis=0)  # one stray point does not move it
         far = {name: point - middle for name, point in of_one.items()}
         away = [name for name, line in far.items() if np.linalg.norm(line) > FAR_MM]
         found += [(vertebra, name, far[name]) for name in away if len(of_one) > 2]

@@ -54,7 +54,7 @@ def _without_start(motion: pd.DataFrame, named: Sequence[str]) -> Iterator[tuple
     yield from (found[number] for number in sorted(found))
 
 
-def zeroed_alike(
+def common_zeroing(
     motion: pd.DataFrame | None, zeroed: bool | Sequence[str]
 ) -> tuple[pd.DataFrame | None, bool]:
     """Motion whose tests are all zeroed or none, and which.

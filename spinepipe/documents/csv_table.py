@@ -194,15 +194,6 @@ _MISTAKEN = {
 """By the end of a column's name: by what a number in another unit must be multiplied, and which."""
 
 
-def _remedy(number: float, column: InputColumn) -> str:
-    """What to do with a number out of range: the unit that brings it back, where there is one."""
-    for end, (factor, words) in _MISTAKEN.items():
-        if column.name.endswith(end) and column.low < factor * number < column.high:
-            return f"suspected: {words}; multiply the column by {factor:.3g}"
-    check = "correct it; check its unit, its sign, and for a slip of the decimal point"
-    return column.otherwise or check
-
-
 def _number_fault(cell: str, number: float, column: InputColumn) -> tuple[str, str]:
     """What is allowed and what to do about a number that is wrong."""
     if not isfinite(number):
@@ -211,7 +202,13 @@ def _number_fault(cell: str, number: float, column: InputColumn) -> tuple[str, s
         return "a finite number with a decimal point", remedy
     if column.type == "integer" and number != int(number):
         return "a whole number", "correct it"
-    return f"{column.meaning}: {column.range_text}", _remedy(number, column)
+    allowed = f"{column.meaning}: {column.range_text}"
+    # out of range: the unit that brings it back, where there is one
+    for end, (factor, words) in _MISTAKEN.items():
+        if column.name.endswith(end) and column.low < factor * number < column.high:
+            return allowed, f"suspected: {words}; multiply the column by {factor:.3g}"
+    check = "correct it; check its unit, its sign, and for a slip of the decimal point"
+    return allowed, column.otherwise or check
 
 
 def read_rows(path: Path, file: str) -> tuple[CsvRows | None, list[InputProblem]]:
@@ -286,17 +283,12 @@ def _long_cells(file: str, records: Records) -> Iterator[InputProblem]:
     for line, cells in records:
         if max(map(len, cells)) > LONGEST_CELL:
             for number, cell in enumerate(cells):
-                if _is_too_long(cell):
+                if len(cell) > LONGEST_REMARK or has_long_word(cell):  # remarks have blanks
                     column = header[number][:LONGEST_CELL] if number < len(header) else None
                     found = f"a cell of {len(cell)} characters, '{cell[:20]}…'"
                     allowed = f"at most {LONGEST_CELL}, or {LONGEST_REMARK} with blanks in it"
                     remedy = "shorten it, or look for a quote mark"
                     yield InputProblem(file, line, column, found, allowed, remedy)
-
-
-def _is_too_long(cell: str) -> bool:
-    """Remarks may be longer than names and numbers; they are told by their blanks."""
-    return len(cell) > LONGEST_REMARK or has_long_word(cell)
 
 
 def _header_problems(file: str, header: list[str]) -> list[InputProblem]:
@@ -332,16 +324,11 @@ def _squared(
                 InputProblem(*place, "the header again", "rows of cells", "delete the line")
             )
         if len(row) != width:
-            problems.append(_ragged(file, line, len(row), width))
+            many = "a decimal comma splits a number into two cells"
+            remedy = f"count the commas ({many if len(row) > width else 'fill the row up'})"
+            found, allowed = f"{len(row)} cells", f"{width} cells, as in the header"
+            problems.append(InputProblem(file, line, None, found, allowed, remedy))
             ragged.add(line)
         cells.append((row + [""] * width)[:width])
     rows = CsvRows(file, header, [line for line, _ in records], cells, frozenset(ragged))
     return rows, list(first_of(problems))
-
-
-def _ragged(file: str, line: int, found: int, width: int) -> InputProblem:
-    cause = "a decimal comma splits a number into two cells" if found > width else "fill the row up"
-    remedy = f"count the commas ({cause})"
-    return InputProblem(
-        file, line, None, f"{found} cells", f"{width} cells, as in the header", remedy
-    )

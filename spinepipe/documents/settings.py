@@ -94,9 +94,11 @@ def _field_at(
             owner = tagged[str(name)] or owner
             continue
         keys.append(name)
-        inner = _inner_model(field)
-        if inner is not None:
-            owner, field = inner, None
+        if field is not None:
+            candidates: list[Any] = [field.annotation, *get_args(field.annotation)]
+            inner = next(filter(None, map(_model, candidates)), None)
+            if inner is not None:
+                owner, field = inner, None
         if isinstance(name, str) and name in owner.model_fields:
             field = owner.model_fields[name]
     return owner, field, tuple(keys)
@@ -128,13 +130,6 @@ def _tagged(field: FieldInfo | None) -> dict[str, type[BaseModel] | None]:
 def _model(candidate: Any) -> type[BaseModel] | None:
     is_model = isinstance(candidate, type) and issubclass(candidate, BaseModel)
     return candidate if is_model else None
-
-
-def _inner_model(field: FieldInfo | None) -> type[BaseModel] | None:
-    if field is None:
-        return None
-    candidates: list[Any] = [field.annotation, *get_args(field.annotation)]
-    return next((model for one in candidates if (model := _model(one)) is not None), None)
 
 
 def _allowed(detail: ErrorDetails) -> str:

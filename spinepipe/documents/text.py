@@ -71,52 +71,33 @@ def read_text(path: Path, file: str, most_bytes: int) -> tuple[str, list[InputPr
         return "", [_not_utf8(file, text[: text.index("\0")].count("\n") + 1)]
     hidden = INVISIBLE.search(text)
     if hidden is not None:
-        return "", [_invisible(file, text[: hidden.start()].count("\n") + 1, hidden[0])]
+        line = text[: hidden.start()].count("\n") + 1
+        found = f"the control character U+{ord(hidden[0]):04X}"
+        allowed = "characters that can be seen, blanks, tabs and line ends"
+        remedy = "delete it; retype the line if it hides"
+        return "", [InputProblem(file, line, None, found, allowed, remedy)]
     return text, []
 
 
 def read_bytes(path: Path, file: str, most_bytes: int) -> tuple[bytes, list[InputProblem]]:
     """What is in a file, empty when there is a problem, and the problems, as `read_text`."""
+    place = (file, None, None)
     try:
         status = path.stat()
         if not S_ISREG(status.st_mode):
-            return b"", [_no_file(file)]
+            remedy = "rename it, or put the file in its place"
+            return b"", [InputProblem(*place, "a folder or device", "a file", remedy)]
         if status.st_size > most_bytes:
-            return b"", [_too_large(file, status.st_size, most_bytes)]
+            found, allowed = f"{status.st_size / 1e6:.1f} MB", f"at most {most_bytes / 1e6:g} MB"
+            remedy = "take out what does not belong, or split it"
+            return b"", [InputProblem(*place, found, allowed, remedy)]
         return path.read_bytes(), []
-    except OSError as error:
-        return b"", [_unreadable(file, error)]
-
-
-def _no_file(file: str) -> InputProblem:
-    found = "a folder or device"
-    return InputProblem(
-        file, None, None, found, "a file", "rename it, or put the file in its place"
-    )
-
-
-def _unreadable(file: str, error: OSError) -> InputProblem:
-    """A file that the system does not let us read."""
-    reason = (error.strerror or type(error).__name__).lower()
-    remedy = "look at what it is and who may read it"
-    return InputProblem(
-        file, None, None, f"what cannot be read ({reason})", "a readable file", remedy
-    )
-
-
-def _too_large(file: str, size: int, most: int) -> InputProblem:
-    found, allowed = f"{size / 1e6:.1f} MB", f"at most {most / 1e6:g} MB"
-    return InputProblem(
-        file, None, None, found, allowed, "take out what does not belong, or split it"
-    )
+    except OSError as error:  # the system does not let us read it
+        found = f"what cannot be read ({(error.strerror or type(error).__name__).lower()})"
+        remedy = "look at what it is and who may read it"
+        return b"", [InputProblem(*place, found, "a readable file", remedy)]
 
 
 def _not_utf8(file: str, line: int) -> InputProblem:
     found = "bytes that are not UTF-8 text"
     return InputProblem(file, line, None, found, "UTF-8", "save the file again with encoding UTF-8")
-
-
-def _invisible(file: str, line: int, character: str) -> InputProblem:
-    found = f"the control character U+{ord(character):04X}"
-    allowed = "characters that can be seen, blanks, tabs and line ends"
-    return InputProblem(file, line, None, found, allowed, "delete it; retype the line if it hides")

@@ -105,7 +105,8 @@ def _document(text: str, file: str) -> tuple[YamlDocument | None, list[InputProb
     try:
         node = loader.get_single_node()
         if not isinstance(node, yaml.MappingNode):
-            return None, [_no_keys(file)]
+            allowed, remedy = "lines of the form `key: value`", "see the format's documentation"
+            return None, [InputProblem(file, None, None, "no keys", allowed, remedy)]
         problems = list(_no_names(node, file))
         if problems:
             return None, problems
@@ -155,15 +156,12 @@ def _fault(event: yaml.Event) -> tuple[str, str, str] | None:
     tag = getattr(event, "tag", None)
     if tag is not None:
         return f"the tag '{tag}'", "values without tags", "delete it, or put text in quotes"
-    if isinstance(event, yaml.ScalarEvent):
-        return _length_fault(event.value)
-    return None
-
-
-def _length_fault(text: str) -> tuple[str, str, str] | None:
-    if len(text) > LONGEST_VALUE:
-        return f"a text of {len(text)} characters", f"at most {LONGEST_VALUE}", "shorten it"
-    longest = longest_word(text)
+    if not isinstance(event, yaml.ScalarEvent):
+        return None
+    if len(event.value) > LONGEST_VALUE:
+        found = f"a text of {len(event.value)} characters"
+        return found, f"at most {LONGEST_VALUE}", "shorten it"
+    longest = longest_word(event.value)
     if longest > LONGEST_CELL:
         found = f"a word or number of {longest} characters"
         return found, f"at most {LONGEST_CELL}", "shorten it, or look for a missing blank"
@@ -211,11 +209,6 @@ def _key_fault(node: yaml.Node) -> tuple[str, str, str] | None:
         found = f"a key of {len(node.value)} characters"
         return found, f"at most {LONGEST_CELL}", "shorten it"
     return None
-
-
-def _no_keys(file: str) -> InputProblem:
-    allowed = "lines of the form `key: value`"
-    return InputProblem(file, None, None, "no keys", allowed, "see the format's documentation")
 
 
 def _no_yaml(file: str, error: Exception) -> InputProblem:

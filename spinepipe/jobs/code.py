@@ -29,7 +29,7 @@ from spinepipe.documents.form import WORDS
 from spinepipe.documents.yaml_text import packaged_yaml
 from spinepipe.facts import FILE as FACTS
 from spinepipe.files import appearing, stamp
-from spinepipe.schema.rows import FILE, read_tables
+from spinepipe.schema.table import FILE, read_tables
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGE = "spinepipe"
@@ -76,8 +76,14 @@ def code_digest(module: str) -> str:
     found = closure(module)
     lines = [f"{name} {_meaning(name)}" for name in sorted(found)]
     words = {word for name in found if _TABLE not in name for word in _piece(name).uses}
-    for path in _data_files(code_files(module)):
-        lines += _facts_named(path, words) if path.name == FACTS else [_data_digest(path)]
+    # data files beside the modules, in a fixed order; of facts the named ones, not their sources
+    folders = {path.parent for path in code_files(module)}
+    for path in sorted(file for folder in folders for file in folder.iterdir()):
+        if path.name == FACTS:
+            named = [row for row in _rows(path) if row["fact"] in words]
+            lines += [" ".join(r[key] for key in ("fact", "of", "values", "unit")) for r in named]
+        elif path.suffix in _DATA_SUFFIXES and path.name != FILE:
+            lines.append(_data_digest(path))
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
@@ -167,7 +173,10 @@ def _used(name: str) -> frozenset[str]:
             found.add(used)
         elif _source(base):
             found.add(used if last in _file(base).parts else base)
-    packages = {parent for used in (name, *found) for parent in _parents(used)}
+    # the packages they are in, without `spinepipe` itself, which names what notebooks use
+    packages = set()
+    for parts in (used.split(".") for used in (name, *found)):
+        packages |= {".".join(parts[:count]) for count in range(2, len(parts))}
     return frozenset(found | {package for package in packages if not _file(package).parts})
 
 
@@ -271,14 +280,6 @@ def keep() -> None:
             temporary.write_text(json.dumps({"python": sys.version, "files": _known()}), "utf-8")
 
 
-def _parents(module: str) -> list[str]:
-    """The packages that a module is in, without ``spinepipe`` itself, which names what notebooks
-    use and does nothing.
-    """
-    parts = module.split(".")
-    return [".".join(parts[:count]) for count in range(2, len(parts))]
-
-
 def _absolute(module: str, node: ast.ImportFrom) -> str:
     """The full name of what `from ... import` names, with leading dots resolved."""
     if not node.level:
@@ -298,18 +299,6 @@ def _is_cosmetic(node: ast.stmt) -> bool:
         and isinstance(node.value, ast.Constant)
         and isinstance(node.value.value, str)
     )
-
-
-def _data_files(sources: set[Path]) -> list[Path]:
-    """Data files beside modules, in a fixed order; of tables only those that are used count."""
-    files = (file for folder in {path.parent for path in sources} for file in folder.iterdir())
-    return sorted(file for file in files if file.suffix in _DATA_SUFFIXES and file.name != FILE)
-
-
-def _facts_named(path: Path, words: set[str]) -> list[str]:
-    """What rows of facts mean, of those that are named: not their sources."""
-    rows = [row for row in _rows(path) if row["fact"] in words]
-    return [" ".join(row[name] for name in ("fact", "of", "values", "unit")) for row in rows]
 
 
 @cache

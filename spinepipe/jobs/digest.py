@@ -7,12 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.files import Stamp, stamp
-from spinepipe.jobs.code import code_digest
+from spinepipe.jobs.code import code_digest, effect_modules
 from spinepipe.marks import KEY, read_mark
+from spinepipe.studies.base_model import made_by
 from spinepipe.studies.registry import PACKAGE, kind_of, place_of
 from spinepipe.studies.study import Study
 
@@ -24,18 +26,8 @@ def value_digest(*values: Any) -> str:
 
 
 _LIBRARIES = (
-    *(
-        "numpy",
-        "scipy",
-        "numba",
-        "pandas",
-        "pyarrow",
-        "pybullet",
-        "SALib",
-        "scikit-learn",
-        "statsmodels",
-    ),
-    *("matplotlib", "plotly", "Jinja2", "spinepipe"),
+    *("numpy", "scipy", "numba", "pandas", "pyarrow", "pybullet", "SALib", "scikit-learn"),
+    *("statsmodels", "matplotlib", "plotly", "Jinja2", "spinepipe"),
 )
 
 
@@ -109,6 +101,27 @@ def mark_of(path: str) -> str:
 @lru_cache(maxsize=64)
 def _mark(where: Stamp) -> str:
     return read_mark(where[0])
+
+
+def base_marks(root: str, model: str | None) -> list[str]:
+    """The mark of a model file among a study's results, else digests of its bytes and its effects.
+
+    Nothing without a file. The mark of a result covers the code of the effects in it already.
+
+    Parameters
+    ----------
+    model : the file, absolute or relative to ``root``.
+    """
+    if model is None:
+        return []
+    path = Path(root) / model
+    mark = read_mark(path) if made_by(path, Path(root)) else ""
+    if mark:
+        return [mark]
+    raw = path.read_bytes()
+    named = effect_modules()
+    used = sorted(name for name in named if name.encode() in raw)
+    return [hashlib.sha256(raw).hexdigest(), *(code_digest(named[name]) for name in used)]
 
 
 def figure_digest(figure: str, study: Study, cohort: Cohort, read: Sequence[str]) -> str:

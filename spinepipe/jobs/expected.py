@@ -12,8 +12,7 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.collect import joined_digest
-from spinepipe.jobs.digest import digest_of, figure_digest, report_digest
-from spinepipe.jobs.model_mark import base_marks
+from spinepipe.jobs.digest import base_marks, digest_of, figure_digest, report_digest
 from spinepipe.studies.base_model import made_by
 from spinepipe.studies.kind import Job
 from spinepipe.studies.read import check
@@ -82,6 +81,7 @@ class Expected:
         if name in (*self.files.made_of_jobs, *self.files.by_specimen):
             return self.of_table(name)
         kind, place = kind_of(self.study.kind), {}
+        # a job may make many results of one pattern, such as `{specimen}.osim`: which place is it?
         for pattern in (made for job in kind.jobs for made in job.makes if "{" in made):
             form = re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>[^/]+)", re.escape(pattern))
             if found := re.fullmatch(form, name):

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.strays import is_hidden
-from spinepipe.files import Stamp, stamp
+from spinepipe.files import Stamp, is_hidden, stamp
 from spinepipe.studies.read import check, read
 from spinepipe.studies.study import STUDIES, Study
 

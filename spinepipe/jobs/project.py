@@ -5,6 +5,7 @@ whatever its age and whatever Snakemake's record says. `Project.outdated` tells 
 public door: an input that is newer than the file, where the file carries another mark.
 """
 
+import fcntl
 import json
 import os
 import sys
@@ -15,12 +16,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
-from spinepipe.files import appearing, refusal, sweep
+from spinepipe.files import HOST, appearing, refusal, sweep
 from spinepipe.jobs import code
 from spinepipe.jobs.digest import versions
 from spinepipe.jobs.expected import Expected
 from spinepipe.jobs.pool import warm_up
-from spinepipe.jobs.run_lock import AtWork, lock
 from spinepipe.marks import mark_in
 from spinepipe.problems import InputError
 from spinepipe.studies import read as studies
@@ -275,3 +275,34 @@ def _stop_timers() -> None:
     for thread in threading.enumerate():
         if isinstance(thread, threading.Timer):
             thread.cancel()
+
+
+class AtWork(Exception):
+    """Another run holds the lock; the text says which."""
+
+
+def lock(path: Path) -> TextIO:
+    """The lock of a run, one at a time in a project; held until the file returned is closed.
+
+    It belongs to a process (`flock`): the system takes it off when that one ends, however it ends,
+    so that a run that was killed leaves nothing to be unlocked.
+    Where a disk knows no such locks, every run gets it.
+
+    Raises
+    ------
+    AtWork
+        With process, machine and hour of the run that holds it.
+    """
+    file = path.open("a+", encoding="utf-8")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        with file:
+            file.seek(0)
+            raise AtWork(file.read().strip()) from None
+    except OSError:
+        pass
+    file.truncate(0)
+    file.write(f"process {os.getpid()} on {HOST}, since {time.strftime('%Y-%m-%d %H:%M')}\n")
+    file.flush()
+    return file

@@ -79,7 +79,12 @@ def run_job(
                 f"job {name}: settings, data or code have changed since this run was planned. Run "
                 "the same command again"
             )
-    _date_back(inputs)
+    # Snakemake would end the run for an input that is dated in the future
+    for path in inputs:
+        with suppress(OSError):
+            if os.stat(path).st_mtime > time.time():
+                os.utime(path)
+                warn(f"{path} was dated in the future: a clock is or was wrong. It is dated back")
 
 
 def _one_by_one(
@@ -111,15 +116,6 @@ def _one_by_one(
 
 def _carry(paths: Sequence[str], mark: str) -> bool:
     return all(mark_in(path) == mark for path in paths)
-
-
-def _date_back(inputs: Sequence[str]) -> None:
-    """Date as now what is dated in the future: Snakemake would end the run for it."""
-    for path in inputs:
-        with suppress(OSError):
-            if os.stat(path).st_mtime > time.time():
-                os.utime(path)
-                warn(f"{path} was dated in the future: a clock is or was wrong. It is dated back")
 
 
 def _plain(files: Any) -> Any:

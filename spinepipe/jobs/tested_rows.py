@@ -8,7 +8,7 @@ from spinepipe.statistics import StatisticalTest, corrected, family_size
 
 
 @dataclass(frozen=True)
-class Tested:
+class FamilyTest:
     """One test and what it is of; ``*`` stands for all specimens or joints together."""
 
     family: str
@@ -20,9 +20,9 @@ class Tested:
     specimen: str = "*"
 
 
-def corrected_rows(tests: Iterable[Tested]) -> Iterator[dict[str, Any]]:
+def corrected_rows(tests: Iterable[FamilyTest]) -> Iterator[dict[str, Any]]:
     """Rows with p-values corrected within each family and kind of test."""
-    families: dict[tuple[str, str], list[Tested]] = {}
+    families: dict[tuple[str, str], list[FamilyTest]] = {}
     for test in tests:
         families.setdefault((test.family, test.outcome.test), []).append(test)
     for family in families.values():
@@ -32,7 +32,9 @@ def corrected_rows(tests: Iterable[Tested]) -> Iterator[dict[str, Any]]:
             yield _row(test, bonferroni, holm, family_size(ps))
 
 
-def _row(test: Tested, bonferroni: float | None, holm: float | None, size: int) -> dict[str, Any]:
+def _row(
+    test: FamilyTest, bonferroni: float | None, holm: float | None, size: int
+) -> dict[str, Any]:
     outcome = test.outcome
     return {
         **{key: getattr(test, key) for key in ("specimen", "family", "joint", "response")},

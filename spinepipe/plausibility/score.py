@@ -7,13 +7,14 @@ the remedy, and how often it happens beside the other mistakes of the same quant
 """
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from math import inf, log
+from math import exp, inf, log
 from typing import final
 
-import pandas as pd
+from spinepipe.units import TRANSLATIONS
 
 PACKAGE = "spinepipe.plausibility"
 
@@ -40,10 +41,6 @@ class UsualRange:
     def holds(self, value: float) -> bool:
         """Whether nothing is told of a value."""
         return self.low <= value <= self.high
-
-    def holds_each(self, values: pd.Series) -> "pd.Series[bool]":
-        """The same of many values."""
-        return values.between(self.low, self.high)
 
     def __str__(self) -> str:
         """As messages say what is allowed."""
@@ -155,3 +152,43 @@ def suspect(what: str, value: float, quantity: str) -> MistakeHypothesis | None:
     ]
     best = max(odds, key=lambda pair: pair[0], default=(-inf, None))
     return best[1] if best[0] > -inf else None
+
+
+# --- motion and load ------------------------------------------------------------------------------
+# Motion that differs by more than a factor of five from what published stiffness gives is of no
+# stiffness that was measured before: a joint is fused or cut, or a unit is wrong.
+
+
+def is_plausible(ratio: float) -> bool:
+    """Whether motion over the expected motion, above 0, is one that joints were seen to have."""
+    return usual("motion_over_expected").holds(ratio)
+
+
+def implausible(slope: float | None) -> str:
+    """What is wrong with measured over expected motion, in words; nothing where it may be right."""
+    if slope is None or slope <= 0.0 or is_plausible(slope):
+        return ""
+    return f"{slope:.3g} times the motion that published stiffness gives"
+
+
+def unit_of(slopes: Sequence[float], coordinate: str) -> str:
+    """The unit that explains the motion of all joints of a test, in words; nothing if none does.
+
+    One joint alone may be fused or cut; a unit is of all.
+    """
+    if not slopes or not all(implausible(slope) for slope in slopes):
+        return ""
+    unit = unit_like(geometric_mean(slopes), coordinate)
+    return "" if unit is None else f"{unit.words} ({unit.size})"
+
+
+def unit_like(
+    ratio: float, coordinate: str, quantity: str = "motion_over_expected"
+) -> MistakeHypothesis | None:
+    """The mistaken unit that makes so large a motion of a coordinate; None if none does."""
+    return suspect("translation" if coordinate in TRANSLATIONS else "rotation", ratio, quantity)
+
+
+def geometric_mean(ratios: Sequence[float]) -> float:
+    """The mean on a scale of factors; all above 0."""
+    return exp(sum(map(log, ratios)) / len(ratios))

@@ -86,15 +86,15 @@ class Licence:
         return all(part.strip("()") in ALLOWED for part in parts)
 
 
-def licences(lock: Path = LOCK) -> list[Licence]:
-    """Licences of all packages that a lock file pins, as they are installed here.
+def licences() -> list[Licence]:
+    """Licences of all packages that the lock file pins, as they are installed here.
 
     Raises
     ------
     PackageNotFoundError
         For one that is not installed.
     """
-    return [_of(name, version) for name, version in sorted(pinned(lock).items())]
+    return [_of(name, version) for name, version in sorted(pinned().items())]
 
 
 def pinned(lock: Path = LOCK) -> dict[str, str]:

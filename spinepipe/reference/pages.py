@@ -6,7 +6,8 @@ A page says where a part goes:
     <!-- end of generated -->
 
 What stands between the markers is written by `spinepipe docs` and compared in the tests: the list
-of effects, tables of configuration keys from the pydantic models, columns of a cohort.
+of effects, tables of configuration keys from the pydantic models, columns of a cohort. The page
+of all columns of all result tables is written as a whole, and nobody keeps it.
 """
 
 import inspect
@@ -15,7 +16,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import Field, fields
 from functools import cache, partial
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from spinepipe.effects import Effect, Parameter, TriedValues, create, registered
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.reference.licences import licences
+from spinepipe.schema import Column, Table
 from spinepipe.studies.read import Selection
 from spinepipe.studies.registry import every_form, every_kind
 from spinepipe.testing_machine.settings import MachineMapping
@@ -57,10 +59,10 @@ END = "<!-- end of generated -->"
 _PART = re.compile(rf"<!-- generated: (.+?) -->\n.*?{re.escape(END)}", re.DOTALL)
 
 
-def outdated(root: Path) -> list[Path]:
+def outdated_pages(root: Path) -> list[Path]:
     """Pages whose generated parts differ from what the code says."""
     texts = ((path, path.read_text(encoding="utf-8")) for path in pages(root))
-    return [path for path, text in texts if refreshed(text, path.name) != text]
+    return [path for path, text in texts if refresh(text, path.name) != text]
 
 
 def pages(root: Path) -> list[Path]:
@@ -68,7 +70,7 @@ def pages(root: Path) -> list[Path]:
     return sorted((root / DOCS).rglob("*.md"))
 
 
-def refreshed(text: str, page: str) -> str:
+def refresh(text: str, page: str) -> str:
     """A page with all its generated parts as they should be.
 
     Raises
@@ -378,3 +380,40 @@ def _line(cells: Sequence[str]) -> str:
 def code(text: str) -> str:
     """Text as it is typed."""
     return f"`{text}`"
+
+
+# --- columns of result tables ---------------------------------------------------------------------
+
+PAGE = "docs/tables.md"
+"""Where it is written; nobody keeps it, as it follows from the tables alone."""
+
+_COLUMN_HEAD = ("column", "type", "unit", "range", "meaning", "an empty cell means")
+
+
+def columns_page() -> str:
+    """All columns, kind by kind. How tables are read is told beside it."""
+    parts = [
+        "# Columns of result tables",
+        "Made by `spinepipe docs`. [How to read results](results.md)",
+    ]
+    for name, kind in every_kind().items():
+        parts.append(f"## Studies of kind [{name}](studies/{name}.md)")
+        parts += [_shape(shape) for shape in kind.tables]
+    return "\n\n".join(parts) + "\n"
+
+
+def _shape(shape: Table) -> str:
+    rows = [
+        (code(c.name), c.type, c.unit, _range(c), c.meaning, c.empty or "never empty")
+        for c in shape.columns
+    ]
+    key = f"Unique by {', '.join(map(code, shape.key))}."
+    words = [f"### {shape.name}.parquet", shape.note, shape.about, key, table(_COLUMN_HEAD, rows)]
+    return "\n\n".join(word for word in words if word)
+
+
+def _range(column: Column) -> str:
+    if column.allowed:
+        return ", ".join(map(code, column.allowed))
+    ends = (("at least {:g}", column.low), ("at most {:g}", column.high))
+    return " and ".join(words.format(end) for words, end in ends if isfinite(end))

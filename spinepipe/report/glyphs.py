@@ -101,16 +101,14 @@ def draw_density(
     panel.plot(x, top, color=color, lw=0.6, zorder=2)
 
 
-def draw_strip(
-    panel: Axes, values: Array, y: float, color: str, height: float = 0.3, size_pt: float = 2.0
-) -> None:
+def draw_strip(panel: Axes, values: Array, y: float, color: str) -> None:
     """Dots spread over a height around y, always alike; finite values (n,), n at least 1."""
     panel.plot(
         values,
-        y + spread_out(len(values)) * height,
+        y + spread_out(len(values)) * 0.3,
         "o",
         color=color,
-        ms=size_pt,
+        ms=2.0,
         mew=0.0,
         alpha=0.45,
         zorder=3,

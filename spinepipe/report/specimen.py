@@ -118,8 +118,13 @@ FRONTAL = _Side("Frontal, from behind", 2, "z, right (mm)", 0, -1)
 def draw_specimen(cohort: Cohort, view: SpecimenView) -> Figure:
     """Both views at one scale; of every test the step with the largest load is drawn."""
     figure = blank(_HEIGHT_MM, _WIDTH_MM)
-    low, high = _extent(view)
-    size = float((high - low)[1])
+    # height of all points that are drawn, 30 mm at least
+    points = [frame.origin for frame in view.frames] + [body.com for body in view.bodies]
+    points += [point for named in view.points.values() for point in named.values()]
+    points += [w.point for case in view.cases for s in case.steps for w in s.wrenches]
+    every = np.array(points) * MM_PER_M
+    low = every.min(axis=0)
+    size = float((np.maximum(every.max(axis=0), low + 30.0) - low)[1])
     for axis, side in zip(
         side_by_side(figure, 2, 2, sharey=True), (SAGITTAL, FRONTAL), strict=True
     ):
@@ -134,27 +139,14 @@ def draw_specimen(cohort: Cohort, view: SpecimenView) -> Figure:
         axis.spines["left"].set_visible(True)
         axis.tick_params(axis="y", size=2.5)
     figure.axes[0].set_ylabel("y, superior (mm)")
-    _one_scale(figure)
+    # the same width of both views, so that equal heights are equal lengths
+    ends = [axis.get_xlim() for axis in figure.axes]
+    half = max(right - left for left, right in ends) / 2.0
+    for axis, (left, right) in zip(figure.axes, ends, strict=True):
+        middle = (left + right) / 2.0
+        axis.set_xlim(middle - half, middle + half)
     _legend(figure, cohort, view)
     return figure
-
-
-def _one_scale(figure: Figure) -> None:
-    """The same width of both views, so that equal heights are equal lengths."""
-    ends = [axis.get_xlim() for axis in figure.axes]
-    half = max(high - low for low, high in ends) / 2.0
-    for axis, (low, high) in zip(figure.axes, ends, strict=True):
-        middle = (low + high) / 2.0
-        axis.set_xlim(middle - half, middle + half)
-
-
-def _extent(view: SpecimenView) -> tuple[Array, Array]:
-    """Lowest and highest of all points that are drawn, mm."""
-    points = [frame.origin for frame in view.frames] + [body.com for body in view.bodies]
-    points += [point for named in view.points.values() for point in named.values()]
-    points += [w.point for case in view.cases for s in case.steps for w in s.wrenches]
-    every = np.array(points) * MM_PER_M
-    return every.min(axis=0), np.maximum(every.max(axis=0), every.min(axis=0) + 30.0)
 
 
 def _landmarks(axis: Axes, side: _Side, view: SpecimenView) -> None:

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -16,7 +17,8 @@ from spinepipe.marks import write_marked
 
 BLACK, GREY, WHITE = "#000000", "#767676", "#FFFFFF"
 BLUE, GREEN, VERMILLION = "#0072B2", "#009E73", "#D55E00"
-"""Okabe and Ito, Color Universal Design, 2008."""
+PURPLE, SKY = "#CC79A7", "#56B4E9"
+"""Okabe and Ito, Color Universal Design, 2008: the last two are reddish purple and sky blue."""
 
 EMPTY, HATCH = "#E4E4E4", "#9A9A9A"
 """Cells of a map where nothing was read, and the lines across those that say why."""
@@ -93,6 +95,24 @@ def note(panel: Axes, x: float, y: float, words: str, color: str = BLACK, **how:
     settings = {"fontsize": SMALL_PT, "va": "center", "color": INK.get(color, color), **how}
     behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4}
     panel.text(x, y, words, transform=across, bbox=behind, in_layout=False, **settings)
+
+
+Dashes = str | tuple[int, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class LineStyle:
+    """Colour, line and mark of one of several, told apart without colour too."""
+
+    color: str
+    marker: str
+    dashes: Dashes
+
+    def line(self, hollow: bool = False, **how: Any) -> dict[str, Any]:
+        """Settings of a line with marks; hollow where it is not to be trusted."""
+        face = WHITE if hollow else self.color
+        look = {"color": self.color, "ls": self.dashes, "marker": self.marker, "lw": 1.0}
+        return {**look, "ms": 3.4, "mec": self.color, "mfc": face, "mew": 0.8, **how}
 
 
 _NO_DATE: dict[str, dict[str, None]] = {

@@ -35,7 +35,7 @@ def _options(wanted: WantedFiles, poses: bool, representations: bool) -> Iterato
         yield problem("--representation", wanted.representation, allowed, "leave it out")
 
 
-def written(model: SpineModel, words: str) -> tuple[str, str]:
+def opensim_document(model: SpineModel, words: str) -> tuple[str, str]:
     """OpenSim's document of a model, and in words what it is and what it leaves out.
 
     Raises
@@ -50,7 +50,7 @@ def written(model: SpineModel, words: str) -> tuple[str, str]:
     return document, words
 
 
-def needed(path: Path, what: str) -> Path:
+def required_result(path: Path, what: str) -> Path:
     """A result file that must be there.
 
     Raises

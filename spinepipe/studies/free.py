@@ -26,7 +26,7 @@ LEAST_SHARE = 0.1
 or rotation is, at usual stiffness."""
 
 
-def freed(calibration: Any, cohort: Cohort, tests: Sequence[str] | None) -> Any:
+def free_coordinates(calibration: Any, cohort: Cohort, tests: Sequence[str] | None) -> Any:
     """The settings of a calibration with coordinates in place of `auto`.
 
     A free coordinate whose weight the study does not give counts as the settings say, or, where
@@ -83,9 +83,9 @@ def _moves(loads: Array) -> Array:
     return share
 
 
-def calibration_settled(study: Any, cohort: Cohort) -> Any:
+def settle_calibration(study: Any, cohort: Cohort) -> Any:
     """A study with ``calibration`` and ``tests`` whose `auto` is put into coordinates."""
-    calibration = freed(study.calibration, cohort, study.tests)
+    calibration = free_coordinates(study.calibration, cohort, study.tests)
     same = calibration is study.calibration
     return study if same else study.model_copy(update={"calibration": calibration})
 
@@ -107,15 +107,12 @@ def unmeasured(root: Path, study: Any, cohort: Cohort) -> tuple[InputProblem, ..
         return ()
     file = STUDIES / f"{study.study}.yaml"
     document, _ = read_yaml(root / file, study.study)
-    if document is None or not _names_free(document.data, key):
+    named: Any = None if document is None else document.data
+    for part in key.split("."):
+        named = named.get(part) if isinstance(named, dict) else None
+    if document is None or named is None:
         return ()  # left to the default, or put there in place of `auto`
     place = (file.as_posix(), document.line_of(key), key)
     found = f"{', '.join(nobody)}, which nobody measured in cohort '{cohort.name}'"
     remedy = "take it out: its stiffness would keep its start or run to a bound"
     return (InputProblem(*place, found, one_of(known), remedy),)
-
-
-def _names_free(data: Any, key: str) -> bool:
-    for part in key.split("."):
-        data = data.get(part) if isinstance(data, dict) else None
-    return data is not None

@@ -3,17 +3,21 @@
 Each kind judges its own files (`Kind.doubts`), whatever study is asked for.
 """
 
+from collections.abc import Iterator
 from importlib import import_module
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.memoize import kept_with_cohort
+from spinepipe.cohort.cohort import memoize_per_cohort
+from spinepipe.muscles.subject import CM_PER_M
+from spinepipe.plausibility.warnings.bodies import person
 from spinepipe.plausibility.warnings.judge import of_cohort
-from spinepipe.plausibility.warnings.warning import PlausibilityWarning
+from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell
 from spinepipe.problems import InputProblem
 from spinepipe.studies.registry import PACKAGE, every_kind
+from spinepipe.studies.subjects import SUBJECTS
 
 
-@kept_with_cohort
+@memoize_per_cohort
 def suspicions(cohort: Cohort) -> tuple[PlausibilityWarning, ...]:
     """All that looks wrong; kept, as warnings and refusals are asked one after the other."""
     found = list(of_cohort(cohort))
@@ -39,3 +43,12 @@ def refusals(cohort: Cohort) -> tuple[InputProblem, ...]:
 
 def _refused(cohort: Cohort, one: PlausibilityWarning) -> bool:
     return one.certain and one.group not in cohort.acknowledged_warnings
+
+
+def subject_doubts(cohort: Cohort) -> Iterator[PlausibilityWarning]:
+    """What is most likely wrong with subjects that are sound: mass in lb, age in months."""
+    rows = cohort.further.get(SUBJECTS.stem)
+    for line, row in () if rows is None else rows.iterrows():
+        height_m = float(row["height_cm"]) / CM_PER_M
+        whose = (TableCell(SUBJECTS.stem, line, "height_cm"), str(row["specimen"]), CM_PER_M)
+        yield from person(cohort, *whose, height_m, float(row["mass_kg"]), float(row["age_years"]))

@@ -14,8 +14,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.form import TableForm
 from spinepipe.documents.names import COHORT_NAME
 from spinepipe.documents.settings import validate
-from spinepipe.documents.strays import files_in, folders_in, strays_in
 from spinepipe.documents.yaml_text import YamlDocument, read_yaml
+from spinepipe.files import files_in, folders_in, strays_in
 from spinepipe.problems import InputError, InputProblem, Spelling, closest, did_you_mean, one_of
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.parts import FORM
@@ -56,7 +56,13 @@ def load(path: Path, root: Path) -> tuple[YamlDocument | None, Study | None, lis
     if document is None:
         return None, None, problems
     study, faults = _validated(document)
-    return document, study, [*problems, *faults, *_name_problems(document, path.stem)]
+    problems += faults
+    name = document.data.get("study")
+    if isinstance(name, str) and name != path.stem:
+        place = (document.file, document.line_of("study"), "study")
+        found, allowed = f"'{name}'", f"the file's name, '{path.stem}'"
+        problems.append(InputProblem(*place, found, allowed, "rename the file or change the key"))
+    return document, study, problems
 
 
 def of_data(data: dict[str, Any], cohort: Cohort, called: str) -> Study:
@@ -97,15 +103,6 @@ def _validated(document: YamlDocument) -> tuple[Study | None, list[InputProblem]
     otherwise = "the kind decides which other keys are allowed"
     remedy = did_you_mean(str(kind), kind_names(), otherwise)
     return None, [InputProblem(*place, found, one_of(kind_names()), remedy)]
-
-
-def _name_problems(document: YamlDocument, stem: str) -> list[InputProblem]:
-    name = document.data.get("study")
-    if not isinstance(name, str) or name == stem:
-        return []
-    place = (document.file, document.line_of("study"), "study")
-    remedy = "rename the file or change the key"
-    return [InputProblem(*place, f"'{name}'", f"the file's name, '{stem}'", remedy)]
 
 
 class Misfit(InputError):

@@ -8,7 +8,7 @@ from spinepipe.model import LoadCase, LoadStep
 
 
 @dataclass(frozen=True)
-class AskedTest:
+class SelectedTest:
     """A test of which some steps are computed.
 
     Attributes
@@ -36,7 +36,9 @@ class AskedTest:
         return sorted({0, *range(len(self.case.steps))[self.stored]})
 
 
-def asked(case: LoadCase, pressed: bool, all_steps: bool, subtracted: bool = True) -> AskedTest:
+def select_steps(
+    case: LoadCase, pressed: bool, all_steps: bool, subtracted: bool = True
+) -> SelectedTest:
     """What is computed of a test: all of its load steps, or that of the largest load only.
 
     Joints have no memory, so of the steps before the largest load those are computed where the load
@@ -52,10 +54,12 @@ def asked(case: LoadCase, pressed: bool, all_steps: bool, subtracted: bool = Tru
     peak = peak_step(case)
     largest = case.steps[peak].step
     if all_steps:
-        return AskedTest(case, from_first, largest, slice(None))
+        return SelectedTest(case, from_first, largest, slice(None))
     places = case.leading_to([0, peak] if from_first else [peak], pressed)
     steps = tuple(case.steps[place] for place in places)
-    return AskedTest(replace(case, steps=steps), from_first, largest, slice(len(steps) - 1, None))
+    return SelectedTest(
+        replace(case, steps=steps), from_first, largest, slice(len(steps) - 1, None)
+    )
 
 
 def first_cycles(cases: Iterable[LoadCase]) -> tuple[LoadCase, ...]:

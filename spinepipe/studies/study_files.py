@@ -186,19 +186,20 @@ class StudyFiles(ABC):
         Snakemake does not miss a deleted file once the table made of it exists.
         """
         tables = self.tables_of(full)
+        whole = {name: os.path.exists(f"{self.folder}/{name}.parquet") for name in tables}
         lost = [
             file
             for table in self.made_of_jobs
             if table in tables
             for specimen, block in self.blocks(table)
-            if self._is_joined(table, specimen, block)
+            if whole[table] or os.path.exists(self.block_file(table, specimen, block))
             for file in self.job_files(table, specimen, block)
             if not os.path.exists(file)
         ]
         return lost + [
             file
             for table in self.by_specimen
-            if table in tables and os.path.exists(f"{self.folder}/{table}.parquet")
+            if table in tables and whole[table]
             for file in self.block_files(table)
             if not os.path.exists(file)
         ]
@@ -213,10 +214,6 @@ class StudyFiles(ABC):
             for specimen, block in self.blocks(table):
                 files += self.job_files(table, specimen, block)
         return files
-
-    def _is_joined(self, table: str, specimen: str, block: str) -> bool:
-        whole = f"{self.folder}/{table}.parquet"
-        return os.path.exists(whole) or os.path.exists(self.block_file(table, specimen, block))
 
 
 def numbered_blocks(specimens: Sequence[str], files: int) -> list[tuple[str, str]]:

@@ -83,17 +83,6 @@ def column_of(coordinate: str) -> str:
     return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
 
 
-def load_factor(unit: str, positive: str) -> float:
-    """What a reading of a load channel is multiplied with to be in N or N m along ground axes."""
-    return DIRECTIONS[positive].sign * {**FORCES, **MOMENTS}[unit]
-
-
-def motion_factor(unit: str, positive: str) -> float:
-    """What a reading of a motion channel is multiplied with to be in deg or mm as columns say."""
-    return DIRECTIONS[positive].sign * {**ANGLES, **LENGTHS}[unit]
-
-
-def words_that_fit(unit: str) -> tuple[str, ...]:
-    """Directions that something in this unit can have."""
-    turns = unit in MOMENTS or unit in ANGLES
-    return tuple(word for word, direction in DIRECTIONS.items() if direction.turns == turns)
+def factor_of(unit: str, positive: str) -> float:
+    """What a reading of a channel is multiplied with to be in N, N m, deg or mm as columns say."""
+    return DIRECTIONS[positive].sign * {**FORCES, **MOMENTS, **ANGLES, **LENGTHS}[unit]

@@ -1,4 +1,4 @@
-"""Cut a recording into cycles, where the driving load turns back.
+"""Segmentation a recording into cycles, where the driving load turns back.
 
 A reversal counts where the load goes back by more than a share of its range, so that noise makes
 none. A cycle begins where the load leaves the reference: zero, or, if the load never comes near
@@ -59,7 +59,7 @@ class Cycle:
 
 
 @dataclass(frozen=True)
-class Cut:
+class Segmentation:
     """The cycles of one recording.
 
     Attributes
@@ -87,9 +87,9 @@ class Cut:
         return tuple((number, cycle) for number, cycle in numbered if number not in dropped)
 
 
-def cut(
+def segment(
     load: Array, smallest_reversal: float, preconditioning: int, asked: float | None = None
-) -> Cut:
+) -> Segmentation:
     """Cycles of a recording.
 
     Parameters
@@ -116,11 +116,13 @@ def cut(
     cycles = _cycles(branches, way * (load - reference), way, both, least)
     cycles = [replace(c, peaks=tuple(reference + way * p for p in c.peaks)) for c in cycles]
     dropped = tuple(_left_out(cycles, reference, preconditioning))
-    return Cut(reference, way, low, high, both, len(turns) - 2, tuple(cycles), dropped)
+    return Segmentation(reference, way, low, high, both, len(turns) - 2, tuple(cycles), dropped)
 
 
 def reversals(load: Array, least: float) -> list[int]:
     """Rows where the load turns back by more than ``least``, the first and last row besides."""
+    # a turning-point filter with a dead band: `best` is the extreme of the present way; it counts
+    # as a reversal once the load has gone back from it by `least`
     turns, best, way = [0], 0, 0
     for row in range(1, len(load)):
         if way == 0:

@@ -21,9 +21,14 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
+from spinepipe.testing_machine.load_steps import (
+    ReadingPrecision,
+    ResampledTest,
+    reading_precision,
+    resample_test,
+)
 from spinepipe.testing_machine.recording import Recording, read_recording
 from spinepipe.testing_machine.settings import MachineMapping, check_mapping
-from spinepipe.testing_machine.thinned import Sureness, ThinnedTest, sureness, thinned_test
 from spinepipe.units import COORDINATE_COLUMNS
 
 BY_HAND = ("joints.csv", "specimens.csv")
@@ -46,16 +51,16 @@ Rows = list[Sequence[object]]
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedCohort:
     """A cohort that is read and not yet written."""
 
     mapping: MachineMapping
-    tests: tuple[ThinnedTest, ...]
-    rotation: Sureness | None
-    translation: Sureness | None
+    tests: tuple[ResampledTest, ...]
+    rotation: ReadingPrecision | None
+    translation: ReadingPrecision | None
 
 
-def read(path: Path) -> Imported:
+def read(path: Path) -> ImportedCohort:
     """Read the YAML and all files that it names.
 
     Raises
@@ -73,14 +78,14 @@ def read(path: Path) -> Imported:
             recordings.setdefault((of.specimen, of.test), []).append(recording)
     tests = []
     for group in recordings.values():
-        test, faults = thinned_test(group, mapping.steps, mapping.zeroed)
+        test, faults = resample_test(group, mapping.steps, mapping.zeroed)
         problems += faults
         if test is not None:
             tests.append(test)
     if problems:
         raise InputError(problems)
-    sures = [sureness(tests, unit, mapping.zeroed) for unit in ("_deg", "_mm")]
-    return Imported(mapping, tuple(tests), *sures)
+    sures = [reading_precision(tests, unit, mapping.zeroed) for unit in ("_deg", "_mm")]
+    return ImportedCohort(mapping, tuple(tests), *sures)
 
 
 def _mapping(path: Path) -> MachineMapping:
@@ -101,7 +106,7 @@ def _mapping(path: Path) -> MachineMapping:
     return mapping
 
 
-def write(imported: Imported, folder: Path, replace: bool) -> list[str]:
+def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
     """Write the cohort folder, and return the names of files that were there and stayed.
 
     Parameters
@@ -160,13 +165,15 @@ def _shape(form: TableForm, text: str) -> Table:
     return Table(form.stem, f"One row per {form.row}", keys, columns)
 
 
-def _header(imported: Imported) -> str:
+def _header(imported: ImportedCohort) -> str:
     mapping = imported.mapping
     files = ", ".join(dict.fromkeys(of.file for of in mapping.files))
+    rows = np.concatenate([cycle.rows for test in imported.tests for cycle in test.cycles])
     end = "" if mapping.source.rstrip().endswith(".") else "."
     source = (
         f"{mapping.source.rstrip()}{end} Made by `spinepipe import` of {files}: cycles cut at "
-        f"reversals of the load, {_thinning(imported)} "
+        "reversals of the load, each reading by local regression on the load over "
+        f"{int(np.median(rows))} rows (median), loading and unloading apart. "
         f"measurement_sd: {sd_sentence(imported)}"
     )
     document = {
@@ -184,15 +191,7 @@ def _header(imported: Imported) -> str:
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)
 
 
-def _thinning(imported: Imported) -> str:
-    rows = np.concatenate([cycle.rows for test in imported.tests for cycle in test.cycles])
-    return (
-        "each reading by local regression on the load over "
-        f"{int(np.median(rows))} rows (median), loading and unloading apart."
-    )
-
-
-def _declared(sure: Sureness | None, unit: str) -> float:
+def _declared(sure: ReadingPrecision | None, unit: str) -> float:
     """The SD with two digits, rounded up."""
     if sure is None or sure.sd == 0.0:
         return NOT_READ[unit]
@@ -200,7 +199,7 @@ def _declared(sure: Sureness | None, unit: str) -> float:
     return float(f"{np.ceil(sure.sd * scale - 1e-9) / scale:.10g}")
 
 
-def sd_sentence(imported: Imported) -> str:
+def sd_sentence(imported: ImportedCohort) -> str:
     """Where the declared SDs come from."""
     words = []
     for sure, unit in ((imported.rotation, "deg"), (imported.translation, "mm")):
@@ -222,11 +221,11 @@ def sd_sentence(imported: Imported) -> str:
     return " ".join(words)
 
 
-def _specimens(imported: Imported) -> list[str]:
+def _specimens(imported: ImportedCohort) -> list[str]:
     return list(dict.fromkeys(test.specimen for test in imported.tests))
 
 
-def _joints(imported: Imported) -> Rows:
+def _joints(imported: ImportedCohort) -> Rows:
     """A template: joints above each other, axes of ground."""
     joints = joint_names(imported.mapping.vertebrae)
     rows: Rows = [("specimen", "joint", *_FRAME)]
@@ -236,7 +235,7 @@ def _joints(imported: Imported) -> Rows:
     return rows
 
 
-def _loads(imported: Imported) -> Rows:
+def _loads(imported: ImportedCohort) -> Rows:
     point = imported.mapping.load_point_mm or ("", "", "")
     vertebra = imported.mapping.loaded_vertebra
     rows: Rows = [
@@ -252,7 +251,7 @@ def _loads(imported: Imported) -> Rows:
     return rows
 
 
-def _motion(imported: Imported) -> Rows:
+def _motion(imported: ImportedCohort) -> Rows:
     joints = joint_names(imported.mapping.vertebrae)
     rows: Rows = [("specimen", "test", "cycle", "step", "joint", *COORDINATE_COLUMNS)]
     for test in imported.tests:

@@ -20,8 +20,7 @@ from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     SECONDS,
     column_of,
-    load_factor,
-    motion_factor,
+    factor_of,
 )
 from spinepipe.testing_machine.settings import FileForm, MachineMapping, TestFile
 
@@ -86,7 +85,8 @@ def read_recording(
     if problems:
         return None, problems
     try:
-        text = data.decode(_codec(mapping.form))
+        encoding = mapping.form.encoding
+        text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
     except UnicodeError:
         remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
         found = f"letters that are not {mapping.form.encoding}"
@@ -99,10 +99,6 @@ def read_recording(
     if cells is None:
         return None, problems
     return _understood(cells, of, mapping, problems)
-
-
-def _codec(form: FileForm) -> str:
-    return "utf-8-sig" if form.encoding == "utf-8" else form.encoding
 
 
 def _cells(text: str, file: str, form: FileForm) -> tuple[_Cells | None, list[InputProblem]]:
@@ -155,17 +151,18 @@ def _understood(
     for load in mapping.loads:
         values = _column(cells, load.column, of.file, mapping.form, problems)
         if values is not None:
-            factor = load_factor(load.unit, load.positive)
+            factor = factor_of(load.unit, load.positive)
             loads[DIRECTIONS[load.positive].load] = values * factor
     motion: dict[tuple[str, str], Array] = {}
     finest: dict[tuple[str, str], float] = {}
     for channel in mapping.motion:
         values = _column(cells, channel.column, of.file, mapping.form, problems)
         if values is not None:
-            factor = motion_factor(channel.unit, channel.positive)
+            factor = factor_of(channel.unit, channel.positive)
             place = (channel.joint, column_of(DIRECTIONS[channel.positive].coordinate))
             motion[place] = values * factor
-            finest[place] = _finest(motion[place])
+            steps = np.diff(np.unique(motion[place]))  # between readings that differ
+            finest[place] = float(steps.min()) if steps.size else 0.0
     if problems:
         return None, problems
     driving = DIRECTIONS[mapping.driving(of).positive].load
@@ -191,7 +188,10 @@ def _column(
     place = _place(cells, column)
     if place is None:
         known: Sequence[str] = cells.names or [str(n + 1) for n in range(cells.width)]
-        remedy = did_you_mean(str(column), known, _other_delimiter(cells, form))
+        otherwise = "correct the name; look whether `form.names_line` is right"
+        if len(cells.names) == 1:
+            otherwise = f"is `form.delimiter` right? With {form.delimiter} the file has one column"
+        remedy = did_you_mean(str(column), known, otherwise)
         line = form.names_line or None
         problems.append(
             InputProblem(file, line, str(column), "no such column", one_of(known), remedy)
@@ -212,12 +212,6 @@ def _place(cells: _Cells, column: str | int) -> int | None:
     if isinstance(column, int):
         return column - 1 if column <= cells.width else None
     return cells.names.index(column) if column in cells.names else None
-
-
-def _other_delimiter(cells: _Cells, form: FileForm) -> str:
-    if len(cells.names) == 1:
-        return f"is `form.delimiter` right? With {form.delimiter} the file has one column"
-    return "correct the name; look whether `form.names_line` is right"
 
 
 def _no_numbers(
@@ -255,9 +249,3 @@ def _jumps(values: Array) -> NDArray[np.bool_]:
     away = np.abs(values - usual)
     steps = float(np.quantile(np.abs(np.diff(usual)), 0.95))
     return away > max(JUMP * float(np.ptp(usual)), 3.0 * steps, 10.0 * float(np.median(away)))
-
-
-def _finest(values: Array) -> float:
-    """The smallest step between two different readings: the resolution that the file has."""
-    steps = np.diff(np.unique(values))
-    return float(steps.min()) if steps.size else 0.0

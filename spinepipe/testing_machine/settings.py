@@ -11,13 +11,14 @@ from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, nam
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem, did_you_mean, one_of
 from spinepipe.testing_machine.channels import (
+    ANGLES,
     DIRECTIONS,
     FORCES,
+    MOMENTS,
     LoadUnit,
     MotionUnit,
     TimeUnit,
     Towards,
-    words_that_fit,
 )
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -249,7 +250,8 @@ def _directions(document: YamlDocument, mapping: MachineMapping) -> Iterator[Inp
     )
     for side, channels in sides:
         for number, channel in enumerate(channels):
-            fit = words_that_fit(channel.unit)
+            turns = channel.unit in MOMENTS or channel.unit in ANGLES
+            fit = tuple(word for word, one in DIRECTIONS.items() if one.turns == turns)
             if channel.positive not in fit:
                 key = f"{side}.{number}.positive"
                 found = f"'{channel.positive}' in {channel.unit}"

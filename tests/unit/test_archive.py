@@ -21,8 +21,7 @@ from spinepipe.cli import main
 from spinepipe.cli.archive import _inputs, _packages
 from spinepipe.jobs.digest import versions
 from spinepipe.jobs.expected import Expected
-from spinepipe.jobs.project import RUNNING
-from spinepipe.jobs.run_lock import lock
+from spinepipe.jobs.project import RUNNING, lock
 from spinepipe.marks import KEY, with_mark, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, write_model
 from spinepipe.muscles.myo_sim import PACKAGE, VERSION

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from types import SimpleNamespace
@@ -32,17 +33,25 @@ from tests.generators import ais_films
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
     """Exit code, standard output and standard error of a command."""
-    code = main([str(argument) for argument in arguments])
-    told = capsys.readouterr()
-    assert "Traceback" not in told.err
-    return code, told.out, told.err
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        code = main([str(argument) for argument in arguments])
+        told = capsys.readouterr()
+        assert "Traceback" not in told.err
+        return code, told.out, told.err
+
+    return run
 
 
-def test_check_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_all(tmp_path: Path, run: Run) -> None:
     project(tmp_path, Size())
-    code, out, _ = run(capsys, "--root", tmp_path, "check")
+    code, out, _ = run("--root", tmp_path, "check")
     assert code == 0
     assert out.splitlines() == [
         "ok    config/config.yaml: a plain run builds probe",
@@ -59,9 +68,7 @@ PURE_MOMENTS = (
 
 
 @pytest.mark.parametrize("free", ["", "[anterior, superior, extension]"])
-def test_check_tells_how_much_the_data_tell(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], free: str
-) -> None:
+def test_check_tells_how_much_the_data_tell(tmp_path: Path, run: Run, free: str) -> None:
     """Moments, and rotations alone were read: translations asked for are warned of."""
     file = good("t12s1_phantom", tmp_path / "config/cohorts") / "motion.csv"
     motion = pd.read_csv(file)
@@ -70,7 +77,7 @@ def test_check_tells_how_much_the_data_tell(
     (tmp_path / "config/studies").mkdir()
     asked = f"calibration: {{free: {free}}}\n" if free else ""
     (tmp_path / "config/studies/pose.yaml").write_text(PURE_MOMENTS + asked)
-    code, out, _ = run(capsys, "--root", tmp_path, "check", "pose")
+    code, out, _ = run("--root", tmp_path, "check", "pose")
     assert code == 0
     if not free:
         told = "the data tell 3 of 3 free stiffnesses (extension, right_bending, left_rotation)"
@@ -83,12 +90,12 @@ def test_check_tells_how_much_the_data_tell(
         assert line.endswith("leave some out: anterior, superior would keep their start")
 
 
-def test_check_tells_each_problem_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_tells_each_problem_once(tmp_path: Path, run: Run) -> None:
     project(tmp_path, Size())
     write(tmp_path / "config/cohorts/small", swap("bodies.csv", "a,L3,0.06", "a,L3,-1"))
     path = tmp_path / "config/studies/probe.yaml"
     path.write_text(path.read_text().replace("straight", "small") + "sed: 4\n")
-    code, out, _ = run(capsys, "check", "--root", tmp_path)
+    code, out, _ = run("check", "--root", tmp_path)
     assert code == 1
     assert out.count("bodies.csv, line 2, mass_kg") == 1
     assert "probe.yaml, line 10, sed" in out
@@ -97,19 +104,17 @@ def test_check_tells_each_problem_once(tmp_path: Path, capsys: pytest.CaptureFix
     assert "2 problems in all" in out
 
 
-def test_check_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_by_name(tmp_path: Path, run: Run) -> None:
     project(tmp_path, Size())
-    code, out, _ = run(capsys, "--root", tmp_path, "check", "straight", "probe")
+    code, out, _ = run("--root", tmp_path, "check", "straight", "probe")
     assert (code, len(out.splitlines())) == (0, 2)
-    code, _, err = run(capsys, "--root", tmp_path, "check", "prob")
+    code, _, err = run("--root", tmp_path, "check", "prob")
     assert code == 1
     assert "unknown study 'prob'" in err
     assert "did you mean 'probe'?" in err
 
 
-def test_check_of_results_removes_damaged_ones_and_nothing_else(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_of_results_removes_damaged_ones_and_nothing_else(tmp_path: Path, run: Run) -> None:
     root = grid_cases.project(tmp_path)
     results = root / f"results/{grid_cases.STUDY}"
     own, other = results / "notes.csv", root / "results/validation/table.csv"
@@ -117,26 +122,26 @@ def test_check_of_results_removes_damaged_ones_and_nothing_else(
     for path in (own, other, damaged):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("a,b\n")
-    code, _, error = run(capsys, "--root", root, "check", "--results", "..")
+    code, _, error = run("--root", root, "check", "--results", "..")
     assert code != 0
     assert "unknown study '..'" in error
     assert damaged.exists()
-    code, out, _ = run(capsys, "--root", root, "check", "--results")
+    code, out, _ = run("--root", root, "check", "--results")
     assert code == 1
     assert f"FAIL  results/{grid_cases.STUDY}/stiffness_sets.parquet: damaged" in out
     assert (own.exists(), other.exists(), damaged.exists()) == (True, True, False)
 
 
-def test_check_in_the_wrong_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, _, err = run(capsys, "--root", tmp_path, "check")
+def test_check_in_the_wrong_folder(tmp_path: Path, run: Run) -> None:
+    code, _, err = run("--root", tmp_path, "check")
     assert code == 1
     assert "pass --root" in err
 
 
 @pytest.mark.parametrize("name", ["probe", "straight", "./config/cohorts/straight"])
-def test_show(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_show(tmp_path: Path, run: Run, name: str) -> None:
     project(tmp_path, Size())
-    code, out, _ = run(capsys, "--root", tmp_path, "show", name, "b")
+    code, out, _ = run("--root", tmp_path, "show", name, "b")
     assert code == 0
     assert "specimen   b (2 of 2)" in out
     assert "  V2V3   " in out
@@ -144,23 +149,21 @@ def test_show(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> 
     assert (tmp_path / "results" / "show" / f"{Path(name).name}-b.png").stat().st_size > 10_000
 
 
-def test_show_without_landmarks_bodies_motion(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_show_without_landmarks_bodies_motion(tmp_path: Path, run: Run) -> None:
     frame = "specimen,joint,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
     rows = "".join(f"{s},{j}\n" for s in "ab" for j in ("L3L4,0,5,0,-3,0,0", "L2L3,0,41,0,4,0,0"))
     changes = [text("joints.csv", frame + rows), swap("cohort.yaml", "true", "false")]
     changes += [without(f"{name}.csv") for name in ("landmarks", "bodies", "loads", "motion")]
     write(tmp_path / "config/cohorts/small", *changes)
     picture = tmp_path / "a.svg"
-    code, out, _ = run(capsys, "--root", tmp_path, "show", "small", "-o", picture)
+    code, out, _ = run("--root", tmp_path, "show", "small", "-o", picture)
     assert code == 0
     assert "bodies: none" in out
     assert "measured motion: none" in out
     assert picture.read_text().startswith("<?xml")
 
 
-def test_show_moments_of_several_tests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_moments_of_several_tests(tmp_path: Path, run: Run) -> None:
     header = "specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm"
     tests = {"flexion": "0,0,-7.5", "right_bending": "7.5,0,0", "left_rotation": "0,7.5,0"}
     rows = [
@@ -170,7 +173,7 @@ def test_show_moments_of_several_tests(tmp_path: Path, capsys: pytest.CaptureFix
     ]
     loads = text("loads.csv", "\n".join([header, *rows]) + "\n")
     write(tmp_path / "config/cohorts/small", loads, without("motion.csv"))
-    code, out, _ = run(capsys, "--root", tmp_path, "show", "small")
+    code, out, _ = run("--root", tmp_path, "show", "small")
     assert code == 0
     assert "left_rotation" in out
     assert (tmp_path / "results" / "show" / "small.png").exists()
@@ -185,10 +188,10 @@ def test_show_moments_of_several_tests(tmp_path: Path, capsys: pytest.CaptureFix
     ],
 )
 def test_show_of_what_is_not_there(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], says: str
+    tmp_path: Path, run: Run, arguments: list[str], says: str
 ) -> None:
     project(tmp_path, Size())
-    code, _, err = run(capsys, "--root", tmp_path, "show", *arguments)
+    code, _, err = run("--root", tmp_path, "show", *arguments)
     assert code == 1
     assert says in err
 
@@ -201,30 +204,28 @@ def bushing(file: Path, joint: str) -> list[float]:
     return [float(word) for word in found.findtext("rotational_stiffness").split()]
 
 
-def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_export(tmp_path: Path, run: Run) -> None:
     """1 N m turns each joint by 1.5 degrees: fitted it has about 38.2 N m/rad."""
     results(project(tmp_path, Size()), Size())
     file = tmp_path / "out" / "a.osim"
-    code, out, _ = run(capsys, "--root", tmp_path, "export", STUDY, "a", "-o", file)
+    code, out, _ = run("--root", tmp_path, "export", STUDY, "a", "-o", file)
     assert code == 0
     assert "joint pose nominal, stiffness: fitted in this pose" in out
     fitted = bushing(file, "V2V3")
-    code, out, _ = run(capsys, "--root", tmp_path, "export", STUDY, "a", "--start", "-o", file)
+    code, out, _ = run("--root", tmp_path, "export", STUDY, "a", "--start", "-o", file)
     assert code == 0
     assert "joint pose nominal, stiffness: start of the study" in out
     assert bushing(file, "V2V3")[0] == 37.0 != fitted[0]
     assert fitted[0] == pytest.approx(1.0 / np.deg2rad(1.5), rel=0.1)  # 20 N turn it a little too
     nominal = file.read_text()
-    code, out, _ = run(capsys, "--root", tmp_path, "export", STUDY, "a", "--pose", 3, "-o", file)
+    code, out, _ = run("--root", tmp_path, "export", STUDY, "a", "--pose", 3, "-o", file)
     assert code == 0
     assert "joint pose 0003, stiffness: calibrated for this pose" in out
     assert file.read_text() != nominal
 
 
 @pytest.mark.parametrize("kind", ["range_of_motion", "global_sensitivity"])
-def test_export_of_studies_that_fit_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
-) -> None:
+def test_export_of_studies_that_fit_nothing(tmp_path: Path, run: Run, kind: str) -> None:
     more = (
         "factors:\n  - {of: load_size, times: {sd: 0.02}}\n"
         "  - {of: joint_axes, axis: extension, offset_deg: {sd: 2}}\n"
@@ -235,20 +236,20 @@ def test_export_of_studies_that_fit_nothing(
     body = f"study: given\nkind: {kind}\ncohort: chains\nstiffness: {{extension_nm_per_rad: 44}}\n"
     (tmp_path / "config/studies/given.yaml").write_text(body + more)
     file = tmp_path / "a.osim"
-    code, out, err = run(capsys, "--root", tmp_path, "export", "given", "a", "-o", file)
+    code, out, err = run("--root", tmp_path, "export", "given", "a", "-o", file)
     assert (code, err) == (0, "")
     assert "the study's own, nothing is fitted" in out
     assert bushing(file, "L4L5")[0] == 44.0
-    code, _, err = run(capsys, "--root", tmp_path, "export", "given", "a", "--pose", 1, "-o", file)
+    code, _, err = run("--root", tmp_path, "export", "given", "a", "--pose", 1, "-o", file)
     assert code == 1
     assert "exports no sampled joints" in err
 
 
-def test_export_of_a_cohort_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_export_of_a_cohort_study(tmp_path: Path, run: Run) -> None:
     """Each joint is as stiff as it was made; without results it is told what makes them."""
     chains = Chains({"a": A}).write(tmp_path)
     file, asked = tmp_path / "a.osim", ["--root", tmp_path, "export", "probe", "a", "-o"]
-    code, _, err = run(capsys, *asked, file)
+    code, _, err = run(*asked, file)
     assert code == 1
     assert "run `snakemake -j2 results/probe/ranking.parquet` first, or add --start" in err
     rows = chains.fit("a", "per_joint")["stiffness"]
@@ -257,21 +258,21 @@ def test_export_of_a_cohort_study(tmp_path: Path, capsys: pytest.CaptureFixture[
     rows.to_parquet(tmp_path / "results/probe/stiffness.parquet")
     ranked = {"criterion": "left_out_case", "representation": ["per_specimen", "per_joint"]}
     pd.DataFrame({**ranked, "rank": [2, 1]}).to_parquet(tmp_path / "results/probe/ranking.parquet")
-    code, out, _ = run(capsys, *asked, file)
+    code, out, _ = run(*asked, file)
     assert code == 0
     assert "fitted, each joint its own (first by left-out-case error)" in out
     for joint, (extension, bending, rotation) in zip(JOINTS, A, strict=True):
         told = bushing(file, joint)
         assert told == pytest.approx([extension, bending, rotation], rel=1e-3)
-    code, _, err = run(capsys, *asked, file, "--representation", "per_specimen")
+    code, _, err = run(*asked, file, "--representation", "per_specimen")
     assert code == 1
     assert "no fit of a by per_specimen" in err
-    code, _, _ = run(capsys, *asked, file, "--start")
+    code, _, _ = run(*asked, file, "--start")
     assert (code, bushing(file, "L4L5")[0]) == (0, 51.0)
 
 
 def test_export_of_a_law_that_stiffens_says_what_is_not_in_the_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, run: Run
 ) -> None:
     name = "per_joint_stiffening"
     study = f"representations: [per_joint, {name}]\n"
@@ -282,13 +283,13 @@ def test_export_of_a_law_that_stiffens_says_what_is_not_in_the_file(
     rows.to_parquet(tmp_path / "results/probe/stiffness.parquet")
     file = tmp_path / "a.osim"
     command = ["--root", tmp_path, "export", "probe", "a", "--representation", name, "-o", file]
-    code, out, _ = run(capsys, *command)
+    code, out, _ = run(*command)
     assert code == 0
     assert "at rest: that it grows with motion is not in the file" in out
     assert bushing(file, JOINTS[0])[0] == pytest.approx(A[0][0], rel=0.02)
 
 
-def test_export_of_a_model_with_effects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_export_of_a_model_with_effects(tmp_path: Path, run: Run) -> None:
     """Bushings are written, and what OpenSim cannot say is named, outside and inside the file."""
     Chains({"a": A}).write(tmp_path)
     study = "study: lack\nkind: discrepancy\ncohort: chains\nbase: {stiffness: per_joint}\n"
@@ -301,22 +302,20 @@ def test_export_of_a_model_with_effects(tmp_path: Path, capsys: pytest.CaptureFi
         "  - {effect: neutral_zone}\n"
     )
     file = tmp_path / "a.osim"
-    code, out, _ = run(capsys, "--root", tmp_path, "export", "lack", "a", "-o", file)
+    code, out, _ = run("--root", tmp_path, "export", "lack", "a", "-o", file)
     assert code == 0
     assert "not in the file, as OpenSim has no counterpart: neutral_zone" in out
     assert "In the model and not in this file: neutral_zone." in file.read_text()
     assert bushing(file, "L4L5")[0] == 33.0
 
 
-def test_export_says_why_a_kind_has_none(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_export_says_why_a_kind_has_none(tmp_path: Path, run: Run) -> None:
     kinds = every_kind()
     assert {name for name, kind in kinds.items() if not kind.exports} == {
         name for name, kind in kinds.items() if kind.why_no_export
     }
     arguments = ("--root", ROOT, "export", "ais18_scoliosis", "p01", "-o", tmp_path / "a.osim")
-    code, _, err = run(capsys, *arguments)
+    code, _, err = run(*arguments)
     assert code == 1
     assert "films show rotations in one plane" in err
 
@@ -333,7 +332,7 @@ def test_export_says_why_a_kind_has_none(
 )
 def test_export_of_what_is_not_there(
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    run: Run,
     computed: bool,
     arguments: list[str],
     says: str,
@@ -341,7 +340,7 @@ def test_export_of_what_is_not_there(
     project(tmp_path, Size())
     if computed:
         results(tmp_path, Size())
-    code, _, err = run(capsys, "--root", tmp_path, "export", *arguments)
+    code, _, err = run("--root", tmp_path, "export", *arguments)
     assert code == 1
     assert says in err
 
@@ -360,11 +359,11 @@ def healthy(root: Path) -> Path:
 
 
 def test_doctor_on_a_sound_folder(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(doctor, "check_engine", lambda root: "not asked")
     monkeypatch.setattr(doctor, "check_libraries", lambda root: "not asked")
-    code, out, _ = run(capsys, "--root", healthy(tmp_path), "doctor")
+    code, out, _ = run("--root", healthy(tmp_path), "doctor")
     assert code == 0
     assert [line.split()[:2] for line in out.splitlines()] == [
         ["ok", name]
@@ -422,7 +421,7 @@ NOBODYS = "/proc/self/cache"
 
 
 def test_a_home_that_cannot_be_written_gives_way_to_the_project(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`make` and `spinepipe` keep caches there, and the doctor says how Snakemake alone would."""
     monkeypatch.setenv("XDG_CACHE_HOME", NOBODYS)
@@ -430,7 +429,7 @@ def test_a_home_that_cannot_be_written_gives_way_to_the_project(
     own = tmp_path / ".snakemake/cache"
     with pytest.raises(doctor.Trouble, match=rf"^{NOBODYS} cannot.*`export XDG_CACHE_HOME={own}`"):
         doctor.check_cache(tmp_path)
-    run(capsys, "--root", tmp_path, "check")
+    run("--root", tmp_path, "check")
     assert os.environ["MPLCONFIGDIR"] == f"{own}/matplotlib"
     shutil.copy(ROOT / "Makefile", tmp_path)
     asked = ["make", "-s", "--eval=told:\n\t@echo $$XDG_CACHE_HOME $$MPLCONFIGDIR", "told"]
@@ -458,25 +457,25 @@ def test_doctor_finds_an_unsound_engine(
 
 
 def test_doctor_ends_with_1_when_something_fails(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(doctor, "check_engine", lambda root: "not asked")
-    code, out, _ = run(capsys, "--root", tmp_path, "doctor")
+    code, out, _ = run("--root", tmp_path, "doctor")
     assert code == 1
     assert "FAIL  profile" in out
     assert "ok    cores" in out
 
 
-def test_docs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_docs(tmp_path: Path, run: Run) -> None:
     page = tmp_path / "docs" / "page.md"
     page.parent.mkdir()
     page.write_text("<!-- generated: effects -->\n<!-- end of generated -->\n")
-    assert run(capsys, "--root", tmp_path, "docs", "--check")[0] == 1
-    code, out, _ = run(capsys, "--root", tmp_path, "docs")
+    assert run("--root", tmp_path, "docs", "--check")[0] == 1
+    code, out, _ = run("--root", tmp_path, "docs")
     assert (code, out.splitlines()[0]) == (0, "wrote docs/page.md")
     assert "### poses.parquet" in (tmp_path / "docs" / "tables.md").read_text("utf-8")
     assert "linear_bushing" in page.read_text()
-    assert run(capsys, "--root", tmp_path, "docs", "--check")[0] == 0
+    assert run("--root", tmp_path, "docs", "--check")[0] == 0
 
 
 def test_a_locale_of_ascii_alone_is_left_behind(tmp_path: Path) -> None:
@@ -504,11 +503,9 @@ def test_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert "invalid choice: 'chek'" in told.err
 
 
-def test_a_broken_library_is_one_message(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_broken_library_is_one_message(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "spinepipe.cli.check", None)
-    code, _, err = run(capsys, "check")
+    code, _, err = run("check")
     assert code == 1
     assert "`spinepipe doctor` says what is missing" in err
 
@@ -522,16 +519,14 @@ def test_what_is_shipped_is_sound_to_the_program(named: list[str]) -> None:
     assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
-def test_a_cohort_of_films_is_sound_and_shown_in_words(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_cohort_of_films_is_sound_and_shown_in_words(tmp_path: Path, run: Run) -> None:
     folder = tmp_path / "config" / "cohorts" / "ais"
     ais_films.write(folder, ais_films.READINGS["ais18_phantom"], count=2)
-    code, out, _ = run(capsys, "--root", tmp_path, "check", "ais")
+    code, out, _ = run("--root", tmp_path, "check", "ais")
     assert code == 0
     assert "2 specimens, 14 joints, 0 tests, 0 rows of motion, 150 rows of films" in out
     picture = tmp_path / "a.png"
-    code, out, _ = run(capsys, "--root", tmp_path, "show", "ais", "p02", "-o", picture)
+    code, out, _ = run("--root", tmp_path, "show", "ais", "p02", "-o", picture)
     assert code == 0
     assert "joint frames in ground, neutral pose: none" in out
     assert "  traction" in out
@@ -539,15 +534,13 @@ def test_a_cohort_of_films_is_sound_and_shown_in_words(
     assert not picture.exists()
 
 
-def test_check_warns_of_units_and_ends_well(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_warns_of_units_and_ends_well(tmp_path: Path, run: Run) -> None:
     """Motion in radians: one line for each test and column, told once though a study reads it."""
     chains = Chains({"a": A, "b": 1.1 * A}, ["flexion"])
     chains.motion["extension_deg"] = np.deg2rad(chains.motion["extension_deg"])
     chains.motion[["right_bending_deg", "left_rotation_deg"]] = np.nan  # nobody measured them
     chains.write(tmp_path)
-    code, out, _ = run(capsys, "--root", tmp_path, "check")
+    code, out, _ = run("--root", tmp_path, "check")
     assert code == 0
     (warning,) = [line for line in out.splitlines() if line.startswith("warn")]
     assert warning.startswith("warn  chains/motion.csv, line 5, extension_deg: found extension_deg")

@@ -21,8 +21,8 @@ def forget() -> None:
     """As a new process knows nothing."""
     for known in (code._known, code._file, code._used, code.closure, code.code_digest):
         known.cache_clear()
-    code._layouts.cache_clear()
-    code.effect_modules.cache_clear()
+    for known in (code._layouts, code.effect_modules, code._data_digest, code._rows):
+        known.cache_clear()
 
 
 @pytest.fixture
@@ -97,6 +97,14 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: Path) -> Path
     return tmp_path / "spinepipe"
 
 
+def digest(path: Path | None = None, text: str = "") -> str:
+    """Of `spinepipe.own`, as a new process tells it once a file has this text."""
+    if path is not None:
+        path.write_text(text, "utf-8")
+    forget()
+    return code.code_digest("spinepipe.own")
+
+
 @pytest.mark.parametrize(
     ("name", "counts"),
     [
@@ -108,17 +116,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: Path) -> Path
 )
 def test_data_beside_imported_modules_counts(package: Path, name: str, counts: bool) -> None:
     """Whether it is there and what it holds: published values decide results as code does."""
-
-    def digest() -> str:
-        forget()
-        code._data_digest.cache_clear()
-        return code.code_digest("spinepipe.own")
-
-    without = digest()
-    (package / name).write_text("1\n", "utf-8")
-    one = digest()
-    (package / name).write_text("2\n", "utf-8")
-    assert (one != without, digest() != one) == (counts, counts)
+    without, one = digest(), digest(package / name, "1\n")
+    assert (one != without, digest(package / name, "2\n") != one) == (counts, counts)
     (package / name).rename((package / name).with_stem("renamed"))
     assert (digest() != one) is counts
 
@@ -178,14 +177,9 @@ def test_of_tables_the_imported_ones_count_without_words(
         "utf-8",
     )
     (package / "own.py").write_text("from spinepipe.used.it import ONE\n", "utf-8")
-
-    def digest(text: str) -> str:
-        (package / "used/tables.csv").write_text(text, "utf-8")
-        forget()
-        return code.code_digest("spinepipe.own")
-
     assert was in ROWS
-    assert (digest(ROWS) != digest(ROWS.replace(was, becomes))) is counts
+    file = package / "used/tables.csv"
+    assert (digest(file, ROWS) != digest(file, ROWS.replace(was, becomes))) is counts
 
 
 @pytest.mark.parametrize(
@@ -202,16 +196,9 @@ def test_effects_count_where_they_are_named_or_all_are_asked_for(
     (package / "effects").mkdir()
     (package / "effects/__init__.py").write_text("def create(name): ...\n", "utf-8")
     (package / "own.py").write_text(own, "utf-8")
-
-    def digest() -> str:
-        forget()
-        return code.code_digest("spinepipe.own")
-
-    without = digest()
-    (package / "effects/creep.py").write_text("rate = 1\n", "utf-8")
-    one = digest()
-    (package / "effects/creep.py").write_text("rate = 22\n", "utf-8")
-    assert (one != without, digest() != one) == (counts, counts)
+    effect = package / "effects/creep.py"
+    without, one = digest(), digest(effect, "rate = 1\n")
+    assert (one != without, digest(effect, "rate = 22\n") != one) == (counts, counts)
 
 
 FACTS = """fact,of,values,unit,status,source,doi,place,note
@@ -235,19 +222,12 @@ usual_rate,,3,1/s,choice,own estimate,,,
     ],
 )
 def test_of_facts_the_named_ones_count_without_their_sources(
-    package: Path, monkeypatch: pytest.MonkeyPatch, was: str, becomes: str, counts: bool
+    package: Path, was: str, becomes: str, counts: bool
 ) -> None:
-    monkeypatch.setattr(code, "_rows", cache(code._rows.__wrapped__))
     (package / "used/it.py").write_text("x = numbers(__name__, 'usual_size')\n", "utf-8")
-
-    def digest(text: str) -> str:
-        (package / "used/facts.csv").write_text(text, "utf-8")
-        forget()
-        code._rows.cache_clear()
-        return code.code_digest("spinepipe.own")
-
     assert was in FACTS
-    assert (digest(FACTS) != digest(FACTS.replace(was, becomes))) is counts
+    file = package / "used/facts.csv"
+    assert (digest(file, FACTS) != digest(file, FACTS.replace(was, becomes))) is counts
 
 
 FORM = """# Who takes part.
@@ -286,11 +266,6 @@ persons:
 def test_of_forms_columns_and_rules_count_without_words(
     package: Path, was: str, becomes: str, counts: bool
 ) -> None:
-    def digest(text: str) -> str:
-        (package / "used/forms.yaml").write_text(text, "utf-8")
-        forget()
-        code._data_digest.cache_clear()
-        return code.code_digest("spinepipe.own")
-
     assert was in FORM
-    assert (digest(FORM) != digest(FORM.replace(was, becomes))) is counts
+    file = package / "used/forms.yaml"
+    assert (digest(file, FORM) != digest(file, FORM.replace(was, becomes))) is counts

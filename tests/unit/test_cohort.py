@@ -1,19 +1,27 @@
 """Valid cohorts of every allowed form are read as they stand.
 
-Catches a valid cohort that is refused, or read as another one.
+Catches a valid cohort that is refused, or read as another one, and tables of an old cohort that a
+worker goes on using.
 """
 
+import gc
+import weakref
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cohort_cases import NAME, Change, add, cell, joints, line, motion, swap, text, without, write
+from straight_chains import TESTS, write_cohort
 
 from spinepipe import cohort
+from spinepipe.cohort import Cohort
+from spinepipe.cohort.cohort import memoize_per_cohort
 from spinepipe.cohort.columns import TABLES
-from spinepipe.cohort.specimen import load_cases
+from spinepipe.cohort.specimen import bodies, load_cases
 from spinepipe.documents.form import InputColumn, TableForm
+from spinepipe.studies.cohort_stiffness.problem import specimen_tests
+from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
 LOADS_BY_CYCLE = """\
 specimen,test,cycle,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm
@@ -188,3 +196,34 @@ def test_a_table_without_specimens_is_part_of_what_each_hangs_on(tmp_path: Path)
     first = digest("one", "task\nlift\n", "1")
     assert digest("two", "task\nlift\n", "2") == first
     assert digest("three", "task\nbend\n", "1") != first
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_cohort(tmp_path / "chains")
+    return tmp_path / "chains"
+
+
+def test_an_answer_is_worked_out_once_for_each_cohort_and_question(folder: Path) -> None:
+    asked: list[tuple[int, str]] = []
+
+    @memoize_per_cohort
+    def answer(given: Cohort, question: str) -> str:
+        asked.append((id(given), question))
+        return question.upper()
+
+    one, other = cohort.read(folder), cohort.read(folder)
+    for each in (one, other, one):
+        assert [answer(each, word) for word in ("a", "b", "a")] == ["A", "B", "A"]
+    assert asked == [(id(each), word) for each in (one, other) for word in ("a", "b")]
+
+
+def test_nothing_that_is_kept_holds_a_cohort(folder: Path) -> None:
+    study = CohortStiffness(study="small", kind="cohort_stiffness", cohort="chains")
+    chains = cohort.read(folder)
+    assert bodies(chains, "a") is bodies(chains, "a")
+    assert {one.case.test for one in specimen_tests(study, chains, "a").tested} == set(TESTS)
+    seen = weakref.ref(chains)
+    del chains
+    gc.collect()
+    assert seen() is None

@@ -16,7 +16,7 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe import problems
-from spinepipe.cohort import Cohort, check_supports
+from spinepipe.cohort import Cohort, checks
 from spinepipe.cohort.measured import MeasuredCycle, measured_specimen
 from spinepipe.cohort.supports import STATES, Rig, motion_read
 from spinepipe.problems import InputError, InputProblem
@@ -112,7 +112,7 @@ def test_a_rig_looked_up_is_the_rig_read_row_by_row(rows) -> None:
 def test_a_table_of_many_rows_is_gone_through_once(tmp_path, monkeypatch) -> None:
     """Else 150,000 tests times 150,000 rows of a rig hold a check up for good."""
     made = []
-    monkeypatch.setattr(check_supports, "Rig", lambda *given: made.append(given) or Rig(*given))
+    monkeypatch.setattr(checks, "Rig", lambda *given: made.append(given) or Rig(*given))
     read(tmp_path, rig("*,*,*,extension,held,"))
     assert not made
     read(tmp_path / "prescribed", rig("*,*,*,extension,prescribed,"))

@@ -12,7 +12,7 @@ from cohort_cases import Change, swap, text, write
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.zeroing import zeroed_alike
+from spinepipe.cohort.zeroing import common_zeroing
 from spinepipe.problems import InputError, InputProblem
 
 LOADS = """\
@@ -77,11 +77,11 @@ def test_each_cycle_counts_from_its_own_start() -> None:
     rows = {"specimen": "a", "test": "x", "joint": "L3L4", "step": [0, 1, 0, 1]}
     blank = dict.fromkeys(cohorts.columns.TABLES["motion"].names[5:], np.nan)
     motion = pd.DataFrame(rows | blank | {"cycle": [1, 1, 2, 2], "extension_deg": [1.0, 3, 2, 7]})
-    found, together = zeroed_alike(motion, ["another"])
+    found, together = common_zeroing(motion, ["another"])
     assert found is not None
     assert (found["extension_deg"].tolist(), together) == ([1.0, 3.0, 2.0, 7.0], False)
     other = pd.concat([motion, motion.assign(test="another")], ignore_index=True)
-    found, together = zeroed_alike(other, ["another"])
+    found, together = common_zeroing(other, ["another"])
     assert found is not None
     assert (found["extension_deg"].tolist(), together) == ([0.0, 2, 0, 5, 1, 3, 2, 7], True)
 

@@ -9,15 +9,14 @@ from pathlib import Path
 import pytest
 
 from spinepipe.problems import InputError
-from spinepipe.reference.pages import END, generators, outdated, pages, refreshed
-from spinepipe.reference.result_tables import columns_page
+from spinepipe.reference.pages import END, columns_page, generators, outdated_pages, pages, refresh
 from spinepipe.studies.registry import every_kind
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_pages_are_up_to_date() -> None:
-    assert outdated(ROOT) == [], "run `spinepipe docs`"
+    assert outdated_pages(ROOT) == [], "run `spinepipe docs`"
 
 
 def test_every_part_stands_on_some_page() -> None:
@@ -34,19 +33,19 @@ def test_links_lead_somewhere() -> None:
 
 def test_a_part_is_replaced_between_its_markers_only() -> None:
     text = f"before\n\n<!-- generated: cohort joints -->\nold\n{END}\n\nafter\n"
-    new = refreshed(text, "page.md")
+    new = refresh(text, "page.md")
     assert new.startswith("before\n\n<!-- generated: cohort joints -->\n")
     assert new.endswith(f"{END}\n\nafter\n")
     assert "old" not in new
     assert "| **`specimen`** | text |" in new
-    assert refreshed(new, "page.md") == new
+    assert refresh(new, "page.md") == new
 
 
 def test_unknown_and_open_markers_are_told() -> None:
     with pytest.raises(InputError, match=r"page\.md.*'cohort joint'.*did you mean 'cohort joints'"):
-        refreshed(f"<!-- generated: cohort joint -->\n{END}", "page.md")
+        refresh(f"<!-- generated: cohort joint -->\n{END}", "page.md")
     with pytest.raises(InputError, match="a marker without an end"):
-        refreshed("<!-- generated: cohort joints -->\n", "page.md")
+        refresh("<!-- generated: cohort joints -->\n", "page.md")
 
 
 @pytest.mark.parametrize(

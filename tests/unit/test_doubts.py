@@ -3,8 +3,6 @@
 Catches a wrong unit or sign that goes unsaid, is told twice, or is told of good data.
 """
 
-import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,11 +13,8 @@ import study_cases
 from chain_cases import Chains
 from cohort_cases import write as write_small
 from cohort_edge_cases import A
+from mistaken_cohorts import good, told
 
-from spinepipe import cohort as cohorts
-from spinepipe.problems import InputProblem
-from spinepipe.studies.plausibility import suspicions
-from spinepipe.studies.registry import every_form
 from tests.generators.hidden import Recipe, draw_hidden, make
 from tests.generators.phantom import phantom
 from tests.generators.phantom import write as write_phantom
@@ -31,27 +26,6 @@ MOMENTS = ["mx_nm", "my_nm", "mz_nm"]
 FORCES = ["fx_n", "fy_n", "fz_n"]
 POINTS = ["px_mm", "py_mm", "pz_mm"]
 ANGLES_OF_TESTS = {"flexion": "extension_deg", "left_lateral_bending": "right_bending_deg"}
-
-
-def told(folder: Path) -> tuple[InputProblem, ...]:
-    return tuple(one.problem for one in suspicions(cohorts.read(folder, every_form())))
-
-
-@pytest.fixture(scope="module")
-def shipped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """A copy of a cohort that comes along, two specimens of the phantom."""
-    root = tmp_path_factory.mktemp("cohorts")
-
-    def copy(name: str) -> Path:
-        folder = root / str(len(list(root.iterdir()))) / name
-        shutil.copytree(next(path for path in SHIPPED if path.name == name), folder)
-        for file in folder.glob("*.csv"):
-            table = pd.read_csv(file)
-            if name == "t12s1_phantom":
-                table[table["specimen"].isin(["s01", "s02", "*"])].to_csv(file, index=False)
-        return folder
-
-    return copy
 
 
 def change(folder: Path, file: str, columns: list[str], factor: float, **where: str) -> None:
@@ -123,16 +97,16 @@ MISTAKES = [
     ],
 )
 def test_a_wrong_unit_is_told_once_for_each_column(
-    shipped: Callable[[str], Path],
     name: str,
     file: str,
     columns: list[str],
     factor: float,
     words: str,
     column: str,
+    tmp_path: Path,
 ) -> None:
     """Factors are those of the units: pi / 180 rad, 0.112985 N m in a lbf in, 1000 mm."""
-    folder = shipped(name)
+    folder = good(name, tmp_path)
     for table, scaled in (("loads.csv", MOMENTS), ("motion.csv", ANGLES)):
         change(folder, table, scaled, 1.0 / 20.0)  # moments beyond 500 are refused as cells
     change(folder, file, columns, factor)
@@ -161,9 +135,9 @@ def test_a_wrong_unit_is_told_once_for_each_column(
     ],
 )
 def test_lengths_and_forces(
-    shipped: Callable[[str], Path], file: str, columns: list[str], factor: float, words: str
+    file: str, columns: list[str], factor: float, words: str, tmp_path: Path
 ) -> None:
-    folder = shipped("palanca_l1l4")
+    folder = good("palanca_l1l4", tmp_path)
     change(folder, file, columns, factor)
     found = told(folder)
     assert any(words in problem.remedy for problem in found)
@@ -173,8 +147,8 @@ def test_lengths_and_forces(
     }
 
 
-def test_one_test_of_one_specimen(shipped: Callable[[str], Path]) -> None:
-    folder = shipped("t12s1_phantom")
+def test_one_test_of_one_specimen(tmp_path: Path) -> None:
+    folder = good("t12s1_phantom", tmp_path)
     change(folder, "motion.csv", ANGLES, np.pi / 180.0, specimen="s02", test="flexion")
     (problem,) = told(folder)
     assert problem.column == "extension_deg"
@@ -184,8 +158,8 @@ def test_one_test_of_one_specimen(shipped: Callable[[str], Path]) -> None:
     assert row.startswith("s02,flexion")
 
 
-def test_a_fused_joint_is_no_unit(shipped: Callable[[str], Path]) -> None:
-    folder = shipped("t12s1_phantom")
+def test_a_fused_joint_is_no_unit(tmp_path: Path) -> None:
+    folder = good("t12s1_phantom", tmp_path)
     change(folder, "motion.csv", ANGLES, 0.05, joint="L3L4")
     assert told(folder) == ()
 
@@ -193,22 +167,22 @@ def test_a_fused_joint_is_no_unit(shipped: Callable[[str], Path]) -> None:
 @pytest.mark.parametrize(
     "test", ["flexion", pytest.param("left_lateral_bending", marks=pytest.mark.full)]
 )
-def test_signs_of_a_joint_and_of_a_test(shipped: Callable[[str], Path], test: str) -> None:
-    folder = shipped("t12s1_phantom")
+def test_signs_of_a_joint_and_of_a_test(test: str, tmp_path: Path) -> None:
+    folder = good("t12s1_phantom", tmp_path)
     column = ANGLES_OF_TESTS[test]
     change(folder, "motion.csv", [column], -1.0, specimen="s01", test=test, joint="L2L3")
     (problem,) = told(folder)
     assert problem.found == f"{column} of L2L3 against the load (s01, test {test})"
     assert problem.remedy.startswith(f"suspected: the sign of {column}")
-    whole = shipped("t12s1_phantom")
+    whole = good("t12s1_phantom", tmp_path / "whole")
     change(whole, "loads.csv", MOMENTS, -1.0, test=test)
     (problem,) = told(whole)
     assert problem.found == f"{column} of all joints against the load (all specimens, test {test})"
     assert "in t12s1_phantom/loads.csv" in problem.remedy
 
 
-def test_a_joint_that_only_trembles_tells_no_sign(shipped: Callable[[str], Path]) -> None:
+def test_a_joint_that_only_trembles_tells_no_sign(tmp_path: Path) -> None:
     """Ten times less than the SD of a reading, and against the load."""
-    folder = shipped("t12s1_phantom")
+    folder = good("t12s1_phantom", tmp_path)
     change(folder, "motion.csv", ANGLES, -1e-3, joint="L2L3")
     assert told(folder) == ()

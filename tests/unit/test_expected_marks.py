@@ -17,9 +17,8 @@ from mistaken_cohorts import good
 from spinepipe.jobs import collect, inputs
 from spinepipe.jobs.block import run_joined
 from spinepipe.jobs.collect import StaleFile
-from spinepipe.jobs.digest import digest_of
+from spinepipe.jobs.digest import base_marks, digest_of
 from spinepipe.jobs.expected import Expected, place_of
-from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import DamagedFile, read_mark
 from spinepipe.model.file import EffectEntry, ModelFile, write_model
 from spinepipe.studies.range_of_motion import draw, simulate

@@ -25,7 +25,7 @@ from spinepipe.cohort.specimen import joint_frames, on_bushings
 from spinepipe.problems import InputError
 from spinepipe.statics import free_parameters
 from spinepipe.testing_machine import folder as folders
-from spinepipe.testing_machine.cycles import cut
+from spinepipe.testing_machine.cycles import segment
 from tests.generators.testing_machine import Rig, german, record
 from tests.generators.testing_machine import main as write_example
 
@@ -62,7 +62,7 @@ def written(folder: Path, text: str | None = None, **changes: object) -> Path:
     return path
 
 
-def motion_and_loads(imported: folders.Imported) -> tuple[np.ndarray, np.ndarray]:
+def motion_and_loads(imported: folders.ImportedCohort) -> tuple[np.ndarray, np.ndarray]:
     """(C, T) extension, deg, and moment about z, N m."""
     (test,) = imported.tests
     return (
@@ -215,7 +215,7 @@ def test_a_load_that_only_rises_is_half_a_cycle(tmp_path: Path) -> None:
 def test_what_is_cut_off_or_falls_short_is_left_out_and_told() -> None:
     steps = np.linspace(0.0, 1.0, 50)
     one = np.concatenate([steps, steps[::-1]])
-    found = cut(np.concatenate([one, 0.5 * one, one, one, steps]), 0.2, 1)
+    found = segment(np.concatenate([one, 0.5 * one, one, one, steps]), 0.2, 1)
     assert [number for number, _ in found.kept] == [3, 4]
     reasons = dict(found.left_out)
     assert reasons[1] == "preconditioning"

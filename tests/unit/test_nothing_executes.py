@@ -56,6 +56,7 @@ PROGRAMS = {
 """Files that start a program, and why."""
 
 BY_NAME = {
+    "__init__.py": "what notebooks use, by names written there",
     "effects/__init__.py": "every file of its own folder",
     "comparison/papers.py": "the engine in the folder beside the package",
     "studies/plausibility.py": "the doubts of a kind",

@@ -29,7 +29,7 @@ from sweeps import sweep
 from spinepipe import cohort as cohorts
 from spinepipe.cli.program import main
 from spinepipe.frames import rotation_zxy
-from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
+from spinepipe.plausibility.warnings.levels import NeutralPose
 from spinepipe.plausibility.warnings.postures import _stray_deg
 from spinepipe.problems import InputError
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from spinepipe.files import HOST
-from spinepipe.jobs.run_lock import AtWork, lock
+from spinepipe.jobs.project import AtWork, lock
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from spinepipe.jobs.run_lock import lock
+from spinepipe.jobs.project import lock
 
 held = lock(Path(sys.argv[1]))
 print("held", flush=True)

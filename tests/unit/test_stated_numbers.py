@@ -16,7 +16,7 @@ import yaml
 
 from papers.engine import rows_of
 from spinepipe.anatomy import published
-from spinepipe.reference.pictures import FOLDER, PICTURES, renewed
+from spinepipe.cli.docs import FOLDER, PICTURES, copy_pictures
 from spinepipe.studies.discrepancy.verdict import share_of_gap
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -109,7 +109,7 @@ def test_pictures_are_copied_from_results(tmp_path: Path) -> None:
     name, source = next(iter(PICTURES.items()))
     (tmp_path / source).parent.mkdir(parents=True)
     (tmp_path / source).write_bytes(b"drawn")
-    assert renewed(tmp_path) == {other: other == name for other in PICTURES}
+    assert copy_pictures(tmp_path) == {other: other == name for other in PICTURES}
     assert (tmp_path / FOLDER / name).read_bytes() == b"drawn"
 
 

@@ -197,12 +197,6 @@ def test_defaults(tmp_path: Path) -> None:
     assert study.load_point_shift_mm.in_order() == (0.0, 0.0, 0.0)
 
 
-def test_check_returns_study_and_cohort(tmp_path: Path) -> None:
-    study, cohort = studies.check(project(tmp_path), "probe")
-    assert study.study == "probe"
-    assert cohort.name == "small"
-
-
 def test_absent_study_is_named_with_those_that_exist(tmp_path: Path) -> None:
     root = project(tmp_path)
     with pytest.raises(InputError, match="did you mean 'probe'"):
@@ -229,12 +223,6 @@ def test_every_field_of_a_study_is_described() -> None:
     assert undescribed(schema) == []
     for part in schema["$defs"].values():
         assert undescribed(part) == []
-
-
-def test_selection(tmp_path: Path) -> None:
-    root = project(tmp_path)
-    assert studies.read_selection(root).studies == ("probe",)
-    assert studies.read_selection(root).full == ()
 
 
 @sweep(

@@ -15,7 +15,7 @@ from small_project import Project, written
 from toy import SPECIMENS
 
 from spinepipe.files import HOST
-from spinepipe.jobs.run_lock import lock
+from spinepipe.jobs.project import lock
 
 pytestmark = pytest.mark.slow
 

@@ -10,8 +10,7 @@ from spinepipe.cohort.check_geometry import INERTIA
 from spinepipe.cohort.cohort import Cohort
 from spinepipe.cohort.load_response import typical
 from spinepipe.plausibility.score import BETTER, MistakeHypothesis, suspect, usual
-from spinepipe.plausibility.warnings.levels import least_kg
-from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
+from spinepipe.plausibility.warnings.levels import NeutralPose, least_kg
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, first_row, warn
 
 

@@ -44,7 +44,8 @@ def beyond_ranges(cohort: Cohort, *quantities: str) -> Warnings:
         if check["number"] == "largest":
             enough = int((sizes > 0.0).to_numpy().sum()) >= int(check["at_least"])
             size = size.nlargest(int(enough))
-        odd = size[~usual(check["quantity"]).holds_each(size)]
+        limits = usual(check["quantity"])
+        odd = size[~size.between(limits.low, limits.high)]
         if len(odd):
             yield _beyond(cohort, check, odd, sizes)
 

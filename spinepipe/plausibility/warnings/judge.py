@@ -7,10 +7,10 @@ and steps before sizes and signs.
 from collections.abc import Iterator, Sequence
 
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.loaded_cycles import LoadedCycle, loaded_cycles
+from spinepipe.cohort.load_response import LoadedCycle, loaded_cycles
 from spinepipe.plausibility.warnings import columns, lengths, postures, readings
 from spinepipe.plausibility.warnings.bodies import masses, persons_of_specimens
-from spinepipe.plausibility.warnings.neutral_pose import neutral_poses
+from spinepipe.plausibility.warnings.levels import neutral_poses
 from spinepipe.plausibility.warnings.order import order
 from spinepipe.plausibility.warnings.response import responses
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, file_of
@@ -34,7 +34,7 @@ def of_cohort(cohort: Cohort) -> tuple[PlausibilityWarning, ...]:
         *(one for one in read if not (other.warnings and one.group == "zeroing")),
         *other.warnings,
         *answers,
-        *(() if other.warnings or answers or geometry else readings.feeble(cohort)),
+        *(() if other.warnings or answers or geometry else readings.too_small(cohort)),
     )
     return tuple(dict.fromkeys(found))
 

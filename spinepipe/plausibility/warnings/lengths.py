@@ -18,8 +18,7 @@ from spinepipe.cohort.swapped_landmarks import FAR_MM, XYZ, column_mistakes
 from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.plausibility.score import BETTER, hypotheses, suspect, usual
-from spinepipe.plausibility.warnings.levels import height_mm, spacing_mm
-from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
+from spinepipe.plausibility.warnings.levels import NeutralPose, height_mm, spacing_mm
 from spinepipe.plausibility.warnings.warning import (
     PlausibilityWarning,
     TableCell,
@@ -59,7 +58,10 @@ def sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> WarningGroup:
     single: dict[str, list[PlausibilityWarning]] = {}
     for pose in poses:
         bodies = _heights(cohort, pose.specimen)
-        ratios = _spacings(pose) or bodies  # where there is one joint alone, bodies count
+        # length of each vertebra, from joint to joint, over that of its level; where there is one
+        # joint alone, bodies count
+        lengths = zip(pose.vertebrae[1:-1], pose.spacing, strict=True)
+        ratios = {v: float(mm) / level for v, mm in lengths if (level := spacing_mm(v))} or bodies
         size = _typical_size(
             [*ratios.values(), *(() if cohort.joints is not None else bodies.values())]
         )
@@ -84,12 +86,6 @@ def sizes(cohort: Cohort, poses: Sequence[NeutralPose]) -> WarningGroup:
             )
         )
     return WarningGroup.of(found, [*single, *(name for own in whole.values() for name in own)])
-
-
-def _spacings(pose: NeutralPose) -> dict[str, float]:
-    """Length of each vertebra, from joint to joint, over that of its level."""
-    found = zip(pose.vertebrae[1:-1], pose.spacing, strict=True)
-    return {name: float(mm) / level for name, mm in found if (level := spacing_mm(name))}
 
 
 def _heights(cohort: Cohort, specimen: str) -> dict[str, float]:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.load_response import LoadedCycle
 from spinepipe.cohort.load_tests import DRIVEN
-from spinepipe.cohort.loaded_cycles import LoadedCycle
 from spinepipe.effects.contract import Array
 from spinepipe.plausibility.score import AGAINST
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, first_row, warn
@@ -40,7 +40,7 @@ Cycles = Mapping[Where, Sequence[LoadedCycle]]
 
 
 @dataclass(frozen=True)
-class Explained:
+class OrderFindings:
     """Warnings, and the specimens and tests of which units and signs need not be asked."""
 
     warnings: tuple[PlausibilityWarning, ...]
@@ -57,7 +57,7 @@ class _Order:
     names: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
 
-def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
+def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> OrderFindings:
     """What another order would explain, one line for each."""
     of_place: dict[Where, list[LoadedCycle]] = defaultdict(list)
     for cycle in cycles:
@@ -71,18 +71,15 @@ def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Explained:
     rest = {place: own for place, own in of_place.items() if place not in seen}
     for key, places in (*_columns(rest), *_in_ground(rest)):
         told[key] += places
-    return Explained(
-        tuple(_warning(cohort, key, places) for key, places in told.items()),
-        frozenset(place for places in told.values() for place in places),
+    warnings = []
+    for key, places in told.items():
+        first = dict(zip(("specimen", "test"), places[0], strict=True))
+        cell = TableCell(key.stem, first_row(cohort, key.stem, **first), key.column)
+        words = {"tests": tests_of(places), **key.names}
+        warnings.append(warn(cohort, key.warning, cell, whose=dict(places), **words))
+    return OrderFindings(
+        tuple(warnings), frozenset(place for places in told.values() for place in places)
     )
-
-
-def _warning(cohort: Cohort, key: _Order, places: Sequence[Where]) -> PlausibilityWarning:
-    specimen, test = places[0]
-    place = TableCell(
-        key.stem, first_row(cohort, key.stem, specimen=specimen, test=test), key.column
-    )
-    return warn(cohort, key.warning, place, whose=dict(places), tests=tests_of(places), **key.names)
 
 
 def tests_of(places: Sequence[Sequence[Any]]) -> str:
@@ -146,6 +143,7 @@ def _unloaded_joints(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> _Order | 
     moved: dict[bool, list[float]] = {True: [], False: []}
     names = []
     for cycle in cycles:
+        # root mean square over the steps of the turn of each joint, about all three axes
         turned = np.nan_to_num(cycle.readings[:, :, 3:])
         sizes = np.sqrt(np.mean(np.sum(turned**2, axis=2), axis=0))
         loaded = (cycle.loads != 0.0).any(axis=(0, 2))
@@ -179,6 +177,7 @@ def _columns(of_place: Cycles) -> Iterator[tuple[_Order, list[Where]]]:
 
 def _answering(cycle: LoadedCycle) -> tuple[int, int] | None:
     """The rotation that the test drives, and the one that answers; None where nobody can tell."""
+    # moments about two axes at once tell nothing: the second must be a third of the first at most
     sizes = np.abs(cycle.loads[:, :, 3:]).max(axis=(0, 1))
     order = np.argsort(sizes)
     if sizes[order[2]] <= 0.0 or sizes[order[1]] > sizes[order[2]] / 3.0:
@@ -225,6 +224,7 @@ def _in_ground(of_place: Cycles) -> Iterator[tuple[_Order, list[Where]]]:
             slopes = np.array([x @ y / (x @ x) if x @ x > 0.0 else 0.0 for x, y in pairs])
             if np.any(slopes <= 0.0):
                 return
+            # Told in ground, joint n reads the sum of the n joints up to it: slopes grow as n does.
             numbers = np.array([joint + 1.0 for joint, _ in driven])
             alike = float(np.corrcoef(slopes, numbers)[0, 1])
             wide = float(slopes[-1] / slopes[0]) * numbers[0] / numbers[-1]

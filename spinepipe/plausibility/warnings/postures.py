@@ -25,8 +25,12 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import FRAME_LANDMARKS, rotation_zxy, zxy_angles
 from spinepipe.plausibility.score import BETTER, usual
 from spinepipe.plausibility.warnings.lengths import stem_of_joints
-from spinepipe.plausibility.warnings.levels import EXTENSION_DEG, extension_range_deg, is_level
-from spinepipe.plausibility.warnings.neutral_pose import NeutralPose
+from spinepipe.plausibility.warnings.levels import (
+    EXTENSION_DEG,
+    NeutralPose,
+    extension_range_deg,
+    is_level,
+)
 from spinepipe.plausibility.warnings.warning import (
     PlausibilityWarning,
     TableCell,

@@ -82,7 +82,7 @@ def readings(cohort: Cohort) -> Warnings:
         yield from () if loads is None else _unsigned(cohort, motion, loads)
 
 
-def feeble(cohort: Cohort) -> Warnings:
+def too_small(cohort: Cohort) -> Warnings:
     """Loads and motion too small whatever joint answers them, where no answer can be judged."""
     motion, loads = cohort.motion, cohort.loads
     if motion is None or loads is None:

@@ -18,11 +18,17 @@ import numpy as np
 
 from spinepipe.anatomy.stiffness_range import plausible, range_of_level
 from spinepipe.cohort.cohort import Cohort
-from spinepipe.cohort.load_response import LoadResponse, answers_of_test, typical
+from spinepipe.cohort.load_response import LoadedCycle, LoadResponse, load_responses, typical
 from spinepipe.cohort.load_tests import DRIVEN, PUSHED
-from spinepipe.cohort.loaded_cycles import LoadedCycle
-from spinepipe.plausibility.motion_size import geometric_mean, is_plausible, unit_like
-from spinepipe.plausibility.score import AGAINST, CLEAR, MistakeHypothesis, usual
+from spinepipe.plausibility.score import (
+    AGAINST,
+    CLEAR,
+    MistakeHypothesis,
+    geometric_mean,
+    is_plausible,
+    unit_like,
+    usual,
+)
 from spinepipe.plausibility.warnings.order import tests_of
 from spinepipe.plausibility.warnings.warning import (
     PlausibilityWarning,
@@ -127,7 +133,7 @@ def _responses(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Iterator[_Respo
     for cycle in cycles:
         from_start = cohort.zeroed_at_step_0 or cycle.read_steps == 1  # from the neutral pose
         of_test = (cycle.specimen, cycle.test, cycle.loads, cycle.readings, from_start)
-        for answer in answers_of_test(*of_test):
+        for answer in load_responses(*of_test):
             joint = cohort.joint_names[answer.joint]
             ratio = answer.slope * plausible(joint, answer.coordinate)
             if ratio != 0.0:

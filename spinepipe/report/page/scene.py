@@ -312,13 +312,14 @@ def _ends(named: Mapping[str, Array], up: Array, mm_per_m: float) -> tuple[Array
 
 def _drum(low: Array, high: Array, radius: float) -> Solid:
     axis = (high - low) / np.linalg.norm(high - low)
-    across = np.cross(axis, [1.0, 0.0, 0.0])
+    across = np.cross(axis, [1.0, 0.0, 0.0])  # none of a body that lies along x
     across /= np.linalg.norm(across)
     angles = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
     ring = radius * (
         np.outer(np.cos(angles), across) + np.outer(np.sin(angles), np.cross(axis, across))
     )
     points = np.vstack([low + ring, high + ring, low, high])
+    # two triangles for each facet of the side, then a fan around the centre of each face
     first = np.arange(CORNERS)
     following = (first + 1) % CORNERS
     sides = [

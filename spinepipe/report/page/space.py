@@ -82,6 +82,8 @@ def segment(
     views = views if with_loads else [replace(view, tested=()) for view in views]
     drawn = scenes(views, cohort, poses)
     groups = groups_of(drawn)
+    marks = "landmarks, " if "vertebrae" in groups else ""
+    loads = " and loads" if "loads" in groups else ""
     return Space(
         "The segment in 3-D",
         "Specimen",
@@ -89,7 +91,7 @@ def segment(
         drawn,
         groups,
         _still(views[0], cohort),
-        _still_shows(cohort, groups),
+        f"Specimen {shown[0]} from its right side and from behind, with {marks}joint frames{loads}",
         _caption(cohort, groups, len(drawn)),
     )
 
@@ -98,13 +100,6 @@ def _still(view: SpecimenView, cohort: Cohort) -> bytes:
     """A specimen as a drawing."""
     with style():
         return picture(draw_specimen(cohort, view), "svg")
-
-
-def _still_shows(cohort: Cohort, groups: Mapping[str, str]) -> str:
-    marks = "landmarks, " if "vertebrae" in groups else ""
-    loads = " and loads" if "loads" in groups else ""
-    name = cohort.specimen_names[0]
-    return f"Specimen {name} from its right side and from behind, with {marks}joint frames{loads}"
 
 
 def _caption(cohort: Cohort, groups: Mapping[str, str], drawn: int) -> str:

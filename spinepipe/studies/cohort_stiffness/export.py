@@ -13,7 +13,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     representations_of,
     tests_of,
 )
-from spinepipe.studies.exports import needed, problem, refuse, written
+from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
@@ -51,12 +51,12 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     others = base_effects(str(wanted.root), study, cohort, wanted.specimen)
     frames = joint_frames(cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)
-    return written(model, f"the cohort's own joints, stiffness: {told}")
+    return opensim_document(model, f"the cohort's own joints, stiffness: {told}")
 
 
 def _recommended(wanted: WantedFiles, known: tuple[str, ...]) -> tuple[str, str]:
     """The representation that is best on held-out motion, and why it is taken, in words."""
-    ranking = read_frame(needed(wanted.results / "ranking.parquet", "a computed study"))
+    ranking = read_frame(required_result(wanted.results / "ranking.parquet", "a computed study"))
     own = ranking[ranking["representation"].isin(known)]
     for criterion in CRITERIA:
         rows = own[own["criterion"] == criterion].dropna(subset=["rank"])
@@ -77,7 +77,7 @@ def _fitted(
     InputError
         Where there is no fit to use.
     """
-    rows = read_frame(needed(wanted.results / "stiffness.parquet", "a computed study"))
+    rows = read_frame(required_result(wanted.results / "stiffness.parquet", "a computed study"))
     tests = tests_of(study, cohort)
     own = rows[
         (rows["specimen"] == wanted.specimen)

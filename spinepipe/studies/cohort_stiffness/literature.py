@@ -12,7 +12,7 @@ from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import ScopedEffect
-from spinepipe.plausibility.motion_size import implausible, unit_of
+from spinepipe.plausibility.score import implausible, unit_of
 from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
 from spinepipe.studies.cohort_stiffness.predict import error_rows, predict_motion

@@ -14,15 +14,14 @@ import numpy as np
 
 from spinepipe.calibration import MeasuredCase, Problem
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.cohort import memoize_per_cohort
 from spinepipe.cohort.load_tests import coupled_range
 from spinepipe.cohort.measured import MeasuredCycle, MeasuredSpecimen, measured_specimen
-from spinepipe.cohort.memoize import kept_with_cohort
 from spinepipe.cohort.specimen import on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.files import Stamp, stamp
 from spinepipe.frames import Pose
-from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.model_mark import base_marks
+from spinepipe.jobs.digest import base_marks, provenance
 from spinepipe.model import ScopedEffect, SpineModel
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.studies.base_model import beside_bushings, own_values
@@ -71,7 +70,7 @@ def specimen_tests(study: CohortStiffness, cohort: Cohort, specimen: str) -> Spe
     return _specimen_tests(cohort, specimen, tests_of(study, cohort), study.cycles)
 
 
-@kept_with_cohort
+@memoize_per_cohort
 def _specimen_tests(
     cohort: Cohort, specimen: str, tests: tuple[str, ...], cycles: str
 ) -> SpecimenTests:

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import BaseModel, Field
 
 from spinepipe.anatomy import published
+from spinepipe.anatomy.published import Reproduction
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.cohort import MeasurementSd
-from spinepipe.cohort.memoize import kept_with_cohort
-from spinepipe.report.published import Reproduction
+from spinepipe.cohort.cohort import MeasurementSd, memoize_per_cohort
 from spinepipe.studies.base_model import Base
 from spinepipe.studies.cohort_stiffness.representations import FITTED, UNLESS_ASKED, named
 from spinepipe.studies.parts import (
@@ -180,7 +179,7 @@ def tests_of(study: CohortStiffness, cohort: Cohort) -> tuple[str, ...]:
     return study.tests or _read_tests(cohort)
 
 
-@kept_with_cohort
+@memoize_per_cohort
 def _read_tests(cohort: Cohort) -> tuple[str, ...]:
     """The tests that have a reading."""
     assert cohort.motion is not None

@@ -12,7 +12,7 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.tested_rows import Tested, corrected_rows
+from spinepipe.jobs.tested_rows import FamilyTest, corrected_rows
 from spinepipe.statistics import (
     ComputationStatus,
     StatisticalTest,
@@ -61,7 +61,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
     write(from_rows(STATISTICS, rows), output, origin)
 
 
-def all_tests(errors: pd.DataFrame, fits: pd.DataFrame) -> Iterator[Tested]:
+def all_tests(errors: pd.DataFrame, fits: pd.DataFrame) -> Iterator[FamilyTest]:
     """Every test of the tables ``errors`` and ``fits``, family by family."""
     seen = compared_motion(errors)
     yield from between_groups(seen)
@@ -70,7 +70,7 @@ def all_tests(errors: pd.DataFrame, fits: pd.DataFrame) -> Iterator[Tested]:
     yield from load_case_specific(fits)
 
 
-def between_groups(errors: pd.DataFrame) -> Iterator[Tested]:
+def between_groups(errors: pd.DataFrame) -> Iterator[FamilyTest]:
     """Kruskal-Wallis as published; Friedman, which keeps what belongs together, beside it.
 
     Fits to single load cases; of a left out load case, fits to all others.
@@ -84,7 +84,7 @@ def between_groups(errors: pd.DataFrame) -> Iterator[Tested]:
                 loaded = rows[rows["loaded"].astype(bool)]
                 for response, part in (("loaded_error", loaded), (response_of(rows), rows)):
                     for outcome in _both(part, factor, block):
-                        yield Tested(family, "*", response, factor, str(test), outcome)
+                        yield FamilyTest(family, "*", response, factor, str(test), outcome)
 
 
 def response_of(rows: pd.DataFrame) -> str:
@@ -110,7 +110,7 @@ def _both(rows: pd.DataFrame, factor: str, block: str) -> Iterator[StatisticalTe
     yield replace(paired, message=joined(paired.message, note))
 
 
-def signed_ranks(errors: pd.DataFrame) -> Iterator[Tested]:
+def signed_ranks(errors: pd.DataFrame) -> Iterator[FamilyTest]:
     """Wilcoxon tests within each specimen: published against fitted, fitted against predicted.
 
     Pairs are the absolute errors at the largest load of all motion of all joints; fits to
@@ -132,7 +132,7 @@ def signed_ranks(errors: pd.DataFrame) -> Iterator[Tested]:
                 yield from _each_specimen(name, first, second)
 
 
-def _each_specimen(name: str, first: pd.DataFrame, second: pd.DataFrame) -> Iterator[Tested]:
+def _each_specimen(name: str, first: pd.DataFrame, second: pd.DataFrame) -> Iterator[FamilyTest]:
     """One test per specimen and load case that both have."""
     keys = ["specimen", "test", "joint", "coordinate"]
     pairs = first[[*keys, "peak_error"]].merge(second[[*keys, "peak_error"]], on=keys)
@@ -141,10 +141,10 @@ def _each_specimen(name: str, first: pd.DataFrame, second: pd.DataFrame) -> Iter
         outcome = wilcoxon_signed_rank(known[:, 0], known[:, 1])
         family = f"{name}/{test}"
         response = response_of(first)
-        yield Tested(family, "*", response, "stage", str(test), outcome, str(specimen))
+        yield FamilyTest(family, "*", response, "stage", str(test), outcome, str(specimen))
 
 
-def against_level_ratio(errors: pd.DataFrame) -> Iterator[Tested]:
+def against_level_ratio(errors: pd.DataFrame) -> Iterator[FamilyTest]:
     """One stiffness for all joints against the published ratio of levels, over specimens.
 
     The errors are root mean squares over joints at the largest load, per coordinate and overall;
@@ -165,7 +165,7 @@ def against_level_ratio(errors: pd.DataFrame) -> Iterator[Tested]:
             note = f"{published.message}; {FITS_AS_PUBLISHED}"
             paired = wilcoxon_signed_rank(values[:, 0], values[:, 1])
             for outcome in (replace(published, message=note), paired):
-                yield Tested(family, "*", response, "representation", "fitted", outcome)
+                yield FamilyTest(family, "*", response, "representation", "fitted", outcome)
 
 
 def _rms(rows: pd.DataFrame) -> Mapping[str, pd.Series]:
@@ -184,7 +184,7 @@ def _rms(rows: pd.DataFrame) -> Mapping[str, pd.Series]:
     return found
 
 
-def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
+def load_case_specific(fits: pd.DataFrame) -> Iterator[FamilyTest]:
     """The extra sum of squares F test for each specimen and each plain representation.
 
     Pooled fits are no least squares fits: they are drawn towards the cohort. Nor are those with
@@ -199,7 +199,7 @@ def load_case_specific(fits: pd.DataFrame) -> Iterator[Tested]:
         notes = rows["message"] if "message" in rows else pd.Series(dtype=str)
         correlated = notes.str.contains(SHARED_ERROR, regex=False).any()
         outcome = _without(SHARED_ERROR) if correlated else nested_fits(rows)
-        yield Tested(family, "*", "stiffness", "load case", "", outcome, str(specimen))
+        yield FamilyTest(family, "*", "stiffness", "load case", "", outcome, str(specimen))
 
 
 def nested_fits(rows: pd.DataFrame) -> StatisticalTest:

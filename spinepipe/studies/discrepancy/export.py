@@ -7,7 +7,7 @@ from spinepipe.cohort.specimen import joint_frames, on_bushings, spine_model
 from spinepipe.effects.contract import Array
 from spinepipe.model.file import effects_for, read_model
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.exports import needed, refuse, written
+from spinepipe.studies.exports import opensim_document, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.parts import Damping
 
@@ -29,11 +29,13 @@ def exported(study: Discrepancy, cohort: Cohort, wanted: WantedFiles) -> tuple[s
     if wanted.start and base is None:
         start = np.array(study.stiffness.in_order(), dtype=float)
         model = on_bushings(cohort, wanted.specimen, frames, start, damping)
-        return written(model, "the cohort's own joints, stiffness: start of the study")
+        return opensim_document(model, "the cohort's own joints, stiffness: start of the study")
     found = wanted.results / "discrepancy" / MODEL
     told = "start of the study, its base model" if wanted.start else "fitted with the effects found"
-    path = wanted.root / base if wanted.start and base else needed(found, "a computed study")
+    path = (
+        wanted.root / base if wanted.start and base else required_result(found, "a computed study")
+    )
     file = read_model(path)
     effects = effects_for(file, wanted.specimen, cohort.joint_names)
     model = spine_model(cohort, wanted.specimen, frames, effects, damping)
-    return written(model, f"the cohort's own joints, stiffness: {told}")
+    return opensim_document(model, f"the cohort's own joints, stiffness: {told}")

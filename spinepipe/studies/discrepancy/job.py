@@ -11,9 +11,8 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import followers
-from spinepipe.jobs.digest import provenance
+from spinepipe.jobs.digest import base_marks, provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.model_mark import base_marks
 from spinepipe.marks import KEY, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.progress import Progress

@@ -30,7 +30,7 @@ from spinepipe.studies.global_sensitivity.start import (
 )
 from spinepipe.studies.global_sensitivity.tables import BASE_MOTION, BASE_STIFFNESS, EVERY
 from spinepipe.studies.parts import stiffness_of_joints
-from spinepipe.studies.selected_tests import AskedTest
+from spinepipe.studies.selected_tests import SelectedTest
 from spinepipe.tables import from_rows, write
 from spinepipe.units import (
     COORDINATE_UNITS,
@@ -193,7 +193,7 @@ def _beside_measured(
 
 
 def _rows_of_test(
-    cohort: Cohort, model: SpineModel, test: AskedTest, measured: Array, noise: Array
+    cohort: Cohort, model: SpineModel, test: SelectedTest, measured: Array, noise: Array
 ) -> Iterator[dict[str, Any]]:
     """Rows of one test; measured (J, 6) and noise (6,) in mm and deg."""
     solved = solve_many(Spines.of(model, 1), Cases.of(test.case, 1))

@@ -7,7 +7,7 @@ from spinepipe.cohort.specimen import joint_frames, on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError
 from spinepipe.status import USABLE
-from spinepipe.studies.exports import needed, problem, refuse, written
+from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.parts import stiffness_of_joints
@@ -33,12 +33,14 @@ def exported(study: GlobalSensitivity, cohort: Cohort, wanted: WantedFiles) -> t
             stiffness = _fitted(wanted, stiffness)
     damping = np.array(study.damping.in_order(), dtype=float)
     model = on_bushings(cohort, wanted.specimen, frames, stiffness, damping)
-    return written(model, f"the cohort's own joints, stiffness: {told}")
+    return opensim_document(model, f"the cohort's own joints, stiffness: {told}")
 
 
 def _fitted(wanted: WantedFiles, start: Array) -> Array:
     """(J, 6) what the study's results have of the specimen, all joints alike."""
-    rows = read_frame(needed(wanted.results / "base_stiffness.parquet", "a computed study"))
+    rows = read_frame(
+        required_result(wanted.results / "base_stiffness.parquet", "a computed study")
+    )
     own = rows[rows["specimen"] == wanted.specimen]
     if own.empty or not own["status"].isin(USABLE).all():
         found = "; ".join(["no fit of " + wanted.specimen, *own["message"].unique()])

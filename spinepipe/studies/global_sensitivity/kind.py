@@ -6,7 +6,7 @@ from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.schema import all_declared
-from spinepipe.studies.free import calibration_settled
+from spinepipe.studies.free import settle_calibration
 from spinepipe.studies.global_sensitivity.checks import check_global_sensitivity
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.size_of_design import check_size_of_design
@@ -142,7 +142,7 @@ KIND = Kind(
     files=SensitivityFiles,
     checks=(check_global_sensitivity,),
     checks_at_start=(check_size_of_design,),
-    settled=calibration_settled,
+    settled=settle_calibration,
     tables=all_declared(__file__),
     jobs=(
         Job(

@@ -13,7 +13,7 @@ from spinepipe.status import Status
 from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, made_of_batches
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.tables import RESPONSES
-from spinepipe.studies.selected_tests import AskedTest
+from spinepipe.studies.selected_tests import SelectedTest
 from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, from_si, subtract_baseline
 
@@ -72,7 +72,7 @@ class _Rows:
     ``status``, ``message`` : (M, T).
     """
 
-    def __init__(self, batch: Batch, test: AskedTest, joints: int) -> None:
+    def __init__(self, batch: Batch, test: SelectedTest, joints: int) -> None:
         self.test = test
         shape = (batch.count, len(test.steps))
         self.motion, self.load = np.full((2, *shape, joints, 6), np.nan)
@@ -82,7 +82,7 @@ class _Rows:
             self.message[sample] = reason
 
 
-def _rows(batch: Batch, test: AskedTest, solved: ManySolved) -> _Rows:
+def _rows(batch: Batch, test: SelectedTest, solved: ManySolved) -> _Rows:
     rows = _Rows(batch, test, solved.q.shape[2])
     motion = subtract_baseline(solved.q.swapaxes(0, 1), test.from_first).swapaxes(0, 1)
     kept, stored = batch.varied.kept, slice(-len(test.steps), None)

@@ -22,7 +22,7 @@ from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.model import LoadCase, SpineModel
 from spinepipe.studies.global_sensitivity.settings import SampleCalibration
 from spinepipe.studies.problem import measured_in_frames, stiffness_problem
-from spinepipe.studies.selected_tests import AskedTest, asked, first_cycles
+from spinepipe.studies.selected_tests import SelectedTest, first_cycles, select_steps
 
 Flags = NDArray[np.bool_]
 
@@ -49,7 +49,7 @@ class DescribedSpecimen:
     points: Array
     known: Flags
     given: Flags
-    tests: tuple[AskedTest, ...]
+    tests: tuple[SelectedTest, ...]
 
 
 def start_of(
@@ -79,7 +79,7 @@ def start_of(
 
 def asked_tests(
     cohort: Cohort, specimen: str, tests: Sequence[str], all_steps: bool
-) -> tuple[AskedTest, ...]:
+) -> tuple[SelectedTest, ...]:
     """The first cycle of each of the tests that the specimen has.
 
     Motion counts as the cohort's does: from step 0 where that was subtracted.
@@ -91,7 +91,7 @@ def asked_tests(
     """
     under = followers(cohort, specimen)
     return tuple(
-        asked(case, cohort.gravity or case.test in under, all_steps, cohort.zeroed_at_step_0)
+        select_steps(case, cohort.gravity or case.test in under, all_steps, cohort.zeroed_at_step_0)
         for case in first_cycles(load_cases(cohort, specimen, tests, np.zeros(3)))
     )
 

@@ -11,7 +11,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.problems import InputError
 from spinepipe.status import Status
-from spinepipe.studies.exports import needed, problem, refuse, written
+from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
     sampled_poses,
@@ -47,7 +47,7 @@ def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -
     else:
         stiffness, origin = _calibrated(wanted.results, specimen, pose), "calibrated for this pose"
     model = bushing_model(study, cohort, specimen, frames, stiffness)
-    return written(model, f"joint pose {name}, stiffness: {origin}")
+    return opensim_document(model, f"joint pose {name}, stiffness: {origin}")
 
 
 def _fitted(study: JointPoseSensitivity, wanted: WantedFiles) -> Array:
@@ -99,7 +99,7 @@ def _calibrated(results: Path, specimen: str, pose: int) -> Array:
     """
     whole = results / "calibrations.parquet"
     single = results / "calibrations" / f"specimen={specimen}" / f"pose={pose:04d}.parquet"
-    path = single if single.is_file() else needed(whole, "a computed study")
+    path = single if single.is_file() else required_result(whole, "a computed study")
     rows = read_frame(path)
     rows = rows[(rows["specimen"] == specimen) & (rows["pose"] == pose)]
     values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)

@@ -5,7 +5,7 @@ from typing import Any
 
 from spinepipe.comparison.papers import hangs_on
 from spinepipe.schema import all_declared
-from spinepipe.studies.free import calibration_settled
+from spinepipe.studies.free import settle_calibration
 from spinepipe.studies.joint_pose_sensitivity.checks import check_joint_pose_sensitivity
 from spinepipe.studies.joint_pose_sensitivity.files import JointPoseFiles
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
@@ -193,6 +193,6 @@ KIND = Kind(
     ignored_by_figures=("block",),
     makes_models="start_model",
     exports="export:exported",
-    settled=calibration_settled,
+    settled=settle_calibration,
     told_by_check="identifiability_preview:told",
 )

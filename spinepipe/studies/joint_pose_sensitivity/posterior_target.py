@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from spinepipe.calibration import Evaluator, Fit, Problem
 from spinepipe.calibration.posterior import ResidualNoise, Target, between, noise_of
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.landmark_frames import Displaced, LandmarkFrames
+from spinepipe.cohort.landmark_frames import FrameDisplacements, LandmarkFrames
 from spinepipe.effects import create
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import ScopedEffect
@@ -48,7 +48,7 @@ class StiffnessAndLandmarks:
         """Stiffnesses and three axes of each free landmark."""
         return len(self.low) + 3 * len(self.free)
 
-    def placed(self, z: Array) -> Displaced:
+    def placed(self, z: Array) -> FrameDisplacements:
         """The joints' frames at points z (P, m)."""
         points = np.tile(self.landmarks.points, (len(z), 1, 1))
         moved = z[:, len(self.low) :].reshape(len(z), -1, 3)  # of free landmarks, in their SDs

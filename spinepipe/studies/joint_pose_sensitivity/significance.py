@@ -9,7 +9,7 @@ import pandas as pd
 
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.digest import provenance
-from spinepipe.jobs.tested_rows import Tested, corrected_rows
+from spinepipe.jobs.tested_rows import FamilyTest, corrected_rows
 from spinepipe.marks import read_json
 from spinepipe.statistics import (
     chi_squared_normality,
@@ -76,7 +76,7 @@ class Specimen:
     motion: pd.DataFrame
     ranking: Sequence[dict[str, Any]]
 
-    def tests(self) -> Iterator[Tested]:
+    def tests(self) -> Iterator[FamilyTest]:
         """All tests, family by family."""
         if not len(self.kept):
             return
@@ -85,7 +85,7 @@ class Specimen:
         for joint, coordinate in measured_coordinates(self.errors):
             yield from self._grid(joint, coordinate)
 
-    def _normality(self) -> Iterator[Tested]:
+    def _normality(self) -> Iterator[FamilyTest]:
         named: list[tuple[str, str, Array]] = []
         for name, column in pose_parameters(self.poses).items():
             named.append(("*", str(name), column.to_numpy(float)))
@@ -95,7 +95,7 @@ class Specimen:
             named.append((joint, f"{coordinate}_error", error))
         for test in NORMALITY:
             for joint, name, values in named:
-                yield Tested("normality", joint, name, "", "", test(values))
+                yield FamilyTest("normality", joint, name, "", "", test(values))
 
     def _stiffness(self) -> Iterator[tuple[str, str, Array]]:
         """(joint, name, values) of every fitted stiffness, by pose."""
@@ -115,13 +115,13 @@ class Specimen:
         grouped = own[own["joint"].isin(measured)].groupby("pose")[names]
         return grouped.mean().reindex(self.kept)  # empty where all runs are lost
 
-    def _calibrated_fits(self) -> Iterator[Tested]:
+    def _calibrated_fits(self) -> Iterator[FamilyTest]:
         """Errors and stiffness of the poses' own fits against each other and against the pose."""
         factors = pose_factors(self.poses).loc[self.kept]
         for joint, name, values in self._stiffness():
             for factor in factors:
                 found = spearman(factors[factor].to_numpy(float), values)
-                yield Tested("stiffness against pose", joint, name, str(factor), "", found)
+                yield FamilyTest("stiffness against pose", joint, name, str(factor), "", found)
             yield from self._errors_against("error against stiffness", joint, name, values)
         for factor in factors:
             values = factors[factor].to_numpy(float)
@@ -129,26 +129,26 @@ class Specimen:
         for joint, coordinate in measured_coordinates(self.errors):
             yield self._error_against_motion(joint, coordinate)
 
-    def _error_against_motion(self, joint: str, coordinate: str) -> Tested:
+    def _error_against_motion(self, joint: str, coordinate: str) -> FamilyTest:
         """Is the error larger where the same motion, seen in other frames, is larger?"""
         moved = self.motion[self.motion["joint"] == joint].set_index("pose").loc[self.kept]
         pair = pd.concat([moved[coordinate], self._own_errors(joint)[coordinate]], axis=1).dropna()
         found = spearman(*pair.to_numpy(float).T)
         response, factor = f"{coordinate}_error", f"{coordinate}_measured"
-        return Tested("error against motion", joint, response, factor, "", found)
+        return FamilyTest("error against motion", joint, response, factor, "", found)
 
     def _errors_against(
         self, family: str, joint: str, factor: str, values: Array
-    ) -> Iterator[Tested]:
+    ) -> Iterator[FamilyTest]:
         errors = self._own_errors(joint)
         for coordinate in COORDINATES:
             error = errors[coordinate].to_numpy(float)
             known = np.isfinite(error)
             if known.any():
                 found = spearman(values[known], error[known])
-                yield Tested(family, joint, f"{coordinate}_error", factor, "", found)
+                yield FamilyTest(family, joint, f"{coordinate}_error", factor, "", found)
 
-    def _grid(self, joint: str, coordinate: str) -> Iterator[Tested]:
+    def _grid(self, joint: str, coordinate: str) -> Iterator[FamilyTest]:
         """Friedman tests and correlations over the grid of poses and best stiffness sets."""
         grid = complete_grid(self.errors, joint, coordinate)
         if grid.empty:
@@ -156,8 +156,8 @@ class Specimen:
         error = f"{coordinate}_error"
         values = grid.to_numpy(float)
         # blocks are poses and treatments sets of stiffness, then the other way round
-        yield Tested("friedman", joint, error, "stiffness", "", friedman(values))
-        yield Tested("friedman", joint, error, "pose", "", friedman(values.T))
+        yield FamilyTest("friedman", joint, error, "stiffness", "", friedman(values))
+        yield FamilyTest("friedman", joint, error, "pose", "", friedman(values.T))
         family = f"two-factor: {error} at {joint} against"
         factors = pose_factors(self.poses).loc[grid.index]
         for factor in factors:
@@ -165,11 +165,11 @@ class Specimen:
                 pair = factors[factor].to_numpy(float), grid[stratum].to_numpy(float)
                 for test in (kendall, spearman):
                     name = str(factor), str(stratum)
-                    yield Tested(f"{family} pose", joint, error, *name, test(*pair))
+                    yield FamilyTest(f"{family} pose", joint, error, *name, test(*pair))
         for factor, stiffness in self._best_stiffness(joint, [str(name) for name in grid.columns]):
             for pose, row in zip(grid.index, values, strict=True):
                 found = spearman(stiffness, row)
-                yield Tested(f"{family} stiffness", joint, error, factor, str(pose), found)
+                yield FamilyTest(f"{family} stiffness", joint, error, factor, str(pose), found)
 
     def _best_stiffness(self, joint: str, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
         """(name, values) of each fitted stiffness in the best sets, in the order of names."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames, on_bushings
-from spinepipe.studies.exports import refuse, written
+from spinepipe.studies.exports import opensim_document, refuse
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
@@ -23,4 +23,6 @@ def exported(study: RangeOfMotion, cohort: Cohort, wanted: WantedFiles) -> tuple
     stiffness = stiffness_of_joints(cohort, study.stiffness, study.level_stiffness)
     damping = np.array(study.damping.in_order(), dtype=float)
     model = on_bushings(cohort, wanted.specimen, frames, stiffness, damping)
-    return written(model, "the cohort's own joints, stiffness: the study's own, nothing is fitted")
+    return opensim_document(
+        model, "the cohort's own joints, stiffness: the study's own, nothing is fitted"
+    )

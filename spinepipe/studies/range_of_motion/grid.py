@@ -19,7 +19,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import LoadCase
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
-from spinepipe.studies.selected_tests import AskedTest, asked, first_cycles
+from spinepipe.studies.selected_tests import SelectedTest, first_cycles, select_steps
 from spinepipe.tables import opened
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
 
@@ -29,13 +29,13 @@ _MOTION = tuple(f"predicted_{name}" for name in COORDINATE_COLUMNS)
 
 
 @lru_cache(maxsize=256)
-def asked_tests(root: str, study: str, specimen: str, _digest: str) -> tuple[AskedTest, ...]:
+def asked_tests(root: str, study: str, specimen: str, _digest: str) -> tuple[SelectedTest, ...]:
     """Tests of a specimen; ``_digest`` is that of its cohort."""
     settings, cohort = study_of_kind(RangeOfMotion, root, study)
     virtual = virtual_tensions(settings)
     tension_n = followers(cohort, specimen) if virtual is None else virtual
     return tuple(
-        asked(
+        select_steps(
             case,
             cohort.gravity or tension_n.get(case.test, 0.0) > 0.0,
             settings.rows == "all_steps",

@@ -22,7 +22,7 @@ from spinepipe.status import Status
 from spinepipe.studies.range_of_motion.grid import asked_tests, virtual_tensions
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import RANGE_OF_MOTION
-from spinepipe.studies.selected_tests import AskedTest
+from spinepipe.studies.selected_tests import SelectedTest
 from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, from_si
 
@@ -61,7 +61,7 @@ def _solved(
     specimen: str,
     placed: tuple[Pose, ...],
     values: Array,
-    tests: Sequence[AskedTest],
+    tests: Sequence[SelectedTest],
 ) -> list[Ends]:
     """Ends of the stored steps of one spine, test by test; refused where it is none."""
     damping = np.array(settings.damping.in_order())
@@ -92,7 +92,7 @@ def _solved(
 
 
 def _columns(
-    joints: tuple[str, ...], tests: Iterable[tuple[AskedTest, Ends]]
+    joints: tuple[str, ...], tests: Iterable[tuple[SelectedTest, Ends]]
 ) -> dict[str, list[Any]]:
     """Columns of a job file; rows step by step, joint by joint."""
     names = ("test", "step", "largest_load", "joint", "status", "message")

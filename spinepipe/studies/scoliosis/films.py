@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.memoize import kept_with_cohort
+from spinepipe.cohort.cohort import memoize_per_cohort
 from spinepipe.documents.form import read_forms
 from spinepipe.effects.contract import Array
 from spinepipe.studies.scoliosis.settings import Scoliosis
@@ -106,7 +106,7 @@ class PatientFilms:
         return float(lengths[0] / lengths[1])
 
 
-@kept_with_cohort
+@memoize_per_cohort
 def read_films(cohort: Cohort, patient: str) -> PatientFilms:
     """The films of a patient; `checks` has seen to it that they are whole."""
     rows = cohort.further["films"]

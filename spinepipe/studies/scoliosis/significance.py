@@ -13,7 +13,7 @@ import pandas as pd
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
-from spinepipe.jobs.tested_rows import Tested, corrected_rows
+from spinepipe.jobs.tested_rows import FamilyTest, corrected_rows
 from spinepipe.statistics import StatisticalTest, wilcoxon_signed_rank
 from spinepipe.status import joined
 from spinepipe.studies.scoliosis.errors import by_patient, errors_by_measure
@@ -33,7 +33,7 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 
 def all_tests(
     positions: pd.DataFrame, displacements: pd.DataFrame, curves: pd.DataFrame
-) -> Iterator[Tested]:
+) -> Iterator[FamilyTest]:
     """Every pair of models, measure by measure, on fitted and on held-out films.
 
     The response is the one model, the factor the other; an effect below zero says that the one has
@@ -43,7 +43,7 @@ def all_tests(
         values = by_patient(errors)
         for one, other in combinations(values.columns, 2):
             outcome = compared(values[one], values[other], MEASURES[measure][0])
-            yield Tested(f"{group}/{measure}", "*", str(one), str(other), group, outcome)
+            yield FamilyTest(f"{group}/{measure}", "*", str(one), str(other), group, outcome)
 
 
 def compared(one: "pd.Series[Any]", other: "pd.Series[Any]", unit: str) -> StatisticalTest:

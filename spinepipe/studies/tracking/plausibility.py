@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.plausibility.score import suspect, usual
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
 from spinepipe.problems import InputError
-from spinepipe.studies.implausible_subjects import subject_doubts
+from spinepipe.studies.plausibility import subject_doubts
 from spinepipe.studies.tracking.persons import read_recording, trial_rows
 from spinepipe.studies.tracking.trials import MARKER_SET, STANCE, TRIALS
 

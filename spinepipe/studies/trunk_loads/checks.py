@@ -17,8 +17,8 @@ from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import InputError, InputProblem, Spelling, did_you_mean, one_of
-from spinepipe.studies.implausible_subjects import subject_doubts
 from spinepipe.studies.places import at, unknown_names
+from spinepipe.studies.plausibility import subject_doubts
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
 from spinepipe.studies.trunk_loads.forms import MUSCLE_PARAMETERS, MUSCLES, TASKS

@@ -21,7 +21,7 @@ from example_effects import CubicStiffening, MarkerError
 from scipy.optimize import brentq
 
 from spinepipe.effects import register, registry
-from spinepipe.jobs.model_mark import base_marks
+from spinepipe.jobs.digest import base_marks
 from spinepipe.marks import write_marked
 from spinepipe.problems import InputError
 from spinepipe.report.page.document import Picture, ResultTables

@@ -237,7 +237,7 @@ def test_no_name_but_of_our_data_is_ever_called(name: str) -> None:
 @sweep(
     "name, words",
     [
-        ("spinepipe.tables.parquet:Table", "is called spinepipe.schema.table:Table"),
+        ("spinepipe.tables:Table", "is called spinepipe.schema.table:Table"),
         ("spinepipe.files:re.RegexFlag", "cannot be kept as data"),
     ],
 )

@@ -25,7 +25,7 @@ import pyarrow.parquet as pq
 
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of
-from spinepipe.jobs.model_mark import base_marks
+from spinepipe.jobs.digest import base_marks
 from spinepipe.marks import KEY, with_mark, write_marked
 from spinepipe.tables import write
 

@@ -22,14 +22,13 @@ from spinepipe.anatomy.stiffness_range import middle, published_range
 from spinepipe.cohort.load_response import (
     ALL,
     LoadResponse,
-    answers_of_test,
     joint_loads,
+    load_responses,
     of_specimens,
     typical,
 )
 from spinepipe.effects.contract import Array
-from spinepipe.plausibility.motion_size import geometric_mean, is_plausible, unit_like
-from spinepipe.plausibility.score import AGAINST, CLEAR
+from spinepipe.plausibility.score import AGAINST, CLEAR, geometric_mean, is_plausible, unit_like
 from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     bad_markers,
     beside_the_curve,
@@ -109,7 +108,7 @@ def answers(
     for name, one in readings.items():
         for test in one.tests:
             loads = joint_loads(one.frames, test.case)
-            found += answers_of_test(name, test.case.test, loads, test.mean, zeroed)
+            found += load_responses(name, test.case.test, loads, test.mean, zeroed)
     return [a for a in found if a.rms > clear * sd[COORDINATES.index(a.coordinate)]]
 
 

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.line_styles import Dashes
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
-from spinepipe.report.style import BLACK, BLUE, GREY, VERMILLION, WHITE, blank, saying
+from spinepipe.report.style import BLACK, BLUE, GREY, VERMILLION, WHITE, Dashes, blank, saying
 from spinepipe.studies.scoliosis.figures.line_styles import axis_lines
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import GROUPS

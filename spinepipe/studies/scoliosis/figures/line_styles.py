@@ -6,8 +6,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from spinepipe.report.line_styles import PURPLE, Dashes
-from spinepipe.report.style import BLUE, GREEN, GREY, VERMILLION
+from spinepipe.report.style import BLUE, GREEN, GREY, PURPLE, VERMILLION, Dashes
 from spinepipe.studies.scoliosis.words import IN_WORDS
 
 

@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import BODIES, JOINTS
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, lines_of, log_ticks
-from spinepipe.report.style import blank, saying
+from spinepipe.report.style import LineStyle, blank, saying
 from spinepipe.report.words import capital, plain
 from spinepipe.studies.tracking.error_metrics import SAGITTAL
 from spinepipe.studies.tracking.figures.line_styles import (

@@ -13,9 +13,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
 from spinepipe.motion.skeleton import JOINTS, LUMBAR_JOINTS, PELVIS, body_poses
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, lettered
-from spinepipe.report.style import BLACK, blank, saying
+from spinepipe.report.style import BLACK, LineStyle, blank, saying
 from spinepipe.report.words import capital, listed, plain
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.error_metrics import Truth, joint_rotations, truths

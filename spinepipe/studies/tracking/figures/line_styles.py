@@ -7,8 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from spinepipe.report.line_styles import PURPLE, SKY, LineStyle
-from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION
+from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILLION, LineStyle
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.words import short_of, sort_approaches
 

@@ -10,9 +10,8 @@ from matplotlib.lines import Line2D
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.motion.skeleton import LUMBAR_JOINTS
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import across_of, explain_marks, head, side_by_side
-from spinepipe.report.style import GREY, blank, saying
+from spinepipe.report.style import GREY, LineStyle, blank, saying
 from spinepipe.report.words import capital, plain
 from spinepipe.studies.tracking.figures.line_styles import (
     choose_approaches,

@@ -17,9 +17,18 @@ from matplotlib.patches import Patch
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
-from spinepipe.report.style import BLACK, BLUE, GREY, SMALL_PT, VERMILLION, WHITE, blank, saying
+from spinepipe.report.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    SMALL_PT,
+    VERMILLION,
+    WHITE,
+    LineStyle,
+    blank,
+    saying,
+)
 from spinepipe.report.words import AXIS, capital, plain, short, tick
 from spinepipe.studies.tracking.figures.line_styles import persons_words, show_ticks, styles_of
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS

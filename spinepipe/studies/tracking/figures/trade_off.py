@@ -10,9 +10,8 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
-from spinepipe.report.style import BLACK, SMALL_PT, WHITE, blank, saying
+from spinepipe.report.style import BLACK, SMALL_PT, WHITE, LineStyle, blank, saying
 from spinepipe.report.words import plain, tick
 from spinepipe.status import Status
 from spinepipe.studies.tracking.figures.line_styles import (

@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, log_ticks, side_by_side
-from spinepipe.report.style import BLACK, GREY, blank, saying
+from spinepipe.report.style import BLACK, GREY, LineStyle, blank, saying
 from spinepipe.studies.trunk_loads.figures.line_styles import (
     HOLLOW_WORDS,
     key_of,

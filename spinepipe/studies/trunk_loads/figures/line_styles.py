@@ -3,8 +3,7 @@
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from spinepipe.report.line_styles import PURPLE, SKY, LineStyle
-from spinepipe.report.style import BLACK, BLUE, GREEN, VERMILLION
+from spinepipe.report.style import BLACK, BLUE, GREEN, PURPLE, SKY, VERMILLION, LineStyle
 from spinepipe.report.words import plain, short
 
 LOOKS = (

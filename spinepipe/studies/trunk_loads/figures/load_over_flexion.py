@@ -10,9 +10,8 @@ from matplotlib.lines import Line2D
 
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.trunk import GLOBAL_EXTENSORS
-from spinepipe.report.line_styles import LineStyle
 from spinepipe.report.panels import explain_marks, head, side_by_side
-from spinepipe.report.style import BLACK, BLUE, VERMILLION, blank, saying
+from spinepipe.report.style import BLACK, BLUE, VERMILLION, LineStyle, blank, saying
 from spinepipe.report.words import plain, short
 from spinepipe.studies.trunk_loads.figures.line_styles import key_of, look_of, scale
 from spinepipe.studies.trunk_loads.selection import (

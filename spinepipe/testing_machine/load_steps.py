@@ -1,4 +1,10 @@
-"""All cycles of one test of one specimen on common load steps, and how sure the readings are."""
+"""All cycles of a test on common load steps: each reading by local regression on the load.
+
+At a level of the load a parabola is fitted to the rows of the branch whose load is near, the
+nearer the more they count (tricube weights; Cleveland 1979, J Am Stat Assoc 74, 829-836). Loading
+and unloading are branches of their own, so a loop stays a loop. What rows leave around the
+parabola, with what neighbouring rows share, tells the SD of the reading.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -6,20 +12,33 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.decomposition import pinvh
 from spinepipe.problems import InputProblem
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
-from spinepipe.testing_machine.cycles import Cut, Cycle, cut
+from spinepipe.testing_machine.cycles import Branch, Cycle, Segmentation, segment
 from spinepipe.testing_machine.recording import Recording
 from spinepipe.testing_machine.settings import LoadSteps
-from spinepipe.testing_machine.thinning import BEYOND, Step, common_levels, plan, read_at, sds_of
 
 Array = NDArray[np.float64]
 Place = tuple[str, str]
 """Joint and column of ``motion.csv``."""
 
 
+ENOUGH_ROWS = 8
+"""The window around a level grows from half a step until it holds so many rows."""
+
+FOR_A_PARABOLA = 8
+"""With fewer rows a straight line is fitted."""
+
+FEWEST_ROWS = 3
+STRONGEST_CORRELATION = 0.98
+SINGULAR = 1e-10
+BEYOND = 0.02
+"""Share of the range of a cycle by which a level may lie beyond the turn of a branch."""
+
+
 @dataclass(frozen=True, eq=False)
-class ThinnedCycle:
+class ResampledCycle:
     """One cycle on its load steps.
 
     Attributes
@@ -38,7 +57,7 @@ class ThinnedCycle:
 
 
 @dataclass(frozen=True, eq=False)
-class ThinnedTest:
+class ResampledTest:
     """A test of a specimen: every cycle that is kept, in the order of the files.
 
     Attributes
@@ -51,14 +70,146 @@ class ThinnedTest:
     driving: str
     places: tuple[Place, ...]
     levels: tuple[float, ...]
-    cycles: tuple[ThinnedCycle, ...]
+    cycles: tuple[ResampledCycle, ...]
     recordings: tuple[Recording, ...]
-    cuts: tuple[Cut, ...]
+    cuts: tuple[Segmentation, ...]
 
 
-def thinned_test(
+@dataclass(frozen=True)
+class Step:
+    """One load step of a cycle: a level of the load on one of its branches."""
+
+    level: float
+    branch: int
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What local regression says at one load step.
+
+    Attributes
+    ----------
+    values : (C,) reading of each quantity.
+    share : SD of a reading in SDs of a single row, where rows err by themselves.
+    left : (n, C) what is left of the rows near the level. freedom : n less what was fitted.
+    """
+
+    values: Array
+    share: float
+    left: Array
+    freedom: float
+
+    @property
+    def raw(self) -> Array:
+        """(C,) SD of a single row around the parabola."""
+        return np.sqrt((self.left**2).sum(axis=0) / self.freedom)
+
+
+def common_levels(
+    cut: Segmentation, cycles: Sequence[Cycle], per_side: int, asked: Sequence[float] | None
+) -> tuple[tuple[float, ...], ...]:
+    """Levels beyond the reference that all cycles reach, by turn, outwards; signed, absolute.
+
+    Parameters
+    ----------
+    cycles : those that are kept. asked : sizes of the driving load instead of equal steps.
+    """
+    sides = []
+    for turn in range(max(len(cycle.peaks) for cycle in cycles)):
+        way = cut.way if turn == 0 else -cut.way
+        reached = min(way * (c.peaks[turn] - cut.reference) for c in cycles if len(c.peaks) > turn)
+        if asked is None:
+            round_one = float(f"{reached:.2g}")
+            top = round_one if round_one <= reached * (1 + BEYOND) else reached
+            sizes = [top * (n + 1) / per_side for n in range(per_side)]
+            sides.append(tuple(cut.reference + way * size for size in sizes))
+        else:
+            told = [way * size for size in sorted(asked)]
+            told = [one for one in told if way * (one - cut.reference) > 0]
+            sides.append(tuple(one for one in told if _within(way * one, way, cut, reached)))
+    return tuple(sides)
+
+
+def _within(size: float, way: int, cut: Segmentation, reached: float) -> bool:
+    return size - way * cut.reference <= reached * (1 + BEYOND)
+
+
+def plan(
+    cut: Segmentation, sides: Sequence[Sequence[float]], cycle: Cycle, load: Array
+) -> list[Step]:
+    """The load steps of a cycle in the order in which it passes them, the reference first.
+
+    A cycle that the recording cuts off has those that it passes.
+    """
+    steps = [Step(cut.reference, 0)]
+    for turn, levels in enumerate(sides):
+        if turn:
+            steps.append(Step(cut.reference, turn))
+        steps += [Step(level, turn) for level in levels]
+        steps += [Step(level, turn + 1) for level in levels[-2::-1]]
+    steps.append(Step(cut.reference, len(sides)))
+    if cycle.complete:
+        return steps
+    kept: list[Step] = []
+    for step in steps:
+        if step.branch >= len(cycle.branches) or not _passed(cut, cycle, step, load):
+            break
+        kept.append(step)
+    return kept
+
+
+def _passed(cut: Segmentation, cycle: Cycle, step: Step, load: Array) -> bool:
+    rows = load[cycle.branches[step.branch].rows]
+    slack = BEYOND * (cut.high - cut.low)
+    return bool(rows.min() - slack <= step.level <= rows.max() + slack)
+
+
+def read_at(
+    level: float, width: float, branch: Branch, load: Array, quantities: Array
+) -> Reading | None:
+    """Local regression of quantities (N, C) at a level of the load (N,), on one branch.
+
+    ``width``: the step between levels; None where the branch has fewer than three rows.
+    """
+    u, y = load[branch.rows] - level, quantities[branch.rows]
+    if len(u) < FEWEST_ROWS:
+        return None
+    # the window: half a step to either side, or as far as the eighth nearest row
+    enough = np.sort(np.abs(u))[min(ENOUGH_ROWS, len(u)) - 1]
+    reach = max(width / 2, 1.001 * float(enough))
+    near = np.abs(u) < reach
+    x, y = u[near] / reach, y[near]
+    # weighted least squares of a parabola in the load, tricube weights
+    weight = (1.0 - np.abs(x) ** 3) ** 3
+    degree = 2 if len(x) >= FOR_A_PARABOLA else 1
+    terms = x[:, None] ** np.arange(degree + 1)
+    inverse = pinvh(terms.T @ (weight[:, None] * terms), SINGULAR)
+    smoother = inverse @ (terms.T * weight)  # (p, n): coefficients of a parabola from the rows
+    coefficients = smoother @ y
+    # what is left, and the degrees of freedom: rows less the trace of the smoother
+    left = y - terms @ coefficients
+    freedom = max(len(x) - float(np.trace(smoother @ terms)), 1.0)
+    return Reading(coefficients[0], float(np.linalg.norm(smoother[0])), left, freedom)
+
+
+def sds_of(readings: Sequence[Reading]) -> Array:
+    """(T, C) SDs of readings, more where rows resemble their neighbours: by (1 + r) / (1 - r).
+
+    The correlation r of neighbouring rows is taken from all readings together.
+    """
+    # lag-1 autocorrelation r of what is left; an AR(1) series has (1 - r) / (1 + r) as many
+    # independent rows
+    power = sum((one.left**2).sum(axis=0) for one in readings)
+    product = sum((one.left[1:] * one.left[:-1]).sum(axis=0) for one in readings)
+    r = np.divide(product, power, out=np.zeros_like(power), where=power > 0)
+    r = np.clip(r, 0.0, STRONGEST_CORRELATION)
+    own = np.array([one.raw * one.share for one in readings])
+    return own * np.sqrt((1 + r) / (1 - r))
+
+
+def resample_test(
     recordings: Sequence[Recording], steps: LoadSteps, zeroed: bool
-) -> tuple[ThinnedTest | None, list[InputProblem]]:
+) -> tuple[ResampledTest | None, list[InputProblem]]:
     """The cycles of recordings of one test of one specimen, on steps that all of them reach.
 
     Parameters
@@ -68,7 +219,13 @@ def thinned_test(
     problems = [found for one in recordings for found in _out_of_range(one, steps)]
     if problems:
         return None, problems
-    cuts = [_cut(one, steps) for one in recordings]
+    cuts = [
+        segment(
+            *(one.loads[one.driving], steps.smallest_reversal),
+            *(one.of.preconditioning_cycles, steps.reference),
+        )
+        for one in recordings
+    ]
     problems = [
         problem
         for one, found in zip(recordings, cuts, strict=True)
@@ -89,7 +246,7 @@ def thinned_test(
     done = []
     for one, cycle in kept:
         planned = plan(cuts[0], sides, cycle, one.loads[one.driving])
-        result = _thinned(one, cycle, planned, zeroed)
+        result = _resample(one, cycle, planned, zeroed)
         if isinstance(result, InputProblem):
             problems.append(result)
         else:
@@ -98,7 +255,7 @@ def thinned_test(
         return None, problems
     levels = tuple(step.level for step in planned)
     of = first.of
-    made = ThinnedTest(
+    made = ResampledTest(
         of.specimen, of.test, first.driving, places, levels, tuple(done),
         tuple(recordings), tuple(cuts),
     )  # fmt: skip
@@ -126,12 +283,9 @@ def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[InputProblem]:
             )
 
 
-def _cut(one: Recording, steps: LoadSteps) -> Cut:
-    load = one.loads[one.driving]
-    return cut(load, steps.smallest_reversal, one.of.preconditioning_cycles, steps.reference)
-
-
-def _cut_problems(one: Recording, found: Cut, first: Cut) -> Iterator[InputProblem]:
+def _cut_problems(
+    one: Recording, found: Segmentation, first: Segmentation
+) -> Iterator[InputProblem]:
     if not found.kept:
         told = f"{len(found.cycles)} cycles, of which none is kept"
         remedy = "lower `preconditioning_cycles` or `steps.smallest_reversal`, or look at the file"
@@ -143,7 +297,7 @@ def _cut_problems(one: Recording, found: Cut, first: Cut) -> Iterator[InputProbl
 
 
 def _beyond(
-    one: Recording, found: Cut, cycles: Sequence[Cycle], steps: LoadSteps
+    one: Recording, found: Segmentation, cycles: Sequence[Cycle], steps: LoadSteps
 ) -> Iterator[InputProblem]:
     """Levels that were asked for and that some cycle does not reach."""
     if steps.levels is None:
@@ -157,18 +311,23 @@ def _beyond(
         yield InputProblem(one.file, None, one.driving, told, allowed, remedy)
 
 
-def _thinned(
+def _resample(
     one: Recording, cycle: Cycle, planned: Sequence[Step], zeroed: bool
-) -> ThinnedCycle | InputProblem:
+) -> ResampledCycle | InputProblem:
     load = one.loads[one.driving]
     others = [name for name in one.loads if name != one.driving]
     columns = [*one.motion.values(), *(one.loads[name] for name in others)]
     columns += [] if one.time is None else [one.time]
     quantities = np.column_stack(columns)
     readings = []
-    for step, width in zip(planned, _widths([step.level for step in planned]), strict=True):
+    # width of each window: the distance of its level to the nearest other one
+    known = np.unique([step.level for step in planned])
+    gaps = np.diff(known)
+    near = np.minimum(np.append(gaps, np.inf), np.append(np.inf, gaps))
+    width_of = {level: float(gap) for level, gap in zip(known, near, strict=True)}
+    for step in planned:
         branch = cycle.branches[step.branch]
-        reading = read_at(step.level, width, branch, load, quantities)
+        reading = read_at(step.level, width_of[step.level], branch, load, quantities)
         if reading is None:
             line = int(one.lines[branch.first])
             found = f"{branch.last - branch.first + 1} lines on the way to or from a reversal"
@@ -182,7 +341,7 @@ def _thinned(
     for place, name in enumerate(others):
         loads[:, LOAD_COLUMNS.index(name)] = values[:, n + place]
     motion = values[:, :n] - values[0, :n] if zeroed else values[:, :n]
-    return ThinnedCycle(
+    return ResampledCycle(
         loads=loads,
         time=None if one.time is None else _times(values[:, -1], planned, cycle, one.time),
         motion=motion,
@@ -190,15 +349,6 @@ def _thinned(
         raw=np.array([reading.raw[:n] for reading in readings]),
         rows=np.array([len(reading.left) for reading in readings]),
     )
-
-
-def _widths(levels: Sequence[float]) -> list[float]:
-    """Distance of each level to its nearest neighbour among all levels."""
-    known = np.unique(levels)
-    gaps = np.diff(known)
-    near = np.minimum(np.append(gaps, np.inf), np.append(np.inf, gaps))
-    at = {level: float(gap) for level, gap in zip(known, near, strict=True)}
-    return [at[level] for level in levels]
 
 
 def _times(regressed: Array, planned: Sequence[Step], cycle: Cycle, time: Array) -> Array:
@@ -212,7 +362,7 @@ def _times(regressed: Array, planned: Sequence[Step], cycle: Cycle, time: Array)
 
 
 @dataclass(frozen=True)
-class Sureness:
+class ReadingPrecision:
     """How sure the readings of one kind (deg or mm) are; NaN where it cannot be told.
 
     Attributes
@@ -233,7 +383,9 @@ class Sureness:
         return float(np.nanmax([self.regression, self.cycles, self.finest]))
 
 
-def sureness(tests: Sequence[ThinnedTest], unit: str, zeroed: bool) -> Sureness | None:
+def reading_precision(
+    tests: Sequence[ResampledTest], unit: str, zeroed: bool
+) -> ReadingPrecision | None:
     """Pooled over all readings whose column ends with this unit; None where there are none."""
     of_rows, of_regression, of_cycles, finest = [], [], [], []
     for test in tests:
@@ -247,7 +399,7 @@ def sureness(tests: Sequence[ThinnedTest], unit: str, zeroed: bool) -> Sureness 
                 of_cycles.append(_between([c.motion[:, place] for c in test.cycles], zeroed))
     if not of_rows:
         return None
-    return Sureness(
+    return ReadingPrecision(
         _rms(np.concatenate(of_rows)),
         _rms(np.concatenate(of_regression)),
         _rms(np.concatenate(of_cycles)) if of_cycles else float("nan"),
