@@ -19,7 +19,7 @@ and of Shojaei 2017, which are printed in no text at hand; a cohort that has the
 `white_panjabi_1990` is no set of the paper: it shares T1-S1 out as ranges of motion are.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib.resources import files
 
 import numpy as np
@@ -93,7 +93,16 @@ def ratio_sets(own: pd.DataFrame | None = None, file: str = RATIOS_FILE) -> dict
     InputError
         Of shares that do not sum to 1.
     """
-    if own is not None and (problems := list(_wrong_sums(own, file))):
+    problems = []
+    if own is not None:
+        # shares of a rotation that are not all of it
+        for (name, coordinate), part in own.groupby(["set", "coordinate"], sort=False):
+            total = float(part["ratio"].sum())
+            if abs(total - 1.0) > SUM_DIFFERS:
+                wrong, line = f"ratios of {coordinate} in {name} sum to {total:.4g}", part.index[0]
+                told = (wrong, "a sum of 1", "divide each by their sum")
+                problems.append(InputProblem(file, int(str(line)), "ratio", *told))
+    if problems:
         raise InputError(problems)
     found: dict[str, Array] = {}
     for rows in [packaged_rows(RATIOS_FILE, ("ratio",)), *([] if own is None else [own])]:
@@ -103,13 +112,3 @@ def ratio_sets(own: pd.DataFrame | None = None, file: str = RATIOS_FILE) -> dict
             shares[joint_places(part), rotation] = part["ratio"].to_numpy(float)
             found[str(name)] = shares
     return found
-
-
-def _wrong_sums(rows: pd.DataFrame, file: str) -> Iterator[InputProblem]:
-    """Shares of a rotation that are not all of it."""
-    for (name, coordinate), part in rows.groupby(["set", "coordinate"], sort=False):
-        total = float(part["ratio"].sum())
-        if abs(total - 1.0) > SUM_DIFFERS:
-            found = f"ratios of {coordinate} in {name} sum to {total:.4g}"
-            line = int(str(part.index[0]))
-            yield InputProblem(file, line, "ratio", found, "a sum of 1", "divide each by their sum")

@@ -146,18 +146,18 @@ def passive_elements(own: pd.DataFrame | None = None, file: str = FILE) -> Passi
         for name in NUMBERS:
             values[name][at] = rows[name].to_numpy(float)
         values["b"][at] *= DISPLAY_PER_SI[coordinate]
-    if own is not None and (problems := [*_steep(own, file), *_kinks(own, values, file)]):
-        raise InputError(problems)
-    return PassiveElements(**values)
-
-
-def _steep(own: pd.DataFrame, file: str) -> Iterator[InputProblem]:
-    """Rates of rotations that are those of another unit."""
-    steep = own["coordinate"].isin(ROTATIONS) & (own["b"] > LARGEST_B_PER_DEG)
-    for line, rate in own["b"][steep].items():
+    if own is not None:
+        # rates of rotations that are those of another unit
         allowed = f"at most {LARGEST_B_PER_DEG:g} per degree"
         remedy = "rates per radian are divided by 57.3"
-        yield InputProblem(file, int(str(line)), "b", f"{rate:g}", allowed, remedy)
+        steep = own["coordinate"].isin(ROTATIONS) & (own["b"] > LARGEST_B_PER_DEG)
+        problems = [
+            InputProblem(file, int(str(line)), "b", f"{rate:g}", allowed, remedy)
+            for line, rate in own["b"][steep].items()
+        ]
+        if problems := [*problems, *_kinks(own, values, file)]:
+            raise InputError(problems)
+    return PassiveElements(**values)
 
 
 def _kinks(own: pd.DataFrame, values: dict[str, Array], file: str) -> Iterator[InputProblem]:

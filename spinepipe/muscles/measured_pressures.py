@@ -71,23 +71,21 @@ def measured_pressures() -> tuple[MeasuredPressure, ...]:
 
 def pair_with_tasks(tasks: Mapping[str, Task]) -> tuple[PairedPressure, ...]:
     """Measured pressures of those tasks that have one."""
-    found = (_pair(name, task) for name, task in tasks.items())
-    return tuple(one for one in found if one is not None)
-
-
-def _pair(name: str, task: Task) -> PairedPressure | None:
-    if task.number is None or task.number == 7:  # a course of angles, not one posture
-        return None
-    rows = [row for row in measured_pressures() if row.task == task.number and row.value]
-    if task.number == 9:  # lateral bending was measured at several angles
-        bent = DEG_PER_RAD * abs(float(task.turned[-1, 1]))
-        of_each = [(row, row.condition.removesuffix(" deg")) for row in rows]
-        rows = [r for r, deg in of_each if deg.isdigit() and abs(float(deg) - bent) < SAME_DEG]
-    rows = [row for row in rows if row.status == "confirmed"] or rows
-    if not rows:
-        return None
-    status = rows[0].status
-    source = "; ".join(dict.fromkeys(row.source for row in rows))
-    mean = float(np.mean([row.value for row in rows if row.value is not None]))
-    counted = task.number in COUNTED and status == "confirmed"
-    return PairedPressure(name, mean, status, source, counted)
+    found = []
+    for name, task in tasks.items():
+        if task.number is None or task.number == 7:  # a course of angles, not one posture
+            continue
+        rows = [row for row in measured_pressures() if row.task == task.number and row.value]
+        if task.number == 9:  # lateral bending was measured at several angles
+            bent = DEG_PER_RAD * abs(float(task.turned[-1, 1]))
+            of_each = [(row, row.condition.removesuffix(" deg")) for row in rows]
+            rows = [r for r, deg in of_each if deg.isdigit() and abs(float(deg) - bent) < SAME_DEG]
+        # confirmed series alone, where there are any
+        rows = [row for row in rows if row.status == "confirmed"] or rows
+        if rows:
+            status = rows[0].status
+            source = "; ".join(dict.fromkeys(row.source for row in rows))
+            mean = float(np.mean([row.value for row in rows if row.value is not None]))
+            counted = task.number in COUNTED and status == "confirmed"
+            found.append(PairedPressure(name, mean, status, source, counted))
+    return tuple(found)

@@ -187,17 +187,13 @@ def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
     row, number, share = row[order], number[order], share[order]
     # as far behind the centre as the rule says of how far the string is
     string = start[row] + share[:, None] * way[row]
-    centre, back = trunk.vertebrae[number], -_forwards(trunk)[number]
+    centres = trunk.vertebrae
+    line = np.concatenate([centres[:1], centres[:-1]]) - np.concatenate([centres[1:], centres[-1:]])
+    # forwards across the spine at each vertebra, in the source's pose: by the centres about it
+    across = np.stack([line[:, 1], -line[:, 0], np.zeros(len(line))], axis=1)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    centre, back = centres[number], -across[number]
     distance = np.einsum("bi,bi->b", string - centre, back)
     at = centre + np.maximum(rule.share * distance, rule.least_m)[:, None] * back
     at[:, 2] += string[:, 2]
     return Bars(np.searchsorted(owner[row], np.arange(len(muscles) + 1)), leg[row], of[number], at)
-
-
-def _forwards(trunk: Trunk) -> Array:
-    """(17, 3) across the spine at each vertebra, in the source's pose: by the centres about it."""
-    centres = trunk.vertebrae
-    line = np.concatenate([centres[:1], centres[:-1]]) - np.concatenate([centres[1:], centres[-1:]])
-    across = np.stack([line[:, 1], -line[:, 0], np.zeros(len(line))], axis=1)
-    found: Array = across / np.linalg.norm(across, axis=1, keepdims=True)
-    return found

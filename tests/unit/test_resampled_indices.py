@@ -109,13 +109,13 @@ def test_pawn_of_weights_is_that_of_repeated_rows_in_the_same_slices() -> None:
 
 def test_resamples_all_in_or_out_of_a_part_are_no_distance_away() -> None:
     values, part = np.array([3.0, 1.0, 2.0, 4.0]), np.array([True, True, False, False])
-    ordered = given_data.WeightedSample(
-        values, np.array([[1, 1, 0, 0], [0, 0, 1, 1], [1, 1, 1, 1.0]])
-    )
+    weights = np.array([[1, 1, 0, 0], [0, 0, 1, 1], [1, 1, 1, 1.0]])
+    ordered = given_data.WeightedSample(values, weights)
     np.testing.assert_allclose(ordered.share(part), [1.0, 0.0, 0.5])
     # of all four: after 1 half of the part and a quarter of all
     np.testing.assert_allclose(ordered.distance(part), [0.0, 0.0, 0.25])
-    np.testing.assert_allclose(given_data._from_rest(ordered, part), [0.0, 0.0, 0.5])
+    from_rest = given_data.regional(values[:, None], part[:, None], weights)
+    np.testing.assert_allclose(from_rest[:, 0, 0], [0.0, 0.0, 0.5])
 
 
 @sweep("n", [50, 51])

@@ -102,8 +102,11 @@ def noise_floor(
     )
     floors = {}
     for name in names:
-        if name == "S2":
-            floors[name] = _of_pairs(found)
+        if name == "S2":  # from the lowest to the highest end of the dummy's pairs
+            pairs = [i for i in found if i.index == "S2" and DUMMY in (i.factor, i.other)]
+            low = np.ma.stack([pair.low for pair in pairs]).min(axis=0)
+            high = np.ma.stack([pair.high for pair in pairs]).max(axis=0)
+            floors[name] = Floor(low, high, len(pairs))
             continue
         known = np.array([status is IndexStatus.DONE for status in of_dummy[name].status])
         drawn = np.empty((0, 0))
@@ -151,14 +154,6 @@ def _floor(name: str, drawn: Array, known: NDArray[np.bool_], confidence: float)
             else percentile_interval(sizes, confidence)
         )
     return Floor(masked(ends[0], ~known), masked(ends[1], ~known), len(drawn))
-
-
-def _of_pairs(found: Sequence[SensitivityIndex]) -> Floor:
-    """From the lowest to the highest end of the dummy's pairs."""
-    pairs = [i for i in found if i.index == "S2" and DUMMY in (i.factor, i.other)]
-    low = np.ma.stack([pair.low for pair in pairs]).min(axis=0)
-    high = np.ma.stack([pair.high for pair in pairs]).max(axis=0)
-    return Floor(low, high, len(pairs))
 
 
 def _replicates(

@@ -113,8 +113,13 @@ def _one(index: str, unit: Array, outputs: Array, settings: Settings) -> Array:
         estimates = partial(rbd_fast_resampled, unit, outputs)
         estimate, drawn = rbd_fast_s1(unit, outputs), _resampled(estimates, len(unit), settings)[1]
     elif index == "PAWN":
-        estimates = partial(_pawn, unit, outputs, settings.slices)
-        estimate, drawn = _resampled(estimates, len(unit), settings)
+        estimate, drawn = _resampled(
+            lambda weights: np.stack(
+                [pawn(unit, output, weights, settings.slices) for output in outputs.T], axis=-1
+            ),
+            len(unit),
+            settings,
+        )
     else:
         region = tail_of(outputs, settings.tail, highest=index == "KS_high")
         estimate, drawn = _resampled(partial(regional, unit, region), len(unit), settings)
@@ -129,11 +134,6 @@ def _resampled(
     blocks = resample_weights(n, settings.bootstraps, settings.seed)
     drawn = np.concatenate([estimates(weights) for weights in blocks])
     return estimates(np.ones((1, n)))[0], drawn
-
-
-def _pawn(unit: Array, outputs: Array, slices: int, weights: Array) -> Array:
-    """(R, D, K) of `pawn`."""
-    return np.stack([pawn(unit, output, weights, slices) for output in outputs.T], axis=-1)
 
 
 def rbd_fast_s1(unit: Array, outputs: Array) -> Array:
@@ -156,33 +156,26 @@ def rbd_fast_resampled(unit: Array, outputs: Array, weights: Array) -> Array:
 
     SALib takes 0.4 ms for each resample of 1,024 points, one transform for all 0.012 ms.
     """
-    found = np.empty((len(weights), unit.shape[1], outputs.shape[1]))
+    r, n = weights.shape
+    found = np.empty((r, unit.shape[1], outputs.shape[1]))
     for column, values in enumerate(unit.T):
-        rows = _sorted_rows(values, weights)
-        # along these rows the factor goes up and down once, as on a curve of FAST of frequency 1
+        # rows (R, N) of each resample, up through every other one by value and down the rest: along
+        # them the factor goes up and down once, as on a curve of FAST of frequency 1
+        order = np.argsort(values, kind="stable")
+        counts = weights[:, order].astype(int).ravel()
+        rows = np.repeat(np.tile(order, r), counts).reshape(r, n)
+        rows = np.hstack([rows[:, ::2], rows[:, 1::2][:, ::-1]])
         for k in range(outputs.shape[1]):
-            raw = _share_of_harmonics(outputs[rows, k])
+            # share of the first harmonics in the variance of each row; 0 without any variance
+            curve = outputs[rows, k]
+            power = np.abs(rfft(curve - curve.mean(axis=1, keepdims=True), axis=1)) ** 2
+            # both sides of the spectrum, but for the middle line of an even number of points
+            power[:, 1 : (n + 1) // 2] *= 2.0
+            whole = power[:, 1:].sum(axis=1)
+            first = power[:, 1 : HARMONICS + 1].sum(axis=1)
+            raw = np.divide(first, whole, out=np.zeros_like(whole), where=whole > 0.0)
             found[:, column, k] = rbd_fast.unskew_S1(raw, HARMONICS, len(outputs))
     return found
-
-
-def _sorted_rows(values: Array, weights: Array) -> Array:
-    """(R, N) rows of each resample, up through every other one by value and down the rest."""
-    order = np.argsort(values, kind="stable")
-    r, n = weights.shape
-    counts = weights[:, order].astype(int).ravel()
-    rows = np.repeat(np.tile(order, r), counts).reshape(r, n)
-    return np.hstack([rows[:, ::2], rows[:, 1::2][:, ::-1]])
-
-
-def _share_of_harmonics(permuted: Array) -> Array:
-    """(R,) share of the first harmonics in the variance of each row (R, N); 0 without any."""
-    n = permuted.shape[1]
-    power = np.abs(rfft(permuted - permuted.mean(axis=1, keepdims=True), axis=1)) ** 2
-    power[:, 1 : (n + 1) // 2] *= 2.0  # both sides, but for the middle one of an even number
-    whole = power[:, 1:].sum(axis=1)
-    first = power[:, 1 : HARMONICS + 1].sum(axis=1)
-    return np.divide(first, whole, out=np.zeros_like(whole), where=whole > 0.0)
 
 
 def pawn(unit: Array, output: Array, weights: Array, slices: int) -> Array:
@@ -264,15 +257,9 @@ def regional(unit: Array, region: NDArray[np.bool_], weights: Array) -> Array:
     for column, values in enumerate(unit.T):
         factor = WeightedSample(values, weights)
         for k in range(region.shape[1]):
-            found[:, column, k] = _from_rest(factor, region[:, k])
+            # with the region's share p in all, F_region - F_all = (1 - p) (F_region - F_rest);
+            # 0 for a resample that lies all in one of them
+            outside = 1.0 - factor.share(region[:, k])
+            split, apart = outside > 0.0, factor.distance(region[:, k])
+            found[:, column, k] = np.where(split, apart / np.where(split, outside, 1.0), 0.0)
     return found
-
-
-def _from_rest(factor: WeightedSample, region: NDArray[np.bool_]) -> Array:
-    """(R,) distance between region and rest; 0 for a resample that lies all in one of them.
-
-    With the region's share p in all, F_region - F_all = (1 - p) (F_region - F_rest).
-    """
-    outside = 1.0 - factor.share(region)
-    split = outside > 0.0
-    return np.where(split, factor.distance(region) / np.where(split, outside, 1.0), 0.0)

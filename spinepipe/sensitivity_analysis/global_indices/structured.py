@@ -6,7 +6,6 @@ once. With 24 factors and a dummy, 1,024 base samples, pairs and 1,000 resamples
 output instead of 10.6 s (one core).
 """
 
-from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -79,13 +78,21 @@ def morris_indices(design: Design, outputs: Array, settings: Settings) -> IndexE
     over resampled trajectories; those of sigma are narrow below 20 trajectories (88-95 % held).
     """
     effects = elementary_effects(design, outputs)
-    kinds = [(index, g) for g in range(len(design.inputs)) for index in _kinds(design, g)]
-    pick = np.array([3 * g + ALONE.index(index) for index, g in kinds])
-    drawn = _resamples(len(effects), settings)
-    found = [
-        _of_effects(effects[:, :, k], drawn, settings.confidence)[:, pick]
-        for k in range(outputs.shape[1])
+    kinds = [
+        (index, g)
+        for g, name in enumerate(design.inputs)
+        for index in (("mu_star",) if design.groups.count(name) > 1 else ALONE)
     ]
+    pick = np.array([3 * g + ALONE.index(index) for index, g in kinds])
+    r = len(effects)
+    resamples = _resamples(r, settings)
+    found = []
+    for k in range(outputs.shape[1]):
+        own = effects[:, :, k]
+        whole = _indices(np.full((1, r), 1.0 / r), own)
+        drawn = np.concatenate([_indices(some / r, own) for some in resamples])
+        ends = percentile_interval(drawn, settings.confidence)
+        found.append(np.vstack([whole, ends])[:, pick])
     estimate, low, high = np.stack(found, axis=-1)
     names = tuple((index, design.inputs[g], "") for index, g in kinds)
     return IndexEstimates(names, estimate, np.stack([low, high]))
@@ -108,11 +115,6 @@ def elementary_effects(design: Design, outputs: Array) -> Array:
     return found
 
 
-def _kinds(design: Design, g: int) -> tuple[str, ...]:
-    several = design.groups.count(design.inputs[g]) > 1
-    return ("mu_star",) if several else ALONE
-
-
 Counts = NDArray[np.uint8]
 
 
@@ -123,14 +125,6 @@ def _resamples(n: int, settings: Settings) -> list[Counts]:
     """
     drawn = resample_weights(n, settings.bootstraps, settings.seed)
     return [weights.astype(np.uint8) for weights in drawn]
-
-
-def _of_effects(effects: Array, resamples: Sequence[Counts], confidence: float) -> Array:
-    """(3, 3 G) estimates and ends of one output from effects (r, G)."""
-    r = len(effects)
-    drawn = np.concatenate([_indices(some / r, effects) for some in resamples])
-    whole = _indices(np.full((1, r), 1.0 / r), effects)
-    return np.vstack([whole, percentile_interval(drawn, confidence)])
 
 
 def _indices(weights: Array, effects: Array) -> Array:
@@ -161,26 +155,19 @@ def sobol_indices(design: Design, outputs: Array, settings: Settings) -> IndexEs
     paired = len(inputs) if design.second_order and settings.asks("S2") else 0
     pairs = np.array(list(combinations(range(paired), 2)), dtype=int).reshape(-1, 2)
     blocks = outputs.reshape(-1, design.block, outputs.shape[1])
-    drawn = _resamples(len(blocks), settings)
-    found = [
-        _of_blocks(blocks[:, :, k], len(inputs), pairs, drawn, settings.confidence)
-        for k in range(outputs.shape[1])
-    ]
+    resamples = _resamples(len(blocks), settings)
+    found = []
+    for k in range(outputs.shape[1]):
+        own = blocks[:, :, k]
+        columns = _columns((own - own.mean()) / own.std(), len(inputs), pairs)
+        whole = _from_means(columns.mean(axis=0)[None], len(inputs), pairs)
+        means = (some.astype(float) @ columns / len(own) for some in resamples)
+        drawn = np.vstack([_from_means(some, len(inputs), pairs) for some in means])
+        found.append(np.vstack([whole, percentile_interval(drawn, settings.confidence)]))
     estimate, low, high = np.stack(found, axis=-1)
     names = [(index, name, "") for index in ("S1", "ST") for name in inputs]
     names += [("S2", inputs[j], inputs[k]) for j, k in pairs]
     return IndexEstimates(tuple(names), estimate, np.stack([low, high]))
-
-
-def _of_blocks(
-    blocks: Array, inputs: int, pairs: Array, resamples: Sequence[Counts], confidence: float
-) -> Array:
-    """(3, C) estimates and ends of one output from (N, block) runs."""
-    columns = _columns((blocks - blocks.mean()) / blocks.std(), inputs, pairs)
-    whole = _from_means(columns.mean(axis=0)[None], inputs, pairs)
-    means = (some.astype(float) @ columns / len(blocks) for some in resamples)
-    drawn = np.vstack([_from_means(some, inputs, pairs) for some in means])
-    return np.vstack([whole, percentile_interval(drawn, confidence)])
 
 
 def _columns(blocks: Array, inputs: int, pairs: Array) -> Array:

@@ -86,10 +86,14 @@ def run(
 ) -> None:
     """Write what the blocks of one specimen's samples say: indices, how they settle, who failed."""
     settings, cohort = study_of_kind(GlobalSensitivity, root, study)
-    outputs = [
-        *response_outputs(responses, settings),
-        *calibrated_outputs(calibrated, settings),
-    ]
+    outputs: list[OutputGroup] = []
+    # responses are read only where motion or loads are asked, and of them the columns asked
+    columns = [_MOTION[name] for name in settings.outputs.motion]
+    columns += [_LOAD[name] for name in settings.outputs.joint_load]
+    if columns:
+        place = ["sample", "test", "step", "joint", "status"]
+        outputs += outputs_of(read_blocks(responses, [*place, *columns]), settings)
+    outputs += calibrated_outputs(calibrated, settings)
     read = [mark_of(path) for path in (design, *responses, *calibrated)]
     made_by = provenance("analyse", settings, cohort, [specimen], read)
     drawn = design_of(settings)
@@ -175,15 +179,6 @@ def _numbers(index: SensitivityIndex) -> Columns:
 def _repeated(count: int, **values: Any) -> Columns:
     """The same in all cells of a column."""
     return {name: [value] * count for name, value in values.items()}
-
-
-def response_outputs(blocks: Sequence[str], study: GlobalSensitivity) -> Iterator[OutputGroup]:
-    """Outputs of each test and step from the blocks of a specimen's responses."""
-    if study.outputs.motion or study.outputs.joint_load:
-        columns = [_MOTION[name] for name in study.outputs.motion]
-        columns += [_LOAD[name] for name in study.outputs.joint_load]
-        asked = ["sample", "test", "step", "joint", "status", *columns]
-        yield from outputs_of(read_blocks(blocks, asked), study)
 
 
 def outputs_of(rows: pa.Table, study: GlobalSensitivity) -> Iterator[OutputGroup]:

@@ -125,7 +125,12 @@ def vary(start: DescribedSpecimen, changes: Sequence[FactorChange], values: Arra
         values=(bushing,),
     )
     cases = tuple(varied_cases(test.case, total) for test in start.tests)
-    return _of_kept(spines, cases, refused)
+    # the spines that are spines
+    kept = np.setdiff1d(np.arange(len(spines)), list(refused)).astype(np.int64)
+    if refused:
+        spines = spines.part(kept)
+        cases = tuple(case.part(kept) for case in cases)
+    return SpineSamples(spines, cases, kept, dict(sorted(refused.items())))
 
 
 def _out_of_bounds(scoped: ScopedEffect, joints: Sequence[str], values: Array) -> dict[int, str]:
@@ -138,15 +143,6 @@ def _out_of_bounds(scoped: ScopedEffect, joints: Sequence[str], values: Array) -
             allowed = f"allowed {limits.low:.3g} to {limits.high:.3g}"
             refused.setdefault(sample, f"joint {joints[joint]}: {value}, {allowed}")
     return refused
-
-
-def _of_kept(spines: Spines, cases: tuple[Cases, ...], refused: dict[int, str]) -> SpineSamples:
-    """The spines that are spines."""
-    kept = np.setdiff1d(np.arange(len(spines)), list(refused)).astype(np.int64)
-    if refused:
-        spines = spines.part(kept)
-        cases = tuple(case.part(kept) for case in cases)
-    return SpineSamples(spines, cases, kept, dict(sorted(refused.items())))
 
 
 def variation(

@@ -49,12 +49,26 @@ def check_scoliosis(
     """Everything that is wrong with the films of a cohort."""
     films = cohort.further.get("films")
     if films is None:
-        place = at(document, "cohort")
         found, allowed = "a cohort without films.csv", "a cohort with films of its patients"
-        yield InputProblem(*place, found, allowed, "add films.csv, or name another cohort")
+        remedy = "add films.csv, or name another cohort"
+        yield InputProblem(*at(document, "cohort"), found, allowed, remedy)
         return
     for patient in cohort.specimen_names:
-        yield from _patient(cohort, patient, films[films["specimen"] == patient])
+        rows = films[films["specimen"] == patient]
+        file = f"{cohort.name}/films.csv"
+        shapes: dict[str, Film] = {}
+        for position in dict.fromkeys(rows["position"]):
+            film = rows[rows["position"] == position]
+            place = _FilmPlace(file, patient, position)
+            faults = list(_film(cohort, place, film))
+            yield from faults
+            if not faults:
+                shapes[position] = Film(*film_readings(film, cohort.vertebrae).mean(axis=0))
+                yield from _tilts(place, film, cohort.vertebrae, shapes[position])
+        # then what films of one patient say of each other
+        yield from _bends(file, patient, shapes)
+        if ERECT in shapes:
+            yield from _cobb(cohort, patient, shapes[ERECT])
 
 
 @dataclass(frozen=True)
@@ -70,22 +84,6 @@ class _FilmPlace:
     ) -> InputProblem:
         named = f"{self.patient}, film {self.position}: {found}"
         return InputProblem(self.file, row, what, named, allowed, remedy)
-
-
-def _patient(cohort: Cohort, patient: str, rows: pd.DataFrame) -> Iterator[InputProblem]:
-    file = f"{cohort.name}/films.csv"
-    known = list(dict.fromkeys(rows["position"]))
-    shapes: dict[str, Film] = {}
-    for position in known:
-        film, place = rows[rows["position"] == position], _FilmPlace(file, patient, position)
-        faults = list(_film(cohort, place, film))
-        yield from faults
-        if not faults:
-            shapes[position] = Film(*film_readings(film, cohort.vertebrae).mean(axis=0))
-            yield from _tilts(place, film, cohort.vertebrae, shapes[position])
-    yield from _bends(file, patient, shapes)
-    if ERECT in shapes:
-        yield from _cobb(cohort, patient, shapes[ERECT])
 
 
 def _cobb(cohort: Cohort, patient: str, erect: Film) -> Iterator[InputProblem]:

@@ -6,7 +6,6 @@ under it, as the parabolas hold near the fits alone.
 """
 
 import sys
-from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from spinepipe.studies.scoliosis.film_fit import (
     weighed_with,
 )
 from spinepipe.studies.scoliosis.films import reading_noise
-from spinepipe.studies.scoliosis.personal import Patient, patient_of
+from spinepipe.studies.scoliosis.personal import patient_of
 from spinepipe.studies.scoliosis.population import (
     Population,
     PopulationEstimate,
@@ -70,8 +69,11 @@ def fit_population(
     rounds, change, fits = 0, np.inf, dict[str, FilmFitResult]()
     for _ in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
         rounds += 1
-        # fits of all under the population, then the population that their parabolas make likeliest
-        fits = dict(_fits(patients, sd, population, fits))
+        # fits of all under the population, from the fits before or, without these, all starts
+        problems = [FilmFit(patient, sd) for patient in patients.values()]
+        found = fit_alike(problems, population, [fits.get(name) for name in patients])
+        fits = {name: one for name, one in zip(patients, found, strict=True) if one is not None}
+        # then the population that their parabolas make likeliest
         before = population
         population = _likeliest(before, [one.information for one in fits.values()])
         change = _change(before, population)
@@ -79,18 +81,6 @@ def fit_population(
             break
     unfitted = tuple(name for name in patients if name not in fits)
     return PopulationEstimate(population, rounds, change, len(fits), unfitted, change < LAST_ROUND)
-
-
-def _fits(
-    patients: Mapping[str, Patient],
-    sd: Array,
-    population: Population,
-    before: Mapping[str, FilmFitResult],
-) -> Iterator[tuple[str, FilmFitResult]]:
-    """The patients that can be fitted, from the fits before or, without these, from all starts."""
-    problems = [FilmFit(patient, sd) for patient in patients.values()]
-    found = fit_alike(problems, population, [before.get(name) for name in patients])
-    return ((name, one) for name, one in zip(patients, found, strict=True) if one is not None)
 
 
 def _likeliest(population: Population, patients: list[FilmInformation]) -> Population:

@@ -131,20 +131,17 @@ def _answer(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:
     told = f"{told}: rotations are off by {held_out.sized(best)} (root mean square)"
     if not ps:
         return f"{told}. There is no other model to compare it with."
-    which = ("the next, ", "")
-    compared = [_beside(held_out, best, *one) for one in zip(ps, which, strict=False)]
+    compared = []
+    for other, which in zip(ps, ("the next, ", ""), strict=False):
+        share = 100.0 * held_out.less(best, other)
+        less = "as much as" if share <= 0.0 else f"{number(share, 2)} % less than"
+        compared.append(f"{less} {which}{TOLD[other]} ({held_out.sized(other)})")
     answer = f"{told}, {' and '.join(compared)}."
     if p is not None and p >= SIGNIFICANT:
         answer += " From the next it cannot be told apart."
     if best == NOT_PERSONAL:
         answer += " Nothing that the others take from the bending films makes them better than it."
     return answer
-
-
-def _beside(standing: ModelRanking, best: str, other: str, which: str) -> str:
-    share = 100.0 * standing.less(best, other)
-    less = "as much as" if share <= 0.0 else f"{number(share, 2)} % less than"
-    return f"{less} {which}{TOLD[other]} ({standing.sized(other)})"
 
 
 def _sure(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:

@@ -112,10 +112,21 @@ def update_population(before: Population, patients: Sequence[PatientPrior]) -> P
     means = np.array([one.mean for one in patients])
     means[:, : before.segments] -= means[:, : before.segments].mean(axis=1, keepdims=True)
     after = replace(before, mean=_level_means(before, means))
+    s, count = after.segments, len(patients)
+    # expected squares of the levels' ratios about the new mean
+    unsure = sum(float(np.trace(one.covariance[:s, :s])) for one in patients)
+    ratios = float(((means - after.mean)[:, :s] ** 2).sum()) + unsure
+    # of the ends: of what those of one patient do not share
+    ends = 0.0
+    for mean, one in zip(means, patients, strict=True):
+        away = (mean - after.mean)[s:]
+        # expected squares of the deviations, less those of their mean, which all ends share
+        moment = np.outer(away, away) + one.covariance[s:, s:]
+        ends += float(np.trace(moment) - moment.sum() / (2 * s))
     return replace(
         after,
-        ratio_sd=_ratio_sd(after, means, patients),
-        end_sd=_end_sd(after, means, patients),
+        ratio_sd=_spread(ratios, count * s, RATIO_SPREAD),
+        end_sd=_spread(ends, count * (2 * s - 1), END_SPREAD),
     )
 
 
@@ -131,24 +142,6 @@ def _level_means(before: Population, means: Array) -> Array:
     common = weight * ends.mean() + (1.0 - weight) * np.log(END_RAD)
     kept = LEVEL_END_SPREAD**2 / (LEVEL_END_SPREAD**2 + before.end_sd**2 / count)
     return np.concatenate([ratios, common + kept * (ends - ends.mean())])
-
-
-def _ratio_sd(after: Population, means: Array, patients: Sequence[PatientPrior]) -> float:
-    s = after.segments
-    away = ((means - after.mean)[:, :s] ** 2).sum()
-    unsure = sum(float(np.trace(one.covariance[:s, :s])) for one in patients)
-    return _spread(float(away) + unsure, len(patients) * s, RATIO_SPREAD)
-
-
-def _end_sd(after: Population, means: Array, patients: Sequence[PatientPrior]) -> float:
-    """Of what the ends of one patient do not share."""
-    s, total = after.segments, 0.0
-    for mean, one in zip(means, patients, strict=True):
-        away = (mean - after.mean)[s:]
-        # expected squares of the deviations, less those of their mean, which all ends share
-        moment = np.outer(away, away) + one.covariance[s:, s:]
-        total += float(np.trace(moment) - moment.sum() / (2 * s))
-    return _spread(total, len(patients) * (2 * s - 1), END_SPREAD)
 
 
 def _spread(squares: float, count: int, usual: float) -> float:

@@ -50,16 +50,12 @@ def run(root: str, study: str, specimen: str, law: str, output: str) -> None:
             one.grid.at_nodes(coefficients)[0][:, 1:]
             for one, coefficients in zip(seen, solved.coefficients, strict=True)
         ]
-        high = largest_loads(solved.law, motions)
+        # (17, 6, 2) N and N m, largest load of each side in motions (F, 17, 6)
+        loads = np.concatenate([solved.law.forces(q) for q in motions])
+        high = np.stack([np.maximum(one, 0.0).max(axis=0) for one in (loads, -loads)], -1)
         rows = list(stiffness_rows(solved.law, person.passive, high, solved.status, solved.message))
     known = {"specimen": specimen, "law": law}
     write(from_rows(STIFFNESS, [row | known for row in rows]), output, made_by)
-
-
-def largest_loads(law: PassiveLaw, motions: list[Array]) -> Array:
-    """(17, 6, 2) N and N m, largest load of each side in motions (F, 17, 6)."""
-    loads = np.concatenate([law.forces(q) for q in motions])
-    return np.stack([np.maximum(loads, 0.0).max(axis=0), np.maximum(-loads, 0.0).max(axis=0)], -1)
 
 
 def stiffness_rows(

@@ -22,7 +22,6 @@ from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_pr
 from spinepipe.studies.tracking.checks_of_markers import LoadedTrial
 from spinepipe.studies.tracking.checks_of_motion import motion_problems
 from spinepipe.studies.tracking.persons import (
-    Row,
     marker_set,
     ratios_of,
     read_recording,
@@ -160,10 +159,18 @@ def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
     file = f"{cohort.name}/{TRIALS.file}"
     for specimen in cohort.specimen_names:
         for row in trial_rows(cohort, specimen):
-            yield from _file_and_axes(file, row)
+            name, place = str(row["file"]), (file, row["line"], "file")
+            if Path(name).suffix.lower() not in READERS:
+                found, allowed = f"'{name}'", f"a file of motion: {', '.join(READERS)}"
+                yield InputProblem(*place, found, allowed, "export it as one of these")
+            if isinstance(row["axes"], str):
+                try:
+                    axes_of(row["axes"])
+                except ValueError as error:
+                    allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
+                    remedy = "name each axis once, a minus where it points the other way"
+                    yield InputProblem(file, row["line"], "axes", str(error), allowed, remedy)
             # a file outside the cohort's folder
-            name = str(row["file"])
-            place = (file, row["line"], "file")
             if (led_out := outside(cohort.folder / name, cohort.folder, place, name)) is not None:
                 yield led_out
         if static_trial(cohort, specimen) is None:
@@ -171,19 +178,6 @@ def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
             allowed = f"a trial of kind {STANCE}, or one marked static"
             remedy = "add it: without it nobody's size is known"
             yield InputProblem(file, None, "kind", found, allowed, remedy)
-
-
-def _file_and_axes(file: str, row: Row) -> Iterator[InputProblem]:
-    if Path(row["file"]).suffix.lower() not in READERS:
-        found, allowed = f"'{row['file']}'", f"a file of motion: {', '.join(READERS)}"
-        yield InputProblem(file, row["line"], "file", found, allowed, "export it as one of these")
-    if isinstance(row["axes"], str):
-        try:
-            axes_of(row["axes"])
-        except ValueError as error:
-            allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
-            remedy = "name each axis once, a minus where it points the other way"
-            yield InputProblem(file, row["line"], "axes", str(error), allowed, remedy)
 
 
 def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:

@@ -39,7 +39,16 @@ def motion_problems(look: LoadedTrial) -> Iterator[InputProblem]:
     """Everything that is wrong with a trial; wrong units or axes hide the rest."""
     size = _size(look)
     if size is not None and not LIKE_THE_SET[0] < size < LIKE_THE_SET[1]:
-        yield _wrong_size(look, size)
+        # the nearest unit that is often mistaken
+        nearest = min(MISTAKEN, key=lambda factor: abs(np.log(size / factor)))
+        remedy = "check names and units of file and set"
+        if LIKE_THE_SET[0] < size / nearest < LIKE_THE_SET[1]:
+            held, told = MISTAKEN[nearest]
+            remedy = f"is it in {held} and says {told}? or is marker_set.csv not in mm?"
+        times = f"{size:.{0 if size >= 1 else 4}f} times"
+        allowed = f"{LIKE_THE_SET[0]:g} to {LIKE_THE_SET[1]:g} times"
+        wrong = f"markers spread {times} as far as in marker_set.csv"
+        yield look.in_motion(None, wrong, allowed, remedy)
         return
     if (fault := _upright(look)) is not None:
         yield fault
@@ -59,17 +68,6 @@ def _size(look: LoadedTrial) -> float | None:
     clouds = (look.trial.places[frame, seen], look.neutral[seen])
     found, wanted = (float(np.linalg.norm(cloud - cloud.mean(axis=0))) for cloud in clouds)
     return found / wanted if wanted > 0.0 else None
-
-
-def _wrong_size(look: LoadedTrial, size: float) -> InputProblem:
-    nearest = min(MISTAKEN, key=lambda factor: abs(np.log(size / factor)))
-    remedy = "check names and units of file and set"
-    if LIKE_THE_SET[0] < size / nearest < LIKE_THE_SET[1]:
-        held, told = MISTAKEN[nearest]
-        remedy = f"is it in {held} and says {told}? or is marker_set.csv not in mm?"
-    found = f"markers spread {size:.{0 if size >= 1 else 4}f} times as far as in marker_set.csv"
-    allowed = f"{LIKE_THE_SET[0]:g} to {LIKE_THE_SET[1]:g} times"
-    return look.in_motion(None, found, allowed, remedy)
 
 
 def _upright(look: LoadedTrial) -> InputProblem | None:

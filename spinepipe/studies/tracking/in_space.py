@@ -152,13 +152,15 @@ def spine_in_space(drawn: pd.DataFrame) -> Space:
         return Space()
     kept = page_motions(every)
     first = next((one for one in kept if len(one.frames) > 1), kept[0])
+    with style():
+        paper = picture(still_figure(first), "svg")
     return Space(
         "The spine in 3-D",
         "Motion",
         f"A spine in space: {', '.join(GROUPS.values())}",
         {one.name: _scene(one) for one in kept},
         GROUPS,
-        _still(first),
+        paper,
         f"Vertebrae and markers from the right and from behind: {first.name}",
         _caption(first.name, len(kept), len(every)),
     )
@@ -285,11 +287,6 @@ def _caption(first: str, shown: int, every: int) -> str:
         "Time runs from the first frame to the last, in equal steps that are thinned out. "
         f"On paper: the first frame and the one farthest from it, {first}.{more}"
     )
-
-
-def _still(one: MotionInSpace) -> bytes:
-    with style():
-        return picture(still_figure(one), "svg")
 
 
 def still_figure(one: MotionInSpace) -> Figure:

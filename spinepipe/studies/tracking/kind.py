@@ -14,7 +14,7 @@ from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
 from spinepipe.studies.tracking.persons import motion_digests
-from spinepipe.studies.tracking.profile import PROFILED, REGIONS, profiled_persons
+from spinepipe.studies.tracking.profile import PROFILED, REGIONS
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.trials import FORMS, approaches_on_trials, calibration_of
 
@@ -127,7 +127,7 @@ class TrackingFiles(StudyFiles):
         """One block per person."""
         named = self.specimens
         if table in _OF_PROFILES:
-            named = profiled_persons(self.study, self.specimens)
+            named = self.study.profiles.specimens or self.specimens[:1]
         elif table == "weights":
             named = self.specimens[:1]
         return numbered_blocks(named, 1)

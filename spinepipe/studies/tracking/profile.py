@@ -164,8 +164,3 @@ def _verdict_row(best: float | None, low: float | None, high: float | None, mess
         "verdict": ("not_told", "one_sided", "told")[closed],
         "message": message,
     }
-
-
-def profiled_persons(settings: Tracking, names: Sequence[str]) -> tuple[str, ...]:
-    """Persons whose markers are asked."""
-    return settings.profiles.specimens or tuple(names[:1])

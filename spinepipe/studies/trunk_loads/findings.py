@@ -23,7 +23,7 @@ from spinepipe.studies.trunk_loads.findings_of_loads import (
 from spinepipe.studies.trunk_loads.headline import leading, missed
 from spinepipe.studies.trunk_loads.selection import sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import TIERS, ended_words, factor, mpa, unbroken
+from spinepipe.studies.trunk_loads.words import ENDED, TIERS, factor, mpa, unbroken
 
 _MOST_PLACES = 4
 _MOST_SHARE = 1.1
@@ -52,7 +52,8 @@ def ended(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[
         some = f"{len(part)} of {count(len(rows), 'task')} of all persons"
         last = part[part["message"] != ""]["message"]
         why = f" One message: {last.iloc[0].rstrip('.')}." if len(last) else ""
-        yield f"{some} ended {ended_words(str(status))} ({_places(part)}).{why}"
+        ending = ENDED.get(str(status), plain(str(status)))
+        yield f"{some} ended {ending} ({_places(part)}).{why}"
 
 
 def _places(rows: pd.DataFrame) -> str:

@@ -19,7 +19,7 @@ from spinepipe.studies.trunk_loads.selection import (
     sound,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import TIERS, factor, load_words, mpa, newton
+from spinepipe.studies.trunk_loads.words import TIERS, factor, mpa, newton
 
 COMPRESSION, PRESSURE = "l4l5_compression_n", "l4l5_pressure_mpa"
 MOST = 0.5
@@ -128,8 +128,10 @@ def _words(found: AnsweredTask, results: ResultTables) -> str:
     row = found.task
     ends = interval(results, row, COMPRESSION)
     between = f" ({newton(ends[0])} to {newton(ends[1])})" if ends else ""
+    kg = float(row["hand_load_kg"])
+    load = f" ({number(kg)} kg in the hands)" if kg > 0.0 else ""
     told = (
-        f"Task {found.name}{load_words(row)} presses L4L5 of {row['specimen']} with "
+        f"Task {found.name}{load} presses L4L5 of {row['specimen']} with "
         f"{newton(row[COMPRESSION])}{between}"
     )
     if found.standing is not None and found.standing[COMPRESSION] > 0.0:

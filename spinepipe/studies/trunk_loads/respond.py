@@ -15,7 +15,6 @@ from spinepipe.studies.trunk_loads.persons import (
 )
 from spinepipe.studies.trunk_loads.postures import read_tasks
 from spinepipe.studies.trunk_loads.rows import Row, outcome_of, task_row
-from spinepipe.studies.trunk_loads.sampling import samples_of_batch, values_of_samples
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.tables import QUANTITIES, RESPONSES
 from spinepipe.tables import from_rows, read_frame, write
@@ -29,9 +28,14 @@ def run(
     read = [*extra_inputs(settings, cohort), mark_of(design)]
     made_by = provenance("respond", settings, cohort, [specimen], read)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
+    drawn, size = read_frame(design), settings.uncertain.samples_per_target
     for path, place in parts.items():
-        samples = samples_of_batch(settings, int(place["batch"]))
-        values = values_of_samples(read_frame(design), samples)
+        batch = int(place["batch"])
+        samples = range(batch * size, min((batch + 1) * size, settings.uncertain.runs))
+        own = drawn[drawn["sample"].isin(list(samples))]
+        # a row for each sample, a column for each factor
+        wide = own.pivot(index="sample", columns="factor", values="value").sort_index()
+        values = [{str(k): float(v) for k, v in row.items()} for row in wide.to_dict("records")]
         numbered = dict(zip(samples, values, strict=True))
         rows = list(rows_of(settings, cohort, specimen, numbered, progress))
         write(from_rows(RESPONSES, rows), path, made_by)

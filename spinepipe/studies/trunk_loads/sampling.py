@@ -1,7 +1,6 @@
 """The design of uncertain inputs of a study, and how its samples are cut into batches."""
 
 import numpy as np
-import pandas as pd
 
 from spinepipe.effects.contract import Array
 from spinepipe.sensitivity_analysis.global_indices.design import Design, draw
@@ -34,19 +33,6 @@ def batches(settings: TrunkLoads) -> int:
     return -(-settings.uncertain.runs // settings.uncertain.samples_per_target)
 
 
-def samples_of_batch(settings: TrunkLoads, batch: int) -> range:
-    """Numbers of the samples of a batch."""
-    size = settings.uncertain.samples_per_target
-    return range(batch * size, min((batch + 1) * size, settings.uncertain.runs))
-
-
 def sampled_specimens(settings: TrunkLoads, specimens: tuple[str, ...]) -> tuple[str, ...]:
     """Persons that are sampled."""
     return settings.uncertain.specimens or specimens[:1]
-
-
-def values_of_samples(design: pd.DataFrame, samples: range) -> list[dict[str, float]]:
-    """Values of the factors of some samples, from table design."""
-    rows = design[design["sample"].isin(list(samples))]
-    wide = rows.pivot(index="sample", columns="factor", values="value").sort_index()
-    return [{str(k): float(v) for k, v in row.items()} for row in wide.to_dict("records")]

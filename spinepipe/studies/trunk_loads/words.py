@@ -1,7 +1,5 @@
 """Tasks, inputs, simplifications and endings in plain words, for figures and findings."""
 
-from typing import Any
-
 from spinepipe.report.words import fixed, number, plain
 from spinepipe.status import Balanced
 
@@ -60,17 +58,6 @@ def newton(value: float) -> str:
 def mpa(value: float) -> str:
     """A pressure."""
     return f"{fixed(value)} MPa"
-
-
-def load_words(row: Any) -> str:
-    """What a task holds, after its name: `` (19.8 kg in the hands)``; nothing without a load."""
-    kg = float(row["hand_load_kg"])
-    return f" ({number(kg)} kg in the hands)" if kg > 0.0 else ""
-
-
-def ended_words(status: str) -> str:
-    """An ending, said of one task."""
-    return ENDED.get(status, plain(status))
 
 
 def unbroken(sentence: str) -> str:

@@ -89,7 +89,8 @@ def test_rounds_end_when_the_population_stands_still_or_after_twenty(
 ) -> None:
     told = SimpleNamespace(information=None)
     monkeypatch.setattr(learning, "patient_of", lambda *_: None)
-    monkeypatch.setattr(learning, "_fits", lambda *_: [("p1", told)])
+    monkeypatch.setattr(learning, "FilmFit", lambda *_: None)
+    monkeypatch.setattr(learning, "fit_alike", lambda *_: [told, None])
     monkeypatch.setattr(learning, "_likeliest", moved(by))
     cohort: Any = SimpleNamespace(specimen_names=("p1", "p2"), joint_names=("a", "b"))
     study: Any = None

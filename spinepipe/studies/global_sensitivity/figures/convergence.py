@@ -1,6 +1,6 @@
 """Figure: how indices settle with the number of runs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -68,7 +68,10 @@ def convergence_figure(
             styles[DUMMY] = _DUMMY_STYLE
         _draw(axis, panel.of(grown), styles, measures)
         axis.set_title(title(index, panel))
-    explain_marks(figure, [], _words(kept, measures), 1)
+    words = f"Line: {NAME[measures.main]} of the panel's leading factors, band: its interval"
+    if any(panel.places > 1 for panel in kept):
+        words += "; means over joints and specimens"
+    explain_marks(figure, [], f"{words}.", 1)
     return figure
 
 
@@ -110,12 +113,3 @@ def _limit(axis: Axes, rows: pd.DataFrame) -> None:
     low, high = np.nanmin(ends), np.nanmax(ends)
     room = (high - low) or 1.0
     axis.set_ylim(low - 0.06 * room, high + _ROOM_FOR_KEY * room)
-
-
-def _words(kept: Sequence[Panel], measures: Measures) -> str:
-    pool = any(panel.places > 1 for panel in kept)
-    parts = (
-        f"Line: {NAME[measures.main]} of the panel's leading factors, band: its interval",
-        "means over joints and specimens" if pool else "",
-    )
-    return "; ".join(part for part in parts if part) + "."

@@ -28,7 +28,6 @@ from spinepipe.studies.global_sensitivity.figures.panels import (
     footnote,
     leading,
     no_index,
-    not_negligible,
     pool,
     screened,
     sections_of,
@@ -111,7 +110,10 @@ def indices_figure(
     for index, (axis, panel) in enumerate(zip(panels, kept, strict=True)):
         _draw(axis, panel, orders[panel.output][0], measures)
         axis.set_title(title(index, panel))
-        axis.set_xlabel(_axis(panel, measures))
+        label = "share of variance" if measures.of_variance else "index"
+        if measures.in_units:
+            label = f"μ*, σ ({unit_of(panel.output, panel.coordinate)})"
+        axis.set_xlabel(label)
     _scale(panels, measures)
     for name, part in _by_output(kept).items():
         axes = [axis for axis, panel in zip(panels, kept, strict=True) if panel.output == name]
@@ -197,19 +199,16 @@ def _scale(axes: Sequence[Axes], measures: Measures) -> None:
         axis.set_xlim(min(low, 0.0) - 0.01 * high, 1.03 * high)
 
 
-def _axis(panel: Panel, measures: Measures) -> str:
-    if measures.in_units:
-        return f"μ*, σ ({unit_of(panel.output, panel.coordinate)})"
-    return "share of variance" if measures.of_variance else "index"
-
-
 def _name(
     panels: Sequence[Axes], kept: Sequence[Panel], order: Sequence[str], measures: Measures
 ) -> None:
     """Names of factors on the left; grey are those that are negligible, or above no floor."""
     rows = pd.concat([panel.rows for panel in kept])
     main = rows[rows["index"] == measures.main]
-    above = not_negligible(main) if screened(main) else above_floor(main)
+    # factors that matter, or may, at any place
+    above = above_floor(main)
+    if screened(main):
+        above = set(main.loc[main["negligible"].eq(False), "factor"])
     known = bool(main["noise_floor"].notna().any()) or screened(main)
     for axis in panels:
         axis.set_yticks(range(len(order)), [factor_name(name) for name in order[::-1]])

@@ -121,7 +121,11 @@ def outputs(cohort: Cohort, indices: pd.DataFrame, measures: Measures) -> list[P
         known = largest_moment(cohort, str(test))
         steps = set(part["step"])
         step = known[1] if known and known[1] in steps else max(steps)
-        for name in _coordinates(part[part["step"] == step], known[0] if known else ""):
+        there = set(part[part["step"] == step]["coordinate"])
+        names = [name for name in COORDINATES if name in there]
+        if known and known[0] in names and output != "stiffness":
+            names = [known[0]]
+        for name in names:
             chosen = _chosen(part, str(output), str(test), step, name)
             found.append(Panel(str(output), str(test), step, name, "", chosen))
     return sorted(found, key=lambda panel: list(OUTPUT).index(panel.output))
@@ -141,11 +145,6 @@ def _chosen(rows: pd.DataFrame, output: str, test: str, step: int, coordinate: s
         & (rows["step"] == step)
         & (rows["coordinate"] == coordinate)
     ]
-
-
-def _coordinates(rows: pd.DataFrame, driven: str) -> list[str]:
-    there = [name for name in COORDINATES if name in set(rows["coordinate"])]
-    return [driven] if driven in there and rows["output"].iloc[0] != "stiffness" else there
 
 
 def choose_panels(found: Sequence[Panel], joints: Sequence[str], most: int) -> list[Panel]:
@@ -209,11 +208,6 @@ def floor_seen(rows: pd.DataFrame) -> bool:
 def screened(rows: pd.DataFrame) -> bool:
     """Whether factors were asked whether they are negligible."""
     return bool(rows["negligible"].notna().any())
-
-
-def not_negligible(rows: pd.DataFrame) -> set[str]:
-    """Factors that matter, or may, at any place."""
-    return set(rows.loc[rows["negligible"].eq(False), "factor"])
 
 
 def failures(rows: pd.DataFrame) -> bool:
@@ -301,7 +295,17 @@ def no_index(rows: pd.DataFrame) -> Figure:
 def footnote(kept: Sequence[Panel], found: Sequence[Panel], not_drawn: str) -> str:
     """Below the panels: runs, what is together, the dummy, and what is only in the table."""
     rows = pd.concat([panel.rows for panel in kept])
-    parts = [_runs(rows), _together(kept), _dummy(rows), _more(kept, found), not_drawn]
+    dummy = "no dummy, so no noise floor"
+    if DUMMY in set(rows["factor"]):
+        quiet = "" if floor_seen(rows) else "the noise floor is too low to be seen; "
+        where = "negligible in every panel"
+        if not screened(rows):
+            where = "above the noise floor in no panel"
+        dummy = f"{quiet}grey names: {where}"
+    there, more = {(panel.output, panel.test, panel.coordinate) for panel in kept}, ""
+    if len(there) != len(found):
+        more = f"{len(there)} of {len(found)} outputs, the others are in the table"
+    parts = [_runs(rows), _together(kept), dummy, more, not_drawn]
     return "; ".join(part for part in parts if part) + "."
 
 
@@ -325,18 +329,3 @@ def _together(kept: Sequence[Panel]) -> str:
     if set(rows["output"]) == {"stiffness"}:
         what_of = f"{specimens} specimens"
     return f"bars and lines: means over the {what_of}"
-
-
-def _dummy(rows: pd.DataFrame) -> str:
-    if DUMMY not in set(rows["factor"]):
-        return "no dummy, so no noise floor"
-    quiet = "" if floor_seen(rows) else "the noise floor is too low to be seen; "
-    grey = "negligible in every panel" if screened(rows) else "above the noise floor in no panel"
-    return f"{quiet}grey names: {grey}"
-
-
-def _more(kept: Sequence[Panel], found: Sequence[Panel]) -> str:
-    there = {(panel.output, panel.test, panel.coordinate) for panel in kept}
-    if len(there) == len(found):
-        return ""
-    return f"{len(there)} of {len(found)} outputs, the others are in the table"

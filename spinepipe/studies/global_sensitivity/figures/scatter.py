@@ -153,7 +153,10 @@ def scatter_figure(
     found, measures = shown_outputs(cohort, indices)
     if not found or measures is None:
         return no_index(indices)
-    values, units = _values(design)
+    # values by sample, and unit, of each factor
+    parts = {str(name): part for name, part in design.groupby("factor", sort=False)}
+    values = {name: part.set_index("sample")["value"] for name, part in parts.items()}
+    units = {name: str(part["unit"].iloc[0]) for name, part in parts.items()}
     run = [panel for panel in found if panel.output != "stiffness"]
     first = first_of(run, MOST_OUTPUTS)
     groups = dict(zip(design["factor"], design["group"], strict=True))
@@ -168,13 +171,6 @@ def scatter_figure(
     handles = _handles(any(len(one.failed) for one in lines))
     explain_marks(figure, handles, _words(lines, cohort), len(handles))
     return figure
-
-
-def _values(design: pd.DataFrame) -> tuple[Values, Mapping[str, str]]:
-    """Values by sample, and unit, of each factor."""
-    parts = {str(name): part for name, part in design.groupby("factor", sort=False)}
-    values = {name: part.set_index("sample")["value"] for name, part in parts.items()}
-    return values, {name: str(part["unit"].iloc[0]) for name, part in parts.items()}
 
 
 def _line(

@@ -101,14 +101,10 @@ def _strips(axis: Axes, y: int, rows: pd.DataFrame, groups: Sequence[str]) -> No
             note(axis, 0.02, middle, "no patient has all poses", GREY)
             continue
         color = STYLES[str(rows["model"].iloc[0])].color
-        filled = group == "held_out"
-        _dots(axis, values, middle, color if filled else WHITE, color)
+        face = color if group == "held_out" else WHITE
+        heights = middle + _STRIP * spread_out(len(values))
+        axis.plot(values, heights, "o", ms=3.0, mfc=face, mec=color, mew=0.6, alpha=0.7, zorder=3)
         _mean(axis, values, middle)
-
-
-def _dots(axis: Axes, values: Array, y: float, face: str, edge: str) -> None:
-    heights = y + _STRIP * spread_out(len(values))
-    axis.plot(values, heights, "o", ms=3.0, mfc=face, mec=edge, mew=0.6, alpha=0.7, zorder=3)
 
 
 def _mean(axis: Axes, values: Array, y: float) -> None:

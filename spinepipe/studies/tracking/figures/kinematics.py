@@ -1,6 +1,6 @@
 """Figure: how lumbar joints turn over a motion's cycle, mean and SD over persons."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -174,19 +174,16 @@ def _true(
     for name, one in spans.items():
         truth = known.get((name, one.trial))
         if truth is not None and len(truth.time_s) > 1 and truth.turned[:, :7].all():
-            curves.append(np.array(list(_of_truth(cohort, truth, one.time_s, kind))).T)
+            # rotation of each joint from the neutral pose of the model, as its coordinates have it
+            skeleton = skeleton_in(cohort, name, subject_of(cohort, name))
+            neutral = joint_rotations(body_poses(skeleton, np.zeros((1, len(JOINTS) + 1, 6)))[0])
+            turned = np.swapaxes(neutral, -1, -2) @ joint_rotations(truth.turns)
+            angles = DEG_PER_RAD * zxy_angles(turned)[..., AXIS[kind]]
+            times, joints = _times(one.time_s), range(len(LUMBAR_JOINTS))
+            curves.append(
+                np.array([np.interp(times, truth.time_s, angles[:, k]) for k in joints]).T
+            )
     return np.array(curves).reshape(-1, INSTANTS, len(LUMBAR_JOINTS))
-
-
-def _of_truth(cohort: Cohort, truth: Truth, time_s: Array, kind: str) -> Iterator[Array]:
-    """(101,) deg of each lumbar joint; the neutral pose is that of the model."""
-    skeleton = skeleton_in(cohort, truth.specimen, subject_of(cohort, truth.specimen))
-    neutral = joint_rotations(body_poses(skeleton, np.zeros((1, len(JOINTS) + 1, 6)))[0])
-    # rotation of the joint from the neutral pose, as its coordinates have it
-    turned = np.swapaxes(neutral, -1, -2) @ joint_rotations(truth.turns)
-    angles = DEG_PER_RAD * zxy_angles(turned)[..., AXIS[kind]]
-    for k in range(len(LUMBAR_JOINTS)):
-        yield np.interp(_times(time_s), truth.time_s, angles[:, k])
 
 
 def _explain(

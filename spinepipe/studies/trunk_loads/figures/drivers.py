@@ -41,7 +41,9 @@ def drivers_figure(study: TrunkLoads, cohort: Cohort, tables: Mapping[str, pd.Da
         return saying("Nothing is known of how far answers can be trusted: no sample held.")
     places = _places(intervals)
     shown = _places(known)[:MOST_TASKS]
-    factors = _order(known)
+    # factors, the largest total index on average last, so that it stands on top
+    means = known.groupby("factor", sort=False)["total"].mean()
+    factors = [str(name) for name in means.sort_values(kind="stable").index]
     heights = [(len(PANELS), _TASK_MM * len(places) + _AROUND_MM)]
     if shown:
         heights.append((len(shown), _ROW_MM * len(factors) + _AROUND_MM))
@@ -62,12 +64,6 @@ def drivers_figure(study: TrunkLoads, cohort: Cohort, tables: Mapping[str, pd.Da
 def _places(rows: pd.DataFrame) -> list[tuple[str, str]]:
     """Person and task of rows, each once."""
     return list(dict.fromkeys(zip(rows["specimen"], rows["task"], strict=True)))
-
-
-def _order(rows: pd.DataFrame) -> list[str]:
-    """Factors, the largest total index on average last, so that it stands on top."""
-    means = rows.groupby("factor", sort=False)["total"].mean()
-    return [str(name) for name in means.sort_values(kind="stable").index]
 
 
 def _named(place: tuple[str, str], several: bool) -> str:
