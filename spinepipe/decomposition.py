@@ -258,16 +258,12 @@ def _svd(matrix: Array) -> tuple[Array, Array, Array]:
     there = _not_zero(matrix)
     some = _only(matrix, there)
     try:
-        found = _gesdd(some)
+        left, sizes, right = _gesdd(some)
     except LinAlgError:
-        found = _gesvd(some)
-    return found if there.all() else _put_back(*found, there)
-
-
-def _put_back(
-    left: Array, sizes: Array, right: Array, there: NDArray[np.bool_]
-) -> tuple[Array, Array, Array]:
-    """The decomposition of a matrix from that of its columns that are ``there`` (N,)."""
+        left, sizes, right = _gesvd(some)
+    if there.all():
+        return left, sizes, right
+    # the decomposition of the whole matrix from that of the columns that are there
     known, least = len(sizes), min(len(left), len(there))
     added = least - known  # directions of size zero, each seen by one of the columns left out
     whole = np.zeros((least, len(there)))

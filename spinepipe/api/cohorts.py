@@ -65,19 +65,17 @@ def check(what: Cohort | str | Path) -> pd.DataFrame:
     0
     """
     try:
-        cohort = what if isinstance(what, Cohort) else _read(Path(what))
+        if isinstance(what, Cohort):
+            cohort = what
+        elif (path := Path(what)).suffix == ".yaml":
+            root = path.absolute().parents[len(STUDIES.parts)]
+            cohort = check_study(root, path.stem, starting=False)[1]
+        else:
+            cohort = read_cohort(path)
     except InputError as error:
         return pd.DataFrame(_rows("problem", error.problems), columns=COLUMNS)
     rows = [*_rows("problem", refusals(cohort)), *_rows("warning", doubts(cohort))]
     return pd.DataFrame(rows, columns=COLUMNS)
-
-
-def _read(path: Path) -> Cohort:
-    """The cohort of a folder or of a study file."""
-    if path.suffix != ".yaml":
-        return read_cohort(path)
-    root = path.absolute().parents[len(STUDIES.parts)]
-    return check_study(root, path.stem, starting=False)[1]
 
 
 def _rows(severity: str, problems: Iterable[InputProblem]) -> list[tuple[object, ...]]:

@@ -16,7 +16,6 @@ from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.tables import CANDIDATES, GAP, HELD_OUT, NEXT_TESTS
-from spinepipe.studies.discrepancy.verdict import Verdict
 
 SENTENCES = {
     "NAMED": "{names} is missing from the model.",
@@ -109,10 +108,24 @@ def _result(found: DiscrepancyResults) -> MissingEffects:
         {"name": one.name, "log_evidence": one.log_evidence, "spread": one.spread, **one.variant}
         for one in verdict.effects
     ]
+    noise, rms = verdict.noise, verdict.rms_residual
+    quality = [
+        ("noise of a rotation", noise.rotation_sd_deg, "deg"),
+        ("noise of a translation", noise.translation_sd_mm, "mm"),
+        ("log evidence needed", verdict.threshold.log_evidence, ""),
+        ("misfit without the effects", rms.base, rms.unit),
+        ("misfit with them", rms.with_effects, rms.unit),
+        ("held out, without", rms.held_out_base, rms.unit),
+        ("held out, with", rms.held_out_with_effects, rms.unit),
+    ]
+    # the verdict in a sentence, with the effects that are named or between which nothing decides
+    names = verdict.named or tuple(dict.fromkeys(one.name for one in verdict.in_set))
+    words = ", ".join(name.replace("_", " ") for name in names)
+    sentence = SENTENCES[verdict.verdict.value].format(names=words)
     return MissingEffects(
-        headline=_headline(verdict),
+        headline=sentence[:1].upper() + sentence[1:],
         table=pd.DataFrame(named, columns=None if named else ["name", "log_evidence", "spread"]),
-        quality=pd.DataFrame(_quality(verdict), columns=["quantity", "value", "unit"]),
+        quality=pd.DataFrame(quality, columns=["quantity", "value", "unit"]),
         verdict=verdict.verdict.value,
         why=verdict.why,
         alternatives=pd.DataFrame([asdict(one) for one in verdict.in_set]),
@@ -123,22 +136,3 @@ def _result(found: DiscrepancyResults) -> MissingEffects:
         left_out=tables[HELD_OUT.name],
         model=found.model_with_effects,
     )
-
-
-def _headline(verdict: Verdict) -> str:
-    names = verdict.named or tuple(dict.fromkeys(one.name for one in verdict.in_set))
-    words = ", ".join(name.replace("_", " ") for name in names)
-    sentence = SENTENCES[verdict.verdict.value].format(names=words)
-    return sentence[:1].upper() + sentence[1:]
-
-
-def _quality(verdict: Verdict) -> list[tuple[str, object, str]]:
-    return [
-        ("noise of a rotation", verdict.noise.rotation_sd_deg, "deg"),
-        ("noise of a translation", verdict.noise.translation_sd_mm, "mm"),
-        ("log evidence needed", verdict.threshold.log_evidence, ""),
-        ("misfit without the effects", verdict.rms_residual.base, verdict.rms_residual.unit),
-        ("misfit with them", verdict.rms_residual.with_effects, verdict.rms_residual.unit),
-        ("held out, without", verdict.rms_residual.held_out_base, verdict.rms_residual.unit),
-        ("held out, with", verdict.rms_residual.held_out_with_effects, verdict.rms_residual.unit),
-    ]

@@ -96,20 +96,16 @@ class _Motion:
     def rate(self, _time: float, state: Array) -> Array:
         """(2n,) rate of change of pose and rate."""
         q, rate = state.reshape(2, 1, -1, 6)
-        self._place(q)
+        # what depends on the pose alone stays where only rates have been varied
+        if q.tobytes() != self._pose:
+            held = self.bound.joint_forces(q)
+            seen = forward_kinematics(self.stack.chains, self.stack.loads, q, held.tangent)
+            self._missing = seen.applied - held.load
+            self._moving = Moving.of(self.stack.chains, self.stack.loads.chain, seen)
+            self._pose = q.tobytes()
         force = self._missing - self._moving.velocity_product_forces(rate) - self.damping * rate
         acceleration = self._moving.accelerations(force.reshape(1, -1))
         return np.concatenate([state[self.n :], acceleration[0]])
-
-    def _place(self, q: Array) -> None:
-        """What depends on the pose alone; asked for again when only rates have been varied."""
-        if q.tobytes() == self._pose:
-            return
-        held = self.bound.joint_forces(q)
-        seen = forward_kinematics(self.stack.chains, self.stack.loads, q, held.tangent)
-        self._missing = seen.applied - held.load
-        self._moving = Moving.of(self.stack.chains, self.stack.loads.chain, seen)
-        self._pose = q.tobytes()
 
 
 LOST = 1e6
@@ -346,8 +342,13 @@ def exact_gradient(problem: Problem, course: Course | None = None) -> Array | No
 def differenced_gradient(problem: Problem) -> Array | None:
     """The same at rest by central differences of high order, with steps that adapt (scipy's)."""
     evaluator = Evaluator(replace(problem, course=None))
+
+    def cost(x: Array) -> float:
+        residual = evaluator.at(np.ascontiguousarray(x)).residual
+        return np.nan if residual is None else float(residual @ residual)
+
     found = jacobian(
-        lambda points: np.apply_along_axis(lambda x: _cost(evaluator, x), 0, points),
+        lambda points: np.apply_along_axis(cost, 0, points),
         np.zeros(len(problem.free)),
         initial_step=FIRST_STEP,
     )
@@ -361,8 +362,3 @@ def relative_error(gradient: Array | None, exact: Array | None) -> float | None:
         return None
     size = float(np.linalg.norm(exact))
     return float(np.linalg.norm(gradient - exact)) / size if size > 0.0 else None
-
-
-def _cost(evaluator: Evaluator, x: Array) -> float:
-    residual = evaluator.at(np.ascontiguousarray(x)).residual
-    return np.nan if residual is None else float(residual @ residual)

@@ -95,15 +95,9 @@ class Hierarchy:
         self.own = same * spreads.specimen[dof] ** 2 + np.diag(spreads.rest[dof] ** 2)
         self._root = np.linalg.cholesky(self.own)
         self._unroot = np.linalg.inv(self._root)
-        self._see(readings.design / spreads.scatter, readings.target / spreads.scatter)
-        self._factor = np.hstack([MEAN_SD * self._of, np.diag(spreads.level[dof])])
-        self._share(self._factor)
-
-    def _see(self, design: Array, target: Array) -> None:
-        """Each specimen in directions of its own in which its readings are independent.
-
-        Singular values keep both what is known to rounding and what is not seen at all.
-        """
+        # each specimen in directions of its own in which its readings are independent; singular
+        # values keep both what is known to rounding and what is not seen at all
+        design, target = readings.design / spreads.scatter, readings.target / spreads.scatter
         left, size, right = svd(design @ self._root)
         self._size = size  # (S, m) of what is seen, in SDs of what to expect
         self._towards = right @ self._unroot  # (S, m, m) directions by unknowns
@@ -111,6 +105,9 @@ class Hierarchy:
         self._unseen = 1.0 / (1.0 + size**2)  # (S, m) 1 where only the prior tells
         self._seen = size**2 * self._unseen
         self.information = self._by_direction(self._seen)
+        # mean and levels, which all specimens share
+        self._factor = np.hstack([MEAN_SD * self._of, np.diag(spreads.level[dof])])
+        self._share(self._factor)
 
     def _by_direction(self, weights: Array) -> Array:
         """(S, m, m) sum over directions of a weight (S, m) times their square."""

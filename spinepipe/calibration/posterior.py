@@ -21,7 +21,7 @@ from scipy.special import ndtr, ndtri
 
 from spinepipe.calibration.problem import Evaluation, Evaluator
 from spinepipe.decomposition import eigh
-from spinepipe.effects.contract import Array, Indices
+from spinepipe.effects.contract import Array
 from spinepipe.units import DISPLAY_PER_SI
 
 ARRIVED = 1e-3
@@ -193,14 +193,21 @@ SADDLE = "the density has no peak where the search ends"
 
 def modes(target: Target, starts: Array) -> list[Mode]:
     """The mode that each of P searches leads to from starts (P, m), by damped Gauss-Newton."""
-    climbs = _climbed(target, starts)
-    arrived = [number for number, (point, _) in enumerate(climbs) if point is not None]
-    tops = [climbs[number][0] for number in arrived]
-    curved = _curvatures(target, np.array(arrived, dtype=np.int64), [t for t in tops if t])
-    found = dict(zip(arrived, curved, strict=True))
-    return [
-        _mode(point, message, found.get(number)) for number, (point, message) in enumerate(climbs)
-    ]
+    size = target.unknowns.size
+    steps = DIFFERENCE * np.vstack([np.eye(size), -np.eye(size)])
+    found = []
+    for number, (top, message) in enumerate(_climbed(target, starts)):
+        curved = None
+        if top is not None:
+            # curvature of the energy by central differences; none beside an edge where nothing
+            # stands
+            around = target.together([(number, top.z + step) for step in steps])
+            slopes = np.array([point.gradient for point in around if point is not None])
+            if len(slopes) == len(steps):
+                curved = (slopes[:size] - slopes[size:]) / (2.0 * DIFFERENCE)
+                curved = 0.5 * (curved + curved.T)
+        found.append(_mode(top, message, curved))
+    return found
 
 
 def _climbed(target: Target, starts: Array) -> list[tuple[Point | None, str]]:
@@ -237,23 +244,6 @@ def _climbed(target: Target, starts: Array) -> list[tuple[Point | None, str]]:
                 damping[number] = max(damping[number], 1e-2) * HARDENED
         going = left
     return ended
-
-
-def _curvatures(target: Target, numbers: Indices, tops: Sequence[Point]) -> list[Array | None]:
-    """(m, m) curvature of the energy at each top; None beside an edge where nothing stands."""
-    found: list[Array | None] = []
-    size = target.unknowns.size
-    steps = DIFFERENCE * np.vstack([np.eye(size), -np.eye(size)])
-    for number, top in zip(numbers.tolist(), tops, strict=True):
-        around = target.together([(number, top.z + step) for step in steps])
-        slopes = [point.gradient for point in around if point is not None]
-        if len(slopes) < len(steps):
-            found.append(None)
-            continue
-        every = np.array(slopes)
-        curved = (every[:size] - every[size:]) / (2.0 * DIFFERENCE)
-        found.append(0.5 * (curved + curved.T))
-    return found
 
 
 def _mode(point: Point | None, message: str, curved: Array | None) -> Mode:

@@ -299,25 +299,24 @@ def needed(problem: Problem) -> tuple[MeasuredCase, ...]:
     RefusedModel
         When nothing that was measured has a weight.
     """
-    read = [case for case in problem.cases if _used(case, problem.weights).any()]
-    if not read:
-        raise RefusedModel(f"{problem.model.specimen}: no reading enters the cost")
-    return tuple(_steps_needed(problem, case) for case in read)
-
-
-def _steps_needed(problem: Problem, measured: MeasuredCase) -> MeasuredCase:
-    """The case without the steps that neither carry a reading nor lead to those that do."""
     kinds = {scoped.effect.kind for scoped in problem.model.effects}
-    if measured.zeroed or EffectKind.PATH in kinds:
-        return measured
-    read = np.flatnonzero(np.any(_used(measured, problem.weights), axis=(1, 2))).tolist()
-    if problem.course is None:  # steps that settle begin from rest, each for itself
-        pressed = bool(np.any(problem.model.gravity)) or EffectKind.LOAD in kinds
-        read = measured.case.leading_to(read, pressed)
-    steps = tuple(measured.case.steps[place] for place in read)
-    return replace(
-        measured, case=replace(measured.case, steps=steps), measured=measured.measured[read]
-    )
+    pressed = bool(np.any(problem.model.gravity)) or EffectKind.LOAD in kinds
+    found = []
+    for measured in problem.cases:
+        read = np.flatnonzero(np.any(_used(measured, problem.weights), axis=(1, 2))).tolist()
+        if not read:
+            continue
+        # steps go that neither carry a reading nor lead to those that do; of zeroed readings and
+        # laws that remember each step counts
+        if not (measured.zeroed or EffectKind.PATH in kinds):
+            if problem.course is None:  # steps that settle begin from rest, each for itself
+                read = measured.case.leading_to(read, pressed)
+            case = replace(measured.case, steps=tuple(measured.case.steps[at] for at in read))
+            measured = replace(measured, case=case, measured=measured.measured[read])
+        found.append(measured)
+    if not found:
+        raise RefusedModel(f"{problem.model.specimen}: no reading enters the cost")
+    return tuple(found)
 
 
 def _used(measured: MeasuredCase, weights: Array) -> NDArray[np.bool_]:

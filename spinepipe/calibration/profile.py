@@ -177,24 +177,21 @@ def profiles(
     asked : of evaluators that share a stack. noise : as in `uncertainty`.
     """
     lead([(evaluator, x) for evaluator, x, _, _ in asked])
-    plans = [(one[0], *_plan(one, noise, level)) for one in asked]
+    plans: list[tuple[Evaluator, Best, list[_Side]]] = []
+    for evaluator, x, evaluation, at_bound in asked:
+        problem, residual, jacobian = evaluator.problem, evaluation.residual, evaluation.jacobian
+        assert residual is not None
+        assert jacobian is not None
+        evaluator.start_at(x)  # or regions would hang on where other starts have been
+        bent = np.array([parameter.logarithmic for parameter in problem.free])
+        around = (problem.lower, problem.upper, problem.scale, bent)
+        best = Best(x, residual, jacobian, *around, along_bounds=problem.along_bounds)
+        rises = list(_rises(problem, evaluation, at_bound, noise, level))
+        plans.append((evaluator, best, _sides(best, rises)))
     searches = [(one, search) for one, _, sides in plans for _, _, search in sides]
     asking = [partial(_through, search) for _, search in searches]
     ends = iter(in_lockstep(asking, partial(among, [one for one, _ in searches])))
     return [_region(best, sides, list(islice(ends, len(sides)))) for _, best, sides in plans]
-
-
-def _plan(asked: Asked, noise: Array | None, level: float) -> tuple[Best, list[_Side]]:
-    """What is known of an optimum, and the ends to be looked for."""
-    evaluator, x, evaluation, at_bound = asked
-    problem = evaluator.problem
-    assert evaluation.residual is not None
-    assert evaluation.jacobian is not None
-    evaluator.start_at(x)  # or regions would hang on where other starts have been
-    bent = np.array([parameter.logarithmic for parameter in problem.free])
-    measured, limits = (evaluation.residual, evaluation.jacobian), (problem.lower, problem.upper)
-    best = Best(x, *measured, *limits, problem.scale, bent, along_bounds=problem.along_bounds)
-    return best, _sides(best, list(_rises(problem, evaluation, at_bound, noise, level)))
 
 
 def profile_in_turn(

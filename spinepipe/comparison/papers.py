@@ -25,11 +25,11 @@ def digest(paper: str) -> str:
     """sha256 of all that a comparison hangs on: the paper's rows and selectors, and the engine."""
     if not beside():
         return ""
-    own = {f"{name}.csv" for name in papers() if name != paper}
-    own |= {f"{name}.py" for name in papers() if name != paper}
+    # selectors of a paper may stand in several files, `<paper>.py` and `<paper>_<idea>.py`
+    others = tuple(f"{name}{end}" for name in papers() if name != paper for end in "._")
     files = (file for file in FOLDER.iterdir() if file.suffix in (".csv", ".py"))
     found = hashlib.sha256()
-    for file in sorted(file for file in files if file.name not in own):
+    for file in sorted(file for file in files if not file.name.startswith(others)):
         found.update(f"{file.name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n".encode())
     return found.hexdigest()
 

@@ -173,7 +173,14 @@ class _Span:
         self.moved = self._moved(upper)
         self.moved[..., :3, :] = np.eye(3)
         self.slope = self._on_line(self.moved)
-        self.bend = self._bend(upper)
+        # second derivatives of the line along itself, and its turning across itself
+        twice = np.einsum("jabxy,jy->jabx", self._turned.second, upper.reshape(-1, 3))
+        bent = np.zeros((*self.moved.shape[:-1], 6, 3))
+        bent[..., 3:, 3:, :] = twice.reshape(*upper.shape[:-1], 3, 3, 3)
+        across = self.moved @ self.moved.swapaxes(-1, -2)
+        across -= self.slope[..., None] * self.slope[..., None, :]
+        along = (bent @ self._along[..., None, :, None])[..., 0]
+        self.bend = across / self._length[..., None] + along
 
     def slope_moved(self, lower: Array, upper: Array) -> Array:
         """(..., J, 6) rate of ``slope`` as the guides move at rates (..., J, 3) in their bones."""
@@ -181,14 +188,6 @@ class _Span:
         beside = line - (line * self._along).sum(axis=-1, keepdims=True) * self._along
         turned = (self.moved @ (beside / self._length)[..., None])[..., 0]
         return self._on_line(self._moved(upper)) + turned
-
-    def _bend(self, upper: Array) -> Array:
-        twice = np.einsum("jabxy,jy->jabx", self._turned.second, upper.reshape(-1, 3))
-        bent = np.zeros((*self.moved.shape[:-1], 6, 3))
-        bent[..., 3:, 3:, :] = twice.reshape(*upper.shape[:-1], 3, 3, 3)
-        across = self.moved @ self.moved.swapaxes(-1, -2)
-        across -= self.slope[..., None] * self.slope[..., None, :]
-        return across / self._length[..., None] + (bent @ self._along[..., None, :, None])[..., 0]
 
     def _carried(self, arm: Array) -> Array:
         """(..., J, 3) where the turned vertebra has what is at rest at ``arm``."""

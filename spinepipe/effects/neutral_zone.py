@@ -153,24 +153,21 @@ def chord(u: Array, n: Array, offset: Array) -> tuple[Array, Array, Array, Array
     """
     u, n, offset = np.broadcast_arrays(u, n, offset)
     near = np.abs(u) < NEAR
-    found = _difference(np.where(near, 1.0, u), n, offset)
+    # from G and its slope at both ends of the chord
+    way = np.where(near, 1.0, u)
+    ends = np.stack([way - offset, offset])
+    log, steep, whole = _powers(ends, n)
+    g, slope = np.exp(-whole / n), np.exp(-(1.0 / n + 1.0) * whole)
+    g_by_n = g * (whole / n - steep * log) / n
+    mean, by_n = (ends * g).sum(axis=0) / way, (ends * g_by_n).sum(axis=0) / way
+    found = np.stack([mean, (slope[0] - mean) / way, by_n, (slope[1] - slope[0]) / way])
     if near.any():
         found[:, near] = _mean_slope(u[near], n[near], offset[near])
     return found[0], found[1], found[2], found[3]
 
 
-def _difference(u: Array, n: Array, offset: Array) -> Array:
-    """(4, ...) value and derivatives from G and its slope at both ends of the chord."""
-    ends = np.stack([u - offset, offset])
-    log, steep, whole = _powers(ends, n)
-    g, slope = np.exp(-whole / n), np.exp(-(1.0 / n + 1.0) * whole)
-    g_by_n = g * (whole / n - steep * log) / n
-    mean, by_n = (ends * g).sum(axis=0) / u, (ends * g_by_n).sum(axis=0) / u
-    return np.stack([mean, (slope[0] - mean) / u, by_n, (slope[1] - slope[0]) / u])
-
-
 def _mean_slope(u: Array, n: Array, offset: Array) -> Array:
-    """The same by Gauss's rule with five points, for short chords."""
+    """(4, ...) what `chord` tells, by Gauss's rule with five points, for short chords."""
     found = np.zeros((4, *u.shape))
     for point, weight in zip(_POINTS, _WEIGHTS, strict=True):
         slope, by_u, by_n = _slope(point * u - offset, n)

@@ -93,38 +93,32 @@ class NonlinearStiffening(CarriedShare):
     def parameters(self) -> tuple[Parameter, ...]:
         """The rate of the exponential, the growth of other shapes, or the gain and its break."""
         if self.shape == "bilinear":
-            return self._gain_and_break
+            gained = f"stiffness in {self.coordinate} gained beyond the break, as a share"
+            gain = Parameter("gain", "1", 0.0, 1e4, 1.0, 1.0, False, gained, off=0.0)
+            where, tried = f"motion in {self.coordinate} at which it stiffens", (-1.0, 1.0)
+            if self.coordinate in TRANSLATIONS:
+                unit, most = "m", _MOST_M
+                at, low = (mm / 1e3 for mm in _BREAK[self.coordinate])
+            else:
+                unit, most = "rad", _MOST_RAD
+                at, low = (float(np.deg2rad(deg)) for deg in _BREAK[self.coordinate])
+            return gain, Parameter("break_at", unit, low, most, at, 0.4, True, where, tried=tried)
         sizes = _RISE_OF_TRANSLATION if self.coordinate in TRANSLATIONS else _RISE
         size, most, unit = sizes[self.shape]
         name = "rate" if self.shape == "exponential" else "growth"
         meaning = f"how fast resistance in {self.coordinate} grows with the motion"
         return (Parameter(name, unit, 0.0, most, size, size, False, meaning, off=0.0),)
 
-    @property
-    def _gain_and_break(self) -> tuple[Parameter, Parameter]:
-        gained = f"stiffness in {self.coordinate} gained beyond the break, as a share"
-        gain = Parameter("gain", "1", 0.0, 1e4, 1.0, 1.0, False, gained, off=0.0)
-        where, tried = f"motion in {self.coordinate} at which it stiffens", (-1.0, 1.0)
-        if self.coordinate in TRANSLATIONS:
-            unit, most = "m", _MOST_M
-            at, low = (mm / 1e3 for mm in _BREAK[self.coordinate])
-        else:
-            unit, most = "rad", _MOST_RAD
-            at, low = (float(np.deg2rad(deg)) for deg in _BREAK[self.coordinate])
-        return gain, Parameter("break_at", unit, low, most, at, 0.4, True, where, tried=tried)
-
     def share(self, q: Array, parameters: Array) -> CarriedFraction:
         """``factor(strength * size(q)) - 1`` with size |q| or q^2; of the bilinear, its own."""
         if self.shape == "bilinear":
             return _beyond(q, parameters[:, :1], parameters[:, 1:])
-        size, by_q = self._size(q)
+        size, by_q = q**2, 2.0 * q
+        if self.shape == "exponential":
+            rounded = ROUNDED_M if self.coordinate in TRANSLATIONS else ROUNDED_RAD
+            size, by_q = magnitude(q, rounded)
         value, slope = _SHARES[self.shape](parameters * size)
         return CarriedFraction(value, slope * parameters * by_q, (slope * size)[:, :, None])
-
-    def _size(self, q: Array) -> tuple[Array, Array]:
-        if self.shape != "exponential":
-            return q**2, 2.0 * q
-        return magnitude(q, ROUNDED_M if self.coordinate in TRANSLATIONS else ROUNDED_RAD)
 
 
 def exponential_rise(v: Array, steepest: float = STEEPEST_EXPONENT) -> tuple[Array, Array]:
@@ -154,10 +148,6 @@ def _tangent(v: Array) -> tuple[Array, Array]:
     return value, by_v
 
 
-def _cubic(v: Array) -> tuple[Array, Array]:
-    return v, np.ones_like(v)
-
-
 def _beyond(q: Array, gain: Array, at: Array) -> CarriedFraction:
     """``gain (|q| - break) / |q|`` beyond the break, by gain and break."""
     u = np.abs(q) / at
@@ -171,5 +161,5 @@ def _beyond(q: Array, gain: Array, at: Array) -> CarriedFraction:
 _SHARES: dict[str, Callable[[Array], tuple[Array, Array]]] = {
     "exponential": exponential_rise,
     "tangent": _tangent,
-    "cubic": _cubic,
+    "cubic": lambda v: (v, np.ones_like(v)),
 }

@@ -50,18 +50,13 @@ class PowerTerm:
             size /= _TRANSLATION[0] if one in TRANSLATIONS else _ROTATION[0]
         meaning = f"load in {self.coordinate} by {' x '.join(self.of)}"
         most = 1e4 * size
-        return (
-            Parameter("coefficient", self._unit, -most, most, 0.0, size, False, meaning, off=0.0),
-        )
-
-    @property
-    def _unit(self) -> str:
-        """N or N m by m and rad."""
+        # N or N m by m and rad
         metres = sum(one in TRANSLATIONS for one in self.of)
         powers = {"m": metres, "rad": len(self.of) - metres}
         below = [n if power == 1 else f"{n}^{power}" for n, power in powers.items() if power]
         above = "N" if self.coordinate in TRANSLATIONS else "N m"
-        return f"{above}/{below[0]}" if len(below) == 1 else f"{above}/({' '.join(below)})"
+        unit = f"{above}/{below[0]}" if len(below) == 1 else f"{above}/({' '.join(below)})"
+        return (Parameter("coefficient", unit, -most, most, 0.0, size, False, meaning, off=0.0),)
 
     def respond(self, q: Array, parameters: Array, carried: Array) -> JointResponse:
         """Load (J, 6) and tangent (J, 6, 6)."""

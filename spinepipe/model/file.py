@@ -51,10 +51,11 @@ class Values(BaseModel):
         """Numbers in quotes count as numbers, decimal ones."""
         if not isinstance(data, dict):
             return data
-        return {
-            key: value if key in cls.model_fields else _as_number(value)
-            for key, value in data.items()
-        }
+        found = dict(data)
+        for key in data.keys() - cls.model_fields.keys():
+            if isinstance(data[key], str) and NUMBER.fullmatch(data[key]):
+                found[key] = float(data[key])
+        return found
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -81,11 +82,6 @@ class ModelFile(BaseModel):
     model: str = Field(min_length=1, description="name of the model, of letters as all names")
     cohort: str = Field(min_length=1, description="cohort the model was made for")
     effects: tuple[EffectEntry, ...] = Field(min_length=1, description="effects, in order")
-
-
-def _as_number(value: Any) -> Any:
-    is_number = isinstance(value, str) and NUMBER.fullmatch(value)
-    return float(value) if is_number else value
 
 
 def write_model(model: ModelFile, path: str | Path, digest: str = "") -> None:

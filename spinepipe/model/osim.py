@@ -15,7 +15,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import osim_parts as parts
 from spinepipe.model.osim_parts import NAME, listed, numbers, told
-from spinepipe.model.spine import Body, LoadCase, RefusedModel, SpineModel
+from spinepipe.model.spine import LoadCase, RefusedModel, SpineModel
 
 BUSHING = "linear_bushing"
 
@@ -63,7 +63,12 @@ def osim(model: SpineModel, loads: LoadCase | None = None, left_out: Sequence[st
         For an effect other than a linear bushing, and a name that OpenSim cannot take.
     """
     stiffness = _stiffness(model, loads)
-    _check_names(model)
+    for name in (model.specimen, *model.joints, *(body.name for body in model.bodies)):
+        if not NAME.fullmatch(name):
+            raise RefusedModel(
+                f"{model.specimen}: OpenSim cannot take the name {name!r}; "
+                "use letters, digits, _ . and - only"
+            )
     document = parts.document()
     root = SubElement(document, "Model", name=model.specimen)
     told(root, "credits", _credits(model, left_out))
@@ -71,13 +76,11 @@ def osim(model: SpineModel, loads: LoadCase | None = None, left_out: Sequence[st
     bodies, joints, forces = (listed(root, kind) for kind in ("Body", "Joint", "Force"))
     paths = ("/ground", *(f"/bodyset/{body.name}" for body in model.bodies))
     for j, (lower, upper) in enumerate(pairwise(paths)):
-        bodies.append(_body(model.bodies[j]))
-        frame = model.frames[j]
+        body, frame = model.bodies[j], model.frames[j]
+        inertia = body.inertia if body.inertia.any() else TOKEN_INERTIA_KG_M2
+        bodies.append(parts.body(body.name, body.mass or TOKEN_MASS_KG, body.com, inertia))
         joints.append(parts.joint(model.joints[j], (lower, frame), (upper, frame)))
-        law = _bushing(f"{model.joints[j]}_bushing", model.frames[j], lower, upper)
-        _resist(law, "stiffness", stiffness[j])
-        _resist(law, "damping", model.damping[j])
-        forces.append(law)
+        forces.append(_bushing(model, j, (lower, upper), stiffness[j]))
     forces.extend([] if loads is None else _prescribed_forces(loads, paths[1:]))
     return parts.written(document)
 
@@ -103,15 +106,6 @@ def _stiffness(model: SpineModel, loads: LoadCase | None) -> Array:
     return total
 
 
-def _check_names(model: SpineModel) -> None:
-    for name in (model.specimen, *model.joints, *(body.name for body in model.bodies)):
-        if not NAME.fullmatch(name):
-            raise RefusedModel(
-                f"{model.specimen}: OpenSim cannot take the name {name!r}; "
-                "use letters, digits, _ . and - only"
-            )
-
-
 def _credits(model: SpineModel, left_out: Sequence[str]) -> str:
     massless = [body.name for body in model.bodies if body.mass == 0.0]
     inertialess = [body.name for body in model.bodies if not body.inertia.any()]
@@ -125,29 +119,27 @@ def _credits(model: SpineModel, left_out: Sequence[str]) -> str:
     return text
 
 
-def _body(body: Body) -> Element:
-    inertia = body.inertia if body.inertia.any() else TOKEN_INERTIA_KG_M2
-    return parts.body(body.name, body.mass or TOKEN_MASS_KG, body.com, inertia)
-
-
-def _bushing(name: str, frame: Pose, lower: str, upper: str) -> Element:
-    element = Element("BushingForce", name=name)
+def _bushing(model: SpineModel, j: int, paths: tuple[str, str], stiffness: Array) -> Element:
+    """Stiffness and damping (6,) of a joint between two bodies, by the axes of a bushing."""
+    element = Element("BushingForce", name=f"{model.joints[j]}_bushing")
     told(element, "socket_frame1", "lower")
     told(element, "socket_frame2", "upper")
+    frame = model.frames[j]
     turned = Pose(frame.rotation @ BUSHING_AXES, frame.origin)
-    element.append(parts.offset_frames((lower, turned), (upper, turned)))
+    element.append(parts.offset_frames((paths[0], turned), (paths[1], turned)))
+    for kind, values in (("stiffness", stiffness), ("damping", model.damping[j])):
+        told(element, f"rotational_{kind}", numbers(values[3:]))
+        told(element, f"translational_{kind}", numbers(values[list(BUSHING_TRANSLATIONS)]))
     return element
-
-
-def _resist(bushing: Element, kind: str, values: Array) -> None:
-    """Stiffness or damping (6,) of a bushing, in the order of its own axes."""
-    told(bushing, f"rotational_{kind}", numbers(values[3:]))
-    told(bushing, f"translational_{kind}", numbers(values[list(BUSHING_TRANSLATIONS)]))
 
 
 def _prescribed_forces(loads: LoadCase, paths: Sequence[str]) -> list[Element]:
     """One prescribed force per loaded point, its components as functions of time."""
-    times = _times(loads)
+    # the recorded times in s where all are and rise, else one second a step
+    times = [float(step.step) for step in loads.steps]
+    recorded = [step.time for step in loads.steps if step.time is not None]
+    if len(recorded) == len(loads.steps) and all(a < b for a, b in pairwise(recorded)):
+        times = recorded
     wrenches: dict[tuple[int, tuple[float, ...]], Array] = {}
     for number, step in enumerate(loads.steps):
         for wrench in step.wrenches:
@@ -165,14 +157,6 @@ def _prescribed_forces(loads: LoadCase, paths: Sequence[str]) -> list[Element]:
         _functions(element, "torqueFunctions", [_function(times, m) for m in history.T[3:]])
         elements.append(element)
     return elements
-
-
-def _times(loads: LoadCase) -> list[float]:
-    """Time of each step in s, see `osim`."""
-    recorded = [step.time for step in loads.steps if step.time is not None]
-    if len(recorded) == len(loads.steps) and all(a < b for a, b in pairwise(recorded)):
-        return recorded
-    return [float(step.step) for step in loads.steps]
 
 
 def _functions(parent: Element, name: str, functions: Iterable[Element]) -> None:

@@ -256,10 +256,7 @@ def _problem(model: SpineModel) -> str | None:
         return "gravity is not finite"
     if not (np.isfinite(model.damping).all() and np.all(model.damping > 0.0)):
         return "damping must be positive: it decides what is stable"
-    return _frame_problem(model) or _body_problem(model) or _effect_problem(model)
-
-
-def _frame_problem(model: SpineModel) -> str | None:
+    # frames
     rotations = np.array([frame.rotation for frame in model.frames])
     origins = np.array([frame.origin for frame in model.frames])
     unit = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
@@ -270,14 +267,11 @@ def _frame_problem(model: SpineModel) -> str | None:
             return f"the frame of joint {joint} is not finite"
         if not is_proper:
             return f"the frame of joint {joint} is not a right-handed rotation"
-    return None
-
-
-def _body_problem(model: SpineModel) -> str | None:
+    # bodies: weight without mass moves nothing
     for body in model.bodies:
         if body.mass == 0.0 and np.any(model.gravity):
             return f"body {body.name} has no mass, but gravity is on"
-    return None
+    return _effect_problem(model)
 
 
 def _impossible(body: Body) -> str | None:

@@ -7,7 +7,6 @@ from math import atan2, cos, hypot, sin
 import numpy as np
 
 from spinepipe.decomposition import eigh
-from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model.spine import Body, SpineModel
 from spinepipe.units import COORDINATES
@@ -79,17 +78,12 @@ def _inertial(body: Body, frame: Pose) -> list[str]:
 def _origin(pose: Pose) -> str:
     if pose is IDENTITY:
         return '<origin xyz="0 0 0" rpy="0 0 0"/>'
-    return (
-        f'<origin xyz="{_numbers(pose.origin)}" rpy="{_numbers(_roll_pitch_yaw(pose.rotation))}"/>'
-    )
-
-
-def _roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
-    """URDF's angles in rad: ``R = Rz(yaw) Ry(pitch) Rx(roll)``."""
-    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = rotation.tolist()
+    # URDF's angles in rad: R = Rz(yaw) Ry(pitch) Rx(roll)
+    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = pose.rotation.tolist()
     yaw = atan2(yx, xx)
     roll = atan2(sin(yaw) * xz - cos(yaw) * yz, cos(yaw) * yy - sin(yaw) * xy)
-    return roll, atan2(-zx, hypot(xx, yx)), yaw
+    angles = (roll, atan2(-zx, hypot(xx, yx)), yaw)
+    return f'<origin xyz="{_numbers(pose.origin)}" rpy="{_numbers(angles)}"/>'
 
 
 def _numbers(values: Iterable[float]) -> str:

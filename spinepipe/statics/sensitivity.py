@@ -193,7 +193,14 @@ def _advance(
     joints_by_x = np.einsum(
         "jab,jbm->jam", kinematics.by_coordinate, dq.reshape(len(dq) // 6, 6, len(free))
     )
-    joints_by_x += _kinematics_by_x(system, kinematics.by_parameter, free)
+    # of geometry parameters: what they move under the laws while the pose stays
+    moved = np.zeros_like(joints_by_x)
+    for column, parameter in enumerate(free):
+        if parameter.effect in kinematics.by_parameter:
+            by_own = kinematics.by_parameter[parameter.effect][0]
+            weights = parameter.derivative(system.model.effects[parameter.effect].values)
+            moved[:, :, column] = by_own[:, :, list(parameter.rows), parameter.column] @ weights
+    joints_by_x += moved
     carried_by_x = _carried(system, step, free, kinematics.q, joints_by_x, state_by_x)
     following = {}
     for law in system.paths:
@@ -242,19 +249,6 @@ def _add_own(by_x: Array, by_parameter: Array, law: Law, free: Sequence[FreePara
             rows = _joints_moved(parameter, law.per_joint)
             own = by_parameter[rows, :, parameter.column]
             by_x[rows, :, column] += own * parameter.derivative(law.values)[:, None]
-
-
-def _kinematics_by_x(
-    system: System, by_parameter: dict[int, tuple[Array, Array]], free: Sequence[FreeParameter]
-) -> Array:
-    """(J, 6, m) derivative of the coordinates seen by the laws by geometry parameters."""
-    result = np.zeros((system.model.n_joints, 6, len(free)))
-    for column, parameter in enumerate(free):
-        if parameter.effect in by_parameter:
-            dq = by_parameter[parameter.effect][0]
-            weights = parameter.derivative(system.model.effects[parameter.effect].values)
-            result[:, :, column] = dq[:, :, list(parameter.rows), parameter.column] @ weights
-    return result
 
 
 def observe(system: System, q: Array, place: int | None = None) -> Array:

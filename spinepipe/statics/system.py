@@ -21,7 +21,7 @@ from spinepipe.effects import (
     Wrench,
 )
 from spinepipe.effects.contract import Array, Indices
-from spinepipe.model import LoadCase, LoadStep, ScopedEffect, SpineModel
+from spinepipe.model import LoadCase, LoadStep, SpineModel
 from spinepipe.statics.joint_forces import (
     ActiveLaw,
     ActivePath,
@@ -130,31 +130,29 @@ class System:
         self.load_effects: list[Active[LoadEffect]] = []
         self.measurement: list[Active[Instrument]] = []
         for index, scoped in enumerate(model.effects):
-            if scoped.in_scope(case.test):
-                self._activate(index, scoped)
+            if not scoped.in_scope(case.test):
+                continue
+            effect = scoped.effect
+            shared = (index, np.array(scoped.joints), scoped.values, effect.per_joint)
+            match effect.kind:
+                case EffectKind.JOINT_LAW:
+                    self.laws.append(ActiveLaw(cast(JointLaw, effect), *shared))
+                case EffectKind.PATH:
+                    self.laws.append(ActivePath(cast(PathLaw, effect), *shared))
+                case EffectKind.GEOMETRY:
+                    self.geometry.append(Active(cast(GeometryEffect, effect), *shared))
+                case EffectKind.LOAD:
+                    self.load_effects.append(Active(cast(LoadEffect, effect), *shared))
+                case EffectKind.MEASUREMENT:
+                    self.measurement.append(Active(cast(Instrument, effect), *shared))
+                case _:
+                    raise TypeError(f"{effect.name}: {effect.kind!r} is not a kind of effect")
         # (J, 6, 6) rows and columns of the diagonal blocks of an (n, n) matrix
         at = np.arange(6 * model.n_joints).reshape(-1, 6)
         shape = (model.n_joints, 6, 6)
         self._blocks = np.broadcast_to(at[:, :, None], shape), np.broadcast_to(at[:, None], shape)
         self._heavy = bool(np.any(model.gravity))
         self.fixed: Indices = np.array(case.fixed, dtype=np.int64)
-
-    def _activate(self, index: int, scoped: ScopedEffect) -> None:
-        effect, joints, values = scoped.effect, np.array(scoped.joints), scoped.values
-        shared = (index, joints, values, effect.per_joint)
-        match effect.kind:
-            case EffectKind.JOINT_LAW:
-                self.laws.append(ActiveLaw(cast(JointLaw, effect), *shared))
-            case EffectKind.PATH:
-                self.laws.append(ActivePath(cast(PathLaw, effect), *shared))
-            case EffectKind.GEOMETRY:
-                self.geometry.append(Active(cast(GeometryEffect, effect), *shared))
-            case EffectKind.LOAD:
-                self.load_effects.append(Active(cast(LoadEffect, effect), *shared))
-            case EffectKind.MEASUREMENT:
-                self.measurement.append(Active(cast(Instrument, effect), *shared))
-            case _:
-                raise TypeError(f"{effect.name}: {effect.kind!r} is not a kind of effect")
 
     def with_model(self, model: SpineModel) -> "System":
         """The same chain, case and effects with the parameter values of another model."""

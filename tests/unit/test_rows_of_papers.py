@@ -115,9 +115,11 @@ def test_a_comparison_hangs_on_its_own_paper_and_the_engine(
     shutil.copytree(FOLDER, tmp_path / "papers", ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(papers, "FOLDER", tmp_path / "papers")
     paper, other = PAPERS[:2]
+    (tmp_path / "papers" / f"{paper}_beside.py").touch()  # a second file of selectors
     for changed, same in (
         (f"{paper}.csv", {other}),
         (f"{paper}.py", {other}),
+        (f"{paper}_beside.py", {other}),
         ("ranges.py", set()),
         ("engine.py", set()),
     ):

@@ -146,6 +146,10 @@ class Stack:
         """Runs of chains; ``steps`` (R,) of each run, and how long each takes, ``seconds`` (L,)."""
         run = np.repeat(np.arange(len(steps)), steps)
         paths = [law for law in effects.laws if law.effect.kind is EffectKind.PATH]
+        # rad: places of a step are looked at as often as any law or geometry effect asks for
+        spacing = np.full(len(steps), SPACING)
+        for one in (*effects.laws, *effects.geometry):
+            spacing[one.acts] = np.minimum(spacing[one.acts], straight_over(one.effect))
         return cls(
             model,
             case,
@@ -157,7 +161,7 @@ class Stack:
             np.concatenate([[0], np.cumsum(steps)]),
             seconds,
             _released(listed, chains, run, bool(effects.dead)),
-            _spacing([*effects.laws, *effects.geometry], len(steps)),
+            spacing,
             _runs_with(paths, len(steps)),
             _runs_with(effects.others, len(steps)),
         )
@@ -431,14 +435,6 @@ def _released(listed: Loads, chains: Chains, run: Indices, dead: bool) -> Flags:
     if dead or chains.gravity.any():  # beside loads that stay, only the same are no others
         more &= share == 1.0
     found[lanes] = ~(same_places & (more | ~last.any(axis=(1, 2))))
-    return found
-
-
-def _spacing(effects: Sequence[Acting], count: int) -> Array:
-    """(R,) rad, as often as any law or geometry effect of a run asks for."""
-    found = np.full(count, SPACING)
-    for one in effects:
-        found[one.acts] = np.minimum(found[one.acts], straight_over(one.effect))
     return found
 
 
