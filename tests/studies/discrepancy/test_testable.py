@@ -22,8 +22,8 @@ from spinepipe.studies.discrepancy.design import extra_tests
 from spinepipe.studies.discrepancy.design.distinguishability import (
     Confusion,
     confusions,
+    distinguishability,
     families,
-    told_apart,
 )
 from spinepipe.studies.discrepancy.design.extra_tests import MENU
 from spinepipe.studies.discrepancy.design.fisher_information import (
@@ -152,7 +152,7 @@ def test_unloading_tells_hysteresis_from_a_neutral_zone():
 
     def share(moments: tuple[float, ...]) -> float:
         grounds = grounds_of(2, moments, ("flexion",))
-        told = told_apart(grounds, tried_in(grounds, pair), NEEDED, 3.0, None, 0, at_once)
+        told = distinguishability(grounds, tried_in(grounds, pair), NEEDED, 3.0, None, 0, at_once)
         return next(c.share for c in told.confusions if (c.effect, c.other) == pair)
 
     assert share(up) > 0.85
@@ -170,7 +170,7 @@ def test_creep_takes_times():
 def test_what_is_told_apart_holds_every_effect_once():
     grounds = grounds_of(joints=2, tests=("flexion",))
     effects = ["facet_contact", "joint_centre_offset", "neutral_zone"]
-    told = told_apart(grounds, tried_in(grounds, effects), NEEDED, 3.0, None, 0, at_once)
+    told = distinguishability(grounds, tried_in(grounds, effects), NEEDED, 3.0, None, 0, at_once)
     hidden = {one.name for one in told.not_testable}
     assert hidden == {"joint_centre_offset"}
     assert {one.name for one in told.smallest_detectable} == set(effects) - hidden
