@@ -388,16 +388,11 @@ def _errors_differ(claim: CohortClaim, what: str, tests: pd.DataFrame, significa
     message = f"by itself under: {listed(list(below))}; {len(known)} load cases; no interval"
     value = float(known["effect"].max())
     holds = "yes" if p < significance else "undecided"
-    return claim.row(holds, message, value, None, p, _specimens_of(what, known))
-
-
-def _specimens_of(what: str, tests: pd.DataFrame) -> int | None:
-    """Specimens in the test of least p: its blocks, or what it compares.
-
-    Friedman's statistic is W n (k - 1) for n blocks of k, which gives k but where W is 0.
-    """
-    least = tests.sort_values("p", kind="stable").iloc[0]
+    # Specimens in the test of least p: its blocks, or what it compares. Friedman's statistic is
+    # W n (k - 1) for n blocks of k, which gives k but where W is 0.
+    least = known.sort_values("p", kind="stable").iloc[0]
     blocks, w = int(least["n"]), float(least["effect"])
-    if what == "levels":
-        return blocks
-    return None if w == 0.0 else 1 + round(float(least["statistic"]) / (w * blocks))
+    specimens: int | None = blocks
+    if what != "levels":
+        specimens = None if w == 0.0 else 1 + round(float(least["statistic"]) / (w * blocks))
+    return claim.row(holds, message, value, None, p, specimens)

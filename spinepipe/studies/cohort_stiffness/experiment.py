@@ -33,7 +33,6 @@ from spinepipe.studies.cohort_stiffness.loop_rows import (
     axis_row,
     displacement_row,
     empty,
-    noise_of_poses,
 )
 from spinepipe.studies.cohort_stiffness.predict import predict_motion
 from spinepipe.studies.cohort_stiffness.problem import (
@@ -56,7 +55,7 @@ from spinepipe.studies.cohort_stiffness.tables import (
     SIMULATED,
 )
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.units import COORDINATES, DEG_PER_RAD, subtract_baseline
+from spinepipe.units import COORDINATES, DEG_PER_RAD, DISPLAY_PER_SI, subtract_baseline
 
 Row = dict[str, Any]
 
@@ -305,7 +304,9 @@ def _of_joint(
     first, last = read.ends
     root = None
     if sd is not None and noise is not None:
-        root = noise_of_poses(sd.translation_mm, sd.rotation_deg, noise.root[[first, last]])
+        # (12, 6 k) noise of the two end poses, whose steps share the unit errors of ``noise.root``
+        each: Array = np.array([sd.translation_mm] * 3 + [sd.rotation_deg] * 3) / DISPLAY_PER_SI
+        root = np.asarray(np.kron(noise.root[[first, last]], np.diag(each)), dtype=np.float64)
     yield row, read.axis(measured, root, np.zeros((12, 0)), MEASURED, "")
     yield _simulated(read, joint, model, why)
 

@@ -155,7 +155,14 @@ class CohortLayout(StudyFiles):
         """The job files of which a block is made."""
         own = f"specimen={specimen}"
         if block == POOLED_BLOCK:
-            places = self._pooled_places()
+            folds = [(label, NOBODY) for label in self.load_sets]
+            if self._held_out:
+                folds += product(self._without_case_folds, self.specimens)
+            places = [
+                f"pooled/representation={representation}/fitted_to={label}/without={one}"
+                for representation in self._pooled
+                for label, one in folds
+            ]
         elif table in OF_EXPERIMENTS:
             places = [f"experiment/{own}"]
         elif table == "nuisances":
@@ -209,16 +216,6 @@ class CohortLayout(StudyFiles):
     def _without_case_folds(self) -> tuple[str, ...]:
         """The load sets that leave no load case out."""
         return tuple(label for label in self.load_sets if label == ALL or label in self.tests)
-
-    def _pooled_places(self) -> list[str]:
-        folds = [(label, NOBODY) for label in self.load_sets]
-        if self._held_out:
-            folds += [(label, one) for label in self._without_case_folds for one in self.specimens]
-        return [
-            f"pooled/representation={representation}/fitted_to={label}/without={without}"
-            for representation in self._pooled
-            for label, without in folds
-        ]
 
 
 def _fitted(folder: str, representations: Iterable[str], labels: Iterable[str]) -> list[str]:

@@ -109,18 +109,15 @@ def sign_rows(
         found = list(_of_joints(cohort.joint_names, read, COORDINATES.index(loaded)))
         if all(row["verdict"] == "flipped" for row in found):
             found = [{**row, "message": f"{row['message']}; {ALL_FLIPPED}"} for row in found]
-        rows += [{"test": test, "coordinate": loaded, **row} for row in _with_units(found, loaded)]
+        # rows of a wrong size with what may be behind it
+        slopes = [row["measured_over_expected"] for row in found if row["verdict"] != "undecided"]
+        unit = unit_of([slope for slope in slopes if slope is not None], loaded)
+        why = f"as {unit} would give" if unit else "a joint that is fused or cut, or a wrong unit"
+        for row in found:
+            if row["verdict"] == "implausible":
+                row["message"] = joined(row["message"], why)
+            rows.append({"test": test, "coordinate": loaded, **row})
     return rows
-
-
-def _with_units(found: Sequence[Row], loaded: str) -> Iterator[Row]:
-    """Rows of a test; those of a wrong size with what may be behind it."""
-    slopes = [row["measured_over_expected"] for row in found if row["verdict"] != "undecided"]
-    unit = unit_of([slope for slope in slopes if slope is not None], loaded)
-    why = f"as {unit} would give" if unit else "a joint that is fused or cut, or a wrong unit"
-    for row in found:
-        wrong = row["verdict"] == "implausible"
-        yield {**row, "message": joined(row["message"], why)} if wrong else row
 
 
 def _independent(one: MeasuredCycle, motion: Array | None, zeroed: bool) -> tuple[Array, Array]:

@@ -29,7 +29,7 @@ from spinepipe.studies.cohort_stiffness.tables import (
     UPPER_HALF,
     WHOLE,
 )
-from spinepipe.units import COORDINATES, DEG_PER_RAD, DISPLAY_PER_SI, MM_PER_M
+from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M
 
 Row = dict[str, Any]
 
@@ -239,13 +239,6 @@ def _sds(before: Array, after: Array, root: Array | None, free: Array | None) ->
     sds = np.linalg.norm(by @ root, axis=1)
     loose = np.abs(by @ free).max(axis=1, initial=0.0) > _TRACES
     return [None if no else float(sd) for sd, no in zip(sds, loose, strict=True)]
-
-
-def noise_of_poses(sd_mm: float, sd_deg: float, root: Array) -> Array:
-    """(12, 6 k) noise of two poses, whose steps share unit errors as ``root`` (2, k) says."""
-    sd: Array = np.array([sd_mm] * 3 + [sd_deg] * 3) / DISPLAY_PER_SI
-    noise: Array = np.asarray(np.kron(root, np.diag(sd)), dtype=np.float64)
-    return noise
 
 
 def paired_curves(rows: pd.DataFrame, name: str, unit: str) -> pd.DataFrame:

@@ -127,21 +127,17 @@ def signed_ranks(errors: pd.DataFrame) -> Iterator[FamilyTest]:
             ("literature_against_fitted", before, own),
             ("fitted_against_left_out_specimen", own, others),
         ):
-            name = f"signed_rank/{comparison}/{representation}"
-            if len(first) and len(second):
-                yield from _each_specimen(name, first, second)
-
-
-def _each_specimen(name: str, first: pd.DataFrame, second: pd.DataFrame) -> Iterator[FamilyTest]:
-    """One test per specimen and load case that both have."""
-    keys = ["specimen", "test", "joint", "coordinate"]
-    pairs = first[[*keys, "peak_error"]].merge(second[[*keys, "peak_error"]], on=keys)
-    for (specimen, test), rows in pairs.groupby(["specimen", "test"], sort=False):
-        known = rows.dropna().filter(like="peak_error").abs().to_numpy(float)
-        outcome = wilcoxon_signed_rank(known[:, 0], known[:, 1])
-        family = f"{name}/{test}"
-        response = response_of(first)
-        yield FamilyTest(family, "*", response, "stage", str(test), outcome, str(specimen))
+            if first.empty or second.empty:
+                continue
+            # one test per specimen and load case that both have
+            keys = ["specimen", "test", "joint", "coordinate"]
+            pairs = first[[*keys, "peak_error"]].merge(second[[*keys, "peak_error"]], on=keys)
+            for (specimen, test), rows in pairs.groupby(["specimen", "test"], sort=False):
+                known = rows.dropna().filter(like="peak_error").abs().to_numpy(float)
+                outcome = wilcoxon_signed_rank(known[:, 0], known[:, 1])
+                family = f"signed_rank/{comparison}/{representation}/{test}"
+                response = response_of(first)
+                yield FamilyTest(family, "*", response, "stage", str(test), outcome, str(specimen))
 
 
 def against_level_ratio(errors: pd.DataFrame) -> Iterator[FamilyTest]:

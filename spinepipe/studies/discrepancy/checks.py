@@ -12,11 +12,6 @@ from spinepipe.studies.places import at, measured_columns, readings, repeated, u
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS
 
 
-def effects_to_try() -> tuple[str, ...]:
-    """Names of the registered effects that say how they may be tried."""
-    return tuple(sorted(name for name, cls in registered().items() if hasattr(cls, "trial")))
-
-
 def check_discrepancy(
     document: YamlDocument, study: Discrepancy, cohort: Cohort
 ) -> Iterator[InputProblem]:
@@ -42,7 +37,7 @@ def check_discrepancy(
 
 def _effects(document: YamlDocument, study: Discrepancy) -> Iterator[InputProblem]:
     """Names of effects that are in the registry and can be tried."""
-    known = effects_to_try()
+    known = tuple(sorted(name for name, cls in registered().items() if hasattr(cls, "trial")))
     spelling = Spelling(known, "delete it")
     for index, name in enumerate(study.effects or ()):
         if name in known:

@@ -289,13 +289,21 @@ def _of_place(
         groups = [(specimen, [one]) for specimen, one in there.items()]
         for specimen, ones in [*groups, *([(EVERY[0], list(there.values()))] if there else [])]:
             value, away = mean_of(ones, number, spread)
+            unit, factor = unit_of(name, coordinate)  # as testers write it
+            low = high = None
+            if away is not None:
+                low = max(value - away, 0.0) if name in _NOT_NEGATIVE else value - away
+                low, high = low * factor, (value + away) * factor
             yield {
                 **place,
                 "specimen": specimen,
                 "number": name,
                 "specimens": len(ones),
                 "at_bound": any(bool(one.at_bound[number]) for one in ones),
-                **_in_field_units(name, coordinate, value, away),
+                "value": value * factor,
+                "unit": unit,
+                "low": low,
+                "high": high,
             }
 
 
@@ -307,20 +315,6 @@ def _seen(number: str, reach: LoadRange, load: float) -> bool:
     if number.endswith("_minus"):
         return sides[0]
     return sides[1] if number.endswith("_plus") or number == "drift_per_decade" else True
-
-
-def _in_field_units(name: str, coordinate: str, value: float, away: float | None) -> Row:
-    """Value and interval in the units that testers write."""
-    unit, factor = unit_of(name, coordinate)
-    if away is None:
-        return {"value": value * factor, "unit": unit, "low": None, "high": None}
-    low = max(value - away, 0.0) if name in _NOT_NEGATIVE else value - away
-    return {
-        "value": value * factor,
-        "unit": unit,
-        "low": low * factor,
-        "high": (value + away) * factor,
-    }
 
 
 def unit_of(name: str, coordinate: str) -> tuple[str, float]:

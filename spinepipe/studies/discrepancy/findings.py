@@ -14,8 +14,6 @@ from spinepipe.studies.discrepancy.misfit_words import (
     shape_sentence,
     what_stays,
     where_most,
-    why_no_name,
-    why_not_all,
     without_a_name,
 )
 from spinepipe.studies.discrepancy.quantities import quantities
@@ -95,7 +93,14 @@ def how_sure(verdict: Verdict) -> str:
             behind = number(first.log_evidence_margin, 2)
             told += f"; next best {general(first.name)}, {behind} behind"
         parts.append(f"{told}.")
-    parts += [why_no_name(verdict), why_not_all(verdict), shape_sentence(verdict)]
+    # why no name is given, where that is more than the shape of what is missing; of some reasons
+    # the headline tells
+    if verdict.reason not in (None, Reason.NO_KNOWN_EFFECT, Reason.DATA_ERRORS):
+        parts.append(f"Why no name: {readable(verdict.why).rstrip('.')}.")
+    if verdict.part is not None and verdict.part.reasons:
+        told = "; ".join(readable(one).rstrip(".") for one in verdict.part.reasons)
+        parts.append(f"Why that is not all: {told}.")
+    parts.append(shape_sentence(verdict))
 
     # residuals in noise SD before and with the effects
     rms = verdict.rms_residual

@@ -16,7 +16,6 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import KEY, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, Values, read_model, write_model
 from spinepipe.progress import Progress
-from spinepipe.schema import all_declared
 from spinepipe.studies.discrepancy.curve_numbers import (
     field_number_rows,
     reaches,
@@ -53,6 +52,17 @@ from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, m
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner, Store
 from spinepipe.studies.discrepancy.summary import noise_summary, summarise
+from spinepipe.studies.discrepancy.tables import (
+    CANDIDATES,
+    CONFUSIONS,
+    FIELD_NUMBERS,
+    GAP,
+    HELD_OUT,
+    IMPERFECTIONS,
+    NEXT_TESTS,
+    TABULATED,
+    WHERE,
+)
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
     Conclusion,
@@ -66,6 +76,10 @@ from spinepipe.units import STIFFNESS_COLUMNS
 
 Row = dict[str, Any]
 
+TABLES = (
+    *(GAP, CANDIDATES, WHERE, CONFUSIONS, HELD_OUT, IMPERFECTIONS),
+    *(NEXT_TESTS, FIELD_NUMBERS, TABULATED),
+)
 JOB = "search"
 STORE = "store"
 
@@ -118,7 +132,7 @@ def run(
 
     results = searched(settings, cohort, file, store, Progress(say))
     metadata = provenance(JOB, settings, cohort, None, base_marks(root, settings.base.model))
-    for table in all_declared(__file__):
+    for table in TABLES:
         rows = results.rows.get(table.name, ())
         write(from_rows(table, rows), tables[table.name], metadata)
     write_marked(advice_csv(results.rows.get("next_tests", ())), design, metadata[KEY])

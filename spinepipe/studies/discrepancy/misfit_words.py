@@ -120,20 +120,6 @@ def more_stays(verdict: Verdict, where: pd.DataFrame) -> str:
     return f"{told}{size}{most}."
 
 
-def why_no_name(verdict: Verdict) -> str:
-    """Why no name is given, where that is more than the shape of what is missing."""
-    if verdict.reason in (None, Reason.NO_KNOWN_EFFECT, Reason.DATA_ERRORS):
-        return ""  # or the headline says it
-    return f"Why no name: {readable(verdict.why).rstrip('.')}."
-
-
-def why_not_all(verdict: Verdict) -> str:
-    """Why it is not said that nothing else is missing."""
-    reasons = () if verdict.part is None else verdict.part.reasons
-    told = "; ".join(readable(one).rstrip(".") for one in reasons)
-    return f"Why that is not all: {told}." if told else ""
-
-
 def shape_sentence(verdict: Verdict) -> str:
     """What generic shapes see; empty where they see nothing, or something else is the reason."""
     if verdict.reason is Reason.NO_BASE or not _tells_of_shape(verdict):

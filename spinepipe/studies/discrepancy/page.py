@@ -37,7 +37,6 @@ from spinepipe.studies.discrepancy.quantities import estimate, quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import CANDIDATES, HELD_OUT, NEXT_TESTS, WHERE
 from spinepipe.studies.discrepancy.verdict import EVERY, Conclusion, Missing, Verdict, read_verdict
-from spinepipe.studies.discrepancy.verdict_unnamed import Formula
 from spinepipe.studies.discrepancy.words import (
     general,
     label_of,
@@ -247,22 +246,21 @@ def in_field_units(verdict: Verdict, results: ResultTables) -> Iterator[Parts]:
     which = "" if verdict.effects else " Of the likeliest of those that cannot be told apart."
     title = "What a tester reads off the curves"
     yield "field_numbers", title, NUMBERS_ABOUT + which, *numbers
+    # how much the whole formula says, in the fit and held out
+    share = ""
+    if formula is not None:
+        explained = f"{100.0 * formula.explained:.0f}\u00a0%"
+        share = f" Together {explained} of the excess misfit (chi squared)"
+        if formula.held_out_closed is not None:
+            closed = f"{100.0 * formula.held_out_closed:.0f}\u00a0%"
+            share += f", and {closed} of that of readings left out"
+        share += "."
     title = "A formula in the place of a name"
-    yield "verdict", title, FORMULA_ABOUT + _share_told(formula), *formula_table(formula)
+    yield "verdict", title, FORMULA_ABOUT + share, *formula_table(formula)
     table = tabulated_table(results.table("tabulated"))
     yield "tabulated", "A table in the place of a name", TABULATED_ABOUT, *table
     title = "Hidden by imperfections"
     yield "verdict", title, WITHHELD_ABOUT, *withheld_table(verdict.withheld)
-
-
-def _share_told(formula: Formula | None) -> str:
-    """How much the whole formula says, in the fit and held out."""
-    if formula is None:
-        return ""
-    told = f" Together {100.0 * formula.explained:.0f}\u00a0% of the excess misfit (chi squared)"
-    if formula.held_out_closed is None:
-        return f"{told}."
-    return f"{told}, and {100.0 * formula.held_out_closed:.0f}\u00a0% of that of readings left out."
 
 
 def file_tables(results: ResultTables) -> Iterator[Parts]:

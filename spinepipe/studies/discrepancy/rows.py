@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.effects import Effect
 from spinepipe.model import Support
 from spinepipe.status import Status
 from spinepipe.studies.discrepancy.design.advice import Advice
@@ -219,26 +218,21 @@ def _of_screen(tried: ScreenedVariant) -> Row:
         )[0]
         for column, sds in zip(tried.form.variant.shapes, tried.sds, strict=True)
     }
-    estimate, unit = _estimate(effect, tried)
+    estimate, unit = None, ""
+    if len(tried.estimate) == 1:  # a single strength, in the unit of tables
+        p = effect.parameters[tried.strengths[0]]
+        assert p.off is not None
+        away = float(tried.estimate[0]) * p.prior_scale
+        # the clip keeps exp finite for estimates of the linear problem that are absurdly large
+        value = p.off * float(np.exp(np.clip(away, -50.0, 50.0))) if p.logarithmic else p.off + away
+        estimate, unit = display_value(p.unit, value)
     return {
-        "shape": json.dumps({name: round(value, 6) for name, value in shapes.items()}),
+        "shape": json.dumps({name: round(size, 6) for name, size in shapes.items()}),
         "parameters": len(tried.estimate) + len(shapes),
         "estimate": estimate,
         "unit": unit,
         "delta_chi2": tried.explained,
     }
-
-
-def _estimate(effect: Effect, tried: ScreenedVariant) -> tuple[float | None, str]:
-    """A single strength in the unit of tables."""
-    if len(tried.estimate) != 1:
-        return None, ""
-    p = effect.parameters[tried.strengths[0]]
-    assert p.off is not None
-    away = float(tried.estimate[0]) * p.prior_scale
-    # the clip keeps exp finite for estimates of the linear problem that are absurdly large
-    value = p.off * float(np.exp(np.clip(away, -50.0, 50.0))) if p.logarithmic else p.off + away
-    return display_value(p.unit, value)
 
 
 def _share(drop: float, excess: float) -> float | None:

@@ -197,21 +197,17 @@ def _changes(row: pd.Series, named: pd.DataFrame, rows: pd.DataFrame) -> str:
         for way in ("anterior", "superior")
         if pd.notna(row[f"per_mm_{way}"])
     ]
+    whose = ""
+    of = rows[rows["coordinate"] == row["coordinate"]]
+    if len(of) > 1:  # in how many specimens or joints it differs, and in which most
+        here = int((named["coordinate"] == row["coordinate"]).sum())
+        place = " ".join(one for one in (row["specimen"], row["joint"]) if one != EVERY_JOINT)
+        whose = f" (in {here} of {len(of)}, most in {place})"
     return (
-        f"{name} stiffness{_whose(row, named, rows)} is {number(row['lowest'])} to "
+        f"{name} stiffness{whose} is {number(row['lowest'])} to "
         f"{number(row['highest'])} {unit} ({number(row['stated'])} where the study puts the load"
         f"{'; ' if slopes else ''}{' and '.join(slopes)})"
     )
-
-
-def _whose(row: pd.Series, named: pd.DataFrame, rows: pd.DataFrame) -> str:
-    """Of several specimens or joints, in how many it differs, and in which most."""
-    of = rows[rows["coordinate"] == row["coordinate"]]
-    if len(of) == 1:
-        return ""
-    here = int((named["coordinate"] == row["coordinate"]).sum())
-    place = " ".join(one for one in (row["specimen"], row["joint"]) if one != EVERY_JOINT)
-    return f" (in {here} of {len(of)}, most in {place})"
 
 
 def _excluded_points(rows: pd.DataFrame) -> str:
@@ -267,25 +263,17 @@ def posterior(results: ResultTables) -> list[str]:
     rows = results.table("posterior")
     if rows.empty:
         return []
-    lost = rows[rows["status"] != Status.CONVERGED.value]
+    lost = rows[rows["status"] != Status.CONVERGED.value].drop_duplicates("specimen")
+    why = [f"{row['specimen']} ({row['message']})" for _, row in lost.iterrows()]
     good = rows[rows["status"] == Status.CONVERGED.value]
     told = [
-        _without_posterior(lost),
+        f"No posterior is told of {listed(why)}." if why else "",
         _intervals(good[good["quantity"] == "stiffness"]),
         _known_landmarks(good[good["quantity"] == "landmark"]),
         _readings_in_band(results.table("posterior_motion")),
         *_pose_weights(results.table("pose_weights")),
     ]
     return [sentence for sentence in told if sentence]
-
-
-def _without_posterior(lost: pd.DataFrame) -> str:
-    """Which specimens have no posterior to be believed, and why."""
-    if lost.empty:
-        return ""
-    first = lost.drop_duplicates("specimen")
-    why = [f"{row['specimen']} ({row['message']})" for _, row in first.iterrows()]
-    return f"No posterior is told of {listed(why)}."
 
 
 def _intervals(rows: pd.DataFrame) -> str:
@@ -368,18 +356,13 @@ def _pose_weights(rows: pd.DataFrame) -> Iterator[str]:
                 "on the draw. Go by the posterior, or sample more poses."
             )
         else:
+            suiting = []  # the stiffnesses that suit the likeliest pose
+            for _, row in part[part["pose"] == best].iterrows():
+                coordinate = COORDINATES[STIFFNESS_COLUMNS.index(row["unknown"])]
+                where = "" if row["joint"] == "*" else f" of {row['joint']}"
+                value = f"{number(row['value'])} {STIFFNESS_UNITS[coordinate]}"
+                suiting.append(f"{AXIS[coordinate].lower()}{where} {value}")
             yield (
                 f"{lead}. The data prefer some: the likeliest, {best}, has {share} of the "
-                f"weight, with {_suiting(part[part['pose'] == best])}."
+                f"weight, with {'; '.join(suiting)}."
             )
-
-
-def _suiting(rows: pd.DataFrame) -> str:
-    """The stiffnesses that suit a pose."""
-    found = []
-    for _, row in rows.iterrows():
-        coordinate = COORDINATES[STIFFNESS_COLUMNS.index(row["unknown"])]
-        where = "" if row["joint"] == "*" else f" of {row['joint']}"
-        value = f"{number(row['value'])} {STIFFNESS_UNITS[coordinate]}"
-        found.append(f"{AXIS[coordinate].lower()}{where} {value}")
-    return "; ".join(found)

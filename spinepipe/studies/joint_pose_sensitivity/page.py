@@ -201,10 +201,23 @@ def in_full(statistics: pd.DataFrame) -> pd.DataFrame:
 def folded(statistics: pd.DataFrame, alpha: float) -> pd.DataFrame:
     """One row per test, joint, response and factor of the other families, as in `FOLDED`."""
     repeated = statistics[_repeated(statistics)]
-    rows = [
-        dict(zip(_FOLD, key, strict=True)) | _fold(part, alpha)
-        for key, part in repeated.groupby(_FOLD, sort=False, dropna=False)
-    ]
+    rows = []
+    for key, part in repeated.groupby(_FOLD, sort=False, dropna=False):
+        kept = part.loc[part["p_bonferroni"] < alpha, "effect"]
+        rows.append(
+            dict(zip(_FOLD, key, strict=True))
+            | {
+                "family_size": part["family_size"].max(),
+                "tests": len(part),
+                "with_result": int(part["p"].notna().sum()),
+                "significant": int((part["p"] < alpha).sum()),
+                "bonferroni": len(kept),
+                "holm": int((part["p_holm"] < alpha).sum()),
+                "effect_name": part["effect_name"].iloc[0],
+                "effect_lowest": kept.min(),
+                "effect_highest": kept.max(),
+            }
+        )
     return pd.DataFrame(rows, columns=[column.name for column in FOLDED])
 
 
@@ -213,18 +226,3 @@ def _repeated(statistics: pd.DataFrame) -> pd.Series:
     again = statistics.duplicated(_FOLD, keep=False)
     families = [statistics["specimen"], statistics["family"]]
     return again.groupby(families).transform("any")
-
-
-def _fold(part: pd.DataFrame, alpha: float) -> dict[str, object]:
-    kept = part.loc[part["p_bonferroni"] < alpha, "effect"]
-    return {
-        "family_size": part["family_size"].max(),
-        "tests": len(part),
-        "with_result": int(part["p"].notna().sum()),
-        "significant": int((part["p"] < alpha).sum()),
-        "bonferroni": len(kept),
-        "holm": int((part["p_holm"] < alpha).sum()),
-        "effect_name": part["effect_name"].iloc[0],
-        "effect_lowest": kept.min(),
-        "effect_highest": kept.max(),
-    }

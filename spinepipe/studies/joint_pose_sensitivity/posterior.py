@@ -36,6 +36,7 @@ from spinepipe.studies.joint_pose_sensitivity.posterior_rows import (
 )
 from spinepipe.studies.joint_pose_sensitivity.posterior_target import (
     SpecimenPosterior,
+    StiffnessInPoses,
     posterior_of,
     problem_of,
     scatter_of,
@@ -211,7 +212,9 @@ def _weights(own: SpecimenPosterior, specimen: str, poses: str, start: Array) ->
     numbers = list(placed)
     for first in range(0, len(numbers), TOGETHER):
         some = numbers[first : first + TOGETHER]
-        target: Target = own.target_in(np.array([placed[number] for number in some]))
+        # over stiffnesses alone, in the frames of each pose
+        unknowns = StiffnessInPoses(*own.bounds, np.array([placed[number] for number in some]))
+        target = Target(own.evaluator, unknowns, own.noise)
         target.evaluator.forget()
         found |= dict(zip(some, modes(target, np.tile(start, (len(some), 1))), strict=True))
     # weights in proportion to the evidence; less its largest, or exp would under- or overflow

@@ -136,8 +136,12 @@ class SpecimenPosterior:
 
     @property
     def noise(self) -> ResidualNoise:
-        """Of the residuals, as the study says."""
-        return noise_of(self.evaluator, reading_sd(self.cohort), self.scatter)
+        """Of the residuals, as the study says; of readings zero where no SD is declared."""
+        declared, sd = self.cohort.measurement_sd, np.zeros(6)  # m and rad, of one reading
+        if declared is not None:
+            known = [declared.translation_mm] * 3 + [declared.rotation_deg] * 3
+            sd = np.array(known) / DISPLAY_PER_SI
+        return noise_of(self.evaluator, sd, self.scatter)
 
     @cached_property
     def unknowns(self) -> StiffnessAndLandmarks:
@@ -151,18 +155,6 @@ class SpecimenPosterior:
     def target(self) -> Target:
         """Over stiffnesses and landmarks."""
         return Target(self.evaluator, self.unknowns, self.noise)
-
-    def target_in(self, by: Array) -> Target:
-        """Over stiffnesses alone, in given frames (P, J, 6), see `StiffnessInPoses`."""
-        return Target(self.evaluator, StiffnessInPoses(*self.bounds, by), self.noise)
-
-
-def reading_sd(cohort: Cohort) -> Array:
-    """(6,) m and rad, declared SD of one reading; zero where the cohort declares none."""
-    declared = cohort.measurement_sd
-    if declared is None:
-        return np.zeros(6)
-    return np.array([declared.translation_mm] * 3 + [declared.rotation_deg] * 3) / DISPLAY_PER_SI
 
 
 def problem_of(root: str, settings: JointPoseSensitivity, specimen: str) -> Problem:

@@ -127,15 +127,12 @@ class Specimen:
             values = factors[factor].to_numpy(float)
             yield from self._errors_against("error against pose", "*", str(factor), values)
         for joint, coordinate in measured_coordinates(self.errors):
-            yield self._error_against_motion(joint, coordinate)
-
-    def _error_against_motion(self, joint: str, coordinate: str) -> FamilyTest:
-        """Is the error larger where the same motion, seen in other frames, is larger?"""
-        moved = self.motion[self.motion["joint"] == joint].set_index("pose").loc[self.kept]
-        pair = pd.concat([moved[coordinate], self._own_errors(joint)[coordinate]], axis=1).dropna()
-        found = spearman(*pair.to_numpy(float).T)
-        response, factor = f"{coordinate}_error", f"{coordinate}_measured"
-        return FamilyTest("error against motion", joint, response, factor, "", found)
+            # is the error larger where the same motion, seen in other frames, is larger?
+            moved = self.motion[self.motion["joint"] == joint].set_index("pose").loc[self.kept]
+            both = [moved[coordinate], self._own_errors(joint)[coordinate]]
+            found = spearman(*pd.concat(both, axis=1).dropna().to_numpy(float).T)
+            response, measured = f"{coordinate}_error", f"{coordinate}_measured"
+            yield FamilyTest("error against motion", joint, response, measured, "", found)
 
     def _errors_against(
         self, family: str, joint: str, factor: str, values: Array

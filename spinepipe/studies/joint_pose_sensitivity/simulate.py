@@ -80,7 +80,7 @@ def run(
         rows = [
             {**row, "stiffness": place["stiffness"], "joint": cohort.joint_names[row["joint"]]}
             for one, steps in zip(tested, ended, strict=True)
-            for row in _case_rows(one, _zeroed(steps) if one.zeroed else steps)
+            for row in _case_rows(one, steps)
         ]
         columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
         write(to_arrow(TABLE, columns), path, made_by[place["stiffness"] == "calibrated"])
@@ -157,18 +157,17 @@ def _settle(settings: JointPoseSensitivity, inputs: MeasuredSpecimen, model: Spi
     return ends
 
 
-def _zeroed(ended: list[_StepResult]) -> list[_StepResult]:
-    """Poses less that of step 0, as the cohort's readings are; none where step 0 has none."""
-    first = ended[0]
-    if first.q is None:
-        lost = replace(first, message=f"step 0, which is subtracted, has no pose: {first.message}")
-        return [lost if end.status.usable else end for end in ended]
-    return [replace(end, q=None if end.q is None else end.q - first.q) for end in ended]
-
-
 def _case_rows(one: MeasuredCycle, ended: list[_StepResult]) -> Iterator[dict[str, Any]]:
     """One row per step and joint (by number) of a case; mm and deg."""
     case = one.case
+    if one.zeroed:  # poses less that of step 0, as the cohort's readings are
+        first = ended[0]
+        if first.q is None:
+            why = f"step 0, which is subtracted, has no pose: {first.message}"
+            lost = replace(first, message=why)
+            ended = [lost if end.status.usable else end for end in ended]
+        else:
+            ended = [replace(end, q=None if end.q is None else end.q - first.q) for end in ended]
     for step, measured, end in zip(case.steps, from_si(one.measured), ended, strict=True):
         nowhere = np.full_like(measured, np.nan)
         predicted = nowhere if end.q is None else from_si(end.q.reshape(-1, 6))

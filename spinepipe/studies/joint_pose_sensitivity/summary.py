@@ -120,7 +120,11 @@ def _pose_rows(
             part = _SummaryKey("poses", "equilibrium", dataset, str(specimen))
             yield from _stiffness_rows(settings, part, own["calibrations"])
             yield from _error_rows(part, own["errors"], own["sizes"])
-            yield from _frame_rows(part, own["poses"])
+            for joint, rows in own["poses"].groupby("joint", sort=False):
+                for name, axis in zip(TRANSLATIONS, "xyz", strict=True):
+                    yield part.row("origin", str(joint), name, "mm", rows[f"{axis}_mm"])
+                for name in ROTATIONS:
+                    yield part.row("orientation", str(joint), name, "deg", rows[f"{name}_deg"])
 
 
 def _stiffness_rows(
@@ -161,14 +165,6 @@ def _error_rows(
             if motion[name].notna().any():
                 values, size = rows[name].to_numpy(float), motion[name].to_numpy(float)
                 yield part.row("error", str(joint), name, COORDINATE_UNITS[name], values, size)
-
-
-def _frame_rows(part: _SummaryKey, poses: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    for joint, rows in poses.groupby("joint", sort=False):
-        for name, axis in zip(TRANSLATIONS, "xyz", strict=True):
-            yield part.row("origin", str(joint), name, "mm", rows[f"{axis}_mm"])
-        for name in ROTATIONS:
-            yield part.row("orientation", str(joint), name, "deg", rows[f"{name}_deg"])
 
 
 def _bootstrap_rows(

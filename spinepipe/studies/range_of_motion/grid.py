@@ -21,7 +21,7 @@ from spinepipe.model import LoadCase
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.selected_tests import SelectedTest, first_cycles, select_steps
 from spinepipe.tables import opened
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS
+from spinepipe.units import COORDINATE_COLUMNS, ROTATIONS
 
 ROWS_AT_A_TIME = 50_000
 _KEYS = ("specimen", "pose", "stiffness", "test", "joint", "largest_load")
@@ -78,11 +78,6 @@ class MotionGrid:
     motion: Array
     asked: NDArray[np.bool_]
 
-    def loaded_motion(self, test: int) -> Array:
-        """(S, P, K, J) motion in the coordinate that a test turns, deg."""
-        chosen: Array = self.motion[:, :, :, test, :, COORDINATES.index(self.loaded[test])]
-        return chosen
-
 
 def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> MotionGrid:
     """Rows of the largest loads of ``range_of_motion.parquet``, read some at a time."""
@@ -108,10 +103,18 @@ def read_grid(path: str, study: RangeOfMotion, cohort: Cohort) -> MotionGrid:
             motion[place] = np.column_stack(values)
             tested[place[:4]] = True
     driven = _driven(study, cohort)
-    loaded = tuple(
-        driven.get(test) or _moves_most(motion[:, :, :, i]) for i, test in enumerate(tests)
-    )
-    return MotionGrid(cohort.specimen_names, tests, cohort.joint_names, loaded, motion, tested)
+    loaded = []
+    for index, test in enumerate(tests):
+        if test in driven:
+            loaded.append(driven[test])
+            continue
+        # The rotation that moves most, by the median over runs and joints; where nothing has an
+        # equilibrium the first rotation.
+        flat = np.abs(motion[:, :, :, index, :, 3:]).reshape(-1, 3)
+        solved = flat[np.isfinite(flat).all(axis=1)]
+        loaded.append(ROTATIONS[int(np.median(solved, axis=0).argmax()) if len(solved) else 0])
+    names_of = cohort.specimen_names, tests, cohort.joint_names
+    return MotionGrid(*names_of, tuple(loaded), motion, tested)
 
 
 def _driven(study: RangeOfMotion, cohort: Cohort) -> dict[str, str]:
@@ -126,11 +129,3 @@ def _driven(study: RangeOfMotion, cohort: Cohort) -> dict[str, str]:
             if coordinate is not None:
                 found.setdefault(case.test, []).append(coordinate)
     return {test: mode(coordinates) for test, coordinates in found.items()}
-
-
-def _moves_most(motion: Array) -> str:
-    """The rotation that moves most; motion (..., 6)."""
-    # By the median over runs and joints; where nothing has an equilibrium the first rotation.
-    flat = np.abs(motion[..., 3:]).reshape(-1, 3)
-    solved = flat[np.isfinite(flat).all(axis=1)]
-    return ROTATIONS[int(np.median(solved, axis=0).argmax())] if len(solved) else ROTATIONS[0]

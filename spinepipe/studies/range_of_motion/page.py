@@ -122,19 +122,18 @@ def _dominant(rows: pd.DataFrame) -> Iterator[str]:
         shares = {name: joints[f"{name}_share"].dropna() for name in _FACTORS}
         medians = {name: share.median() for name, share in shares.items() if len(share)}
         first = max(medians, key=lambda name: medians[name])
-        part = "most" if shares[first].min() > 0.5 else "the largest share"
+        share = shares[first]
+        part = "most" if share.min() > 0.5 else "the largest share"
+        # median and range over the joints, or one number where all are alike
+        low, high = (_percent(end) for end in (share.min(), share.max()))
+        if low == high:
+            told = low if len(share) == 1 else f"{low} at every joint"
+        else:
+            told = f"median {_percent(share.median())}, {low} to {high} over the joints"
         yield (
             f"{str(test).replace('_', ' ').capitalize()}: {part} of the variance is due to "
-            f"{_FACTORS[first]} ({_over_joints(shares[first])})."
+            f"{_FACTORS[first]} ({told})."
         )
-
-
-def _over_joints(shares: pd.Series) -> str:
-    """Median and range over the joints."""
-    low, high = (_percent(end) for end in (shares.min(), shares.max()))
-    if low == high:
-        return low if len(shares) == 1 else f"{low} at every joint"
-    return f"median {_percent(shares.median())}, {low} to {high} over the joints"
 
 
 def _percent(share: float) -> str:

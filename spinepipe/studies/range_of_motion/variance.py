@@ -17,6 +17,7 @@ from spinepipe.studies.range_of_motion.grid import MotionGrid, read_grid
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import EVERY, FACTORS, ROM_VARIANCE
 from spinepipe.tables import from_rows, write
+from spinepipe.units import COORDINATES
 
 FEWEST_COMPLETE = 0.5
 """A specimen whose share of complete poses is smaller takes no part in the cohort's analysis."""
@@ -38,7 +39,8 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 def variance_rows(grid: MotionGrid) -> Iterator[dict[str, Any]]:
     """Rows of each specimen and, where there are several, of the cohort."""
     for number, test in enumerate(grid.tests):
-        drawn = grid.loaded_motion(number)[:, 1:, 1:]  # the first pose and set are no draws
+        # deg in the coordinate that the test turns; the first pose and set are no draws
+        drawn = grid.motion[:, 1:, 1:, number, :, COORDINATES.index(grid.loaded[number])]
         same = {"test": test, "coordinate": grid.loaded[number]}
         tested = np.flatnonzero(grid.asked[:, :, :, number].any(axis=(1, 2)))
         # of each specimen (poses, K, J), the poses with an equilibrium with every stiffness set

@@ -6,6 +6,7 @@ shares the errors of that set-up; another direction and a new set-up have a name
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -112,7 +113,11 @@ def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
                 count[:, part] = 1
                 words = f"{name}: {what} read as well"
                 yield ExtraCycle(words, replace(once, count=count), zeroed)
-        yield run(f"{name}: in twice as many load steps", with_half_steps(case))
+        # a step half-way between each two
+        halved = [step for two in pairwise(case.steps) for step in (two[0], _between(*two))]
+        every = enumerate([*halved, case.steps[-1]])
+        finer = replace(case, steps=tuple(replace(step, step=number) for number, step in every))
+        yield run(f"{name}: in twice as many load steps", finer)
         if not unloads(case):
             yield run(f"{name}: unloading too, the same loads back down", with_unloading(case))
         yield run(f"{name}: loads {LARGER:g} times as large", scale_loads(case, LARGER))
@@ -127,15 +132,6 @@ def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
         yield run(held, with_hold(case))
         if zeroed:
             yield ExtraCycle(f"{name}: readings kept as they are, not zeroed", once, False)
-
-
-def with_half_steps(case: LoadCase) -> LoadCase:
-    """A step half-way between each two."""
-    steps: list[LoadStep] = []
-    for before, after in zip(case.steps[:-1], case.steps[1:], strict=True):
-        steps += [before, _between(before, after)]
-    every = [*steps, case.steps[-1]]
-    return replace(case, steps=tuple(replace(s, step=n) for n, s in enumerate(every)))
 
 
 def _between(before: LoadStep, after: LoadStep) -> LoadStep:

@@ -166,23 +166,25 @@ def judgements(
     of : what each specimen's tests see. needed : log evidence, the screen's threshold and margin.
     """
     design = CohortSignatures(candidates(trials, joints, tests), of)
-    return tuple(_judge(design, number, needed, seed) for number in range(len(trials)))
-
-
-def _judge(design: CohortSignatures, number: int, needed: float, seed: int) -> Judgement:
-    """What a design could tell of one effect: by the variant that shows best."""
-    trials = design.those.trials[number]
-    variants = [_best_spread(design, number, variant) for variant in trials.variants]
-    found = [(one, _detectable(one, trials, design.freedom, needed, seed)) for one in variants]
-    # shown before not shown, then by how little is absorbed; a trace before none
-    best, weakest = min(
-        found, key=lambda pair: (not _shown(*pair), pair[0].absorbed, -pair[0].squared(pair[0].raw))
-    )
-    shown = _shown(best, weakest)
-    gaps = [least for one, least in found if least is not None and _shown(one, least) == shown]
-    least = min(gaps, key=lambda one: one.gap, default=None)
-    why = "" if shown else _why(best, weakest)
-    return Judgement(trials.effect, shown, why, best, best.absorbed, best.absorbed_by_base, least)
+    judged = []
+    for number, one in enumerate(trials):
+        # of each effect by the variant that shows best
+        best_forms = [_best_spread(design, number, variant) for variant in one.variants]
+        found = [
+            (form, _detectable(form, one, design.freedom, needed, seed)) for form in best_forms
+        ]
+        # shown before not shown, then by how little is absorbed; a trace before none
+        best, weakest = min(
+            found,
+            key=lambda pair: (not _shown(*pair), pair[0].absorbed, -pair[0].squared(pair[0].raw)),
+        )
+        shown = _shown(best, weakest)
+        gaps = [gap for form, gap in found if gap is not None and _shown(form, gap) == shown]
+        least = min(gaps, key=lambda detectable: detectable.gap, default=None)
+        why = "" if shown else _why(best, weakest)
+        absorbed = best.absorbed, best.absorbed_by_base
+        judged.append(Judgement(one.effect, shown, why, best, *absorbed, least))
+    return tuple(judged)
 
 
 def _best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typical:

@@ -301,7 +301,13 @@ def gap_by_step_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) 
         axis.set_xlabel("load step")
         axis.xaxis.set_major_locator(MaxNLocator(6, integer=True))
         axis.tick_params(axis="y", length=2.5)
-        _write_reach(axis, rows["measured"].to_numpy(float), unit(coordinate))
+        # how far the joint moved: the size of the motion that the difference is a part of
+        measured, of = rows["measured"].to_numpy(float), unit(coordinate)
+        ends = (number(float(end), 2) for end in (measured.min(), measured.max()))
+        reach = f"moved {' to '.join(ends)}{of if of == '°' else f' {of}'}"
+        style: dict[str, Any] = {"va": "top", "fontsize": SMALL_PT, "color": INK[GREY]}
+        axis.text(0.02, 1.0, reach, transform=axis.transAxes, in_layout=False, **style)
+        axis.margins(y=0.18)
     words = "noise of the mean of the cycles, 95 %"
     handles: list[Line2D | Patch] = [Patch(facecolor=GREY, alpha=0.25, lw=0, label=words)]
     handles += [
@@ -336,12 +342,3 @@ def _draw_steps(axis: Axes, rows: pd.DataFrame, lines: Sequence[str]) -> None:
     for name in lines:
         axis.plot(x, measured - rows[name].to_numpy(float), zorder=3, **_STEP_LINES[name])
     axis.set_xlim(float(x.min()) - 0.3, float(x.max()) + 0.3)
-
-
-def _write_reach(axis: Axes, measured: Array, of: str) -> None:
-    """How far the joint moved: the size of the motion that the difference is a part of."""
-    ends = (number(float(end), 2) for end in (measured.min(), measured.max()))
-    words = f"moved {' to '.join(ends)}{of if of == '°' else f' {of}'}"
-    style: dict[str, Any] = {"va": "top", "fontsize": SMALL_PT, "color": INK[GREY]}
-    axis.text(0.02, 1.0, words, transform=axis.transAxes, in_layout=False, **style)
-    axis.margins(y=0.18)

@@ -89,7 +89,10 @@ def before_a_fit(
     """
     by_name: Mapping[str, SpecimenReadings] = {one.specimen: one for one in measured}
     found = answers(by_name, zeroed, np.nan_to_num(sd), CLEAR)
-    errors = [*wrong_units(found), *wrong_signs(found, joints, list(by_name), sd)]
+    errors = []
+    for kind in (ROTATIONS, TRANSLATIONS):  # apart: a unit is of forces or moments, of mm or deg
+        errors += _wrong_units([one for one in found if one.coordinate in kind])
+    errors += wrong_signs(found, joints, list(by_name), sd)
     if _is_repeated(measured):
         errors += bad_markers(between_cycles(measured), list(by_name), joints, in_every=False)
     return tuple(errors)
@@ -204,16 +207,10 @@ def _signs_of_joints(
     return errors
 
 
-def wrong_units(found: Sequence[LoadResponse]) -> list[SuspectedError]:
-    """Suspected units: of single specimens and tests, else of the whole cohort.
-
-    Translations and rotations apart: a unit is of forces or of moments, of mm or of deg.
+def _wrong_units(found: Sequence[LoadResponse]) -> list[SuspectedError]:
+    """Suspected units of rotations, or of translations: in single specimens, in single tests, else
+    in the whole cohort.
     """
-    kinds = ([a for a in found if a.coordinate in kind] for kind in (ROTATIONS, TRANSLATIONS))
-    return [error for of_kind in kinds for error in _units_of_kind(of_kind)]
-
-
-def _units_of_kind(found: Sequence[LoadResponse]) -> list[SuspectedError]:
     whole = {a.specimen: (a.specimen,) for a in found}
     tests = {f"{a.specimen}, test {a.test}": (a.specimen, a.test) for a in found}
     for places, everywhere in ((whole, True), (tests, False)):

@@ -21,6 +21,7 @@ from spinepipe.studies.discrepancy.search.baseline import (
     base_parameters,
     fit_baseline,
 )
+from spinepipe.studies.discrepancy.search.gaps import gaps_at, whole_gap
 from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.noise import (
@@ -154,14 +155,19 @@ def investigate(
 
 def _with_sure_effects(one: Investigation, asked: Asked, run: PieceRunner) -> Investigation:
     """Fitted and held out again without effects that stood and are doubted beside sure ones."""
-    kept = [effect for effect in one.found.standing if one.ended.keeps(effect)]
+    # what the verdict stands for, for certain or in a set of names that cannot be told apart
+    sure = {id(effect) for effect in one.ended.named}
+    kept = [e for e in one.found.standing if e.name in one.ended.tied or id(e) in sure]
     if not kept or len(kept) == len(one.found.standing):
         return one
     final = one.found.final
     fit = run(joint_fit, final.suppose([e.supposed for e in kept]), final.setting, final.fit.poses)
     if not fit.usable:
         return one
-    found = one.found.with_only(kept, fit)
+    final = final.at(fit)
+    gap, at = whole_gap(final, fit), gaps_at(final, fit)
+    standing = tuple(kept)
+    found = replace(one.found, final=final, standing=standing, final_gap=gap, final_at=at)
     on_record([fit], one.grounds.readings, run)
     return replace(one, found=found, proof=held_out(found, asked, run))
 

@@ -74,10 +74,6 @@ class Outcome:
     reason: Reason | None = None
     left: tuple[str, ...] = ()
 
-    def keeps(self, one: SelectedTerm) -> bool:
-        """Whether the verdict stands for an effect, for certain or in a set."""
-        return one.name in self.tied or any(one is other for other in self.named)
-
 
 _NoName = tuple[Reason, str]
 """Why nothing is named, for programs and in one sentence."""

@@ -1,14 +1,14 @@
 """A search at work: what it may do, what it has looked at so far, and where it ended."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.gaps import Gap, gaps_at, whole_gap
+from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, Trials
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, joint_fit
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, lack_of_fit
@@ -124,12 +124,6 @@ class SearchResult:
     final_at: Mapping[str, Gap]
     generic_threshold_at: Mapping[str, float]
     base_lack: LackOfFit
-
-    def with_only(self, kept: Sequence[SelectedTerm], fit: JointFit) -> "SearchResult":
-        """The same with some of the effects, and the fit that has no others."""
-        final = self.final.at(fit)
-        gap, at = whole_gap(final, fit), gaps_at(final, fit)
-        return replace(self, final=final, standing=tuple(kept), final_gap=gap, final_at=at)
 
 
 def look(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -11,7 +12,6 @@ from matplotlib.ticker import MaxNLocator
 from spinepipe.cohort import Cohort
 from spinepipe.report.glyphs import EXACT, exact, rounded
 from spinepipe.report.panels import (
-    PanelRows,
     explain,
     grid,
     head,
@@ -132,20 +132,17 @@ def _draw(axis: Axes, panel: _AgreementPanel) -> None:
         axis.set_ylim(-1.0, 1.0)
         words = f"{EXACT}, n = {row['n']}"
     else:
-        _draw_limits(axis, row)
+        # each limit in the middle of its interval, of which the outer end is in the table
+        _line(axis, row["bias"], (row["bias_low"], row["bias_high"]), BLACK)
+        lower, upper, far = row["lower_limit"], row["upper_limit"], row["upper_limit_high"]
+        sd_band = lower - row["lower_limit_low"]
+        _line(axis, lower, (row["lower_limit_low"], lower + sd_band), LIMITS)
+        _line(axis, upper, (2.0 * upper - far, far), LIMITS)
+        axis.margins(y=0.18)
+        axis.yaxis.set_major_locator(MaxNLocator(5))
         limits = f"({fixed(row['lower_limit'])} to {fixed(row['upper_limit'])})"
         words = f"bias {fixed(row['bias'])} {limits}, n = {row['n']}"
     axis.text(0.02, 0.995, words, transform=axis.transAxes, fontsize=6.0, va="top")
-
-
-def _draw_limits(axis: Axes, row: pd.Series) -> None:
-    _line(axis, row["bias"], (row["bias_low"], row["bias_high"]), BLACK)
-    sd_band = row["lower_limit"] - row["lower_limit_low"]
-    _line(axis, row["lower_limit"], (row["lower_limit_low"], row["lower_limit"] + sd_band), LIMITS)
-    upper = row["upper_limit"]
-    _line(axis, upper, (2.0 * upper - row["upper_limit_high"], row["upper_limit_high"]), LIMITS)
-    axis.margins(y=0.18)
-    axis.yaxis.set_major_locator(MaxNLocator(5))
 
 
 def _line(axis: Axes, y: float, ends: tuple[float, float], color: str) -> None:
@@ -163,23 +160,20 @@ def _draw_rows(cohort: Cohort, known: pd.DataFrame, settled: str = "") -> Figure
     axes, figure = grid(len(names), rows, row_height(rows, 8.0))
     for index, (name, axis) in enumerate(zip(names, axes, strict=True)):
         head(axis, index, AXIS[name])
-        _draw_coordinate(name, axis, rows)
+        axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
+        for y, frame in enumerate(rows.frames):
+            here = frame[frame["coordinate"] == name]
+            alpha = 1.0 if len(here) == 1 else 0.35
+            bar: dict[str, Any] = {"color": OURS, "lw": 2.5, "alpha": alpha}
+            for _, row in here.iterrows():
+                low, high, bias_low, bias_high, bias = rounded(row[_NUMBERS])
+                axis.plot([low, high], [y, y], **bar, solid_capstyle="butt")
+                axis.plot([bias_low, bias_high], [y, y], color=BLACK, lw=1.2, zorder=4)
+                axis.plot([bias], [y], "|", color=BLACK, ms=5.0, mew=1.0, zorder=5)
+        label_rows(axis, rows, below=0.6, above=0.6)
+        axis.xaxis.set_major_locator(MaxNLocator(4))
+        axis.set_xlabel(f"predicted less measured ({unit(name)})")
     bars = {OURS: "limits of agreement (bias ± 1.96 SD)", BLACK: "bias with 95 % interval"}
     told = ("Reduced poses with their own stiffness.", rows.note and f"{rows.note}.", settled)
     explain(figure, bars, " ".join(words for words in told if words))
     return figure
-
-
-def _draw_coordinate(name: str, axis: Axes, rows: PanelRows) -> None:
-    axis.axvline(0.0, color=GREY, lw=0.6, zorder=1)
-    for y, frame in enumerate(rows.frames):
-        here = frame[frame["coordinate"] == name]
-        alpha = 1.0 if len(here) == 1 else 0.35
-        for _, row in here.iterrows():
-            low, high, bias_low, bias_high, bias = rounded(row[_NUMBERS])
-            axis.plot([low, high], [y, y], color=OURS, lw=2.5, alpha=alpha, solid_capstyle="butt")
-            axis.plot([bias_low, bias_high], [y, y], color=BLACK, lw=1.2, zorder=4)
-            axis.plot([bias], [y], "|", color=BLACK, ms=5.0, mew=1.0, zorder=5)
-    label_rows(axis, rows, below=0.6, above=0.6)
-    axis.xaxis.set_major_locator(MaxNLocator(4))
-    axis.set_xlabel(f"predicted less measured ({unit(name)})")

@@ -142,7 +142,14 @@ def bootstrap_rows(
             for (sampled, loading, *place), _ in reversed(parts)
         ]
         return PanelRows(tuple(labels), tuple(part for _, part in reversed(parts)), ""), False
-    relative = pd.concat([_from_median(part, columns) for _, part in parts])
+    shares = []  # of the own median; errors, which may be zero, less it
+    for _, part in parts:
+        moved = part.copy()
+        for name in columns:
+            middle = part[name].median()
+            moved[name] = part[name] - middle if "_error_" in name else part[name] / middle
+        shares.append(moved)
+    relative = pd.concat(shares)
     groups = [
         ((sampled, loading), part)
         for sampled, loading in reversed(list(product(SAMPLED, LOADINGS)))
@@ -162,14 +169,6 @@ def _part(
     if joint == EVERY_JOINT:  # the stiffness is the same in the rows of all joints
         return solved[chosen].drop_duplicates(FIT)
     return solved[chosen & solved["joint"].eq(joint)]
-
-
-def _from_median(part: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
-    moved = part.copy()
-    for name in columns:
-        middle = part[name].median()
-        moved[name] = part[name] - middle if "_error_" in name else part[name] / middle
-    return moved
 
 
 def _draw_stiffness(

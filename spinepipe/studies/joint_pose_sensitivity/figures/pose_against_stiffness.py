@@ -120,18 +120,16 @@ def _draw_tree(axis: Axes, y: int, here: pd.DataFrame, rows: PanelRows) -> None:
             color = COLORS[str(factor)]
             axis.add_patch(Rectangle((left, base), width, height, fc=color, ec="none", alpha=0.75))
             left += width
-        if rows.with_numbers and len(trees) == 1:
-            _tell_tree(axis, y, tree)
-
-
-def _tell_tree(axis: Axes, y: int, tree: pd.DataFrame) -> None:
-    pose = float(tree.loc[tree["factor"] == "pose", "importance"].sum())
-    first = tree.iloc[0]
-    if first["leaves"] <= 1:
-        note(axis, 0.02, y + 0.38, "nothing is explained: one leaf", GREY)
-        return
-    leaves = f"{int(first['leaves'])} leaves, r² {fixed(first['r2'])}"
-    note(axis, 0.02, y + 0.4, f"pose {percent(round(1000 * pose), 1000)}; {leaves}", GREY)
+        if not rows.with_numbers or len(trees) > 1:
+            continue
+        pose = float(tree.loc[tree["factor"] == "pose", "importance"].sum())
+        first = tree.iloc[0]
+        if first["leaves"] <= 1:
+            note(axis, 0.02, y + 0.38, "nothing is explained: one leaf", GREY)
+        else:
+            leaves = f"{int(first['leaves'])} leaves, r² {fixed(first['r2'])}"
+            words = f"pose {percent(round(1000 * pose), 1000)}; {leaves}"
+            note(axis, 0.02, y + 0.4, words, GREY)
 
 
 def _reasons(table: pd.DataFrame, what: str) -> str:

@@ -151,26 +151,31 @@ def _draw_row(
     color = OURS if held else GREY
     draw_density(axis, panel.inside(values), y + 0.1, 0.42, color, logarithmic=True)
     found = draw_bar(axis, values, y, color)
-    if with_numbers:
-        told = _median_and_iqr(found) if held else _lower_ends(panel, frame)
-        note(axis, 0.02, y + 0.78, told, color)
-        note(axis, 0.02, y + 0.65, _shares(panel, frame), GREY)
-        _tell_far_bound(panel, axis, values, y - 0.125)
+    if not with_numbers:
+        return
+    if held:
+        told = _median_and_iqr(found)
+    else:  # how low the stiffness may be is all that is known of it
+        lower = finite(frame[region_columns(panel.coordinate)[1]])
+        told = "not held by the data"
+        if len(lower):
+            of_ends = quartiles(lower)
+            told = f"not held; above {number(of_ends.low)}–{number(of_ends.high)} (IQR)"
+    note(axis, 0.02, y + 0.78, told, color)
+    note(axis, 0.02, y + 0.65, _shares(panel, frame), GREY)
+    # where fits ended at a bound beyond the axis, say at its edge how many and where it is
+    ends = axis.get_xlim()
+    for bound, x, words in ((panel.low, 0.0, "← {} at {}"), (panel.high, 1.0, "{} at {} →")):
+        there = int(np.isclose(values, bound, rtol=AT_BOUND).sum())
+        if there and not ends[0] < bound < ends[1]:
+            told = words.format(percent(there, len(values)), number(bound))
+            note(axis, x, y - 0.125, told, OURS, ha="right" if x else "left")
 
 
 def _lost(panel: _StiffnessPanel, frame: pd.DataFrame) -> int:
     """Fits that do not identify the stiffness."""
     flags = frame[f"{panel.coordinate}_identifiable"]
     return int((flags == False).sum())  # noqa: E712  (None: held fixed)
-
-
-def _lower_ends(panel: _StiffnessPanel, frame: pd.DataFrame) -> str:
-    """What is known of a stiffness that most fits do not hold: how low it may be."""
-    ends = finite(frame[region_columns(panel.coordinate)[1]])
-    if not len(ends):
-        return "not held by the data"
-    found = quartiles(ends)
-    return f"not held; above {number(found.low)}–{number(found.high)} (IQR)"
 
 
 def _median_and_iqr(found: Quartiles) -> str:
@@ -183,17 +188,6 @@ def _shares(panel: _StiffnessPanel, frame: pd.DataFrame) -> str:
     at = percent(len(values) - len(panel.inside(values)), len(values))
     lost = percent(_lost(panel, frame), len(values))
     return f"at a bound {at}, not identifiable {lost}, n = {len(values)}"
-
-
-def _tell_far_bound(panel: _StiffnessPanel, axis: Axes, values: Array, y: float) -> None:
-    """Where fits ended at a bound beyond the axis, say at its edge how many and where it is."""
-    ends = axis.get_xlim()
-    for bound, x, words in ((panel.low, 0.0, "← {} at {}"), (panel.high, 1.0, "{} at {} →")):
-        there = int(np.isclose(values, bound, rtol=AT_BOUND).sum())
-        if there and not ends[0] < bound < ends[1]:
-            told = words.format(percent(there, len(values)), number(bound))
-            side = "right" if x else "left"
-            note(axis, x, y, told, OURS, ha=side)
 
 
 def _words(bound_factor: float, found: int, poses: int, rows: PanelRows) -> str:

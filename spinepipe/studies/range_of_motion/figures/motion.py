@@ -57,7 +57,13 @@ def levels_figure(
     meaning = {OURS: "all joint frames and stiffness sets" + " of all specimens" * several}
     if several:
         meaning[BEST] = "medians of the specimens"
-    explain(figure, meaning, _words_of_levels(summary, several))
+    # each run has a row per coordinate and joint: it is counted in one of them
+    every = summary[summary["specimen"] == EVERY] if several else summary
+    one = every[every["coordinate"] == COORDINATES[0]].drop_duplicates("test")
+    runs, without = int(np.sum(one["n"] + one["n_without"])), int(np.sum(one["n_without"]))
+    total = f"{count(runs, 'run')} of {count(len(one), 'test')}"
+    words = f"{KEY}; {total}, {without or 'none'} without an equilibrium"
+    explain(figure, meaning, words)
     return figure
 
 
@@ -81,14 +87,6 @@ def _draw_levels(axis: Axes, rows: pd.DataFrame, joints: tuple[str, ...], severa
             draw_bar(axis, own["median"].to_numpy(float), y - 0.2, BEST, thick)
     coordinate = rows["coordinate"].iloc[0]
     axis.set_xlabel(f"{AXIS[coordinate].lower()} (°), + is {POSITIVE[coordinate]}")
-
-
-def _words_of_levels(summary: pd.DataFrame, several: bool) -> str:
-    rows = summary[summary["specimen"] == EVERY] if several else summary
-    one = rows[(rows["coordinate"] == COORDINATES[0])].drop_duplicates("test")
-    runs, without = int(np.sum(one["n"] + one["n_without"])), int(np.sum(one["n_without"]))
-    total = f"{count(runs, 'run')} of {count(len(one), 'test')}"
-    return f"{KEY}; {total}, {without or 'none'} without an equilibrium"
 
 
 _FACTOR_MM = 6.5
@@ -124,7 +122,13 @@ def variance_figure(
         Line2D([], [], color=color, marker=shape, ms=3.5, lw=0.8, label=words)
         for color, shape, words in (_MARKS[name] for name in factors)
     ]
-    explain_marks(figure, handles, _words_of_shares(shown), len(handles))
+    first = shown.iloc[0]
+    whose = "each" if first["specimen"] == EVERY else f"of {first['specimen']}"
+    poses = f"{count(int(first['n_poses']), 'drawn pose')} {whose}"
+    sets = count(int(first["n_stiffness"]), "drawn stiffness set")
+    specimens = count(int(first["n_specimens"]), "specimen")
+    words = f"symbol: estimate, line: 95 % interval; {specimens}, {poses}, {sets}"
+    explain_marks(figure, handles, words, len(handles))
     return figure
 
 
@@ -144,12 +148,3 @@ def _draw_shares(
                 axis.plot([100.0 * row[f"{name}_share"]], [at], shape, color=color, **symbol)
     axis.set_xlim(0.0, 100.0)
     axis.set_xlabel("share of variance (%)")
-
-
-def _words_of_shares(shown: pd.DataFrame) -> str:
-    first = shown.iloc[0]
-    whose = "each" if first["specimen"] == EVERY else f"of {first['specimen']}"
-    poses = f"{count(int(first['n_poses']), 'drawn pose')} {whose}"
-    sets = count(int(first["n_stiffness"]), "drawn stiffness set")
-    specimens = count(int(first["n_specimens"]), "specimen")
-    return f"symbol: estimate, line: 95 % interval; {specimens}, {poses}, {sets}"
