@@ -15,6 +15,7 @@ import spinepipe as sp
 from spinepipe.cohort import Cohort
 
 ROOT = Path(__file__).parents[2]
+mpl.use("Agg")
 MODULES = ("cohorts", "stiffness", "simulation", "missing_effects", "sensitivity", "results")
 
 
@@ -80,6 +81,7 @@ def test_missing_effects_are_those_of_a_run(eight: Project) -> None:
     same(found.misfit, run["gap"])
     same(found.candidates, run["candidates"])
     assert stiffening_chains.STIFFNESS.keys() == set(found.misfit["specimen"])
+    assert len(sp.plot.effects(found).patches) == 2
     # the model goes on into a fit
     fit = sp.calibrate(cohort_of(eight, "chains"), base=found.model, leave_out=None)
     plain = sp.calibrate(cohort_of(eight, "chains"), leave_out=None)
@@ -104,6 +106,7 @@ def test_indices_are_those_of_a_run(eight: Project) -> None:
     }
     found = sp.sensitivity(cohort_of(eight, "lever"), factors, settings=settings)
     run = sp.open_results(eight.path("results/global_sensitivity"))
+    assert sp.plot.indices(found).get_xlabel() == "ST"
     same(found.table, run["indices"])
     same(found.responses, run["responses"])
 
@@ -135,7 +138,6 @@ def test_what_cannot_be_fitted_is_told_as_in_a_study_file(eight: Project) -> Non
 
 
 def test_figures_and_pages_can_be_made(eight: Project, tmp_path: Path) -> None:
-    mpl.use("Agg")
     cohort = cohort_of(eight, straight_chains.NAME)
     fit = sp.calibrate(cohort, stiffness="per_joint")
     shown = sp.plot.curves(cohort, cohort.tests[0], predicted=fit.predicted)
