@@ -1,4 +1,9 @@
-"""Bounded least squares over points of which some have no equilibrium: the driver of every fit."""
+"""Bounded least squares over points of which some have no equilibrium: the driver of every fit.
+
+A point is a set x of m unknowns, at which a simulator finds N residuals; a `Point` is the function
+that looks there. The cost is the residuals' sum of squares. Where there is no equilibrium there is
+no cost, and a step must be shorter.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,10 +17,14 @@ Point = Callable[[Array], tuple[Array, Array] | None]
 """Residuals (N,) and Jacobian (N, m) at x (m,), None where there is no equilibrium."""
 
 OFF_THE_PATH = "the fitted pose is not the one that the load path leads to: the segment snaps"
+"""Said by callers of a fit: one load has several equilibria, and the fit is at another."""
 
 
 def once(point: Point) -> Point:
-    """The same, which looks at each x once: a descent asks for residuals, then for the Jacobian."""
+    """The same point, which is simulated once for each x.
+
+    `descend` asks for residuals and for the Jacobian of an x apart, `point` gives both.
+    """
     looked: dict[bytes, tuple[Array, Array] | None] = {}
 
     def remembered(x: Array) -> tuple[Array, Array] | None:
@@ -33,7 +42,12 @@ class DescentTolerances:
 
     Attributes
     ----------
-    cost, step, slope : tolerances of the cost, of a step and of the slope of the cost.
+    cost : share of the cost; a step that gains less ends the descent. Of `descend_along`, one that
+        promises no more.
+    step : `descend`: length of a step over that of x, in the unknowns' units. `descend_along`:
+        largest entry of a step over the unknowns' scale.
+    slope : largest derivative of half the cost by an unknown that is free to move. `descend_along`
+        does not use it.
     evaluations : most points that are looked at.
     """
 
@@ -44,13 +58,17 @@ class DescentTolerances:
 
     @property
     def given_up(self) -> str:
-        """What is said of a descent that looked at so many points in vain."""
+        """What is said of a descent that ended without arriving."""
         return f"no optimum within {self.evaluations} evaluations"
 
 
 @dataclass(frozen=True)
 class Descent:
-    """Where a descent ended: x (m,), half the sum of squares, whether it arrived."""
+    """Where a descent ended: x (m,), half the sum of squares, whether it arrived.
+
+    ``evaluations``: points that were looked at; as many as were allowed where `descend_along` did
+    not arrive.
+    """
 
     x: Array
     half_cost: float
@@ -68,10 +86,14 @@ def descend(
 ) -> Descent:
     """Least squares from a start that has an equilibrium.
 
+    Method: scipy's ``dogbox``, Gauss-Newton steps within a box around x and within the bounds. A
+    point without equilibrium has NaN for residuals, on which it makes the box smaller.
+
     Parameters
     ----------
-    start : (m,), inside the bounds (m,) each. scale : (m,) size of a first step.
-    size : number of residuals.
+    start : (m,), inside the bounds (m,) each.
+    scale : (m,) size of a typical change of each unknown, by which the sides of the box go.
+    size : number of residuals, N.
     """
     nowhere = np.full(size, np.nan)
     last: list[Array] = []
@@ -104,13 +126,17 @@ def descend(
 
 
 DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e9
-"""Of a step along bounds, in squares of the Jacobian's columns: at first, and its ends."""
+"""Damping of `descend_along`, Levenberg and Marquardt's lambda: at first, least and most.
+
+Without unit, as it multiplies the squared length of each column of the Jacobian. Once it is at the
+most and a step is still not taken, the descent is given up.
+"""
 
 EASED, STIFFENED = 0.1, 5.0
 """Factors of the damping after a step that kept its promise, and after one that did not."""
 
 PROMISE = 1e-3
-"""Share of the gain that the linearised cost promises, below which a step is not taken."""
+"""Share of the gain promised by the linearised residuals that a step must keep to be taken."""
 
 
 def descend_along(
@@ -122,8 +148,10 @@ def descend_along(
 ) -> Descent:
     """The same where optima lie on bounds: each step is a damped linear fit inside the bounds.
 
-    `descend` keeps strictly inside and crawls once some unknowns are where they end. Levenberg and
-    Marquardt's method with the bounds in its linear problem; parameters as of `descend`.
+    A step of `descend` that leaves the bounds ends at the first of them that it meets, so that it
+    takes many where many unknowns end on theirs. Here, Levenberg and Marquardt's method, the linear
+    problem of each step has the bounds and may reach all of them at once. Parameters as of
+    `descend`; a start without equilibrium has an infinite cost and has not arrived.
     """
     x, found, damping = start, point(start), DAMPING
     if found is None:
@@ -153,11 +181,16 @@ def descend_along(
 
 
 def damped_step(residual: Array, jacobian: Array, damping: float, reach: Array) -> Array:
-    """(m,) step within ``reach`` (2, m) of least linearised cost, damped by the columns' sizes.
+    """(m,) step within ``reach`` of least linearised cost, damped by the columns' sizes.
+
+    That is the step s with the least |residual + jacobian s|^2 + damping sum_j (size_j s_j)^2,
+    size_j the length of column j. The second sum is put below the first as rows of its own.
 
     Parameters
     ----------
-    damping : as of `DAMPING`. reach : from no step to the bounds.
+    residual, jacobian : (N,) and (N, m), by unknowns over their scale; so is the step.
+    damping : as of `DAMPING`.
+    reach : (2, m) from x to the lower bounds (0 or less) and to the upper ones (0 or more).
     """
     # Marquardt's scaling by the columns; one that says nothing yet is damped as if a millionth of
     # the largest, so that the rows below have full rank
@@ -170,4 +203,8 @@ def damped_step(residual: Array, jacobian: Array, damping: float, reach: Array) 
 
 
 INSIDE = 1e-12
-"""Bounds of a step lie at least this far apart, in the unknowns' scale."""
+"""Bounds of a step are at least this far from no step, in the unknowns' scale.
+
+The linear solver refuses bounds that coincide, as they would for an unknown with no room at all.
+`descend_along` puts the unknown back onto its bound.
+"""

@@ -1,6 +1,8 @@
 """The program `spinepipe`: finds the command, and turns errors into one clear message.
 
-A command is imported when it is called for, so that `doctor` works where a library is missing.
+A command is the module of that name in `spinepipe.cli`, with ``add_arguments(parser)`` and
+``run(options)``, which returns the exit code. It is imported when it is called for, so that
+`doctor` works where a library is missing.
 """
 
 import argparse
@@ -24,14 +26,24 @@ COMMANDS = {
     "archive": "pack a computed study as a zip, for the supplement of a paper",
     "docs": "write the generated parts of the documentation",
 }
+"""Each command with the line that help says of it."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0 well, 1 a problem, 2 wrong usage."""
+    """Run one command and return its exit code: 0 well, 1 a problem.
+
+    Wrong usage ends the program with exit code 2, and `--help` with 0 (`SystemExit`, by argparse).
+
+    Parameters
+    ----------
+    arguments : what is typed after `spinepipe`; None for that of the command line.
+    """
     if arguments is None and sys.getfilesystemencoding() != "utf-8":
-        # a locale of ASCII: paths hold their bytes as surrogates, which are printed as these bytes
+        # where the locale is not UTF-8 (ASCII, say), bytes of a path that it cannot read stand in
+        # Python's texts as surrogates: they are printed as the same bytes, all else as UTF-8
         for stream in (sys.stdout, sys.stderr):
             cast(TextIOWrapper, stream).reconfigure(encoding="utf-8", errors="surrogateescape")
+    # this parser finds the command alone; its own arguments are read by a second one in `_run`
     parser = argparse.ArgumentParser(
         prog="spinepipe",
         description="Spine models calibrated on measured motion.",
@@ -48,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _add_root(parser: argparse.ArgumentParser, default: Path) -> None:
+    """Let ``--root`` stand before the command as well as after it; what stands after it counts."""
     parser.add_argument(
         "--root",
         type=Path,
@@ -58,7 +71,14 @@ def _add_root(parser: argparse.ArgumentParser, default: Path) -> None:
 
 
 def _run(command: str, rest: Sequence[str], root: Path) -> int:
+    """Run a command with its own arguments and return its exit code.
+
+    Parameters
+    ----------
+    rest : what is typed after the command. root : folder of the Snakefile, unless told in ``rest``.
+    """
     try:
+        # `import` is a word of Python, so its module is `import_`
         module = import_module(f"spinepipe.cli.{command}{'_' if iskeyword(command) else ''}")
     except ImportError as error:
         return _fail(command, f"{error}; `spinepipe doctor` says what is missing")
@@ -67,11 +87,14 @@ def _run(command: str, rest: Sequence[str], root: Path) -> int:
     module.add_arguments(parser)
     options = parser.parse_args(rest)
     options.root = options.root.resolve()
-    if command != "doctor" and refusal(cache_home()):  # who is told so by the doctor
+    # where the user's cache folder cannot be written, Matplotlib gets one inside the project; not
+    # under `doctor`, which looks at that folder itself and says what to do
+    if command != "doctor" and refusal(cache_home()):
         os.environ["MPLCONFIGDIR"] = str(cache_of_project(options.root) / "matplotlib")
     try:
         code: int = module.run(options)
     except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
+        # what is still to be printed goes nowhere, or Python would complain at its end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
@@ -79,7 +102,8 @@ def _run(command: str, rest: Sequence[str], root: Path) -> int:
         from spinepipe.model.spine import RefusedModel
         from spinepipe.problems import InputError
 
-        # these say what the user can mend; any other is a fault of ours
+        # these say what the user can mend, in one line; any other is a fault of ours, and is shown
+        # with its traceback
         if not isinstance(error, DamagedFile | InputError | RefusedModel | OSError | ImportError):
             raise
         if isinstance(error, OSError) and error.filename:
@@ -89,5 +113,6 @@ def _run(command: str, rest: Sequence[str], root: Path) -> int:
 
 
 def _fail(command: str, message: str) -> int:
+    """Print a message to stderr; exit code 1."""
     print(f"spinepipe {command}: {message}", file=sys.stderr)
     return 1

@@ -1,7 +1,12 @@
 """How joints answer the loads that drive them: rad per N m, m per N, by plain least squares.
 
-No model is fitted and no stiffness supposed, so that a mistake in the files cannot drag anything
-along. The load is what a chain carries in its neutral pose; it needs the joint frames alone.
+No model is fitted, so that a mistake in the files (sign, unit) cannot drag anything along.
+Published stiffness is used once, to tell which coordinates a test drives (`_driven`). Loads are
+those that the chain carries in its neutral pose, for which the joint frames are enough.
+
+Signs: a load on a coordinate is positive where it pushes towards positive motion, so a sound joint
+has a positive slope. T load steps, J joints from below; 6 coordinates in the order of
+`spinepipe.units.COORDINATES`.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -21,20 +26,30 @@ from spinepipe.units import COORDINATES, subtract_baseline
 ALL = "all specimens"
 
 ABOUT = (2, 0, 1)
-"""Axis of the joint frame about which each of `ROTATIONS` turns."""
+"""Axis of the joint frame about which each rotation turns, in the order of `COORDINATES`: extension
+about z (right), right bending about x (forwards), left rotation about y (up)."""
 
 MAIN_SHARE = 0.5
-"""A coordinate is driven in a test if it has this share of the joint's largest squared load.
+"""A coordinate is driven in a test if it has more than this share of the joint's largest squared
+load, summed over the steps.
 
 Forces are compared with forces, moments with moments.
 """
 
 NEAR_OTHERS = 0.2
-"""And this share of the largest load of any joint: a short lever arm may change its side."""
+"""And more than this share of the largest load of any joint in the test, not squared.
+
+Where a force passes close to a joint its lever arm is short, and a small error of the joint centre
+may turn the sign of the moment.
+"""
 
 UNSURE_M = 0.01
-"""Joint centres are known no better: a moment must be larger than the forces make over so much, and
-a force must move the joint by more than its rotation does over so much, at usual stiffness."""
+"""Error of a joint centre that is allowed for, m: palpated centres are taken to be no surer.
+
+A moment drives only if it is larger than the joint's forces make with this lever arm. A force
+drives only if it shifts the joint further than the joint's rotation shifts a point at this
+distance, both at usual stiffness.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +58,9 @@ class LoadResponse:
 
     Attributes
     ----------
-    load, motion : (T,) N m and rad, or N and m, as far as read, both without their mean (or from
-        step 0).
+    joint : its number from below. coordinate : one of `COORDINATES`.
+    load, motion : (R,) N m and rad, or N and m, of the R steps with a reading; both less their
+        means, or, where motion was zeroed, as changes from step 0.
     slope : rad per N m or m per N. correlation : of load and motion.
     """
 
@@ -57,12 +73,15 @@ class LoadResponse:
 
     @property
     def slope(self) -> float:
-        """Least squares, motion on load; rad per N m or m per N."""
+        """Least squares of motion on load, through the origin; rad per N m or m per N."""
         return float(self.load @ self.motion / (self.load @ self.load))
 
     @property
     def correlation(self) -> float:
-        """1 where the motion follows the load, -1 where it goes against it."""
+        """1 where the motion follows the load, -1 where it goes against it; 0 without motion.
+
+        About the means, or about step 0 where motion was zeroed (then no Pearson correlation).
+        """
         size = np.sqrt((self.load @ self.load) * (self.motion @ self.motion))
         return float(self.load @ self.motion / size) if size > 0.0 else 0.0
 
@@ -73,11 +92,19 @@ class LoadResponse:
 
 
 def joint_loads(frames: tuple[Pose, ...], case: LoadCase) -> Array:
-    """(T, J, 6) N and N m that the listed loads put on each coordinate, in the neutral pose."""
+    """(T, J, 6) N and N m that the listed loads put on each coordinate, in the neutral pose.
+
+    Of every wrench on a vertebra above the joint: its force on the axes of the joint's frame, its
+    moment about the frame's origin.
+
+    Parameters
+    ----------
+    frames : of the joints in ground, caudal to cranial; joint j carries vertebra j.
+    """
     loads = np.zeros((len(case.steps), len(frames), len(COORDINATES)))
     for row, step in zip(loads, case.steps, strict=True):
         for wrench in step.wrenches:
-            for joint in range(wrench.body + 1):
+            for joint in range(wrench.body + 1):  # all joints below the vertebra it acts on
                 back = frames[joint].rotation.T
                 arm = wrench.point - frames[joint].origin
                 about = wrench.moment + np.cross(arm, wrench.force)
@@ -92,6 +119,7 @@ class LoadedCycle:
 
     Attributes
     ----------
+    frames : of the J joints in ground, neutral pose.
     loads : (T, J, 6) N and N m on each joint coordinate in the neutral pose, of the listed loads.
     readings : (T, J, 6) m and rad, NaN where not read.
     """
@@ -109,12 +137,15 @@ class LoadedCycle:
 
     @property
     def pushed(self) -> bool:
-        """Whether forces act, whose moments hang on where joints are."""
+        """Whether forces act: their moments, unlike pure ones, depend on where joints are."""
         return any(wrench.force.any() for step in self.case.steps for wrench in step.wrenches)
 
     @property
     def from_rest(self) -> Array:
-        """(T, J, 6) the readings, 0 at step 0 where it was subtracted and is no reading."""
+        """(T, J, 6) the readings; where step 0 has none, 0 there for what step 1 reads.
+
+        A step 0 that was subtracted from the others is no reading, and stands as NaN.
+        """
         found = self.readings.copy()
         if len(found) > 1 and not np.isfinite(found[0]).any():
             found[0] = np.where(np.isfinite(found[1]), 0.0, np.nan)
@@ -142,12 +173,14 @@ def loaded_cycles(cohort: Cohort) -> Iterator[LoadedCycle]:
 def load_responses(
     specimen: str, test: str, loads: Array, motion: Array, zeroed: bool
 ) -> Iterator[LoadResponse]:
-    """All driven coordinates that were read under loads that changed.
+    """Responses of one test, of all driven coordinates that were read under loads that changed.
 
     Parameters
     ----------
     loads : (T, J, 6) see `joint_loads`. motion : (T, J, 6) m and rad, NaN where not read.
+    zeroed : whether step 0 was subtracted from the motion; the loads are then told from there too.
     """
+    # driven: by the change of load over all steps, whether read or not
     centred = subtract_baseline(loads, True) if zeroed else loads - loads.mean(axis=0)
     for joint, number in np.argwhere(_driven(np.sum(centred**2, axis=0))):
         read = motion[:, joint, number]
@@ -161,7 +194,10 @@ def load_responses(
 
 
 def _driven(power: Array) -> NDArray[np.bool_]:
-    """(J, 6) which coordinates a test drives, from the sums of squares (J, 6) of their loads."""
+    """(J, 6) which coordinates a test drives, see `MAIN_SHARE`, `NEAR_OTHERS` and `UNSURE_M`.
+
+    ``power`` (J, 6) : sums of squares over the steps of the change of load, N2 and N2 m2.
+    """
     # forces among forces, moments among moments: large in the joint, and not small in the chain
     found = np.zeros(power.shape, dtype=bool)
     for kind in (slice(0, 3), slice(3, 6)):
@@ -170,7 +206,8 @@ def _driven(power: Array) -> NDArray[np.bool_]:
             MAIN_SHARE * own.max(axis=1, keepdims=True), NEAR_OTHERS**2 * own.max(initial=0.0)
         )
         found[:, kind] = (own > least) & (own > 0.0)
-    # what an error of `UNSURE_M` in a joint centre could make of the other kind is no drive
+    # what an error of `UNSURE_M` in a joint centre could make of the other kind is no drive;
+    # load over usual stiffness (N/m, N m/rad) is the motion to expect, m and rad
     usual = np.array([middle(name) for name in COORDINATES])
     forces = power[:, :3].sum(axis=1, keepdims=True)
     turns = np.sum(power[:, 3:] / usual[3:] ** 2, axis=1, keepdims=True)
@@ -180,7 +217,7 @@ def _driven(power: Array) -> NDArray[np.bool_]:
 
 
 def typical(slopes: Sequence[float]) -> float:
-    """Size of an answer, whatever the signs."""
+    """Median size of slopes, whatever the signs."""
     return float(np.median(np.abs(slopes)))
 
 

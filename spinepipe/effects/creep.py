@@ -1,4 +1,14 @@
-"""Creep: the motion drifts on while the load is constant, since a share of what holds relaxes."""
+"""Creep: the motion drifts on while the load is constant, since a share of what holds relaxes.
+
+Where the law of `Creep` is from, told for linear laws before it, K in all. They are a spring in
+line with five elements, each a spring beside a dashpot. The elements have moved by q_c, so the
+spring carries M = K (q - q_c), and ``carried``, what the laws hold at q, is K q = M + K q_c. Of
+K q_c element i makes f / (1 - f) z_i / 5; its z_i, a load (N or N m), follows M with its
+retardation time.
+
+Two kinds of time: a retardation time tells how motion creeps under a held load. Where motion is
+held, the load relaxes faster, with one element by the factor 1 - f; the parameter ``time`` is that.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -11,9 +21,12 @@ from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.units import COORDINATES
 
 ELEMENTS = 5
-"""Retardation times, with equal parts: over three decades they are still less than one apart."""
+"""Retardation times, with equal parts: over three decades they are less than a decade apart.
 
-# Where their logarithms lie, evenly, with an SD of one.
+Three decades is what the largest spread, 2.5, makes of them.
+"""
+
+# where their natural logarithms lie, evenly, with an SD of one: -1.41 to 1.41
 _DEVIATES = np.linspace(-1.0, 1.0, ELEMENTS)
 _DEVIATES = _DEVIATES / np.std(_DEVIATES)
 
@@ -53,6 +66,7 @@ _SPREAD = Parameter(
 )
 
 LOADS = ("held", "ramped")
+"""How M gets from the last step's value to this one's: at once, or in a straight line."""
 
 
 @register("creep")
@@ -99,13 +113,22 @@ class Creep:
     def _step(
         self, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> "_CreepStep":
+        """The step of each joint on the one coordinate, from the state that the last step left."""
         here, ramped = carried[:, self._at], self.load == "ramped"
         return _CreepStep(parameters, state, np.asarray(seconds, dtype=float), here, ramped)
 
     def respond_on_path(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> JointResponse:
-        """Load (J, 6); state is all z and M of each joint at the end of the last step."""
+        """Load (J, 6) and its derivatives.
+
+        The load is M less ``carried``, what creep takes off, so it is against the laws before it.
+
+        Parameters
+        ----------
+        state : (J, 6) at the end of the last step: the five z, then M, N or N m.
+        seconds : duration of this step. carried : (J, 6) what the laws before hold at q.
+        """
         at, step = self._at, self._step(parameters, state, seconds, carried)
         load, by_carried = np.zeros_like(q), np.zeros((*q.shape, 6))
         load[:, at] = step.whole - carried[:, at]
@@ -115,7 +138,7 @@ class Creep:
     def by_parameter_on_path(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
-        """(J, 6, 3): by fraction, time and spread."""
+        """(J, 6, 3) derivative of the load by fraction, time and spread."""
         derivative = np.zeros((*q.shape, 3))
         step = self._step(parameters, state, seconds, carried)
         derivative[:, self._at] = step.whole_by_parameter
@@ -124,7 +147,7 @@ class Creep:
     def by_state(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Array:
-        """(J, 6, S): by all z and M at the step's start."""
+        """(J, 6, S) derivative of the load by all z and M at the step's start."""
         derivative = np.zeros((*q.shape, self.n_states))
         step = self._step(parameters, state, seconds, carried)
         derivative[:, self._at] = step.whole_by_state
@@ -133,7 +156,10 @@ class Creep:
     def advance(
         self, q: Array, parameters: Array, state: Array, seconds: float | Array, carried: Array
     ) -> Advance:
-        """All z and M at the end of the step."""
+        """All z and M at the end of the step.
+
+        Derivatives by the chain rule: each z hangs on its inputs at fixed M, and on M.
+        """
         step = self._step(parameters, state, seconds, carried)
         towards = np.column_stack([step.now, np.ones(len(q))])  # (J, S) each state by M
         by_carried = np.zeros((len(q), self.n_states, 6))
@@ -152,6 +178,14 @@ class _CreepStep:
     """z (J, N) and M (J,) at the end of a step, and their derivatives.
 
     ``z = kept z0 + before M0 + now M`` with kept = exp(-x), x = seconds / time_i; held: before = 0.
+    Ramped: now = 1 - mean and before = mean - kept, with the mean of exp(-t) for t from 0 to x. Put
+    into ``carried = M + lost mean(z)``, this gives M; 0 marks the start of the step.
+
+    Attributes
+    ----------
+    kept, before, now : (J, N). z : (J, N). whole : (J,) M.
+    whole_by_carried : (J,). whole_by_state : (J, N + 1). whole_by_parameter : (J, 3).
+    z_by_parameter : (J, N, 3) at fixed M.
     """
 
     def __init__(
@@ -159,6 +193,7 @@ class _CreepStep:
     ) -> None:
         fraction, time, spread = parameters.T
         lost = fraction / (1.0 - fraction)
+        # seconds over each retardation time, which is time / (1 - f) times exp(spread deviate)
         x = (seconds * (1.0 - fraction) / time)[:, None] * np.exp(-spread[:, None] * _DEVIATES)
         self.kept = np.exp(-x)
         mean = _mean(x) if ramped else self.kept
@@ -173,11 +208,13 @@ class _CreepStep:
         by_z0 = np.column_stack([self.kept, self.before.sum(axis=1)]) / ELEMENTS
         self.whole_by_state = moved[:, None] * by_z0
         slope = _mean_slope(x) if ramped else -self.kept
+        # of z by x at fixed M; then x by ln x, and ln x by fraction, time and spread
         by_x = -self.kept * (z0 - whole0) + slope * (whole0 - self.whole[:, None])
         by_logs = [-1.0 / (1.0 - fraction), -1.0 / time]
         columns = [by_x * x * one[:, None] for one in by_logs] + [by_x * x * -_DEVIATES]
         self.z_by_parameter = np.stack(columns, axis=2)
         self.whole_by_parameter = moved[:, None] * self.z_by_parameter.mean(axis=1)
+        # the fraction acts through f / (1 - f) as well, whose derivative is 1 / (1 - f)^2
         by_lost = -self.whole_by_carried * self.z.mean(axis=1)
         self.whole_by_parameter[:, 0] += by_lost / (1.0 - fraction) ** 2
 

@@ -1,7 +1,8 @@
-"""Dead loads: load effects that are wrenches fixed in ground, whatever the pose.
+"""Dead loads: load effects that are wrenches whose direction and size stay, whatever the pose.
 
-Such an effect says which wrenches it adds to the listed ones, for one test or for many at once:
-arrays have any axes (...) in front.
+A wrench is a force at a point and a moment. Force and moment are fixed in ground; the point moves
+with its vertebra. Such an effect says which wrenches it adds to those that the cohort lists, for
+one load step or for many at once: arrays have any axes (...) in front. All are in ground axes.
 """
 
 from abc import ABC, abstractmethod
@@ -19,7 +20,8 @@ from spinepipe.effects.contract import (
 )
 
 TOP_HEIGHT_M = 0.03
-"""Height of the most cranial vertebra above its joint, as nothing above says where it ends."""
+"""Height of the most cranial vertebra above the joint below it, as no joint above says where it
+ends: a choice, about the height of a lumbar vertebral body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +30,9 @@ class Wrenches:
 
     Attributes
     ----------
-    bodies : (..., W) vertebra; -1 where there is none. points : (..., W, 3) m, neutral pose.
-    forces, moments : (..., W, 3) N and N m.
+    bodies : (..., W) vertebra; -1 fills up steps with fewer wrenches (and is not ground here).
+    points : (..., W, 3) m, where each is in the neutral pose, ground.
+    forces, moments : (..., W, 3) N and N m, ground; the moment comes besides the force's own.
     """
 
     bodies: Indices
@@ -39,7 +42,7 @@ class Wrenches:
 
     @classmethod
     def of(cls, listed: tuple[Wrench, ...]) -> "Wrenches":
-        """Those of one step."""
+        """Those of one step, with no axes in front."""
         numbers = np.zeros((3, len(listed), 3))
         for place, one in enumerate(listed):
             numbers[:, place] = one.point, one.force, one.moment
@@ -48,31 +51,41 @@ class Wrenches:
 
 @dataclass(frozen=True, eq=False)
 class WrenchSlopes:
-    """Derivatives (..., W, 3, P) of forces and moments by the parameters."""
+    """Derivatives (..., W, 3, P) of forces and moments by the P parameters; points have none."""
 
     forces: Array
     moments: Array
 
 
 class DeadLoad(ABC):
-    """A load effect with one row of parameters that adds wrenches to the listed ones."""
+    """A load effect that adds wrenches to the listed ones.
+
+    Its parameters are one row for all joints in scope (``per_joint`` is False). Arguments that all
+    methods share:
+
+    listed, wrenches : those of the cohort. neutral : the chain in its neutral pose.
+    joints : joints in scope; the vertebra that a joint carries has the joint's number.
+    """
 
     @abstractmethod
     def wrenches(
         self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
     ) -> Wrenches:
-        """What is added, at parameters (..., P); the vertebra a joint carries has its index."""
+        """The added wrenches alone, at parameters (..., P)."""
 
     @abstractmethod
     def slopes(
         self, listed: Wrenches, neutral: Neutral, joints: Indices, parameters: Array
     ) -> WrenchSlopes:
-        """Derivatives of what is added."""
+        """Derivatives of the added wrenches by the parameters, in the same order."""
 
     def apply(
         self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
     ) -> AppliedLoad:
-        """Generalised load of the added wrenches at this pose, and its tangent."""
+        """Generalised load (n,) of the added wrenches at this pose, and its tangent (n, n).
+
+        ``parameters`` (1, P).
+        """
         n = len(motion.axes)
         load, tangent = np.zeros(n), np.zeros((n, n))
         added = self.wrenches(Wrenches.of(wrenches), motion.neutral, joints, parameters[0])
@@ -86,11 +99,12 @@ class DeadLoad(ABC):
     def by_parameter(
         self, motion: Motion, wrenches: tuple[Wrench, ...], joints: Indices, parameters: Array
     ) -> Array:
-        """(n, 1, P) derivative of the applied load by the parameters at fixed pose."""
+        """(n, 1, P) derivative of the applied load by the parameters (1, P) at fixed pose."""
         listed, at = Wrenches.of(wrenches), parameters[0]
         added = self.wrenches(listed, motion.neutral, joints, at)
         slopes = self.slopes(listed, motion.neutral, joints, at)
         found = np.zeros((len(motion.axes), parameters.shape[1]))
+        # virtual work: velocity of the point by coordinate rate times force, and so for moments
         for place, body in enumerate(added.bodies.tolist()):
             found += motion.velocities(body, added.points[place]) @ slopes.forces[place]
             found += motion.angular(body) @ slopes.moments[place]
@@ -98,18 +112,20 @@ class DeadLoad(ABC):
 
 
 def upper_ends(neutral: Neutral) -> Array:
-    """(..., J, 3) origin of the joint above each vertebra; of the top one, 30 mm above its own.
+    """(..., J, 3) m, ground: origin of the joint above each vertebra.
 
-    Above means along the joint's superior axis.
+    Of the top one, which has none above, the point `TOP_HEIGHT_M` from the origin of the joint
+    below it, along that joint's superior axis.
     """
     top = neutral.origins[..., -1:, :] + TOP_HEIGHT_M * neutral.rotations[..., -1:, :, 1]
     return np.concatenate([neutral.origins[..., 1:, :], top], axis=-2)
 
 
 def centres(neutral: Neutral) -> Array:
-    """(..., J, 3) centres of mass, or midway between its joints for a vertebra of unstated mass.
+    """(..., J, 3) m, ground: centres of mass; without a mass, midway between a vertebra's joints.
 
-    A vertebra without a mass has its centre of mass at the origin of ground in the model.
+    The model puts the centre of mass of a vertebra without mass at the origin of ground, exactly:
+    by that it is known here.
     """
     stated = neutral.centres_of_mass
     midway = (neutral.origins + upper_ends(neutral)) / 2.0

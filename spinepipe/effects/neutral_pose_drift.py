@@ -1,4 +1,9 @@
-"""Neutral pose drift: the zero of the readings moves on while a test goes on."""
+"""Neutral pose drift: the zero of the readings moves on while a test goes on.
+
+An error of measurement: a reading is the true coordinate plus drift times g, m or rad. A positive
+drift reads too far towards the positive side of the coordinate. Zeroing readings at the first step
+takes nothing off it, since g is 0 there.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -11,7 +16,11 @@ from spinepipe.effects.registry import PER_JOINT, TriedValues, register
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 _DRIFT = {True: (1e-2, 3e-4), False: (0.2, float(np.deg2rad(0.3)))}
-"""Largest and typical, m and rad."""
+"""Drift over a whole test, m of a translation (True) and rad of a rotation (False).
+
+First the bound, on both sides of zero (10 mm; 0.2 rad, 11.5 deg), then the typical one (0.3 mm;
+0.3 deg), which is the default and the SD of the prior. `facts.csv` has no source for them.
+"""
 
 
 @register("neutral_pose_drift")
@@ -64,13 +73,13 @@ class NeutralPoseDrift:
     def observe_beside(
         self, q: Array, parameters: Array, beside: MeasurementContext
     ) -> Observation:
-        """Reported coordinates; the true ones are in them as they are."""
+        """Reported coordinates (J, 6), m and rad; their derivative by the true ones is one."""
         seen = q.copy()
         seen[:, self._at] += parameters[:, 0] * _course(beside.passed, parameters[:, 1])[0]
         return Observation(seen, np.tile(np.eye(6), (len(q), 1, 1)))
 
     def by_parameter_beside(self, q: Array, parameters: Array, beside: MeasurementContext) -> Array:
-        """(J, 6, 2)."""
+        """(J, 6, 2) derivative of the reported coordinates by drift and by pace."""
         course, by_pace = _course(beside.passed, parameters[:, 1])
         found = np.zeros((len(q), 6, 2))
         found[:, self._at, 0] = course
@@ -83,7 +92,13 @@ class NeutralPoseDrift:
 
 
 def _course(passed: Array, pace: Array) -> tuple[Array, Array]:
-    """(J,) share of the drift that has come, and its derivative by the pace."""
+    """(J,) share g of the drift that has come, and its derivative by the pace.
+
+    Parameters
+    ----------
+    passed : (J,) share s of the test that has passed, 0 to 1. pace : (J,) share of the test.
+    """
+    # g = now / whole; by the chain rule the derivative of each by pace has 1 / pace^2, put last
     now, whole = -np.expm1(-passed / pace), -np.expm1(-1.0 / pace)
     by_now, by_whole = -passed * np.exp(-passed / pace), -np.exp(-1.0 / pace)
     return now / whole, (by_now / whole - now * by_whole / whole**2) / pace**2

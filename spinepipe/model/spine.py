@@ -81,7 +81,7 @@ class Support:
     joint, coordinate : places, the coordinate in the order of `spinepipe.units.COORDINATES`.
     value : m or rad, where it is fixed.
     read_as : m per N or rad per N m by which the rig's load on it counts as a reading; None where
-        that load was not measured. See `spinepipe.statics.batched.reactions`.
+        that load was not measured. See `spinepipe.statics.batched.derive`.
     """
 
     joint: int

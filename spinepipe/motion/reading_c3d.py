@@ -1,9 +1,17 @@
-"""Motion as `.c3d`: units and rate of its own; a negative residual says: not seen.
+"""Motion as `.c3d`: unit and rate are the file's own; a negative residual says: not seen.
 
 Nothing that a file tells of its sizes is trusted: a parameter may claim gigabytes, a list may lead
-back to its beginning. Libraries for this form end the process then, or fill the memory. By The C3D
-File Format, User Guide (2008): blocks of 512 bytes; parameters in groups, one behind the other,
-each with the way to the next; frames of four numbers a marker, then of analog channels.
+back to its beginning. Libraries for this form end the process then, or fill the memory.
+
+By The C3D File Format, User Guide (2008). The file has blocks of 512 bytes, counted from 1:
+
+- block 1, the header: where parameters and frames begin, how many markers, frames a second;
+- parameters, in named groups (POINT, TRIAL, ...). Entries stand one behind the other, each with the
+  number of bytes to the next (its *way*). Some tell again what the header tells;
+- frames: four numbers a marker (x, y, z, residual), then the analog channels. All are 32-bit reals,
+  or all 16-bit whole numbers, of which x, y, z are to be multiplied by the *scale*.
+
+`at`, `start` and `behind` are places in the file in bytes from 0.
 """
 
 import struct
@@ -19,25 +27,32 @@ from spinepipe.motion.recording import MarkerRecording, recording_from, unit_of
 from spinepipe.problems import InputError, InputProblem
 
 BLOCK = 512
+"""Bytes."""
+
 MAGIC = 0x50
+"""Second byte of every such file."""
+
 MOST_DIMENSIONS = 7
+"""Of the array of a parameter, by the form."""
 
 INTEL, DEC, MIPS = 84, 85, 86
-"""By which processor numbers were written."""
+"""By which processor numbers were written: Intel (low byte first), DEC (low byte first, reals of
+its own) or MIPS (high byte first)."""
 
 CHARACTERS, BYTE, WORD, REAL = -1, 1, 2, 4
-"""Types of parameters."""
+"""Types of parameters; without their sign, the bytes of one element."""
 
 Value = tuple[str, ...] | tuple[float, ...]
+"""Elements of a parameter's array in the order of the file."""
 
 Parameters = Mapping[tuple[str, str], Value]
-"""Texts or numbers by group and name, both in capitals."""
+"""Value by group and name, both in capitals: (POINT, RATE)."""
 
 SLOWEST, FASTEST = 1.0, 100_000.0
-"""Frames a second."""
+"""Frames a second that are taken for possible."""
 
 COUNT_ENDS = 65_535
-"""Numbers of frames have 16 bits; of longer recordings header and parameters may tell no more."""
+"""Largest number of 16 bits. Longer recordings have it as number of frames, which tells nothing."""
 
 MORE_LABELS = ("LABELS", *(f"LABELS{k}" for k in range(2, 10)))
 """A parameter holds 255 names; further ones follow in the next."""
@@ -55,10 +70,14 @@ class C3dFile:
 
     Attributes
     ----------
-    data : all bytes. processor : of its numbers. behind : byte behind the last parameter.
-    points, analog : markers, and numbers of analog channels, in a frame.
-    first, last : numbers of frames, from 1. start : byte where frames begin.
-    header_scale : of whole numbers; negative: numbers are reals. header_rate : frames a second.
+    data : all bytes. processor : see `INTEL`. parameters : see `Parameters`.
+    behind : where the list of parameters ends, see `_parameters`; no frame begins before it.
+    points, analog : in a frame, how many markers, and how many numbers of analog channels (samples
+        of all channels).
+    first, last : of the first and the last frame, its number in the recording, from 1; by the
+        header. start : where frames begin.
+    header_scale : what whole numbers are multiplied by to be in POINT:UNITS; negative: frames are
+        reals. header_rate : frames a second. Both are used where POINT does not tell them.
     """
 
     data: bytes
@@ -74,11 +93,11 @@ class C3dFile:
     header_rate: float
 
     def texts(self, name: str) -> list[str]:
-        """Texts of a parameter of POINT."""
+        """Texts of a parameter of POINT; none where there is none, or it has numbers."""
         return [one for one in self.parameters.get(("POINT", name), ()) if isinstance(one, str)]
 
     def numbers(self, group: str, name: str) -> list[float]:
-        """Numbers of a parameter."""
+        """Numbers of a parameter; none where there is none, or it has texts."""
         return [one for one in self.parameters.get((group, name), ()) if not isinstance(one, str)]
 
     def number(self, name: str) -> float | None:
@@ -87,12 +106,12 @@ class C3dFile:
 
     @property
     def rate(self) -> float:
-        """Frames a second."""
+        """Frames a second; the header's where POINT tells none or 0."""
         return self.number("RATE") or self.header_rate
 
     @property
     def scale(self) -> float:
-        """Of whole numbers; negative: numbers are reals."""
+        """As `header_scale`; the header's where POINT tells none or 0."""
         return self.number("SCALE") or self.header_scale
 
     @property
@@ -102,8 +121,12 @@ class C3dFile:
 
     @property
     def frames_told(self) -> set[int]:
-        """How many frames header, POINT and TRIAL tell; counts that are full tell nothing."""
-        # TRIAL has two 16-bit words for each end, so that it holds of any recording
+        """How many frames the file tells: by TRIAL alone, else by header and POINT.
+
+        One number where they agree, two where they do not, none where neither tells it: a count of
+        `COUNT_ENDS` is a full counter and tells nothing.
+        """
+        # TRIAL has two 16-bit words for each end, the lower first: enough for any recording
         ends = (self.numbers("TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END"))
         of_trial = [words[0] + 65_536.0 * words[1] for words in ends if len(words) == 2]
         if len(of_trial) == 2:
@@ -117,7 +140,7 @@ class C3dFile:
 
     @property
     def room(self) -> int:
-        """Frames that are in the file; none where they would begin within the parameters."""
+        """Frames for which there are bytes; 0 where they would begin within the parameters."""
         if self.start < self.behind or not self.points:
             return 0
         bytes_of_frame = (4 if self.scale < 0.0 else 2) * (4 * self.points + self.analog)
@@ -125,16 +148,21 @@ class C3dFile:
 
     @property
     def frames(self) -> int:
-        """Number of frames, as told; where nothing tells it, as many as are there."""
+        """Number of frames, as told; where nothing tells it, as many as there is room for.
+
+        Of two numbers that contradict each other it is one of them: `read_c3d` refuses such files.
+        """
         return next(iter(self.frames_told), self.room)
 
 
 def read_c3d(path: Path, file: str) -> MarkerRecording:
-    """Markers of a `.c3d`, in the axes of the file; its first frame tells when it begins.
+    """Markers of a `.c3d`, in m, on the axes of the file.
+
+    Time is 0 at frame 1 of the recording: a file that was cropped begins later, at its first frame.
 
     Parameters
     ----------
-    file : its name in messages.
+    path : of the file. file : its name in messages.
 
     Raises
     ------
@@ -155,6 +183,7 @@ def read_c3d(path: Path, file: str) -> MarkerRecording:
     if scale < 0.0:
         cells = reals(whole.data, whole.start, number, whole.processor)
     else:
+        # with a sign: from 2^15 on they stand for negative numbers (two's complement)
         unsigned = words(whole.data, whole.start, number, whole.processor)
         cells = np.where(unsigned < 1 << 15, unsigned, unsigned - (1 << 16)).astype(np.float64)
     rows = cells.reshape(whole.frames, in_frame)[:, : 4 * whole.points]
@@ -166,7 +195,7 @@ def read_c3d(path: Path, file: str) -> MarkerRecording:
 
 
 def _contradictions(whole: C3dFile, file: str) -> Iterator[InputProblem]:
-    """What the file tells that cannot be, or that its other half tells otherwise."""
+    """What the file tells that cannot be, or that header and parameters tell differently."""
 
     def problem(place: str, found: str, allowed: str) -> InputProblem:
         return InputProblem(file, None, place, found, allowed, AGAIN)
@@ -206,16 +235,19 @@ def parse_c3d(data: bytes) -> C3dFile:
     FormError
         Where it does not hold together.
     """
+    # bytes 0 and 1 of the header: first block of the parameters, and what marks the form
     if len(data) < 2 * BLOCK or data[1] != MAGIC or data[0] < 2:
         raise FormError("no header of a .c3d")
     start = (data[0] - 1) * BLOCK
     if len(data) < start + 4:
         raise FormError("a file that ends before its parameters")
+    # parameters: two bytes that tell nothing, how many blocks, the processor; then the entries
     processor = data[start + 3]
     if processor not in (INTEL, DEC, MIPS):
         raise FormError(f"numbers of a processor {processor}")
     parameters, behind = _parameters(data, start + 4, processor)
-    # the header: 16-bit words from byte 2, the scale at 12, the first block of frames at 16, rate
+    # the header, by bytes: four 16-bit words from 2, the scale at 12, first block of frames at 16,
+    # the rate at 20
     points, analog, first, last = words(data, 2, 4, processor).tolist()
     (scale,), (rate,) = reals(data, 12, 1, processor), reals(data, 20, 1, processor)
     (block,) = words(data, 16, 1, processor).tolist()
@@ -229,13 +261,17 @@ def parse_c3d(data: bytes) -> C3dFile:
 
 
 def words(data: bytes, at: int, number: int, processor: int) -> NDArray[np.int64]:
-    """So many 16-bit numbers without a sign."""
+    """(number,) 16-bit numbers without a sign, from byte ``at`` on."""
     form = ">u2" if processor == MIPS else "<u2"
     return np.frombuffer(data, form, number, at).astype(np.int64)
 
 
 def reals(data: bytes, at: int, number: int, processor: int) -> NDArray[np.float64]:
-    """So many 32-bit reals; of a DEC they have exchanged halves and are four times as large."""
+    """(number,) 32-bit reals, from byte ``at`` on.
+
+    A DEC writes the two 16-bit halves in the other order, and the same bits, read as IEEE's, are
+    four times its number.
+    """
     if processor != DEC:
         form = ">f4" if processor == MIPS else "<f4"
         return np.frombuffer(data, form, number, at).astype(np.float64)
@@ -244,11 +280,15 @@ def reals(data: bytes, at: int, number: int, processor: int) -> NDArray[np.float
 
 
 def _parameters(data: bytes, at: int, processor: int) -> tuple[Parameters, int]:
-    """All parameters, and where they end."""
+    """All parameters, and where the list ends: its last entry, or the empty one behind that.
+
+    An entry: length of its name, number of its group, name, way to the next entry, and of a
+    parameter its value. Entries with a negative group number are the groups themselves.
+    """
     groups: dict[int, str] = {}
     found: list[tuple[int, str, Value]] = []
     while at + 2 <= len(data):
-        length, group = struct.unpack_from("<bb", data, at)  # of a locked entry it is negative
+        length, group = struct.unpack_from("<bb", data, at)  # length: negative if it is locked
         way_at = at + 2 + abs(length)
         if not length:
             break
@@ -260,6 +300,7 @@ def _parameters(data: bytes, at: int, processor: int) -> tuple[Parameters, int]:
             groups[-group] = name
         else:
             found.append((group, name, _value(data, way_at + 2, name, processor)))
+        # counted from the way itself, which has 2 bytes; 0 at the last entry. Never backwards
         if way < 0 or (0 < way < 2):
             raise FormError(f"a parameter {name!a} that leads nowhere")
         if not way:
@@ -271,7 +312,11 @@ def _parameters(data: bytes, at: int, processor: int) -> tuple[Parameters, int]:
 
 
 def _value(data: bytes, at: int, name: str, processor: int) -> Value:
-    """The array of a parameter, the first size changing fastest; texts are one size less."""
+    """The array of a parameter, flat, its first index changing fastest.
+
+    At ``at``: type, how many sizes, the sizes, the elements. Of characters the first size is the
+    length of each text, and texts are the elements. Whole numbers are read without a sign.
+    """
     if at + 2 > len(data):
         raise FormError("a file that ends within its parameters")
     kind, dimensions = struct.unpack_from("<bB", data, at)

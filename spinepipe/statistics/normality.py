@@ -1,7 +1,9 @@
 """Are the values normally distributed, and do more parameters fit better than chance would?
 
-Of the first there are two tests of the paper, and the right one; the second is the extra sum of
-squares F test.
+Of the first there are the two tests of Gould et al. 2024a, chi-squared and Kolmogorov-Smirnov, and
+Lilliefors', the right one where mean and SD are estimated from the same values. Their effect size
+is the skewness: 0 for a normal distribution, positive with a long upper tail. The second is the
+extra sum of squares F test.
 """
 
 from math import isfinite
@@ -20,7 +22,11 @@ from spinepipe.statistics.outcome import (
 )
 
 BINS = 10
+"""Bins of equal width before pooling, as many as MATLAB's ``chi2gof`` takes by default."""
+
 LEAST_EXPECTED = 5.0
+"""Values to expect in a tail bin at least, else chi-squared is no good approximation."""
+
 ESTIMATED = 2
 """Parameters estimated from the values: mean and SD."""
 
@@ -32,15 +38,15 @@ KOLMOGOROV_SMIRNOV = Test("Kolmogorov-Smirnov, normal", "D", "skewness")
 LILLIEFORS = Test("Lilliefors, normal", "D", "skewness")
 
 LILLIEFORS_RANGE = (0.001, 0.99)
-"""The table that p is read from ends here."""
+"""Smallest and largest p in statsmodels' table; beyond it p is the end, and the message says so."""
 
 
 def chi_squared_normality(values: ArrayLike) -> StatisticalTest:
     """Chi-squared goodness of fit to a normal with the values' mean and SD.
 
     As MATLAB's ``chi2gof`` does by default: 10 bins of equal width over the range, the outermost
-    open to infinity, pooled from the tails inwards until at least 5 are expected in each tail bin;
-    degrees of freedom = bins - 1 - 2.
+    open to infinity, pooled from the tails inwards (`_pooled`); degrees of freedom = bins left - 1
+    - 2, for mean and SD.
     """
     x = finite(values)
     if refused := _refused(CHI_SQUARED, x):
@@ -63,7 +69,8 @@ def chi_squared_normality(values: ArrayLike) -> StatisticalTest:
 def kolmogorov_smirnov_normality(values: ArrayLike) -> StatisticalTest:
     """One-sample Kolmogorov-Smirnov test of the standardised values, as Gould et al. 2024a did.
 
-    Its p is too large, as mean and SD come from the same values; see `lilliefors_normality`.
+    Its p is too large, so that it rejects too seldom, as mean and SD come from the same values; see
+    `lilliefors_normality`.
     """
     x = finite(values)
     if refused := _refused(KOLMOGOROV_SMIRNOV, x):
@@ -100,12 +107,13 @@ def _refused(test: Test, values: Array) -> StatisticalTest | None:
 
 
 def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
-    """Bins after pooling the emptier tail bin inwards until both tails expect enough.
+    """Bins after pooling, again and again, the tail bin that expects less with its inner neighbour.
 
-    As in ``chi2gof``, also the bins next to the tails must expect enough, inner bins are left
-    alone, and at least two bins stay.
+    As in ``chi2gof``, it ends when both tail bins and the bin next to each expect `LEAST_EXPECTED`,
+    or two bins are left; inner bins may expect less.
     """
     while len(expected) > 2 and min(expected[[0, 1, -2, -1]]) < LEAST_EXPECTED:
+        # lower of the two bins to merge: at the left end, or at the right one
         first = 0 if expected[0] < expected[-1] else len(expected) - 2
         starts = np.delete(np.arange(len(expected)), first + 1)
         observed, expected = np.add.reduceat(observed, starts), np.add.reduceat(expected, starts)
@@ -113,7 +121,7 @@ def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
 
 
 ROUNDING = 1e-9
-"""A larger model that fits worse by less than this share has only met rounding."""
+"""Share of the smaller model's sum by which the larger one may be worse from rounding alone."""
 
 NESTED = Test("nested models F", "F", "partial R2")
 
@@ -129,12 +137,16 @@ def f_test_nested(
     ----------
     rss_small, rss_large : (weighted) residual sums of squares of the model with fewer and with
         more parameters, with the same weights.
-    df_small, df_large : their residual degrees of freedom, values less parameters.
+    df_small, df_large : their residual degrees of freedom, values less parameters. The larger model
+        has fewer.
 
-    n of the outcome is ``df_large``, 0 where the larger model leaves none. Effect size: partial
-    R2, the share of the smaller model's residual sum of squares that the further parameters
-    explain. A larger model that fits worse was not fitted to the end: F is 0 then, and the message
-    says so.
+    Returns
+    -------
+    F = ((rss_small - rss_large) / (df_small - df_large)) / (rss_large / df_large) and its upper
+    tail p. n is ``df_large`` and no number of values; 0 where the larger model leaves none. Effect
+    size: partial R2, the share of the smaller model's residual sum of squares that the further
+    parameters explain. A larger model that fits worse was not fitted to the end: F is 0 then, p 1,
+    and the message says so. One that fits exactly has no F: status ``constant``.
 
     Raises
     ------

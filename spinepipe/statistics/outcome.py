@@ -1,6 +1,8 @@
 """What a test of values hands back: its numbers, or the reason why there are none.
 
-Also p values corrected for the number of tests in a family, and means with Student's interval.
+Also p values corrected for the number of tests in a family, and means with Student's t interval.
+Effect means effect size here, not an effect of a model, and family means tests that are corrected
+together.
 """
 
 from collections.abc import Sequence
@@ -16,10 +18,14 @@ Array = NDArray[np.float64]
 
 
 P_ZERO = "p is too small for a number: 0 stands for it"
+"""Message of a p below the smallest floating-point number."""
 
 
 class ComputationStatus(StrEnum):
-    """Whether a statistic could be computed."""
+    """Whether a statistic could be computed, and if not, why.
+
+    CONSTANT: values do not vary as the test needs. TOO_FEW: there are too few.
+    """
 
     DONE = "done"
     CONSTANT = "constant"
@@ -28,13 +34,14 @@ class ComputationStatus(StrEnum):
 
 @dataclass(frozen=True)
 class StatisticalTest:
-    """One test, ready to be a row of a table.
+    """The outcome of one test, ready to be a row of a table.
 
     Attributes
     ----------
+    test, statistic_name : names of the test and of its statistic.
     statistic, p, effect : None where the status is not ``done``.
     n : how many observations went in (pairs, or blocks of a Friedman test).
-    effect_name : the effect size's name, e.g. ``rho``.
+    effect_name : the effect size's name, e.g. ``rho``. effect : the effect size.
     message : what a reader of the numbers must know, in plain words.
     """
 
@@ -51,7 +58,7 @@ class StatisticalTest:
 
 @dataclass(frozen=True)
 class Test:
-    """The names of a test, from which its outcomes are made."""
+    """A kind of test: the names that all its outcomes have; see `StatisticalTest`."""
 
     test: str
     statistic_name: str
@@ -81,14 +88,14 @@ class Test:
         )
 
     def without(self, status: ComputationStatus, n: int, message: str) -> StatisticalTest:
-        """The outcome of a test that has no numbers."""
+        """The outcome of a test that has no numbers; ``message`` says why."""
         return StatisticalTest(
             self.test, self.statistic_name, None, None, n, self.effect_name, None, status, message
         )
 
 
 def finite(values: ArrayLike, dimensions: int = 1) -> Array:
-    """The values as floats.
+    """The values as floats, checked; nothing is left out.
 
     Raises
     ------
@@ -105,12 +112,12 @@ def finite(values: ArrayLike, dimensions: int = 1) -> Array:
 
 
 def constant(values: Array) -> bool:
-    """Whether all values are the same."""
+    """Whether all values (at least one) are exactly the same."""
     return bool((values == values.flat[0]).all())
 
 
 def tied(values: Array) -> int:
-    """How many values are equal to another one."""
+    """How many values are equal to another one; of 1, 1, 2 these are two."""
     counts = np.unique(values, return_counts=True)[1]
     return int(counts[counts > 1].sum())
 
@@ -124,16 +131,17 @@ def finite_pairs(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
 
 
 def family_size(ps: Sequence[float | None]) -> int:
-    """How many tests of a family have a p."""
+    """How many tests of a family have a p: what `corrected` corrects for."""
     return sum(p is not None for p in ps)
 
 
 def corrected(
     ps: Sequence[float | None], method: Literal["bonferroni", "holm"]
 ) -> list[float | None]:
-    """The p values corrected for their family, in their order.
+    """The p values corrected for their family, in their order, none above 1.
 
-    A test without p (None) stays without, and does not count in the family.
+    Bonferroni: each times the number of tests. Holm: see `_holm`. A test without p (None) stays
+    without, and does not count in the family.
 
     Raises
     ------
@@ -148,11 +156,13 @@ def corrected(
 
 
 def _holm(p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Holm 1979: the i-th smallest of n times n - i, none below its predecessor.
+    """Holm's step-down method (1979); p (n,), in any order, to corrected p in that order.
+
+    The smallest of n is multiplied by n, the next by n - 1, the largest by 1, and none is below the
+    one before. May be above 1.
 
     Written out because statsmodels collects garbage at each call, 0.1 s in a long-lived process.
     """
-    # step-down: the smallest p is tested n times, the next n - 1 times
     order = np.argsort(p, kind="stable")
     steps = np.maximum.accumulate(np.arange(len(p), 0, -1) * p[order])
     result = np.empty_like(steps)
@@ -161,9 +171,10 @@ def _holm(p: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 LEVEL = 0.95
+"""Confidence level of the interval of a mean."""
 
 SAME = 1e-9
-"""Values that differ by less than this share of their size differ by rounding."""
+"""Values differ by rounding alone if their range is within this share of the largest size."""
 
 
 @dataclass(frozen=True)
@@ -172,9 +183,11 @@ class Mean:
 
     Attributes
     ----------
-    n : how many values there are. value : None without any.
-    interval : 95 % t interval. p : of the t test against zero, two-sided. None of fewer than two
-        values, and where all are the same.
+    n : how many values there are. value : their mean; None without any.
+    interval : low and high end of its 95 % t interval, n - 1 degrees of freedom.
+    p : of the one-sample t test against zero, two-sided.
+
+    Interval and p are None with fewer than two values, and where all are the same (`SAME`).
     """
 
     n: int
@@ -184,7 +197,7 @@ class Mean:
 
 
 def mean_of(values: Array) -> Mean:
-    """Mean of values (n,) and its t interval."""
+    """Mean of finite values (n,), its t interval and its p."""
     n = len(values)
     if n == 0:
         return Mean(n)

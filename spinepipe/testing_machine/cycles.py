@@ -1,9 +1,11 @@
-"""Segmentation a recording into cycles, where the driving load turns back.
+"""Cutting a recording into cycles, by where the driving load turns back.
 
-A reversal counts where the load goes back by more than a share of its range, so that noise makes
-none. A cycle begins where the load leaves the reference: zero, or, if the load never comes near
-zero, the end of its range at which it starts. So a load that swings to both sides is cut where it
-passes zero the way it began, and one that goes up and down is cut at its lower reversals.
+The driving load is the one force (N) or moment (N m) that the machine drives. A reversal counts
+where the load goes back by more than a share of its range, so that noise makes none. A cycle begins
+where the load leaves the reference: zero, or, if the load never comes near zero, the end of its
+range at which it starts; or a size that the user gives. So a load that swings to both sides is cut
+where it passes the reference in the direction of the first swing, and one that stays on one side is
+cut at its reversals near the reference. The way out is from the reference to the first peak.
 """
 
 from collections.abc import Iterator
@@ -16,16 +18,18 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 REACHES = 0.8
-"""A cycle that does not reach this share of what the others reach is no repeat of them."""
+"""A cycle is no repeat of the others if a peak of it, less the reference, is below this share of
+their median.
+"""
 
 
 @dataclass(frozen=True)
 class Branch:
-    """Rows between two reversals: the load goes one way.
+    """Rows of a recording between two reversals: the load goes one way.
 
     Attributes
     ----------
-    first, last : rows, both included.
+    first, last : numbers of rows from 0, both included; neighbouring branches share a row.
     way : 1 where the load rises, -1 where it falls.
     """
 
@@ -45,11 +49,13 @@ class Cycle:
 
     Attributes
     ----------
-    branches : two for a load on one side (out, back), three for a load on both sides (out, across,
-        back); fewer where the recording ends on the way.
+    branches : two for a load on one side (out, back), three for a load on both sides (out, across
+        to the other side, back); fewer where the recording ends on the way. The last branch of a
+        load on both sides goes on past the reference, as the first one of the next cycle.
     start : row where it leaves the reference.
-    peaks : load at the turns, in the order of the branches.
-    complete : whether it comes back to the reference.
+    peaks : load (N or N m, as recorded) at the end of the way out and, of a load on both sides, of
+        the way across.
+    complete : whether it comes back to the reference, to within half of the smallest reversal.
     """
 
     branches: tuple[Branch, ...]
@@ -64,10 +70,13 @@ class Segmentation:
 
     Attributes
     ----------
-    reference : load at which cycles begin and end. way : 1 where cycles first go up, else -1.
-    low, high : range of the load. both_sides : whether cycles cross to the other side.
-    reversals : how many there are. cycles : all of them, in order.
-    left_out : why each one that is not kept is not, by its number from 1.
+    reference : load at which cycles begin and end, N or N m.
+    way : 1 where the load first goes up from the reference, -1 where it first goes down.
+    low, high : range of the load, N or N m.
+    both_sides : whether cycles cross to the other side of the reference.
+    reversals : how many there are; the ends of the recording are none.
+    cycles : all of them, in order, those that are left out too.
+    left_out : number of a cycle, from 1, and why it is left out.
     """
 
     reference: float
@@ -94,14 +103,16 @@ def segment(
 
     Parameters
     ----------
-    load : (N,) the driving load.
-    smallest_reversal : share of its range by which it must turn back.
+    load : (N,) the driving load, N or N m.
+    smallest_reversal : share of its range by which it must turn back for a reversal to count.
     preconditioning : so many cycles at the beginning are left out.
-    asked : size of the load at which cycles begin, on the side on which the load mostly is.
+    asked : size (not below 0) of the load at which cycles begin; it is taken on the side of zero
+        to which the range reaches farther. None: found from the load.
     """
     low, high = float(load.min()), float(load.max())
     least = smallest_reversal * (high - low)
     turns = reversals(load, least)
+    # the reference: as asked, or zero if the range comes near it, or the end where the load starts
     if asked is not None:
         reference = float(np.copysign(asked, low + high))
     elif low - least <= 0.0 <= high + least:
@@ -109,18 +120,26 @@ def segment(
     else:
         reference = low if abs(load[0] - low) < abs(load[0] - high) else high
     reference = float(np.clip(reference, low, high))
+    # to both sides if the range goes beyond the reference by more than a reversal on each; then the
+    # first turn says which way is first, else the side on which the load is
     both = min(high - reference, reference - low) > least
     goes_up = load[turns[1]] > reference if both else high - reference > reference - low
     way = 1 if goes_up else -1
     branches = _branches(turns, load)
     cycles = _cycles(branches, way * (load - reference), way, both, least)
+    # peaks back from loads beyond the reference, positive on the way out, to loads as recorded
     cycles = [replace(c, peaks=tuple(reference + way * p for p in c.peaks)) for c in cycles]
     dropped = tuple(_left_out(cycles, reference, preconditioning))
     return Segmentation(reference, way, low, high, both, len(turns) - 2, tuple(cycles), dropped)
 
 
 def reversals(load: Array, least: float) -> list[int]:
-    """Rows where the load turns back by more than ``least``, the first and last row besides."""
+    """Rows where the load turns back by more than ``least``, with the first and the last row.
+
+    Parameters
+    ----------
+    least : in the unit of the load.
+    """
     # a turning-point filter with a dead band: `best` is the extreme of the present way; it counts
     # as a reversal once the load has gone back from it by `least`
     turns, best, way = [0], 0, 0
@@ -137,6 +156,7 @@ def reversals(load: Array, least: float) -> list[int]:
 
 
 def _branches(turns: list[int], load: Array) -> list[Branch]:
+    """What lies between one turn and the next."""
     return [
         Branch(first, last, 1 if load[last] > load[first] else -1)
         for first, last in pairwise(turns)
@@ -144,17 +164,25 @@ def _branches(turns: list[int], load: Array) -> list[Branch]:
 
 
 def _cycles(branches: list[Branch], out: Array, way: int, both: bool, least: float) -> list[Cycle]:
-    """Cycles that begin with each branch on the way out; ``out`` is the load beyond the reference.
+    """Cycles: one begins with each branch that goes out and ends at least ``least`` beyond the
+    reference. Their peaks are values of ``out``.
 
-    ``out`` is positive on the side to which cycles go first.
+    Parameters
+    ----------
+    out : (N,) load less the reference, positive on the side to which cycles go first.
+    way, both : as in `Segmentation`.
+    least : smallest reversal, in the unit of the load.
     """
     found = []
     for number, branch in enumerate(branches):
         if branch.way != way or out[branch.last] < least:
             continue
+        # it starts at the last row of the branch that is not yet beyond the reference
         inside = np.flatnonzero(out[branch.rows] <= 0.0)
         start = branch.first + (int(inside[-1]) if inside.size else 0)
         of_cycle = branches[number : number + (3 if both else 2)]
+        # back at the reference, to within half a reversal: from above on one side (the second
+        # branch), from below after the other side (the third)
         if not both and len(of_cycle) == 2:
             complete = bool(out[of_cycle[1].rows].min() < least / 2)
         else:
@@ -168,11 +196,16 @@ def _cycles(branches: list[Branch], out: Array, way: int, both: bool, least: flo
 def _left_out(
     cycles: list[Cycle], reference: float, preconditioning: int
 ) -> Iterator[tuple[int, str]]:
-    """Cycles that are no repeats of the others; an incomplete one counts where it is alone."""
+    """Numbers of the cycles that are left out, from 1, and why.
+
+    Left out are the first ones, for preconditioning; of the later ones those that are not complete
+    and those that reach too little (`REACHES`). If no later one is complete, all of them are kept.
+    """
     later = list(enumerate(cycles, start=1))[preconditioning:]
     for number in range(1, min(preconditioning, len(cycles)) + 1):
         yield number, "preconditioning"
     some_complete = any(cycle.complete for _, cycle in later)
+    # (peaks,) size of each peak beyond the reference, the median of complete cycles
     usual = np.median(
         [[abs(peak - reference) for peak in c.peaks] for _, c in later if c.complete] or [[0.0]],
         axis=0,

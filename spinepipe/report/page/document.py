@@ -22,15 +22,18 @@ from spinepipe.studies.study import Study
 from spinepipe.tables import StudyTables
 
 _VERSION = "version_"
+"""Before the name of a library, in metadata that tell its version."""
 _OF_A_TABLE = ("code_digest", "config_digest", "data_digest", "specimens_digest", KEY)
-"""What differs from table to table."""
+"""Metadata that differ from table to table, and are not told as facts of the whole run."""
 
 MOST_ROWS = 400
 """More rows than this are left to the file of the table."""
 
 _NUMERIC = ("number", "integer")
+"""Types of columns that are set as numbers."""
 
 _SAME = ("specimen", "status")
+"""Columns that say nothing where all rows have the same value."""
 
 _UNITS: Mapping[str, str] = {
     "see unit": "",
@@ -38,8 +41,10 @@ _UNITS: Mapping[str, str] = {
     "N/m or N m/rad, see unit": "",
     "mm2, deg2": "",
 }
+"""Unit as a table declares it, to that in the heading: none where it differs from row to row."""
 
 _MOST_NAMES = 12
+"""Specimens that the head of the page names; of more it tells how many."""
 
 
 CIRCULAR = (
@@ -60,7 +65,13 @@ class Headline:
 
 @dataclass(frozen=True)
 class Picture:
-    """One figure: its name, title, address as data, and caption."""
+    """One figure.
+
+    Attributes
+    ----------
+    name : of its file, without an ending.
+    address : the drawing itself, as a ``data:`` address (base64).
+    """
 
     name: str
     title: str
@@ -79,7 +90,8 @@ class ResultTables:
 
     Attributes
     ----------
-    tables : rows of each table that the page reads, and other result files.
+    tables : rows of each table that the page reads (its ``READ``); in ``tables.files`` paths of
+        other result files.
     metadata : what each table's file says of where it comes from.
     pictures : each figure with its title and caption, in the order of the report.
     """
@@ -89,13 +101,19 @@ class ResultTables:
     pictures: Mapping[str, Picture]
 
     def table(self, name: str) -> pd.DataFrame:
-        """Rows of a table, none where the study does not have it."""
+        """Rows of a table; a frame without rows or columns where it was not made, or not read."""
         return self.tables.get(name, pd.DataFrame())
 
 
 @dataclass(frozen=True)
 class Head:
-    """A column's heading; ``meaning`` is its tooltip."""
+    """A column's heading.
+
+    Attributes
+    ----------
+    unit : beside the name, empty where there is none. meaning : shown when it is pointed at.
+    numeric : whether its cells are numbers.
+    """
 
     name: str
     unit: str
@@ -105,7 +123,7 @@ class Head:
 
 @dataclass(frozen=True)
 class Cell:
-    """Text of a cell and, of a number, the value it is sorted by."""
+    """Text of a cell, and the number it is sorted by: None where it is empty or no number."""
 
     text: str
     value: float | None
@@ -117,8 +135,10 @@ class Sortable:
 
     Attributes
     ----------
-    note : what was left out, or nothing.
-    folded : whether its rows are shown on demand.
+    name : of the result file, without an ending.
+    title, about : above the table: its heading, and what its rows are.
+    note : how many rows were left out and where they are, or nothing.
+    folded : whether its rows are hidden until a reader asks for them.
     """
 
     name: str
@@ -136,14 +156,19 @@ class Document:
 
     Attributes
     ----------
-    findings : sentences, the most urgent first. left_out : parts that the settings leave out.
-    poses : rows of the table ``poses`` for the 3-D view; none where nothing was sampled. A cohort
-        that does not tell where joints are has no 3-D view.
-    metadata : what each table's file says of where it comes from.
+    question : what the study asks, below the title.
+    findings : sentences, the most urgent first.
+    pictures, tables : in the order of the page.
+    metadata : what each table's file says of where it comes from, by the table's name.
+    left_out : parts that the settings leave out, in words.
+    poses : rows of the table ``poses``, sampled joint frames for the 3-D view; none where nothing
+        was sampled. A cohort that does not tell where joints are has no 3-D view.
     with_loads : whether the 3-D view shows the loads of the cohort: not where others were applied.
-    tests, load_shift_mm : what the view shows of a study that chooses tests or moves their loads.
+    tests : those whose loads the 3-D view shows; None for all of the cohort.
+    load_shift_mm : by how much the study moves all load points: anterior, superior, right.
     headline : the answer, where the study asks for one; figures then come before the 3-D view.
-    space : the 3-D view, where it is not that of the specimens.
+    space : another 3-D view in the place of that of the specimens, to which ``poses``,
+        ``with_loads``, ``tests`` and ``load_shift_mm`` belong; None for that one.
     """
 
     question: str
@@ -160,7 +185,7 @@ class Document:
     space: Space | None = None
 
     def html(self, study: Study, cohort: Cohort) -> str:
-        """The document, which fetches nothing; the same results, the same bytes."""
+        """The page. It loads nothing from the network, and the same results make the same bytes."""
         environment = Environment(
             autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
         )
@@ -191,6 +216,7 @@ class Document:
 
 
 def _part(name: str) -> str:
+    """Text of a file that lies beside this one."""
     return files("spinepipe.report.page").joinpath(name).read_text(encoding="utf-8")
 
 
@@ -200,17 +226,19 @@ def _specimens(cohort: Cohort) -> str:
 
 
 def _address(svg: bytes) -> str:
+    """A drawing as an address that holds it."""
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Where the tables come from.
+    """What was run: by which code, with which settings and on which data the tables were made.
 
     Attributes
     ----------
     facts : name and value of what all tables agree on; where they do not, every value.
-    digests : table, digest of the code that made it and digest of its settings.
+    digests : of each table its name, the digest (sha256) of the code that made it, and that of the
+        settings that it hangs on.
     settings : all settings of the study as YAML.
     """
 
@@ -220,7 +248,7 @@ class Origin:
 
 
 def origin(study: Study, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
-    """What the metadata of all tables say, in alphabetical order."""
+    """What the metadata of all tables say, in alphabetical order; versions of libraries last."""
     settings = yaml.safe_dump(study.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
     digests = tuple(
         (name, found.get("code_digest", ""), found.get("config_digest", ""))
@@ -230,11 +258,13 @@ def origin(study: Study, metadata: Mapping[str, Mapping[str, str]]) -> Origin:
 
 
 def _facts(metadata: Mapping[str, Mapping[str, str]]) -> list[tuple[str, str]]:
+    """See `Origin.facts`."""
     names = sorted({name for found in metadata.values() for name in found})
     plain = [name for name in names if not name.startswith(_VERSION)]
     versions = [name for name in names if name.startswith(_VERSION)]
     facts = []
     for name in [*plain, *versions]:
+        # `pandas`: that library's own notes on the columns of a file, which say nothing of a run
         if name in _OF_A_TABLE or name == "pandas":
             continue
         values = sorted({found[name] for found in metadata.values() if name in found})
@@ -250,9 +280,15 @@ def sortable(
     frame: pd.DataFrame,
     columns: Sequence[Column],
 ) -> Sortable:
-    """Rows of a frame.
+    """The first `MOST_ROWS` rows of a frame as a table of the page.
 
     Columns that say nothing are left out: all empty, or the one specimen or status of all rows.
+    Where no column is left there are no rows either.
+
+    Parameters
+    ----------
+    name : of the result file, without an ending; a note on rows left out names it.
+    columns : those to be shown, in this order; a frame need not have all of them.
     """
     kept = [c for c in columns if c.name in frame and _says_something(frame[c.name])]
     shown = frame.head(MOST_ROWS)
@@ -286,6 +322,7 @@ def _says_something(values: pd.Series) -> bool:
 
 
 def _cell(value: Any, column: Column) -> Cell:
+    """Text by the type of the column: numbers to three significant digits, integers in full."""
     if value is None or (isinstance(value, float) and pd.isna(value)) or value is pd.NA:
         return Cell("", None)
     if column.type == "number":
@@ -298,7 +335,15 @@ def _cell(value: Any, column: Column) -> Cell:
 
 
 def page_tables(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]:
-    """A result table as a page has it: none without rows, a paper's numbers in two parts."""
+    """A result table as a page has it.
+
+    None without rows; two, see `beside_paper`, of a table ``against_*``, which sets a paper's
+    numbers beside ours; else one.
+
+    Parameters
+    ----------
+    shape : the table as it is declared. frame : its rows.
+    """
     if frame.empty:
         return []
     if shape.name.startswith("against_"):
@@ -311,11 +356,17 @@ _PAPER_ORDER = (
     *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
     *("limit", "verdict", "reason", "where", "evidence"),
 )
-"""What a reader compares stands first; the short name is left to the file."""
+"""Columns of a table ``against_*``: what a reader compares stands first. The key of its rows, a
+short name of each quantity, is left to the file.
+"""
 
 
 def beside_paper(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]:
-    """A paper's numbers beside ours: those that are evidence, then folded those that are none."""
+    """A paper's numbers beside ours: those that are evidence, then folded those that are none.
+
+    Evidence are those whose column ``evidence`` is ``independent``: the cohort and the study were
+    not made to have them, so that agreement could have failed.
+    """
     independent = frame["evidence"] == "independent"
     columns = tuple(map(shape.column, _PAPER_ORDER))
     rest = sortable(shape.name, f"{title}: no evidence", NO_EVIDENCE, frame[~independent], columns)
@@ -332,7 +383,11 @@ NO_EVIDENCE = (
 
 
 def judged(rows: pd.DataFrame) -> str:
-    """How published quantities that are evidence were judged, and what being inside took."""
+    """A sentence on rows of a table ``against_*``; nothing without rows.
+
+    It tells how many quantities that are evidence lie inside the paper's range, outside it, or
+    were not computed; how hard it was to lie inside; and, not counted, those that are no evidence.
+    """
     if rows.empty:
         return ""
     counted = rows[rows["evidence"] == "independent"]
@@ -356,6 +411,7 @@ _NO_EVIDENCE = (
     ("contradicted", "that other numbers of the paper exclude"),
     ("", "that nothing of a run can be held against"),
 )
+"""Values of the column ``evidence`` that are none, with the words that follow their number."""
 
 _WORDS_OF_LIMITS = {
     "two_sided": "lie in a range with two ends whose width the paper gives",
@@ -364,10 +420,14 @@ _WORDS_OF_LIMITS = {
     "one_sided": "are on the right side of a single limit or of zero",
     "binary": "are the same yes, no or count",
 }
+"""Kinds of range, as in the column ``limit``, in words: that which is hardest to lie in first."""
 
 
 def _what_it_took(inside: pd.DataFrame) -> str:
-    """How many of those inside lie in ranges of each kind; nothing where none is inside."""
+    """How many of the rows, all of them inside, lie in ranges of each kind; nothing without rows.
+
+    The strongest kind is told even where its number is 0.
+    """
     if inside.empty:
         return ""
     counts = {name: int((inside["limit"] == name).sum()) for name in _WORDS_OF_LIMITS}

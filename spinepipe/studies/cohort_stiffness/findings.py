@@ -1,8 +1,14 @@
 """Job: what the study says to the findings of Gould et al. 2024b, each with its number.
 
-Each claim is decided by its own test first. Of some thirty that are looked at together one or two
-would be decided by chance alone, so p is corrected for their number (Holm 1979), of a no as of a
-yes. And few specimens decide nothing.
+Each claim is decided by its own test first: yes, no, or undecided. Of some thirty that are looked
+at together, at a significance of 0.05, one or two would be decided by chance alone. So p is
+corrected for their number (Holm 1979 with Shaffer 1986), of a no as of a yes, and a claim that the
+corrected p does not decide is undecided. So is one with fewer than `FEWEST` specimens.
+
+A claim has up to two p. ``p`` tests that there is no effect: if small, there is one. ``p_no`` tests
+that the effect is large enough to matter: if small, it surely is not. A claim without ``p_no`` has
+its no by ``p`` as well, where the effect has the other sign. Claims about load cases may have a no
+by size alone, without a test; nothing is corrected there, and it stays.
 """
 
 from collections import Counter
@@ -65,7 +71,10 @@ def finding_rows(frames: Mapping[str, pd.DataFrame], significance: float) -> Ite
 
 
 def mark_circular(row: Row) -> Row:
-    """The row in a made-up cohort: that specimens and levels differ as drawn is no finding."""
+    """The row in a made-up cohort: that stiffness is as it was drawn is no finding.
+
+    A yes of a claim that is about that (`PUT_IN`) is called circular; all other rows stay.
+    """
     if row["holds"] != "yes" or not str(row["finding"]).startswith(PUT_IN):
         return row
     return row | {"holds": CIRCULAR, "message": joined(MADE_UP, row["message"])}
@@ -76,22 +85,27 @@ def decide_together(rows: Sequence[Row], specimens: int, significance: float) ->
 
     Parameters
     ----------
-    specimens : in the study. significance : p below which a test decides.
+    rows : claims, each decided by its own test.
+    specimens : in the study, for rows that do not say how many theirs are.
+    significance : p below which a test decides.
     """
     for row, p_holm in zip(rows, _corrected(rows), strict=True):
         row = row | {"p_holm": p_holm}
         why = _why_not(row, specimens, significance)
+        # only a yes or a no is taken back; what is circular or was not asked stays
         doubted = {"holds": UNDECIDED, "message": joined(why, row["message"])}
         yield row | doubted if why and row["holds"] in DECIDED else row
 
 
 def _corrected(rows: Sequence[Row]) -> list[float | None]:
-    """The deciding p of each row, corrected for all claims.
+    """The deciding p of each row, corrected for all claims; None for rows without one.
 
-    A claim may have two tests: of no effect, and of one that matters. At most one of these is
-    true, so that p is multiplied by the number of claims of which one may still be, none below
-    its predecessor (Holm 1979, with Shaffer 1986, doi 10.1080/01621459.1986.10478341). A claim of
-    two tests stays among them when one is settled. With one test each it is Holm's method.
+    A claim may have two tests, and so two null hypotheses: no effect, and one that matters. At most
+    one of the two is true, so a claim counts once. From the smallest p on, each is multiplied by
+    the number of claims that still have an untested hypothesis, its own among them, and is not
+    below the one before (Holm 1979, with Shaffer 1986, doi 10.1080/01621459.1986.10478341). A claim
+    of two tests stays in that number until both are done. With one test each it is Holm's method.
+    Claims that are circular by construction are no tests and do not count.
     """
     tests = [
         (row[name], place, name)
@@ -99,7 +113,8 @@ def _corrected(rows: Sequence[Row]) -> list[float | None]:
         for name in _TESTS
         if row[name] is not None and not row.get(BY_CONSTRUCTION)
     ]
-    # Step down from the smallest p. A claim is open as long as one of its tests is.
+    # Step down from the smallest p. A claim, known by its place, is open as long as one of its
+    # tests is.
     open_tests = Counter(place for _, place, _ in tests)
     reached, found = 0.0, {}
     for p, place, name in sorted(tests):
@@ -111,10 +126,14 @@ def _corrected(rows: Sequence[Row]) -> list[float | None]:
 
 
 _TESTS = ("p", "p_no")
+"""Columns of the two tests: of no effect, and of an effect that matters."""
 
 
 def _deciding(row: Row) -> str:
-    """Which test of a row decides: that of its verdict, else the one of smaller p."""
+    """Which test of a row decides: that of its verdict, else the one of smaller p.
+
+    A yes is by ``p``. A no is by ``p_no`` where the claim has that test, else by ``p``.
+    """
     p, p_no = (row[name] for name in _TESTS)
     if p_no is None or row["holds"] == "yes":
         return "p"
@@ -122,7 +141,7 @@ def _deciding(row: Row) -> str:
 
 
 def _why_not(row: Row, specimens: int, significance: float) -> str:
-    """Why a claim cannot be decided, whatever its own test says."""
+    """Why a claim cannot be decided, whatever its own test says; empty if nothing is against it."""
     n = specimens if row["specimens"] is None else row["specimens"]
     if n < FEWEST:
         return f"{n} specimen{'' if n == 1 else 's'}, and a verdict needs {FEWEST}"

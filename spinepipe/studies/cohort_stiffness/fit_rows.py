@@ -1,4 +1,9 @@
-"""Rows of the tables ``stiffness`` and ``fits``, whatever the fit."""
+"""Rows of the tables ``stiffness`` and ``fits``, whatever the fit.
+
+Two kinds of ends are there for a stiffness, both at 95 %: those of its interval, from the standard
+error of the logarithm at the optimum, and those of its region, by profile likelihood. The latter
+take the place of the former where they were looked for.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -17,9 +22,10 @@ from spinepipe.units import COORDINATES, STIFFNESS_UNITS
 Row = dict[str, Any]
 
 LEVEL = 0.975
-"""Upper end of the intervals: 95 % lie between the ends."""
+"""Probability below the upper end of an interval: 95 % lie between the ends."""
 
 _OPEN = ("open_below", "open_above")
+"""Whether the data allow the bound of the fit on that side; only a region tells."""
 
 
 def stiffness_rows(
@@ -37,12 +43,16 @@ def stiffness_rows(
 
     Parameters
     ----------
-    values : (J, 6) stiffness, SI. log_error : (J, 6) standard error of its logarithm, infinite
-        where there is none. identifiable, at_bound : (J, 6); identifiable None for literature.
-    degrees_of_freedom : of Student's t for the intervals; infinite for the normal distribution.
-    reaches : of the stiffness at a joint and coordinate, by profile likelihood; it takes the place
-        of the interval.
-    growth : of laws that stiffen.
+    joints : names, J. free : coordinates that the study fits.
+    values : (J, 6) stiffness at rest, N/m and N m/rad; NaN where there is none.
+    log_error : (J, 6) standard error of its natural logarithm, infinite where there is none.
+    degrees_of_freedom : of Student's t for the intervals; infinite for the normal distribution, 0
+        for no intervals.
+    identifiable : (J, 6); None for stiffness that was not fitted here, as literature's.
+    at_bound : (J, 6), -1 at the lower bound of the fit, 1 at the upper one, else 0.
+    reaches : regions by profile likelihood, by joint's row and coordinate's column; not to be
+        confused with the reach of `interval`.
+    growth : of laws that stiffen; None for linear ones.
     """
     reach = float(stats.t.ppf(LEVEL, degrees_of_freedom)) if degrees_of_freedom > 0 else np.inf
     rows = []
@@ -50,7 +60,8 @@ def stiffness_rows(
         for name in free:
             at = row, COORDINATES.index(name)
             told = (reaches or {}).get(at)
-            # Where no region was looked for the interval stands.
+            # A region brings ends (low, high) and flags, and its ends replace those of the interval
+            # below. Where no region was looked for the interval stands.
             ends = dict.fromkeys(_OPEN) if told is None else asdict(told)
             rows.append(
                 {
@@ -68,7 +79,14 @@ def stiffness_rows(
 
 
 def interval(value: float, log_error: float, reach: float) -> Row:
-    """Value, standard error and ends of the interval, normal in the logarithm."""
+    """Value, standard error and ends of the interval, which is even about the logarithm.
+
+    Parameters
+    ----------
+    value : stiffness. log_error : standard error of its natural logarithm; that of the value is
+        value times as large, to first order.
+    reach : standard errors of the logarithm from the value to an end: a quantile of t.
+    """
     empty: Row = {"standard_error": None, "low": None, "high": None}
     if not np.isfinite(value):
         return {"stiffness": None, **empty}
@@ -95,14 +113,19 @@ def criteria(
 ) -> dict[str, float | None]:
     """Scatter, log-likelihood, corrected Akaike and Schwarz criterion.
 
-    The scatter counts as one more unknown. Source: Burnham and Anderson, Model selection and
-    multimodel inference, 2002, sections 2.2 and 2.4.
+    The scatter is the SD of a weighted residual, in the residuals' unit. It is not known
+    beforehand, so in the criteria it counts as one more unknown. The likelihood is that of normal
+    errors of one variance. Source: Burnham and Anderson, Model selection and multimodel inference,
+    2002, sections 2.2 and 2.4. What cannot be told is None.
 
     Parameters
     ----------
-    cost : sum of squared residuals; None where there is no fit.
+    cost : sum of squared weighted residuals of readings; None where there is no fit.
+    readings : how many residuals it sums. effective_unknowns : unknowns less what priors hold of
+        them; no whole number.
     freedom : degrees of freedom of the scatter; readings less effective unknowns by default.
-    cost_of_priors : squares of priors, which are readings to the scatter, and to nothing else here.
+    cost_of_priors : sum of squared departures from priors, in their SDs. The scatter takes them for
+        further readings; likelihood and criteria leave them out.
     independent : False where residuals are correlated and ``cost`` is told nothing of it: then it
         is no likelihood.
     """
@@ -126,9 +149,15 @@ def criteria(
 
 
 def independent(problem: Problem) -> bool:
-    """Whether residuals are: zeroed readings are not, unless alone in a cycle or allowed for."""
+    """Whether the residuals of a problem are independent of each other.
+
+    Readings that were zeroed share the error of the reading at step 0, which was subtracted from
+    all. So they are dependent, unless each joint and coordinate has one reading in a cycle, or the
+    fit allows for it (``correlated``).
+    """
     if problem.correlated:
         return True
+    # (T, J, weighted coordinates) which readings of each zeroed case there are
     read = [np.isfinite(c.measured[:, :, problem.weights > 0.0]) for c in problem.cases if c.zeroed]
     return all(bool((one.sum(axis=0) <= 1).all()) for one in read)
 

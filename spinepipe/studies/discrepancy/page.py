@@ -1,4 +1,11 @@
-"""The report of a search: its verdict first, then tables of the result files in plain words."""
+"""The report of a search: its verdict first, then tables of the result files in plain words.
+
+Two models are compared: the base, which is asked what it lacks, and the base with the effects that
+the verdict names. Words (``docs/glossary.md``): the gap is the misfit above the noise,
+``sqrt(chi2 / dof - 1)`` in noise SD; log evidence is the natural logarithm of how much likelier
+the readings are with an effect than without it; held out is motion that was left out of the fits
+that predict it.
+"""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -48,7 +55,9 @@ from spinepipe.studies.discrepancy.words import (
 )
 
 Parts = tuple[str, str, str, pd.DataFrame, tuple[Column, ...]]
-"""File, title, what is said of it, rows and columns of a table."""
+"""Of one table of the page: the result file that it is made of, by its name without an ending; its
+title; what is said of it; rows; columns.
+"""
 
 _TRIED = (
     "stage",
@@ -63,16 +72,23 @@ _TRIED = (
     "gap_share",
     "message",
 )
-"""Columns of what was tried; the others are in the file."""
+"""Columns of `CANDIDATES` that are shown; the others are in candidates.parquet."""
 
 _PROOF = (
     *("fold", "kind", "readings"),
     *(f"gap_{model}{end}" for model in ("base", "with_effects") for end in ("", "_low", "_high")),
     *("gap_surrogate", "closed", "gap_closed", "worse", "message"),
 )
-"""Columns of the proof; residuals and one more interval are in the file."""
+"""Columns of `HELD_OUT` that are shown, among them the gaps of both models with their intervals.
+
+Root mean square residuals, and the interval of the surrogate's gap (a generic model
+without physics, for comparison), are in held_out.parquet.
+"""
 
 _ONE_PLACE = "joint x coordinate x test"
+"""Value of the column ``by`` of the table `WHERE` for single places: nothing is pooled over them
+but specimens and load steps.
+"""
 
 _WHERE = (
     f"{WHERE.about} Largest first; of single places those above the noise. All of them, and load "
@@ -85,7 +101,9 @@ _CANDIDATES = (
 )
 
 _MOST_RUNS = 5
-"""Runs of each subject on the page; all are in design.csv."""
+"""Further tests shown of each question (an effect, two names, what has none): the first ones, which
+tell most per cycle. All are in design.csv.
+"""
 
 QUESTION = (
     "Where do model and measurement disagree, which effect does the model lack, what happens when "
@@ -95,15 +113,18 @@ READ = (
     *("where", "candidates", "held_out", "confusions", "next_tests"),
     *("field_numbers", "tabulated"),
 )
-"""Tables whose rows the page needs; of the others it tells where they come from."""
+"""Tables whose rows the page needs. Of the other tables it tells only where they come from: code,
+settings and data.
+"""
 
 
 def document(study: Discrepancy, cohort: Cohort, results: ResultTables) -> Document:
     """What the report says and shows."""
     verdict = read_verdict(results.tables.files["verdict"])
-    # where nothing is missing, what could have been seen comes first
+    # where nothing is missing, the figure of what these tests could have shown comes first
     first = "effect_confusions" if verdict.verdict is Conclusion.NULL else ""
     pictures = sorted(results.pictures.values(), key=lambda picture: picture.name != first)
+    # no line break between a number and its per cent sign
     sure = how_sure(verdict).replace(" %", "\u00a0%")
     return Document(
         question=QUESTION,
@@ -117,7 +138,9 @@ def document(study: Discrepancy, cohort: Cohort, results: ResultTables) -> Docum
 
 
 def page_tables(verdict: Verdict, results: ResultTables) -> list[Sortable]:
-    """Tables with rows, those that say most first."""
+    """Tables with rows, those that say most first: what the verdict names, then what it does not,
+    then result files. Tables without rows are left out.
+    """
     first, last = _named_tables(verdict), _other_tables(verdict)
     parts = (*first, *in_field_units(verdict, results), *last, *file_tables(results))
     found = [sortable(*one) for one in parts if len(one[3])]
@@ -125,7 +148,7 @@ def page_tables(verdict: Verdict, results: ResultTables) -> list[Sortable]:
 
 
 def _named_tables(verdict: Verdict) -> Iterator[Parts]:
-    """What the verdict says of errors, and of the effects that it names."""
+    """What the verdict says of errors of the data, and of the effects that it names or that tie."""
     yield _table(
         "Suspected errors of the data",
         "Readings that no model should be bent to.",
@@ -186,12 +209,20 @@ def _table(title: str, about: str, columns: tuple[Column, ...], rows: Sequence[A
 
 
 def _place(effect: Missing, own: str) -> str:
-    """Where a value holds: where the effect is, and the places of its own or how values differ."""
+    """Where a value holds, in words.
+
+    First where the effect acts; then ``own``, the joint, specimen or test of this one value, or if
+    it has none how the effect's values may differ between places.
+    """
     return "; ".join(part for part in (where_of(effect), own or spread_words(effect)) if part)
 
 
 def _other_tables(verdict: Verdict) -> Iterator[Parts]:
-    """What the verdict says of the effects that it does not name."""
+    """What the verdict says of the effects that it does not name.
+
+    Rivals of those that it names; effects that these tests cannot show at all; and, of those that
+    they can, the smallest gap at which each would have been found.
+    """
     yield _table(
         "Next best names",
         "Log evidence below a few units is too little to decide.",
@@ -239,14 +270,19 @@ def _other_tables(verdict: Verdict) -> Iterator[Parts]:
 
 
 def in_field_units(verdict: Verdict, results: ResultTables) -> Iterator[Parts]:
-    """Tables in the field's units."""
+    """Tables in the field's units (N m/deg, N/mm).
+
+    First numbers of the curves with the effects. The others describe a misfit that has no name, as
+    a formula and as a table, and effects that could be imperfections of the set-up as well.
+    """
     told = verdict.part or verdict.unknown
     formula = None if told is None else told.formula
     numbers = numbers_table(results.table("field_numbers"))
     which = "" if verdict.effects else " Of the likeliest of those that cannot be told apart."
     title = "What a tester reads off the curves"
     yield "field_numbers", title, NUMBERS_ABOUT + which, *numbers
-    # how much the whole formula says, in the fit and held out
+    # how much all terms of the formula explain together, as shares of chi2 above the noise: of the
+    # readings that were fitted, and of those left out
     share = ""
     if formula is not None:
         explained = f"{100.0 * formula.explained:.0f}\u00a0%"
@@ -275,14 +311,16 @@ def file_tables(results: ResultTables) -> Iterator[Parts]:
     held_out = _worded(results.table("held_out"))
     yield "held_out", "Held-out proof", HELD_OUT.about, held_out, proof
 
-    # without load steps, and without single places where noise may be all
+    # without rows of single load steps, and without single places where noise may be all: where
+    # the 95 % interval of the gap begins at 0
     where = results.table("where")
     if len(where):
         above = (where["by"] != "step") & ((where["by"] != _ONE_PLACE) | (where["gap_low"] > 0.0))
         worst = where[above].sort_values("gap", ascending=False, kind="stable")
         yield "where", "Where the models are off", _WHERE, _worded(worst), WHERE.columns
 
-    # estimates as the field gives them, with what they are where it is not the parameter
+    # estimates in the units of the field; where another quantity than the parameter is told (a
+    # motion at which stiffness doubles, say), the unit says which
     candidates = results.table("candidates")
     if len(candidates):
         best = _best(candidates)
@@ -297,7 +335,7 @@ def file_tables(results: ResultTables) -> Iterator[Parts]:
 
 
 def _worded(frame: pd.DataFrame) -> pd.DataFrame:
-    """Effects, places and options in plain words."""
+    """The same rows with effects, tests, coordinates and options in plain words."""
     ways = {
         "effect": general,
         "fold": plain,
@@ -312,7 +350,7 @@ def _worded(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _options(text: str) -> str:
-    """``flexion-extension, tangent`` of options as JSON."""
+    """Values of an effect's options, which are given as JSON: ``flexion-extension, tangent``."""
     values = [
         name
         for value in json.loads(text).values()
@@ -322,7 +360,11 @@ def _options(text: str) -> str:
 
 
 def _best(candidates: pd.DataFrame) -> pd.DataFrame:
-    """Stages in their order, in each the best first; of the screens one form of each effect."""
+    """Rows with a log evidence: stages in the order of the search, in each the best first.
+
+    A form is a variant of an effect and how its values may differ between places. Of a screen,
+    which has many forms of every effect, only the best of each is kept; of other stages all are.
+    """
     rows = candidates[candidates["log_evidence"].notna()]
     order = {stage: number for number, stage in enumerate(rows["stage"].unique())}
     ordered = rows.assign(order=rows["stage"].map(order)).sort_values(
@@ -334,11 +376,13 @@ def _best(candidates: pd.DataFrame) -> pd.DataFrame:
 
 def left_out(study: Discrepancy) -> Iterator[str]:
     """Parts that the settings leave out, each with the setting that does."""
+    # `refit` is no part: it says how left-out readings are predicted
     for part, done in study.held_out:
         if part != "refit" and not done:
             yield f"prediction of left-out {part} (held_out: {part}: false)"
     if study.effects is not None:
         yield f"all effects but {', '.join(study.effects)} (effects)"
+    # a nuisance is a small error of the set-up, given as one prior SD; 0 does not allow for it
     for name, size in study.nuisance:
         if not size:
             yield f"nuisance {name} (nuisance: {name}: 0)"

@@ -1,4 +1,11 @@
-"""Rows of the tables, from what a search found, its proof and its advice."""
+"""Rows of the tables, from what a search found, its proof and its advice.
+
+Words are those of `spinepipe.studies.discrepancy.verdict`. Gaps are in noise SD. *Excess* is chi2
+less its degrees of freedom. A *form* is an effect with its variant, spread and place; its
+*strengths* are off at a known value, its *shapes* say nothing while the strengths are off. Readings
+have places t, j, c: load step, joint from below, coordinate. *Display units* are those of tables:
+mm, deg.
+"""
 
 import csv
 import io
@@ -31,9 +38,13 @@ MOST_FORMS_SHOWN = 5
 """Forms of one effect on a screen that get a row; the others are far behind."""
 
 HELD_OUT_MODELS = ("held_out_base", "held_out_with_effects")
+"""Columns of motion as predicted by fits that did not see it."""
 
 NOT_FITTED = "the linear problem, no fit"
+"""Message of what was screened: its numbers are of readings linearised at the fit before."""
+
 DEGENERATE = "a shape ran to its bound: no more what its name says"
+"""Message of a refit without evidence."""
 
 
 def gap_rows(
@@ -42,11 +53,14 @@ def gap_rows(
     proof: HeldOut,
     tabulated: JointFit | None = None,
 ) -> list[Row]:
-    """Every reading with both models; tests of one name with several load histories averaged.
+    """Every reading, mean over cycles, with what both models say.
+
+    Cycles of one test that were loaded differently are readings apart; here they are averaged.
 
     Parameters
     ----------
-    tabulated : the fit with tables besides, where there are some.
+    joints : names, from below. tabulated : the fit with tables in the model file for what has no
+        name, where there is one.
     """
     collected: dict[tuple[Any, ...], list[Row]] = {}
     for name in found.base.readings:
@@ -62,13 +76,18 @@ def _rows_of(
     proof: HeldOut,
     tabulated: JointFit | None,
 ) -> Iterator[tuple[tuple[Any, ...], Row]]:
-    """Place and row of each reading of a specimen, in display units."""
+    """Place (values of `KEYS`) and row of each reading of a specimen, in display units.
+
+    ``load`` : N or N m on the coordinate, in the neutral pose. ``noise_sd`` : of the mean over
+    cycles.
+    """
     readings, noise = found.base.readings[name], found.base.noise
     fits = {"base": found.base.fit, "with_effects": found.final.fit, "with_table": tabulated}
     modelled = {model: None if fit is None else fit.predicted[name] for model, fit in fits.items()}
     held_out = proof.motion.get(name)
     for number, test in enumerate(readings.tests):
-        size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))  # zeroing adds to the SD
+        # (T,) SD of each step's reading over that of a raw one: zeroing adds the error of step 0
+        size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))
         sd = size[:, None] * noise.sd * DISPLAY_PER_SI
         for t, j, c in zip(*np.nonzero(test.count), strict=True):
             factor, count = DISPLAY_PER_SI[c], int(test.count[t, j, c])
@@ -98,7 +117,13 @@ def _rows_of(
 
 
 def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
-    """A row of a reaction, in loads: what is listed, and what the models hold at that motion."""
+    """A row of a reaction, in loads: what is listed, and what the models hold at that motion.
+
+    The rig holds the coordinate, so what was measured is a load, and the cohort lists it. Its
+    reading is then 0 by definition, and a model's reading is the load that the rig must add to the
+    listed one, times `Support.read_as`. Both are turned back into loads here.
+    """
+    # mm or deg of a reading for each N or N m
     assert rig.read_as is not None
     per, load = float(DISPLAY_PER_SI[coordinate]) * rig.read_as, row["load"]
     held_at = rig.value * float(DISPLAY_PER_SI[coordinate])
@@ -110,7 +135,11 @@ def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
 
 
 def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
-    """One row of those that several load histories of a test have at a place."""
+    """One row of those that several load histories of a test have at a place.
+
+    Means are weighted by the number of readings; a model has one only where it has all rows. What
+    was held out is told where all rows were held out in the same fold.
+    """
     at = dict(zip(KEYS, key, strict=True))
     if len(rows) == 1:
         return at | rows[0]
@@ -121,6 +150,7 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
     for name in ("load", "measured", "base", "with_effects", "with_table"):
         told = [row[name] * row["readings"] for row in rows if row[name] is not None]
         found[name] = sum(told) / readings if len(told) == len(rows) else None
+    # of a mean of n readings it is as 1 / sqrt(n)
     found["noise_sd"] = rows[0]["noise_sd"] * float(np.sqrt(rows[0]["readings"] / readings))
     same = len({row["held_out_fold"] for row in rows}) == 1 and rows[0]["held_out_fold"]
     found["held_out_fold"] = rows[0]["held_out_fold"] if same else ""
@@ -131,7 +161,7 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
 
 
 def where_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
-    """Gaps of both models in every way of pooling."""
+    """Gaps of both models in every way of pooling; ``*`` for what is pooled over."""
     rows = []
     for model, fit in (("base", found.base.fit), ("with_effects", found.final.fit)):
         for place in places(residual_frame(found.base, fit, joints)):
@@ -152,7 +182,8 @@ def where_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
 
 
 def candidate_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
-    """What was tried, stage by stage."""
+    """What was tried, stage by stage: forms on the screen, then those that were refitted."""
+    # chi2 of the base beyond noise, kept positive to be divided by
     excess = max(found.base_gap.excess, np.finfo(float).tiny)
     rows = []
     for stage in found.stages:
@@ -162,6 +193,7 @@ def candidate_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
 
 
 def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[Row]:
+    """Rows of the best forms of each effect on a screen."""
     rows = []
     for one in stage.screen.effects:
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
@@ -211,6 +243,11 @@ def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, scope: str
 
 
 def _of_screen(tried: ScreenedVariant) -> Row:
+    """Numbers of a form on the screen, in display units.
+
+    ``sds``, of the shapes, are prior SDs from the default; ``estimate``, of the strengths, prior
+    SDs from off. ``delta_chi2`` : by how much chi2 falls.
+    """
     effect = tried.form.variant.create()
     shapes = {
         effect.parameters[column].name: display_value(
@@ -222,7 +259,7 @@ def _of_screen(tried: ScreenedVariant) -> Row:
     if len(tried.estimate) == 1:  # a single strength, in the unit of tables
         p = effect.parameters[tried.strengths[0]]
         assert p.off is not None
-        away = float(tried.estimate[0]) * p.prior_scale
+        away = float(tried.estimate[0]) * p.prior_scale  # in its logarithm where it is logarithmic
         # the clip keeps exp finite for estimates of the linear problem that are absurdly large
         value = p.off * float(np.exp(np.clip(away, -50.0, 50.0))) if p.logarithmic else p.off + away
         estimate, unit = display_value(p.unit, value)
@@ -236,10 +273,15 @@ def _of_screen(tried: ScreenedVariant) -> Row:
 
 
 def _share(drop: float, excess: float) -> float | None:
+    """A drop of chi2 over the base's excess; None where that is no more than 1, mere noise.
+
+    The columns call it ``gap_share``: it is a share of the excess, not of its root, the gap.
+    """
     return float(drop / excess) if excess > 1.0 else None
 
 
 def _refitted(stage: SearchStage, joints: Sequence[str], excess: float) -> list[Row]:
+    """Rows of the refits of a stage; of those that ended at the same form and shape, the first."""
     rows, seen = [], set()
     for one in stage.refits:
         scope = _scope(one.form, joints)
@@ -254,6 +296,7 @@ def _refitted(stage: SearchStage, joints: Sequence[str], excess: float) -> list[
 
 
 def _of_refit(one: Refit, excess: float) -> Row:
+    """Numbers of a refit, in display units; evidence that is not finite stands for none."""
     possible = bool(np.isfinite(one.log_evidence))
     status = Status.CONVERGED if possible and not one.fit.status else Status.NOT_CONVERGED
     row: Row = {
@@ -265,7 +308,7 @@ def _of_refit(one: Refit, excess: float) -> Row:
     }
     if not one.fit.usable:
         return row
-    number = len(one.fit.hypothesis.supposed) - 1
+    number = len(one.fit.hypothesis.supposed) - 1  # the form on trial stands behind all others
     own = [u for u in one.fit.hypothesis.unknowns if u.supposed == number]
     values = fitted_values(one.fit, number)
     strengths = [v for v, u in zip(values, own, strict=True) if u.is_strength]
@@ -279,7 +322,11 @@ def _of_refit(one: Refit, excess: float) -> Row:
 
 
 def design_rows(told: Distinguishability) -> list[Row]:
-    """Rows of the table candidates: what the tests could tell of each effect."""
+    """Rows of the table candidates: what the tests could tell of each effect, whatever was read.
+
+    ``absorbed`` : share of its squared signature that base and nuisances can make as well.
+    ``detectable_gap`` : noise SD, that it must make to be found in nine data sets of ten.
+    """
     rows = []
     for one in told.judgements:
         row = _form_row("design", (), one.best.form, "*") | {
@@ -293,7 +340,11 @@ def design_rows(told: Distinguishability) -> list[Row]:
 
 
 def confusion_rows(told: Distinguishability) -> list[Row]:
-    """One row per pair of effects."""
+    """One row per ordered pair of effects, see `Confusion`.
+
+    ``share`` : of what ``effect`` would do, that ``other`` explains; rounding may put it a little
+    outside 0 to 1, which is clipped.
+    """
     return [
         {
             "effect": one.effect,
@@ -306,7 +357,11 @@ def confusion_rows(told: Distinguishability) -> list[Row]:
 
 
 def held_out_rows(proof: HeldOut) -> list[Row]:
-    """One row per fold."""
+    """One row per fold, a set of readings that was held out at once.
+
+    ``rms_*`` : root of chi2 over what a right model would leave; ``gap_*`` : what is beyond, noise
+    SD, with its 95 % interval. ``surrogate`` : a generic model without physics.
+    """
     rows = []
     for one in proof.folds:
         models = {
@@ -316,6 +371,7 @@ def held_out_rows(proof: HeldOut) -> list[Row]:
         }
         row: Row = {"fold": one.name, "kind": one.kind, "readings": one.readings}
         for model, gap in models.items():
+            # chi2 beside what a right model leaves: noise, and nuisances that training left open
             beyond = None if gap is None else gap.against(one.expected)
             row[f"rms_{model}"] = None if beyond is None else beyond.rms
             sized = None if one.expected <= 0.0 else beyond
@@ -334,7 +390,10 @@ def held_out_rows(proof: HeldOut) -> list[Row]:
 
 
 def imperfection_rows(taken: AbsorbedGap, model: str) -> Iterator[Row]:
-    """One row per imperfection, and one per mean over several."""
+    """One row per imperfection, and one per mean over several of a kind.
+
+    ``model`` : whose fit took them up. ``chance`` : how often random errors make as large a mean.
+    """
     for one in taken.each:
         yield _size_row(one.at, model, one.size, one.sd) | {
             "taken_chi2": one.chi2,
@@ -352,6 +411,7 @@ def imperfection_rows(taken: AbsorbedGap, model: str) -> Iterator[Row]:
 
 
 def _size_row(at: NuisancePlace, model: str, size: float, sd: float) -> Row:
+    """Where, and how large: ``size`` and ``sd`` in prior SDs, ``value`` in ``unit``."""
     prior, unit = display_value(at.unit, at.sd)
     return {
         "model": model,
@@ -369,8 +429,13 @@ def _size_row(at: NuisancePlace, model: str, size: float, sd: float) -> Row:
 
 
 def advice_rows(found: Sequence[Advice]) -> list[Row]:
-    """One row per subject and run, in the order of the advice; of several the first one's."""
+    """One row per subject and run, in the order of the advice.
+
+    Of several with the same subject and run: the first one's numbers, in the place of the last.
+    ``subject`` is an effect, two names that are tied, or what has no name; gains are log evidence.
+    """
     rows: dict[tuple[str, str], Row] = {}
+    # from behind, so that the first of several is written last and stays
     for one in reversed(found):
         rows[one.subject, one.test] = {
             "effect_or_pair": one.subject,
@@ -385,7 +450,7 @@ def advice_rows(found: Sequence[Advice]) -> list[Row]:
 
 
 def advice_csv(rows: Sequence[Row]) -> str:
-    """The rows as comma-separated text under the names of the table's columns, rounded."""
+    """The rows as comma-separated text under the names of the table's columns, to 4 digits."""
     content = io.StringIO()
     names = [column.name for column in NEXT_TESTS.columns]
     writer = csv.DictWriter(content, names, lineterminator="\n")

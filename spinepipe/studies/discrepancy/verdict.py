@@ -2,6 +2,12 @@
 
 Fields are the keys of the file, in its order. Sentences are for people: what a program asks has a
 field of its own.
+
+Words. chi2 is the sum of squared residuals in noise SD, whitened: 1 for each degree of freedom
+where only noise is left. *Excess misfit* is chi2 beyond that, chi2 - dof. The *gap* is its root for
+each degree of freedom, ``sqrt(max(0, chi2 / dof - 1))``, in noise SD. *Log evidence* is the natural
+logarithm of a ratio of marginal likelihoods. *Base* is the model without the effects looked for.
+*Held out* are readings predicted by fits that did not see them.
 """
 
 import json
@@ -27,16 +33,19 @@ EVERY = ("*",)
 """All joints, coordinates or specimens."""
 
 REPEATS, DECLARED = "repeats", "declared"
-"""Where the noise is known from."""
+"""Where the noise is known from: repeated cycles of a test, or the cohort's ``measurement_sd``."""
 
 UNIT = "noise sd"
+"""Of `MisfitSizes`, as the file has it: SDs of the noise of one reading."""
 
 
 class Conclusion(StrEnum):
     """What a search came to.
 
-    NAMED: these effects are missing and nothing else. PART: these are, and more stays. SET: one of
-    several, which cannot be told apart. NULL: nothing above the noise. UNKNOWN: none that is known.
+    NAMED: these effects are missing and nothing else. PART: these are, and more stays, unnamed.
+    SET: one of several is missing, which these tests cannot tell apart. NULL: nothing is missing
+    above the noise. UNKNOWN: something is missing and has no name (`Verdict.reason` tells why),
+    also where the data look wrong or the base has no fit.
     """
 
     NAMED = "NAMED"
@@ -61,12 +70,15 @@ class Estimate:
 
     Attributes
     ----------
-    name : with the places it is of behind it: ``width@L4L5@s01``.
+    name : the parameter, and behind each ``@`` a place it belongs to (joint, specimen, test):
+        ``width@L4L5@s01``.
+    value : in ``unit``, that of tables (deg, mm).
     ci95 : low and high; None where that end is open.
-    at_bound : whether it ended at a bound, and its value says no more than that.
-    open_below, open_above : the readings allow the bound there, and what may lie beyond.
-    identifiable : whether both ends are known; else the readings do not tell the value. None in a
-        file of before this was asked.
+    at_bound : whether the fit ended at a limit of the parameter; the value says no more than that.
+    open_below, open_above : whether the readings allow the limit on that side, so that the interval
+        has no end there.
+    identifiable : whether both ends are known; else the readings do not tell the value. None in
+        files written before the key existed.
     """
 
     name: str
@@ -81,8 +93,9 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RivalName:
-    """Another name, and by how much log evidence it is behind.
+    """Another name in the place of an effect, and how much less log evidence it has there.
 
+    ``log_evidence_margin`` : positive where the rival is the less likely; 3 is odds of 20 to 1.
     ``coordinates`` : those that its best form loads; ``*`` where it names none.
     """
 
@@ -93,7 +106,7 @@ class RivalName:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One name of a set.
+    """One name of a set of names that cannot be told apart.
 
     Attributes
     ----------
@@ -113,9 +126,12 @@ class FieldNumber:
     Attributes
     ----------
     name : of `spinepipe.effects.field_numbers.NUMBERS`; minus and plus are the sides of the load.
-    specimens : whose mean it is. load : at which it is told, N m or N.
-    unit : N m/deg, deg, N m deg of rotations, N/mm, mm, J of translations, 1 for a share.
-    ci95 : by the errors of all fitted values; None where the number comes and goes within them.
+    specimens : how many the value is the mean of.
+    load : size at which it is told, on both sides; N m for a rotation, N for a translation.
+    unit : of stiffness N m/deg or N/mm, of motion deg or mm, of loop area N m deg or J (rotation or
+        translation); 1 for a share.
+    ci95 : propagated to first order from the covariance of all fitted values; None where the number
+        exists at some values within their errors and not at others.
     """
 
     name: str
@@ -134,10 +150,12 @@ class Missing:
 
     Attributes
     ----------
-    variant : its options. spread : how values may differ between places.
+    kind : as `spinepipe.effects.contract.EffectKind` writes it (``joint law``).
+    variant : its options. spread : between which places (joints, specimens, tests) its values may
+        differ.
     log_evidence : against the model without it. rivals : best first.
-    field_numbers : of the joints it acts on, with all that the model has there; means over the
-        specimens. Those of each are in field_numbers.parquet.
+    field_numbers : of the joints it acts on, with all laws that the model has there; means over the
+        specimens. Those of each specimen are in field_numbers.parquet.
     """
 
     name: str
@@ -153,7 +171,11 @@ class Missing:
 
 @dataclass(frozen=True)
 class NotTestable:
-    """An effect that these tests cannot show, why, and the test that would; empty: none tried."""
+    """An effect that these tests cannot show, and why.
+
+    ``test_that_would_tell`` : the first of a menu of additions that would show it; empty where none
+    of them would.
+    """
 
     name: str
     why: str
@@ -162,7 +184,16 @@ class NotTestable:
 
 @dataclass(frozen=True)
 class ReportedNoise:
-    """SDs of one reading, None where none was read, and how they are known."""
+    """SDs of one reading, before zeroing, and how they are known.
+
+    Attributes
+    ----------
+    source : `REPEATS` or `DECLARED`; empty where neither is there.
+    rotation_sd_deg, translation_sd_mm : root mean square over the coordinates that were read; None
+        where none was.
+    serial_correlation : between neighbouring load steps of a cycle.
+    outliers_left_out : how many readings.
+    """
 
     source: str = ""
     rotation_sd_deg: float | None = None
@@ -173,7 +204,11 @@ class ReportedNoise:
 
 @dataclass(frozen=True)
 class MisfitSizes:
-    """A measure of the misfit, in fits and held out, without and with the effects."""
+    """A measure of the misfit, in fits and held out, without and with the effects.
+
+    As `Verdict.rms_residual` it is ``sqrt(chi2 / dof)``, 1 where only noise is left; as `Gaps` it
+    is the gap, 0 there. None where there is no fit, or nothing was scored.
+    """
 
     unit: str = field(default=UNIT, init=False)
     base: float | None = None
@@ -183,18 +218,23 @@ class MisfitSizes:
 
 
 def share_of_gap(excess: float) -> float:
-    """Share of the gap that goes with this share of the excess misfit, whose root the gap is."""
+    """Share by which the gap shrinks when this share of the excess misfit is taken away.
+
+    The gap is the root of the excess misfit: 1 - sqrt(1 - excess). Negative where the effects make
+    it worse.
+    """
     return 1.0 - sqrt(max(0.0, 1.0 - excess))
 
 
 @dataclass(frozen=True)
 class Gaps(MisfitSizes):
-    """The gap.
+    """The gap; held out, beyond what a right model would leave there.
 
     Attributes
     ----------
-    held_out_closed : share of the excess misfit (chi2) that the effects take away held out.
-    held_out_gap_closed : share of the gap, which is the root of it, that they close.
+    held_out_closed : share of the base's excess misfit (chi2) that the effects take away held out;
+        None where noise may be all of it.
+    held_out_gap_closed : the same as a share of the gap, see `share_of_gap`.
     """
 
     held_out_closed: float | None = None
@@ -203,13 +243,14 @@ class Gaps(MisfitSizes):
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What folds of one kind say together.
+    """What folds of one kind say together. A fold is a set of readings held out at once.
 
     Attributes
     ----------
-    kind : test, specimen or steps. folds : that were scored. base, with_effects : gaps, noise SD.
-    excess_closed, gap_closed : shares of the excess misfit (chi2), and of the gap; None where noise
-        may be all.
+    kind : of what is left out: test, specimen or steps.
+    folds : how many were scored. base, with_effects : held-out gaps, noise SD.
+    excess_closed, gap_closed : as `Gaps.held_out_closed` and `Gaps.held_out_gap_closed`, of these
+        folds alone.
     """
 
     kind: str
@@ -222,9 +263,10 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class SmallestDetectable:
-    """The smallest gap, noise SD, at which an effect would be found, in a set or by its own name.
+    """How large a gap an effect must make to be found in nine data sets of ten.
 
-    ``by_name`` : from which no other effect is as good; None where one always is.
+    ``gap`` : noise SD, to be found at all, if only in a set. ``by_name`` : noise SD, from which it
+    leads over every other effect; None where another always is as good.
     """
 
     name: str
@@ -238,7 +280,8 @@ class SuspectedError:
 
     Attributes
     ----------
-    where : specimens, and joint, coordinate or test. what : the mistake. evidence : with numbers.
+    where : specimens, and joint, coordinate or test. what : the mistake. evidence : for it, in
+        words and numbers.
     """
 
     where: str
@@ -248,7 +291,14 @@ class SuspectedError:
 
 @dataclass(frozen=True)
 class Threshold:
-    """Log evidence that an effect must exceed, how often noise does, and the draws behind it."""
+    """What an effect must exceed to be named.
+
+    Attributes
+    ----------
+    log_evidence : the threshold; None where the base has no fit.
+    false_alarm : share of data sets that lack nothing in which the best effect may exceed it.
+    draws : how many such data sets were drawn to find it.
+    """
 
     log_evidence: float | None = None
     false_alarm: float | None = None
@@ -257,7 +307,10 @@ class Threshold:
 
 @dataclass(frozen=True)
 class KindOfImperfection:
-    """What a kind of imperfection takes up of chi2, all joints, tests and specimens together."""
+    """What a kind of imperfection takes up of chi2, all joints, tests and specimens together.
+
+    ``taken_chi2`` : how much larger chi2 would be without it, to first order.
+    """
 
     kind: str
     taken_chi2: float
@@ -265,7 +318,7 @@ class KindOfImperfection:
 
 @dataclass(frozen=True)
 class LargeImperfection:
-    """The most likely size of one imperfection, in prior SDs and in ``unit``."""
+    """The most likely size of one imperfection: in prior SDs, and as ``value`` in ``unit``."""
 
     kind: str
     where: str
@@ -280,7 +333,8 @@ class CommonImperfection:
 
     Attributes
     ----------
-    mean_in_prior_sds, se : the mean, and its standard error by the scatter of the places.
+    mean_in_prior_sds, se : the mean, and its standard error by the scatter of the places, both in
+        prior SDs. value : the mean in ``unit``.
     """
 
     kind: str
@@ -295,11 +349,15 @@ class CommonImperfection:
 class Imperfections:
     """What the small imperfections took up that the study allows for.
 
+    An imperfection is a small error of the set-up or its description (joint centre, axes, direction
+    or size of a load, ...), a nuisance of the fit with a prior SD of its own.
+
     Attributes
     ----------
-    gap_without, gap_with : noise SD, of the model that the verdict stands for; the first refitted
-        without any, None where that has no fit. by_kind, largest : most first.
-    common : those that are no random errors. message : all this in sentences.
+    gap_with : noise SD, of the model that the verdict stands for. gap_without : the same model
+        refitted with no imperfection allowed for; None where that has no fit.
+    by_kind, largest : most first. common : those that are no random errors.
+    message : all this in sentences.
     """
 
     gap_without: float | None
@@ -312,14 +370,15 @@ class Imperfections:
 
 @dataclass(frozen=True)
 class WithheldEffect:
-    """An effect without a name, as it is no larger than an imperfection that is allowed for.
+    """An effect that is not named, as an imperfection that is allowed for explains it as well.
 
     Attributes
     ----------
-    imperfection : its kind. allowed : its prior SD, in ``unit``; 1 is a share.
-    known_to : largest SD at which the effect would be evident; None where knowing this kind alone
-        does not do, or it would have to be known better than anybody can.
-    log_evidence : as things are. log_evidence_if_known : were the imperfection known exactly.
+    imperfection : kind of the imperfection. allowed : its prior SD, in ``unit``; unit 1 is a share.
+    known_to : largest prior SD, in ``unit``, at which the effect would pass the threshold; None
+        where knowing this kind alone is not enough, or only at an SD nobody can reach.
+    log_evidence : of the effect, with the prior SD ``allowed``. log_evidence_if_known : with that
+        SD 0.
     """
 
     name: str
@@ -337,13 +396,18 @@ class Verdict:
 
     Attributes
     ----------
-    effects : missing for certain. candidates_in_set : names that cannot be told apart.
-    candidates : the same with their coordinates, once for each.
-    families : sets of effects that these tests cannot tell apart.
+    why : the conclusion's reason, one sentence.
+    effects : missing for certain.
+    candidates_in_set : names that these data cannot tell apart.
+    candidates : the same, each with the coordinates it would load.
+    families : by the design of the tests alone, before residuals are looked at, sets of effects
+        that cannot be told apart.
+    unknown : why nothing is named, and what is missing; None where there is no such reason.
+    part : of PART, what stays beside ``effects``.
     imperfections : what those allowed for took up; None where the base has no fit.
-    tabulated : of UNKNOWN and PART, what the model with effects has besides; None for nothing.
-    withheld : effects that imperfections hide, one for each kind of imperfection that does.
-    left_out : what is told held out, tests and specimens apart.
+    tabulated : of UNKNOWN and PART, tables in the model file for what has no name; None for none.
+    withheld : effects that imperfections hide, one entry for each kind of imperfection that does.
+    left_out : held-out gaps by what was left out, tests and specimens apart.
     """
 
     cohort: str
@@ -374,7 +438,10 @@ class Verdict:
 
     @property
     def in_set(self) -> tuple[Candidate, ...]:
-        """Names that cannot be told apart, with their coordinates where the file has them."""
+        """Names that cannot be told apart, with their coordinates.
+
+        Files without ``candidates`` have the names alone: each then acts on ``*``.
+        """
         names = (Candidate(name, EVERY, None) for name in self.candidates_in_set)
         return self.candidates or tuple(names)
 
@@ -393,7 +460,7 @@ def verdict_of(data: Mapping[str, Any]) -> Verdict:
     Raises
     ------
     ValueError
-        For data that are no verdict: key, what was found, what is allowed.
+        For data that are no verdict; the text has key, what was found and what is allowed.
     """
     return _FORM.validate_python(data)
 
@@ -404,7 +471,7 @@ def read_verdict(path: str | Path) -> Verdict:
     Raises
     ------
     ValueError
-        As `verdict_of` does, and for a file that is not as it was written.
+        As `verdict_of` does, and for a file whose marks do not fit: it was changed or cut off.
     """
     return verdict_of(read_json(path))
 
@@ -415,7 +482,10 @@ def plain_data(verdict: Verdict) -> dict[str, Any]:
 
 
 def write_verdict(verdict: Verdict, path: str | Path, digest: str) -> None:
-    """Write ``verdict.json`` with its marks; it appears whole or not at all."""
+    """Write ``verdict.json`` with its marks; it appears whole or not at all.
+
+    ``digest`` : of all that it was made from, see `spinepipe.marks.with_mark`.
+    """
     data = with_mark(plain_data(verdict), digest)
     with appearing(path) as temporary:
         temporary.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")

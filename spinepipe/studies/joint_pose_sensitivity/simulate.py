@@ -1,4 +1,10 @@
-"""Job: motion of one specimen in joint poses with stiffness sets, under all its tests."""
+"""Job: motion of one specimen in joint poses with stiffness sets, under all its tests.
+
+Pose has two senses here. A joint pose is a sampled set of joint frames: where the joints lie and
+how their axes are turned. The pose at the end of a load step, ``q``, is how far the joints moved.
+Stiffness is the one fitted in the joint pose itself (``calibrated``), or one of the sets with the
+least cost in the reduced dataset of the specimen (``best01`` ...), taken to other joint poses too.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +37,7 @@ from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS, from_si
 from spinepipe.world import Chain
 
 TABLE = SIMULATIONS.without("specimen", "pose")
-"""A job file: specimen and pose are in its folders' names."""
+"""Columns of a file of this job: its specimen and pose are in the names of its folders."""
 
 
 def run(
@@ -42,17 +48,22 @@ def run(
     specimen: str,
     parts: Mapping[str, Mapping[str, str]],
 ) -> None:
-    """Write the rows of poses and stiffness sets, a file each; all are solved in one stack.
+    """Write a file of rows for each joint pose and stiffness set that is asked for.
 
     Parameters
     ----------
-    calibrations : files that hold those of the specimen.
+    root, study : folder of the project, and name of the study.
+    poses : file of the specimen's sampled joint frames. calibrations : files of all its fits.
+    parts : file to be written, to its ``pose`` (number) and ``stiffness`` (``calibrated``,
+        ``best01`` ...).
     """
     settings, cohort = study_and_cohort(root, study)
     inputs = specimen_inputs(root, study, specimen, cohort.digest)
     fits = pd.concat([read_frame(path) for path in calibrations])
     best = {one["name"]: np.array(one["stiffness"]) for one in rank_fits(settings, fits)}
     of_pose, sampled = fits.set_index("pose"), sampled_poses(poses)
+    # of each file the joint frames and the stiffness, (1 or J, 6) N/m and N m/rad, or in the place
+    # of either why there is none
     asked: list[tuple[tuple[Pose, ...] | str, Array | str]] = []
     values: Array | str
     for place in parts.values():
@@ -67,7 +78,9 @@ def run(
             values = best.get(place["stiffness"], lacking)
         asked.append((no_frames if placed is None else placed, values))
     read = [mark_of(path) for path in (poses, *calibrations)]
-    rule = settings.success.model_dump_json()  # decides which fits are ranked
+    # the mark of a file: what it hangs on. The settings that decide which fits are ranked count for
+    # the best sets alone (False), not for a pose's own stiffness (True)
+    rule = settings.success.model_dump_json()
     made_by = {
         own: provenance("simulate", settings, cohort, [specimen], [*read, *rules])
         for own, rules in ((True, []), (False, [rule]))
@@ -75,7 +88,8 @@ def run(
     ends = _solve_all(settings, cohort, inputs, asked)
     for (path, place), (frames, _), ended in zip(parts.items(), asked, ends, strict=True):
         tested = inputs.tested
-        if not isinstance(frames, str):  # readings as seen in the frames of the pose
+        # measured motion as coordinates of the pose's joint frames, in which it is predicted
+        if not isinstance(frames, str):
             tested = tuple(one.in_frames(inputs.frames, frames) for one in tested)
         rows = [
             {**row, "stiffness": place["stiffness"], "joint": cohort.joint_names[row["joint"]]}
@@ -88,7 +102,14 @@ def run(
 
 @dataclass(frozen=True)
 class _StepResult:
-    """How a load step ended: pose (n,) or None, and what was left to go to equilibrium (n,)."""
+    """How a load step ended; n = 6 x joints, from below, m and rad.
+
+    Attributes
+    ----------
+    q : (n,) coordinates of all joints, or None where there is no solution.
+    remaining : (n,) coordinates at equilibrium less q, where motion was simulated in time; None
+        where equilibrium was solved, or there is none.
+    """
 
     q: Array | None
     status: Status
@@ -97,7 +118,7 @@ class _StepResult:
 
 
 _Ends = list[list[_StepResult]]
-"""Of all steps of all cases."""
+"""Of one model: for each case (a cycle of a test) the ends of its load steps, in their order."""
 
 
 def _solve_all(
@@ -106,7 +127,15 @@ def _solve_all(
     inputs: MeasuredSpecimen,
     placed: Sequence[tuple[tuple[Pose, ...] | str, Array | str]],
 ) -> list[_Ends]:
-    """Ends of all steps of all cases in poses with a stiffness each; refused where one is none."""
+    """Ends of all load steps, for each pair of joint frames and stiffness.
+
+    Where frames or stiffness are missing, or the model is refused, all steps are `REFUSED` with the
+    reason.
+
+    Parameters
+    ----------
+    placed : joint frames and stiffness, (6,) or (1 or J, 6) SI; a text says why there is none.
+    """
     ends: list[_Ends | None] = []
     models: list[SpineModel] = []
     for frames, values in placed:
@@ -118,6 +147,8 @@ def _solve_all(
         except RefusedModel as error:
             refused = _StepResult(None, Status.REFUSED, str(error))
             ends.append([[refused] * len(case.steps) for case in inputs.cases])
+    # pairs that have a model (None so far) get their ends in order: by motion in time, or as poses
+    # of equilibrium
     if settings.loading == "settle":
         found = iter([_settle(settings, inputs, model) for model in models])
     else:
@@ -126,13 +157,14 @@ def _solve_all(
 
 
 def _balance(inputs: MeasuredSpecimen, models: Sequence[SpineModel]) -> list[_Ends]:
-    """Equilibrium under each load step, of all models in one stack."""
+    """Equilibrium under each load step; all models are solved side by side, see `Stack`."""
     if not models:
         return []
     runs = [(number, case) for number in range(len(models)) for case in inputs.cases]
     stack = Stack.of(models, runs)
     found = stack.solve()
     messages = {**stack.warnings(found.q), **found.messages}
+    # a lane is one load step of one case of one model
     each = zip(found.q.reshape(len(found.q), -1), found.status.tolist(), strict=True)
     ended = [
         _StepResult(None if np.isnan(q[0]) else q, Status(status), messages.get(lane, ""))
@@ -144,7 +176,11 @@ def _balance(inputs: MeasuredSpecimen, models: Sequence[SpineModel]) -> list[_En
 
 
 def _settle(settings: JointPoseSensitivity, inputs: MeasuredSpecimen, model: SpineModel) -> _Ends:
-    """Where each load step, switched on in the neutral pose, has brought the chain in time."""
+    """Where the chain is ``settle_time_s`` after each load step.
+
+    Each step begins anew: the chain is at rest in the neutral pose, and the load comes on at once
+    and stays. The damped equations of motion are integrated, see `spinepipe.statics.transient`.
+    """
     chain, ends = Chain(model), []
     for case in inputs.cases:
         system, ended = System(chain, model, case), []
@@ -158,9 +194,18 @@ def _settle(settings: JointPoseSensitivity, inputs: MeasuredSpecimen, model: Spi
 
 
 def _case_rows(one: MeasuredCycle, ended: list[_StepResult]) -> Iterator[dict[str, Any]]:
-    """One row per step and joint (by number) of a case; mm and deg."""
+    """One row per step and joint (by number from 0, the lowest) of a case; mm and deg.
+
+    Errors are predicted less measured. What is left to go to equilibrium is the largest over all
+    joints, and the same in all rows of a step.
+
+    Parameters
+    ----------
+    one : measured motion, in the same joint frames as the predicted one.
+    """
     case = one.case
-    if one.zeroed:  # poses less that of step 0, as the cohort's readings are
+    # coordinates less those of step 0, as the cohort's readings are
+    if one.zeroed:
         first = ended[0]
         if first.q is None:
             why = f"step 0, which is subtracted, has no pose: {first.message}"
@@ -182,6 +227,7 @@ def _case_rows(one: MeasuredCycle, ended: list[_StepResult]) -> Iterator[dict[st
                 **_six("predicted", there),
                 **_six("measured", seen),
                 **_six("error", there - seen),
+                # some coordinates measured, not all: see `MeasuredCycle.in_frames`
                 "unmeasured_taken_as_zero": bool(known.any() and not known.all()),
                 "remaining_mm": None if left is None else left[:, :3].max(),
                 "remaining_deg": None if left is None else left[:, 3:].max(),
@@ -191,6 +237,7 @@ def _case_rows(one: MeasuredCycle, ended: list[_StepResult]) -> Iterator[dict[st
 
 
 def _six(prefix: str, values: Array) -> dict[str, float]:
+    """Values (6,), mm and deg, as columns ``prefix_...``."""
     return {
         f"{prefix}_{name}": float(value)
         for name, value in zip(COORDINATE_COLUMNS, values, strict=True)

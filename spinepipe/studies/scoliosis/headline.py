@@ -1,7 +1,9 @@
 """The answer for a surgeon: which model reproduces films it has not seen, and how sure that is.
 
-It hangs on rotations of segments, pooled over held-out films and patients; differences between
-models are tested over patients (table ``statistics``).
+A model is personalised on some films of a patient (fitted) and predicts the others (held out). The
+answer hangs on its errors in rotations of segments since the erect film, deg, pooled as a root mean
+square over the held-out films of all patients. Differences between models are tested over patients
+(table ``statistics``: Wilcoxon's signed rank test, corrected by Holm's method).
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,7 +18,7 @@ from spinepipe.studies.scoliosis.errors import REFERENCE
 from spinepipe.studies.scoliosis.words import TOLD
 
 DECIDING = "rotation"
-"""The measure that the answer hangs on."""
+"""The measure that the answer hangs on, as the column ``measure`` of ``accuracy`` has it."""
 
 SIGNIFICANT = 0.05
 """p-values below this, corrected by Holm's method, are called significant."""
@@ -25,6 +27,9 @@ NOT_PERSONAL = "uniform"
 """The model that takes nothing from a patient's films but their shape."""
 
 NO_POSE = (PrescribedStatus.UNSTABLE, PrescribedStatus.NOT_CONVERGED)
+"""How a solve may end without a pose. Where the top cannot be put where the film has it
+(`UNREACHABLE`) there is a pose, the one that misses it least, and it is held against the film.
+"""
 
 
 @dataclass(frozen=True)
@@ -33,14 +38,20 @@ class ModelRanking:
 
     Attributes
     ----------
-    rows : of the table accuracy, those that have an error.
+    rows : of the table ``accuracy``, a model each: those of these films and this measure that have
+        an error.
     """
 
     rows: pd.DataFrame
 
     @classmethod
     def of(cls, accuracy: pd.DataFrame, films: str, measure: str) -> "ModelRanking":
-        """From the table ``accuracy``, which may have no rows."""
+        """From the table ``accuracy``, which may have no rows.
+
+        Parameters
+        ----------
+        films : ``fitted`` or ``held_out``. measure : a name of `MEASURES`.
+        """
         if accuracy.empty:
             return cls(accuracy)
         own = accuracy[(accuracy["films"] == films) & (accuracy["measure"] == measure)]
@@ -52,21 +63,24 @@ class ModelRanking:
         return [] if self.rows.empty else list(self.rows["model"])
 
     def error(self, model: str) -> float:
-        """Root mean square error of a model."""
+        """Root mean square error of a model, in the unit of the measure (deg or mm)."""
         return float(self.rows.loc[self.rows["model"] == model, "rmse"].iloc[0])
 
     def sized(self, model: str) -> str:
-        """The same with its unit."""
+        """The same in words, with its unit: ``3.2°``."""
         unit = "°" if self.rows["unit"].iloc[0] == "deg" else " mm"
         return f"{number(self.error(model))}{unit}"
 
     def less(self, model: str, other: str) -> float:
-        """Share by which the error of a model is less than that of another."""
+        """Share by which the error of a model is less than that of another; below 0: it is more."""
         return 1.0 - self.error(model) / self.error(other)
 
     @property
     def noise(self) -> float | None:
-        """What reading films alone makes; None where nobody knows."""
+        """Error that reading the films alone makes, in the unit of the measure.
+
+        None where neither repeated readings nor the study tell how exactly films are read.
+        """
         if self.rows.empty:
             return None
         known = self.rows["reading_noise"].dropna()
@@ -92,7 +106,11 @@ def headline(results: ResultTables) -> Headline:
 
 
 def _compared(standing: ModelRanking) -> list[str]:
-    """The models that the first one is held against: the next, and the paper's reference."""
+    """The models that the best one is held against: the next best first, then the reference.
+
+    The reference is the model that Jalalian 2017 compares with (`REFERENCE`). It is not
+    added where it is one of the two best itself.
+    """
     others = standing.models[1:]
     return [*others[:1], *(name for name in others[1:] if name == REFERENCE)]
 
@@ -108,6 +126,7 @@ def _without(positions: pd.DataFrame) -> str:
 
 
 def _of_fitted(fitted: ModelRanking) -> str:
+    """The best model on films that it was fitted to, where none are held out."""
     if not fitted.models:
         return ""
     best = fitted.models[0]
@@ -120,7 +139,14 @@ def _of_fitted(fitted: ModelRanking) -> str:
 
 
 def _answer(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:
+    """The best model, and its error beside those of others.
+
+    Parameters
+    ----------
+    ps : p of the best model against each of `_compared`, the next best first; see `p_of`.
+    """
     best, *_ = held_out.models
+    # only a difference from the next best that is significant lets it be called the best
     p = next(iter(ps.values()), None)
     told = (
         f"{capital(TOLD[best])} has the least error of rotations on positions that it has not seen"
@@ -145,7 +171,12 @@ def _answer(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:
 
 
 def _sure(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:
-    """Whether the first model differs from those it is held against, over patients."""
+    """Whether the best model differs from those it is held against, over patients.
+
+    Parameters
+    ----------
+    ps : as of `_answer`.
+    """
     if not ps:
         return ""
     patients = count(int(held_out.rows["n_patients"].min()), "patient")
@@ -167,7 +198,7 @@ def _sure(held_out: ModelRanking, ps: Mapping[str, float | None]) -> str:
 
 
 def above_noise(standing: ModelRanking) -> str:
-    """Whether the least error is more than what reading films makes."""
+    """Whether the least error is more than what reading films makes; for rotations, deg."""
     best = standing.models[0]
     if standing.noise is None:
         return (
@@ -184,7 +215,14 @@ def above_noise(standing: ModelRanking) -> str:
 
 
 def p_of(statistics: pd.DataFrame, films: str, measure: str, one: str, other: str) -> float | None:
-    """p of the paired test of two models over patients, corrected by Holm; None without a test."""
+    """p of the paired Wilcoxon test of two models over patients, corrected by Holm's method.
+
+    None without a test. Which model is named first does not matter.
+
+    Parameters
+    ----------
+    statistics : the table; a family is all pairs of models on one group of films and one measure.
+    """
     if statistics.empty:
         return None
     rows = statistics[statistics["family"] == f"{films}/{measure}"]
@@ -194,7 +232,13 @@ def p_of(statistics: pd.DataFrame, films: str, measure: str, one: str, other: st
 
 
 def _doubts(positions: pd.DataFrame, held_out: ModelRanking) -> list[str]:
-    """What should be looked at before the answer is believed."""
+    """What should be looked at before the answer is believed: poses that were not found, and models
+    that are compared on unlike patients for that reason.
+
+    Parameters
+    ----------
+    positions : of fitted and held-out films.
+    """
     if positions.empty:
         return []
     doubts = []
@@ -215,7 +259,17 @@ def _doubts(positions: pd.DataFrame, held_out: ModelRanking) -> list[str]:
 
 
 def _of_fits(laws: pd.DataFrame, population: pd.DataFrame) -> Iterator[str]:
-    """Fits that ended where they were not free to end, or before they had."""
+    """Doubts about the fits: multipliers held at their bound, a population that did not converge.
+
+    The reference model has a multiplier of stiffness for each region; over that of the last region
+    it lies between 1/10 and 10 (Petit 2004, `FARTHEST_MULTIPLIER`). ``tangent_fitted`` fits all
+    patients in rounds, each with what the round before says of the population, until that stands
+    still.
+
+    Parameters
+    ----------
+    laws, population : tables of these names.
+    """
     if "fit_status" in laws:
         fits = laws[laws["model"] == REFERENCE].drop_duplicates("specimen")
         held = int((fits["fit_status"] == Status.CONVERGED_AT_BOUND.value).sum())

@@ -1,4 +1,10 @@
-"""What a study of scoliotic spines asks."""
+"""What a study of scoliotic spines asks.
+
+Lateral stiffness is that of lateral bending here, N m/rad, not of a shift to the side. Two words
+have two senses: `Scale` says where the size of all stiffness comes from, `Variants.scale` lists
+factors that it is tried with; `Scoliosis.enlargement` is a factor (1.2), that of `Variants` a
+percentage beyond one (20).
+"""
 
 from typing import Annotated, Literal, get_args
 
@@ -8,8 +14,15 @@ from spinepipe.studies.parts import FORM, EachOnce, PublishedStiffness
 from spinepipe.studies.study import Study
 from spinepipe.units import COORDINATES
 
+# tangent: bounded tangents from the two bending films, as published (Jalalian 2017)
+# tangent_fitted: tangents of all segments fitted at once, through the simulator, to places and
+#     tilts on both films; what films leave open stays as a population of patients has it
+# linear_regions: one multiplier of the stated springs for each curve of the spine (Petit)
+# linear_per_segment: a spring for each segment from the same two rotations and moments as tangent
+# uniform: the same spring in all segments, nothing is taken from films
 ModelName = Literal["tangent", "tangent_fitted", "linear_regions", "linear_per_segment", "uniform"]
 
+# by how much ends are beyond the rotations of the bending films; 0 is told, but has no loads
 Percent = Annotated[float, Field(ge=0, le=200)]
 Factor = Annotated[float, Field(gt=0, le=1e3)]
 
@@ -17,7 +30,13 @@ MODELS: tuple[ModelName, ...] = get_args(ModelName)
 
 
 class Scale(BaseModel):
-    """Where the size of the stiffness comes from, which films do not tell."""
+    """Where the size of the stiffness comes from, which films do not tell.
+
+    Films show rotations and no forces, so they decide the ratios between segments alone. The size,
+    the geometric mean over segments of the lateral stiffness in the erect pose, is the same in all
+    models: it is stated (``mean_stiffness``), or follows from the moment about the apical disc in
+    that bend where it is larger (``apical_moment``). Only the one that ``of`` names has a say.
+    """
 
     model_config = FORM
 
@@ -40,7 +59,14 @@ class Scale(BaseModel):
 
 
 class SagittalProfile(BaseModel):
-    """What films of the coronal plane do not show of a vertebra."""
+    """What films of the coronal plane do not show of a vertebra: where the joint above it is.
+
+    The joint is at the back end of the lower vertebra's superior endplate: half the depth behind
+    the line of the centres, and at ``endplate_share`` of the way from the lower centre to the upper
+    one, also where corners were read. The share is half a vertebra over a vertebra and a disc:
+    0.5 / (1 + 1/3) = 0.375 of lumbar and 0.5 / (1 + 1/5) = 0.417 of thoracic spines; 0.5 would be a
+    disc without height.
+    """
 
     model_config = FORM
 
@@ -58,7 +84,10 @@ class SagittalProfile(BaseModel):
 
 
 class Variants(BaseModel):
-    """Choices of the published tangent that are varied one at a time."""
+    """Choices of the published tangent that are varied one at a time, all else as the study has it.
+
+    Without enlargement the loads of the films are infinite: that row says so and has no numbers.
+    """
 
     model_config = FORM
 
@@ -73,7 +102,14 @@ class Variants(BaseModel):
 
 
 class Scoliosis(Study):
-    """Patients whose stiffness is found from bending films, and what other films say of it."""
+    """Patients whose stiffness is found from bending films, and what other films say of it.
+
+    ``enlargement``: a tangent law has two end rotations that it comes near and never has; they are
+    put at so many times the segment's rotations on the two bending films.
+    ``model_sd_*`` is the error of the model beside that of reading (``tilt_sd_deg``,
+    ``place_sd_mm``), which is stated only where films were not read repeatedly.
+    ``film_regions``: ratio is the stiffness of a segment over the geometric mean of all.
+    """
 
     kind: Literal["scoliosis"]
     models: EachOnce[ModelName] = Field(default=MODELS, description="models that are compared")

@@ -1,6 +1,8 @@
 """What a study of tracked motions demands of its cohort: each fault with its place and remedy.
 
 Tables are checked whenever the study is read; files of motion, which take longer, when it starts.
+Faults are handed on and not raised: each is an `InputProblem`, whose arguments are file, line,
+column or key, what was found, what is allowed, and the remedy.
 """
 
 from collections.abc import Iterator
@@ -42,13 +44,17 @@ from spinepipe.studies.tracking.trials import (
 from spinepipe.units import COORDINATES
 
 NEEDED = (SUBJECTS, TRIALS, MARKER_SET)
+"""Tables that a cohort must have."""
 
 LISTED = 4
-"""So many names are written out."""
+"""So many names of further markers are written out in a message; then dots."""
 
 SLICES_SHARE = (0.25, 0.60)
-"""Pelvis and slices of the trunk over body mass: 0.42 to 0.45 in the sources; head and arms, which
-are hung on T1, would add 0.16 to 0.17."""
+"""Least and largest mass of pelvis and trunk slices together, over body mass.
+
+Wide about 0.42 to 0.45, what the sources give (Pearsall 1996, pelvis: de Leva 1996). Head and arms,
+which are hung on T1 later and must not be counted here, would add 0.16 to 0.17.
+"""
 
 
 def check_tracking(
@@ -56,7 +62,9 @@ def check_tracking(
 ) -> Iterator[InputProblem]:
     """Everything that is wrong with the tables of a cohort."""
     yield from _tables(document, cohort)
-    if cohort.vertebrae == BODIES:  # rows of joints are those of the whole trunk
+    # rows of passive.csv and ratios.csv name joints from L5S1 to T1T2, so they are judged where the
+    # chain has all of these; `_tables` tells of one that has not
+    if cohort.vertebrae == BODIES:
         yield from _approaches(document, study, cohort)
         try:
             passive_elements(cohort.further.get(PASSIVE.stem), f"{cohort.name}/{PASSIVE.file}")
@@ -72,7 +80,7 @@ def check_tracking(
 
 
 def _persons_and_trials(cohort: Cohort) -> Iterator[InputProblem]:
-    """Persons, trials and markers."""
+    """Faults of subjects.csv and trials.csv, as far as these are there."""
     further = cohort.further
     if SUBJECTS.stem in further:
         yield from subject_problems(cohort, further[SUBJECTS.stem])
@@ -83,7 +91,10 @@ def _persons_and_trials(cohort: Cohort) -> Iterator[InputProblem]:
 def check_recordings(
     document: YamlDocument, _study: Tracking, cohort: Cohort, _root: Path
 ) -> Iterator[InputProblem]:
-    """Everything that is wrong with files of motion; nothing where tables cannot be relied on."""
+    """Everything that is wrong with files of motion; nothing where a table has a fault.
+
+    All kinds of study are handed the same arguments; ``_study`` and ``_root`` are not needed here.
+    """
     if not any((*_tables(document, cohort), *_persons_and_trials(cohort))) and not any(
         _bodies(cohort)
     ):
@@ -91,7 +102,7 @@ def check_recordings(
 
 
 def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
-    """Files that every study needs, and the chain that the markers are on."""
+    """Tables that every study of tracked motions needs, and the chain of joints from S1 to T1."""
     place = at(document, "cohort")
     for form in NEEDED:
         if form.stem not in cohort.further:
@@ -110,7 +121,11 @@ def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
 
 
 def _approaches(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[InputProblem]:
-    """Approaches whose ratios nobody has, or that learn from trials nobody did."""
+    """Approaches whose ratios are in no table, or that learn from a kind of trial nobody did.
+
+    Ratios share a motion among the joints (`ik_constrained_<set>`); other approaches calibrate
+    passive elements on trials of one kind and use them in others.
+    """
     try:
         sets = ratios_of(cohort)
     except InputError as error:
@@ -132,13 +147,13 @@ def _approaches(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iter
 
 
 def _bodies(cohort: Cohort) -> Iterator[InputProblem]:
-    """Slices of the trunk that cannot be those of the person."""
+    """Masses of pelvis and trunk slices that cannot be those of the person, see `SLICES_SHARE`."""
     file = f"{cohort.name}/bodies.csv"
     known = set(cohort.further[SUBJECTS.stem]["specimen"])
     for specimen in [name for name in cohort.specimen_names if name in known]:
         subject = subject_of(cohort, specimen)
         if not MASS_KG[0] <= subject.mass_kg <= MASS_KG[1]:
-            continue  # told in subjects.csv
+            continue  # the body mass itself is wrong: `subject_problems` tells it
         allowed = (
             f"{SLICES_SHARE[0]:.0%} to {SLICES_SHARE[1]:.0%} of {subject.mass_kg:g} kg: "
             "pelvis and slices of the trunk, without head and arms"
@@ -155,7 +170,7 @@ def _bodies(cohort: Cohort) -> Iterator[InputProblem]:
 
 
 def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
-    """Files and axes in `trials.csv`, and persons without a trial that tells their size."""
+    """Faults of files and axes in `trials.csv`; persons without a trial that tells their size."""
     file = f"{cohort.name}/{TRIALS.file}"
     for specimen in cohort.specimen_names:
         for row in trial_rows(cohort, specimen):
@@ -170,7 +185,7 @@ def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
                     allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
                     remedy = "name each axis once, a minus where it points the other way"
                     yield InputProblem(file, row["line"], "axes", str(error), allowed, remedy)
-            # a file outside the cohort's folder
+            # a file outside the cohort's folder, by .. or by a link
             if (led_out := outside(cohort.folder / name, cohort.folder, place, name)) is not None:
                 yield led_out
         if static_trial(cohort, specimen) is None:
@@ -181,10 +196,11 @@ def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
 
 
 def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
-    """Everything that is wrong with files of motion; tables are sound."""
+    """Everything that is wrong with files of motion, of a cohort whose tables are sound."""
     for specimen in cohort.specimen_names:
         markers = marker_set(cohort, specimen)
         skeleton = skeleton_in(cohort, specimen, subject_of(cohort, specimen))
+        # (K, 3) m, markers in ground while all coordinates, the pelvis's too, are zero
         rest = np.zeros((1, len(BODIES), len(COORDINATES)))
         neutral = marker_places(skeleton, markers, rest)[0]
         for row in trial_rows(cohort, specimen):

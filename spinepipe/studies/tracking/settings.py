@@ -1,4 +1,9 @@
-"""What a study of tracked motions asks."""
+"""What a study of tracked motions asks.
+
+Names of approaches: ``ik`` is inverse kinematics, which looks for markers near their places and
+asks for no loads of muscles; ``optk`` is the best motion over all its time, in which these loads
+and accelerations cost as well. Passive elements are what joints resist with (`motion.passive`).
+"""
 
 import re
 from typing import Annotated, Literal
@@ -10,11 +15,22 @@ from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
 
 CONSTRAINED = "ik_constrained_"
-"""What the names of approaches with ratios begin with; the rest names the set."""
+"""What the names of approaches with ratios begin with; the rest names the set.
+
+A ratio is the share of a joint in the rotation of all joints together (``ratios.csv``); another
+sense than that of `Ratio`.
+"""
 
 OWN = "optk_calibrated"
-"""The approach that calibrates passive elements on the motion itself."""
+"""The approach that calibrates passive elements on the person's trials of the motion's own kind."""
 
+# ik: markers alone, each frame by itself; joints turn and do not slide
+# ik_constrained_*: the same, three rotations in all shared out among joints by ratios
+# ik_smooth: markers and small accelerations over the whole motion; no loads
+# ik_springs: each frame by itself, joints that slide too and resist as generic passive elements do
+# optk_zero: dynamics without passive elements
+# optk_generic: with those of passive.csv or of the cohort; *_lower, *_upper: A times those factors
+# optk_calibrated, optk_from_*: with passive elements that were fitted, see `OWN` and `LEARNT`
 APPROACHES = (
     "ik",
     f"{CONSTRAINED}christophy_2012",
@@ -36,7 +52,7 @@ _WITH_RATIOS = f"{CONSTRAINED}[a-z0-9_]+"
 
 
 def _known(name: str) -> str:
-    """The name as it is, if it is one of an approach."""
+    """The name as it is, if it is one of an approach; else a `ValueError` with what is allowed."""
     if name in APPROACHES or re.fullmatch(_WITH_RATIOS, name):
         return name
     listed = f"{one_of(APPROACHES)}, or {CONSTRAINED} and the name of a set in ratios.csv"
@@ -51,24 +67,36 @@ Approach = Annotated[
     AfterValidator(_known),
     WithJsonSchema({"type": "string", "pattern": f"^({_PATTERN})$"}),
 ]
-"""Name of an approach; whether the ratios are there is for the checks to say."""
+"""Name of an approach; whether ``ratios.csv`` has the set it names is for the checks to say."""
 
 LEARNT: dict[str, str] = {
     "optk_from_flexion": "flexion_extension",
     "optk_from_bending": "lateral_bending",
     "optk_from_both": "both",
 }
-"""From which trials passive elements are, that an approach takes over."""
+"""Kind of trials on which the passive elements were calibrated that an approach takes over.
+
+``both``: on trials of both kinds together.
+"""
 
 Scaling = Literal["none", "markers"]
 
+# see `motion.residual_terms.MuscleDemand`
 ForceCost = Literal["squared", "minus_gravity", "level_difference"]
 
+# a factor: of the generic stiffness in `Profiles`, of `Scales.loads` in `trade_off`
 Ratio = Annotated[float, Field(gt=0, le=1e4)]
 
 
 class Scales(BaseModel):
-    """By what each kind of error is divided before it is squared."""
+    """By what each kind of error is divided before it is squared: the larger, the less it counts.
+
+    Some are no such divisors. ``loads`` multiplies the squares of moments and forces, so that more
+    counts more. ``frames`` multiplies the mean over a trial's nodes of all these squares.
+    ``skin_mm`` and ``shared_skin_mm`` are SDs of an error that markers share (`motion.skin`). A and
+    B are the numbers of a passive element, load = A (exp(B q) - 1): A is its size, B how early it
+    stiffens; ``size_sd`` and ``shape_sd`` draw calibrated ones to the generic ones.
+    """
 
     model_config = FORM
 
@@ -113,7 +141,11 @@ class Scales(BaseModel):
 
 
 class JointLimits(BaseModel):
-    """How far joints may go."""
+    """How far joints may go: both ends of each range are multiplied by `times`.
+
+    Beyond it is dear, not forbidden. Approaches that ask for markers alone, `ik_smooth` and those
+    with ratios have no ranges.
+    """
 
     model_config = FORM
 
@@ -133,7 +165,12 @@ class JointLimits(BaseModel):
 
 
 class Profiles(BaseModel):
-    """Whether markers tell stiffness: one region is made stiffer and softer, all else fitted."""
+    """Whether markers tell stiffness: one region is made stiffer and softer, all else fitted.
+
+    A profile likelihood. Each ratio is the factor of the generic A at which the region's passive
+    elements are held in one coordinate (`profile`). A fit for each of them takes long, hence fewer
+    intervals than for the motions themselves.
+    """
 
     model_config = FORM
 
@@ -145,7 +182,10 @@ class Profiles(BaseModel):
 
 
 class Tracking(Study):
-    """Motions of the spine from markers on the skin, by several approaches."""
+    """Motions of the spine from markers on the skin, by several approaches.
+
+    A motion is a spline whose nodes are ``intervals`` + 1 and evenly spaced in time.
+    """
 
     kind: Literal["tracking"]
     approaches: EachOnce[Approach] = Field(default=APPROACHES, description="what is compared")

@@ -2,6 +2,11 @@
 
 A round tries all effects beside those that are in the model; later ones try them in the place of
 one that is. What a round led to is seen from the model of the next.
+
+Log evidence is the natural logarithm of the ratio of marginal likelihoods, with the effect over
+without it: above zero it speaks for the effect. An effect has several forms (variant, how values
+differ between places, shape); that of most evidence stands for it. Of a screen the table has the
+evidence of all forms together (their mean, by the forms' shares) in the best one's row.
 """
 
 import re
@@ -31,8 +36,15 @@ from spinepipe.studies.discrepancy.words import general
 from spinepipe.tables import StudyTables
 
 SCREEN, REFIT, NO_FIT = "screen", "refit", "no_fit"
+"""Ways of trying: all effects in the linearised problem, the leading few by the full simulator.
+
+The third is no way, but a column: see `EvidenceRound`.
+"""
+
 ENTERED, LEFT, REPLACED = "entered", "left", "replaced"
 MOST_ROUNDS = 12
+"""Columns at most; see `rounds_shown`."""
+
 _EVENTS = {
     ENTERED: ("^", BLUE, "entered after it"),
     LEFT: ("v", VERMILLION, "left after it"),
@@ -41,14 +53,26 @@ _EVENTS = {
 """Marker, colour and words of what a round led to."""
 
 _IN_PLACE = re.compile(r"^in place of (?P<names>.+?)(?P<trial>, beside .+)? \(\d+\)$")
+"""Round as `SearchState.stage` names it: ``in place of X (2)``, of two effects ``X and Y``.
+
+With ``, beside Z`` it is a trial: Z already in the place of X, and all others tried beside it.
+Rounds in which effects may enter are a number alone and do not match.
+"""
+
 _ROW_MM, _TURNED_MM, _WRAPPED_MM, _KEY_MM = 4.8, 30.0, 14.0, 17.0
+"""Height of a row, of headings (turned, or wrapped), and of the key below."""
+
 _FULL = 6
 """Rounds whose columns fill the figure; of more the headings are turned."""
 
 _DARK = 0.62
+"""Share of the colour scale above which numbers are white, to be read on dark cells."""
+
 _LEAST_DECADES = 1.0
+"""Powers of ten above the threshold that colours span at least, lest little looks like much."""
+
 _NO_TRACE = 0.05
-"""Evidence below this, of either sign, is printed as 0: the tests say nothing of the effect."""
+"""Log evidence below this, of either sign, is printed as 0: the tests say nothing of the effect."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +81,15 @@ class EvidenceRound:
 
     Attributes
     ----------
-    beside : effects in the model. without : those in whose place the others were tried.
-    trial : whether it tried a second effect in the place of one: no step of the search's own.
-    evidence : a row per effect with ``screen`` and ``refit``, of its best form, NaN where none, and
-        ``no_fit``: whether it was refitted and no form has a result, so that it is no rival.
-    events : what became of effects after it.
+    stage : its name, as in the table ``candidates`` but without ``screen`` or ``refit``.
+    beside : effects in the model, once for each form. without : those that were taken out of it,
+        in whose place the others were tried; none in a round in which effects may enter.
+    trial : whether it tried two effects in the place of one. The model was then changed for the
+        trial alone, so that it says nothing of what the round before led to.
+    evidence : a row per effect with ``screen`` and ``refit``, the log evidence of its best form,
+        NaN where none has any, and ``no_fit``: whether it was refitted and no form has a result, so
+        that it is no rival.
+    events : effects that entered, left or gave way after it, by name.
     """
 
     stage: str
@@ -73,7 +101,7 @@ class EvidenceRound:
 
     @property
     def shown(self) -> pd.Series:
-        """The evidence of each effect: of its refit, else of the screen."""
+        """Log evidence by effect: of its refit, else of the screen."""
         return self.evidence[REFIT].fillna(self.evidence[SCREEN])
 
     @property
@@ -85,7 +113,7 @@ class EvidenceRound:
 
 
 def _counted(names: Sequence[str]) -> str:
-    """``nonlinear stiffening x 2, creep``: forms of one effect together."""
+    """Names in plain words, forms of one effect counted: ``nonlinear stiffening × 2, creep``."""
     times = Counter(names)
     return ", ".join(general(name) + (f" × {n}" if n > 1 else "") for name, n in times.items())
 
@@ -93,12 +121,18 @@ def _counted(names: Sequence[str]) -> str:
 def rounds(candidates: pd.DataFrame, end: Sequence[str] = ()) -> list[EvidenceRound]:
     """All rounds in their order, each with what it led to.
 
+    What a round led to is the difference between its model and that of the next one; trials are
+    passed over.
+
     Parameters
     ----------
-    end : effects that the verdict stands for; empty: the last round says no more.
+    candidates : the table of that name. Its stages of the search count, ``design`` does not.
+    end : effects that the verdict names or cannot tell apart: the model after the last round.
+        Empty: nothing is said of what the last round led to.
     """
     if candidates["log_evidence"].isna().all():
         return []
+    # "screen 2" is the way and the round; rows of a round may be of both ways
     way = candidates["stage"].str.partition(" ")
     looked = candidates.assign(way=way[0], round=way[2])
     looked = looked[looked["way"].isin((SCREEN, REFIT))]
@@ -107,12 +141,14 @@ def rounds(candidates: pd.DataFrame, end: Sequence[str] = ()) -> list[EvidenceRo
     for one, later in pairwise(steps):
         one.events.update(_events(_model(one), _model(later)))
     if end and steps:
+        # a verdict names an effect once, whatever its forms: it has as many as it had, or one
         known = {name: _model(steps[-1]).get(name, 1) for name in end}
         steps[-1].events.update(_events(_model(steps[-1]), Counter(known)))
     return found
 
 
 def _round(stage: str, rows: pd.DataFrame) -> EvidenceRound:
+    """A round from its rows of the table, with their ``way``."""
     best = rows.groupby(["effect", "way"])["log_evidence"].max().unstack("way")
     evidence = best.reindex(columns=[SCREEN, REFIT])
     refitted = evidence.index.isin(rows.loc[rows["way"] == REFIT, "effect"])
@@ -124,19 +160,23 @@ def _round(stage: str, rows: pd.DataFrame) -> EvidenceRound:
 
 
 def _model(one: EvidenceRound) -> Counter[str]:
-    """Effects that the search had in its model when it came to the round, and their forms."""
+    """How many forms of each effect were in the model when the search came to the round."""
     return Counter([*one.beside, *one.without])
 
 
 def _events(before: Counter[str], later: Counter[str]) -> dict[str, str]:
-    """What entered, and what left or gave way to that."""
+    """What entered, and what left, or gave way where something entered at the same time."""
+    # differences of counts keep what is above zero
     entered, gone = later - before, before - later
     lost = REPLACED if entered else LEFT
     return dict.fromkeys(sorted(entered), ENTERED) | dict.fromkeys(sorted(gone), lost)
 
 
 def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Figure:
-    """Effects by rounds: the evidence in each cell, coloured where it passes the threshold."""
+    """Effects by rounds: the log evidence in each cell, coloured where it passes the threshold.
+
+    Names are bold where the verdict has them: blue for certain, green for one of a set.
+    """
     verdict = read_verdict(tables.files["verdict"])
     end = (*verdict.named, *verdict.candidates_in_set)
     every = rounds(tables["candidates"], end)
@@ -156,6 +196,7 @@ def evidence_by_round_figure(study: Discrepancy, cohort: Cohort, tables: StudyTa
     threshold = verdict.threshold.log_evidence
     forms = [one.evidence.reindex(names) for one in shown]
     failed = np.column_stack([one[NO_FIT].fillna(False).to_numpy(bool) for one in forms])
+    # what was refitted without a result is white, whatever the screen said of it
     levels, scale = _levels(np.where(failed, -np.inf, grid), threshold)
     image = draw_heat(axis, levels, scale, None, levels <= 0.0)
     _numbers(axis, grid, forms, levels, scale)
@@ -189,7 +230,10 @@ def _panel(figure: Figure, columns: int) -> Axes:
 
 
 def rounds_shown(every: Sequence[EvidenceRound]) -> list[EvidenceRound]:
-    """Of many rounds those that led to something first, in their order."""
+    """At most `MOST_ROUNDS`, in their order.
+
+    The first, which has the base alone, and those that led to something go before the others.
+    """
     if len(every) <= MOST_ROUNDS:
         return list(every)
     ranked = sorted(range(len(every)), key=lambda n: (n > 0 and not every[n].events, n))
@@ -197,7 +241,14 @@ def rounds_shown(every: Sequence[EvidenceRound]) -> list[EvidenceRound]:
 
 
 def _levels(grid: Array, threshold: float | None) -> tuple[Array, Normalize]:
-    """(R, C) decades above the threshold, 0 below it; without one all is white."""
+    """Colours (R, C) of R effects in C rounds: powers of ten above the threshold, 0 below it.
+
+    Without a threshold all is white. NaN stays NaN and is hatched.
+
+    Parameters
+    ----------
+    grid : (R, C) log evidence. threshold : log evidence that noise seldom exceeds, above zero.
+    """
     if threshold is None:
         return np.where(np.isfinite(grid), 0.0, np.nan), Normalize(0.0, 1.0)
     beyond = np.log10(np.maximum(grid, threshold) / threshold)
@@ -207,7 +258,13 @@ def _levels(grid: Array, threshold: float | None) -> tuple[Array, Normalize]:
 def _numbers(
     axis: Axes, grid: Array, by_way: Sequence[pd.DataFrame], levels: Array, scale: Normalize
 ) -> None:
-    """The evidence in each cell, small where it was only screened."""
+    """The log evidence in each cell: bold where refitted, small where only screened.
+
+    Parameters
+    ----------
+    grid : (R, C) log evidence. by_way : `EvidenceRound.evidence` of each column, rows as of grid.
+    levels, scale : of `_levels`.
+    """
     for row, column in np.argwhere(np.isfinite(grid)):
         value = float(grid[row, column])
         refitted = np.isfinite(by_way[column][REFIT].iloc[row])
@@ -245,6 +302,10 @@ def _mark(axis: Axes, names: Sequence[str], shown: Sequence[EvidenceRound]) -> N
 
 
 def _scale_bar(figure: Figure, axis: Axes, image: object, threshold: float, to: Normalize) -> None:
+    """The colours' key, from the threshold on; told in log evidence, though powers of ten are even.
+
+    Powers of ten within 1.5 times the threshold are left out, as they would stand upon its own.
+    """
     bar = figure.colorbar(image, ax=axis, location="right", aspect=30, shrink=0.8)  # type: ignore[arg-type]
     most = threshold * 10.0 ** float(to.vmax or 0.0)
     ticks = [threshold, *(x for d in range(7) for x in (10.0**d,) if 1.5 * threshold < x < most)]
@@ -255,6 +316,7 @@ def _scale_bar(figure: Figure, axis: Axes, image: object, threshold: float, to: 
 
 
 def _handles(shown: Sequence[EvidenceRound], grid: Array) -> list[Line2D | Patch]:
+    """Keys of the marks that are there."""
     handles: list[Line2D | Patch] = []
     if any(one.beside for one in shown):
         handles.append(Patch(fill=False, ec=BLUE, lw=1.2, label="in the model"))
@@ -272,6 +334,7 @@ def _handles(shown: Sequence[EvidenceRound], grid: Array) -> list[Line2D | Patch
 def _words(
     every: Sequence[EvidenceRound], shown: Sequence[EvidenceRound], hidden: int, verdict: Verdict
 ) -> str:
+    """The sentence below the figure; ``hidden``: how many effects have no row."""
     told = [
         "A column is a round of the search; best form of each effect; bold: refitted by the full "
         "simulator, else screened",

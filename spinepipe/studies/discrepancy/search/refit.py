@@ -1,4 +1,15 @@
-"""Nonlinear refits of the forms that lead the screen, with their evidence by Laplace's method."""
+"""Nonlinear refits of the forms that lead the screen, with their evidence by Laplace's method.
+
+The screen tries every effect to first order at the baseline's fit. A form is a variant of an effect
+(its options) and how its values may differ between joints, specimens and tests. Of its parameters,
+strengths switch it on: at the value off it does nothing. Shapes say how it then acts; of them "off"
+below means their default, the mean of their prior. A refit adds one form to those of the baseline's
+fit and fits all unknowns anew by the full simulator: stiffnesses of the base, parameters of the
+effects that stand already, and its own.
+
+All evidence is the natural logarithm of a ratio of marginal likelihoods (Bayes factor), all chi2 is
+of whitened residuals: imperfections of the set-up are in the noise.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,19 +34,30 @@ from spinepipe.studies.discrepancy.search.screen import SIZES, Screen, Screened,
 from spinepipe.studies.discrepancy.store import PieceRunner
 
 SMALLEST_START = 0.02
-"""Prior SDs from off at which a strength starts at least, so that its shapes have a say."""
+"""Declared prior SDs from off at which a strength starts at least. At off no reading depends on its
+shapes, so that a fit could not move them.
+"""
 
 STARTS = (1.0, 0.5, 0.2)
-"""Shares of the strength on the screen at which fits start, one after the other."""
+"""Shares of the strength found on the screen at which a fit starts. The next one is tried only
+where from the one before there is no fit, say because the spine has no equilibrium there.
+"""
 
 MOST_EFFECTS, MOST_FORMS = 4, (3, 3, 1, 1)
-"""Effects that lead the screen, and forms of each, that are refitted."""
+"""How many effects from the top of the screen are refitted, and of each, by its place, how many
+variants. A form with equal values may come besides, see `_forms`.
+"""
 
 ANOTHER_FORM = 3.0
-"""Log evidence by which a form with more unknowns must be better than a plainer one."""
+"""Log evidence by which a form with more unknowns must be better than a plainer one of the same
+effect: odds of 20 to 1, from which on evidence is called strong (Kass and Raftery 1995).
+"""
 
 SCREEN_SHARE, SCREEN_MARGIN = 0.75, 6.0
-"""The screen is linear: an effect may trail the leader by this share of its evidence and more."""
+"""How far an effect may be behind the leader of the screen and still be refitted: by this share of
+the leader's log evidence and by this many units besides, see `_least`. Much, as the screen is
+linear and a strong effect is not.
+"""
 
 
 @dataclass(frozen=True)
@@ -44,8 +66,11 @@ class Refit:
 
     Attributes
     ----------
-    log_evidence : against the fit before, the form's share of its effect taken off.
-    gain : drop of chi2.
+    fit : with the form last among its effects.
+    log_evidence : for the form, against the fit before. The logarithm of the form's share of its
+        effect (below 0, see `Trials.log_share`) is added, so that an effect gains nothing by having
+        many forms. Minus infinity where there is no fit, or it is not what its name says.
+    gain : chi2 of the fit before less that of this one.
     """
 
     form: CandidateForm
@@ -60,7 +85,7 @@ class Refit:
 
     @property
     def unknowns(self) -> int:
-        """Numbers that the form adds to what is fitted."""
+        """How many numbers the form adds to what is fitted."""
         unknowns = self.fit.hypothesis.unknowns
         return sum(one.supposed == len(self.fit.hypothesis.supposed) - 1 for one in unknowns)
 
@@ -72,7 +97,16 @@ def refits(
     run: PieceRunner,
     progress: Progress,
 ) -> tuple[Refit, ...]:
-    """The leading effects of a screen, refitted beside those of the baseline's fit; best first."""
+    """The leading forms of a screen, each refitted beside the baseline's fit, in the order of
+    `rank_refits`.
+
+    Variants that stand in the baseline's fit already are not added again. After the first refits,
+    the leading ones are tried once more with equal values everywhere, see `_simpler`.
+
+    Parameters
+    ----------
+    trials : of all effects, for the shares of their forms.
+    """
     by_name = {one.effect: one for one in trials}
     there = {one.form.variant for one in standing(baseline.fit)}
     new = [tried for tried in leading(screen) if tried.form.variant not in there]
@@ -85,10 +119,12 @@ def refits(
 
 
 def rank_refits(found: Sequence[Refit]) -> tuple[Refit, ...]:
-    """Refits, best first; of one effect's forms that are hardly behind the best, the plainest.
+    """Refits by log evidence, best first, but of each effect a plain form first, if one is near.
 
-    What an effect is in a specimen that was not measured, a form with values of their own for each
-    specimen tells badly: where the data hardly ask for it, equal values predict better.
+    Of the forms of one effect whose log evidence is less than `ANOTHER_FORM` behind the best, that
+    with the fewest unknowns takes the best one's place. A form with values of its own for each
+    specimen says little of a specimen that was not measured: unless the data clearly ask for it,
+    equal values predict better.
     """
     # of each effect the form with the fewest unknowns, of those near its best one
     ranked = sorted(found, key=lambda one: -one.log_evidence)
@@ -113,8 +149,16 @@ def rank_refits(found: Sequence[Refit]) -> tuple[Refit, ...]:
 def _simpler(
     found: Sequence[Refit], screen: Screen, before: Sequence[ActiveTerm]
 ) -> Iterator[ActiveTerm]:
-    """The leading refits of two effects with values the same everywhere, where not tried yet."""
+    """The best forms of two effects again, with values the same everywhere, where not tried yet.
+
+    They start from the values that the refit ended at (of places that differ, their mean).
+
+    Parameters
+    ----------
+    before : effects of the fit before; that of the refit stands behind them.
+    """
     ranked = sorted(found, key=lambda one: -one.log_evidence)
+    # each effect with its best refit; effects stand in the order of the worst refit of each
     best = list({one.name: one for one in reversed(ranked)}.values())[::-1][:2]
     tried = {one.form for one in found}
     for one in best:
@@ -129,11 +173,21 @@ def _simpler(
 def laplace(fit: JointFit, number: int, gain: float) -> float:
     """Log evidence for one supposed effect of a fit, whose unknowns lower chi2 by ``gain``.
 
-    Laplace's method (Kass and Raftery 1995, doi 10.2307/2291091): the likelihood is taken for
-    normal around the fit, a from off with curvature A. With the prior N(off, S) the evidence is
-    gain / 2 - log det(I + A S) / 2 - a' (A^-1 + S)^-1 a / 2. Strengths have prior SDs of t,
-    averaged over the sizes t of the screen, shapes those that they declare. Signed strengths have
-    half a normal as prior, which adds log 2 + log Phi(mean / sd) of the posterior: see `Group`.
+    Laplace's method (Kass and Raftery 1995, doi 10.2307/2291091): the likelihood of the effect's
+    parameters is taken for normal about the fit, which is a distance a from off, with the curvature
+    A of chi2 / 2. With the prior N(off, S) the log evidence is
+
+        gain / 2 - log det(I + A S) / 2 - a' (A^-1 + S)^-1 a / 2
+
+    S is diagonal. A strength has t times its declared prior SD, and the evidence (not its
+    logarithm) is averaged over the sizes t of the screen; a shape has its declared prior SD.
+    Strengths of which bounds allow one side of off alone have half a normal as prior, which adds
+    log 2 + log Phi(mean / sd) for each, with mean and SD of its posterior: see `Group`.
+
+    Parameters
+    ----------
+    number : of the effect among those supposed by the fit.
+    gain : chi2 without the effect less that of the fit.
     """
     unknowns = fit.hypothesis.unknowns
     own = np.array([u.supposed == number for u in unknowns])
@@ -141,6 +195,7 @@ def laplace(fit: JointFit, number: int, gain: float) -> float:
     chosen = [u for u in unknowns if u.supposed == number]
     away = fit.x[own] - np.array([u.mean for u in chosen])  # a: off is the mean of the prior
     is_strength = np.array([u.is_strength for u in chosen])
+    # the fit itself has a wider prior on strengths, by STRENGTH_SDS
     declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
     parameters = fit.hypothesis.supposed[number].form.variant.create().parameters
     sides = np.array([parameters[u.column].side for u in chosen])
@@ -160,9 +215,11 @@ def laplace(fit: JointFit, number: int, gain: float) -> float:
 
 
 def in_place(fit: JointFit, number: int) -> tuple[float, float]:
-    """Drop of chi2 by one supposed effect, and its log evidence, both to second order at the fit.
+    """Drop of chi2 by one effect of a fit, and its log evidence, by the curvature at the fit alone.
 
-    For an effect without which the others have no fit that it could be compared with.
+    For an effect without which the others have no fit, so that there is no chi2 to compare with: it
+    is taken as if chi2 were a parabola from the fit back to off, all other unknowns fitted anew.
+    The form's share of its effect is not in this log evidence.
     """
     own = np.array([u.supposed == number for u in fit.hypothesis.unknowns])
     off = np.array([u.mean for u in fit.hypothesis.unknowns])
@@ -172,8 +229,16 @@ def in_place(fit: JointFit, number: int) -> tuple[float, float]:
 
 
 def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
-    """(k, k) curvature of half chi2 by some unknowns, all others free (and weakly held)."""
-    # the Schur complement of J'J + P in the others, by their QR: P is square of their priors
+    """(k, k) second derivative of chi2 / 2 by k of the unknowns, where all others follow by a fit.
+
+    The others have their weak priors, the k have none: their prior comes in with the evidence.
+
+    Parameters
+    ----------
+    own : (m,) which of all unknowns.
+    """
+    # the Schur complement of J'J + P in the others, with P = diag(1 / sd^2) of their priors: F'F of
+    # the k columns of J less their projection on the others' [J; P^(1/2)], by QR
     jacobian = fit.whole_jacobian()
     priors = np.diag([1.0 / u.sd for u in fit.hypothesis.unknowns])
     others = np.vstack([jacobian[:, ~own], priors[np.ix_(~own, ~own)]])
@@ -185,7 +250,9 @@ def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
 
 
 def leading(screen: Screen) -> Iterator[ScreenedVariant]:
-    """Forms worth a refit."""
+    """Forms worth a refit: of the first effects of the screen, while their log evidence is above
+    `_least`.
+    """
     least = _least(screen.effects[0].log_evidence)
     for place, one in enumerate(screen.effects[:MOST_EFFECTS]):
         if one.log_evidence > least:
@@ -193,12 +260,15 @@ def leading(screen: Screen) -> Iterator[ScreenedVariant]:
 
 
 def _least(best: float) -> float:
-    """Evidence on the screen from which a refit may still win."""
+    """Log evidence on the screen above which a refit may still win; ``best`` : the leader's."""
     return max(0.0, best - SCREEN_MARGIN - SCREEN_SHARE * best)
 
 
 def _forms(one: Screened, most: int) -> list[ScreenedVariant]:
-    """The best form of each leading variant, and that of equal values where it is another.
+    """Of one effect the best form of each of its best variants, so many variants at most.
+
+    Besides, of the best variant, the form with the same values everywhere, if it is another one and
+    not far behind.
 
     Variants that are alike while weak (shapes of stiffening) part only in the refit.
     """
@@ -217,7 +287,10 @@ def _forms(one: Screened, most: int) -> list[ScreenedVariant]:
 
 
 def starting_term(tried: ScreenedVariant) -> ActiveTerm:
-    """The form with the typical strengths and the shapes that the screen suggests."""
+    """The form with the shapes, and the strengths, at which it does best on the screen.
+
+    A start has one value for all places: of strengths that differ between places the mean.
+    """
     variant = tried.form.variant
     parameters = variant.create().parameters
     values = variant.off(tried.sds)
@@ -228,7 +301,10 @@ def starting_term(tried: ScreenedVariant) -> ActiveTerm:
 
 
 def _value(p: Parameter, sds: float) -> float:
-    """A strength that many prior SDs from off, a little at least, inside its bounds."""
+    """A strength that many declared prior SDs from off, at least `SMALLEST_START`.
+
+    On the side of off that the bounds allow, and strictly between the bounds, as a descent needs.
+    """
     assert p.off is not None
     side = p.side or float(np.sign(sds) or 1.0)
     away = side * max(abs(sds), SMALLEST_START) * p.prior_scale
@@ -240,7 +316,8 @@ def _value(p: Parameter, sds: float) -> float:
 def refit(baseline: BaselineFit, one: ActiveTerm, trials: Trials) -> Refit:
     """One more form beside those of the baseline's fit.
 
-    What tips the segment over where it starts is tried again closer to off.
+    Where the spine has no stable equilibrium at the start (a load, or a joint that is too soft), or
+    the fit ends off the load path, it is started again closer to off, see `STARTS`.
     """
     before = baseline.fit
     for share in STARTS:
@@ -270,7 +347,9 @@ def _degenerate(fit: JointFit, number: int) -> bool:
 
 
 def weaker(one: ActiveTerm, share: float) -> ActiveTerm:
-    """The same, started at a share of the way from off."""
+    """The same term with its strengths started nearer to off: at that share of the way, in the
+    logarithm where fits work with it. Shapes stay.
+    """
     parameters, start = one.form.variant.create().parameters, one.start.copy()
     for column in one.form.variant.strengths:
         p = parameters[column]
@@ -281,7 +360,11 @@ def weaker(one: ActiveTerm, share: float) -> ActiveTerm:
 
 
 def standing(fit: JointFit) -> tuple[ActiveTerm, ...]:
-    """The effects of a fit, to start from again where it ended (places that differ: their mean)."""
+    """The effects of a fit, to start from again where it ended.
+
+    A start has one value for all places: of those that differ between places the mean move from the
+    old start, so of logarithmic parameters the geometric mean.
+    """
     found = []
     for number, one in enumerate(fit.hypothesis.supposed):
         parameters = one.form.variant.create().parameters

@@ -1,4 +1,8 @@
-"""Figure: predicted against measured motion after Bland and Altman."""
+"""Figure: predicted against measured motion after Bland and Altman.
+
+Each reading as the difference (predicted less measured) over the mean of the two, mm or deg, with
+the mean difference (bias) and the limits of agreement, bias +- 1.96 SD of the differences.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,20 +30,33 @@ from spinepipe.studies.joint_pose_sensitivity.findings import settling
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
+# columns of the table `agreement`, in the order in which `_draw_rows` takes them apart
 _NUMBERS = ["lower_limit", "upper_limit", "bias_low", "bias_high", "bias"]
 MOST_PANELS = 12
-"""With more of them, bias and limits are drawn in rows instead, without the readings."""
+"""With more joints and coordinates than this, bias and limits are drawn in rows instead of panels,
+without the readings.
+"""
 
 _DATASET, _OWN = "reduced", "calibrated"
+"""Poses whose fit neither failed nor is an outlier (`filters`), and the stiffness set that was
+fitted in the pose itself.
+"""
 _ACROSS_AT_MOST, _PANEL_MM, _KEY_MM = 3, 48.0, 16.0
 _MOST_OUTLINES = 300
+"""More dots than this become a picture inside the SVG, which stays small."""
 LIMITS = VERMILLION
+"""Colour of the limits of agreement."""
 
 
 def agreement_figure(
     study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
-    """A panel per joint and coordinate, or where there are many a row for each."""
+    """A panel per specimen, joint and coordinate; with more than `MOST_PANELS`, rows instead.
+
+    Parameters
+    ----------
+    tables : agreement, and for panels success and simulations.
+    """
     known = _usable(tables["agreement"], cohort)
     if known.empty:
         total = count(len(tables["agreement"]), "row")
@@ -65,12 +82,21 @@ def agreement_figure(
 
 
 def in_rows(table: pd.DataFrame, cohort: Cohort) -> bool:
-    """Whether there are too many joints and directions for a panel each."""
+    """Whether there are too many joints and coordinates for a panel each.
+
+    Parameters
+    ----------
+    table : agreement.
+    """
     return len(_usable(table, cohort)) > MOST_PANELS
 
 
 def _usable(table: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
-    """Rows with a result of the reduced dataset, by specimen, coordinate and joint from above."""
+    """Rows with a result of single joints in the reduced dataset.
+
+    By specimen, then joint from above, then coordinate. Rows without a result have too few pairs of
+    readings, or the same difference in all of them.
+    """
     rows = table[(table["status"] == "done") & (table["dataset"] == _DATASET)]
     single = rows[rows["joint"] != "*"]
     orders = {
@@ -85,7 +111,13 @@ def _usable(table: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
 
 @dataclass(frozen=True)
 class _AgreementPanel:
-    """One joint and coordinate of a specimen: the row of the table and the readings behind it."""
+    """One joint and coordinate of a specimen.
+
+    Attributes
+    ----------
+    row : of the table ``agreement``. readings : ``mean`` of predicted and measured, and their
+        ``difference``, predicted less measured, mm or deg.
+    """
 
     row: pd.Series
     readings: pd.DataFrame
@@ -93,6 +125,11 @@ class _AgreementPanel:
 
 
 def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int) -> _AgreementPanel:
+    """The readings behind a row of the table: all poses of the reduced dataset, tests and steps.
+
+    Step 0 is drawn too. Where motion is zeroed there it is a dot at (0, 0), which the table, its
+    limits and its n leave out.
+    """
     column = COORDINATE_COLUMNS[COORDINATES.index(row["coordinate"])]
     success, runs = tables["success"], tables["simulations"]
     kept = success.loc[success["reduced"] & (success["specimen"] == row["specimen"]), "pose"]
@@ -110,6 +147,7 @@ def _panel(row: pd.Series, tables: Mapping[str, pd.DataFrame], n_specimens: int)
 
 
 def _draw(axis: Axes, panel: _AgreementPanel) -> None:
+    """Readings as dots; bias and limits as lines, with bands for their 95 % intervals."""
     row, readings = panel.row, panel.readings
     axis.plot(
         readings["mean"],
@@ -132,7 +170,9 @@ def _draw(axis: Axes, panel: _AgreementPanel) -> None:
         axis.set_ylim(-1.0, 1.0)
         words = f"{EXACT}, n = {row['n']}"
     else:
-        # each limit in the middle of its interval, of which the outer end is in the table
+        # of the interval of a limit the table has the end away from the bias alone; towards the
+        # bias the band is drawn as wide. The interval itself (noncentral t, see `bland_altman`) is
+        # narrower on that side, the more so the fewer pairs there are
         _line(axis, row["bias"], (row["bias_low"], row["bias_high"]), BLACK)
         lower, upper, far = row["lower_limit"], row["upper_limit"], row["upper_limit_high"]
         sd_band = lower - row["lower_limit_low"]
@@ -146,6 +186,7 @@ def _draw(axis: Axes, panel: _AgreementPanel) -> None:
 
 
 def _line(axis: Axes, y: float, ends: tuple[float, float], color: str) -> None:
+    """A line at y with a band between ``ends``: full for the bias (black), dashed for limits."""
     axis.axhspan(*ends, color=color, alpha=0.15, lw=0, zorder=1)
     axis.axhline(y, color=color, lw=0.9, ls="-" if color == BLACK else (0, (5, 2)), zorder=4)
 
@@ -153,7 +194,9 @@ def _line(axis: Axes, y: float, ends: tuple[float, float], color: str) -> None:
 def _draw_rows(cohort: Cohort, known: pd.DataFrame, settled: str = "") -> Figure:
     """A panel per coordinate: bias with its interval on a line from limit to limit.
 
-    ``settled`` is what is to be said where motion was not simulated at rest, or nothing.
+    A row of a panel is a joint of a specimen, or where these are many of all specimens, whose bars
+    then lie over each other, half transparent. ``settled`` : a sentence where motion was read
+    before it had come to rest, or nothing.
     """
     names = [name for name in COORDINATES if name in set(known["coordinate"])]
     rows = rows_of(known, cohort.specimen_names, cohort.joint_names)

@@ -1,4 +1,10 @@
-"""Figure: what the enlargement of the published ends does, and the scale that films do not tell."""
+"""Figure: what two choices that films do not settle do to the published tangent model.
+
+A segment's moment grows as a tangent and is infinite at two rotations, its *ends*. Enlargement: by
+how many percent the ends lie beyond the rotations on the bending films. Scale: factor of the
+lateral stiffness of all segments, other rotations unchanged; films tell stiffness of segments over
+each other and not its size.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,12 +23,17 @@ from spinepipe.studies.scoliosis.tables import GROUPS
 from spinepipe.studies.scoliosis.words import OF_FILMS
 
 ROTATION, MOVED = "rotation_rmse_deg", "moved_deg"
+"""Columns of the table `variation`: root mean square error of all segments' rotations against the
+films, and largest change of one of them from the model as the study has it."""
+
 _STYLES: Mapping[str, tuple[str, str, Dashes]] = {
     "fitted": (VERMILLION, "s", (0, (4, 2))),
     "held_out": (BLUE, "o", "-"),
 }
+"""Colour, marker and dashes by group of films: those the model was fitted to, and the others."""
+
 LEAST_DEG = 1e-3
-"""Axes reach to this at least, where all is rounding."""
+"""Upper end of a vertical axis at least: smaller values are rounding and would fill the panel."""
 
 _TITLES = {
     ("enlargement", ROTATION): "Ends beyond the films",
@@ -32,12 +43,16 @@ _TITLES = {
 """Of panels, by what is varied and the column that is shown."""
 
 _HEIGHT_MM, _KEY_MM = 62.0, 16.0
+"""Of the panels, and of the explanation of the marks."""
 
 
 def enlargement_figure(
     study: Scoliosis, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
 ) -> Figure:
-    """Errors over the enlargement, then errors and largest change over the scale."""
+    """Errors over the enlargement, then errors and largest change over the scale.
+
+    A panel whose column is empty, as nothing was varied or nobody has a pose, is left out.
+    """
     rows = tables["variation"]
     parts = {
         name: rows[rows["varied"] == name].sort_values("value", kind="stable")
@@ -60,7 +75,10 @@ def enlargement_figure(
 
 
 def _line(axis: Axes, rows: pd.DataFrame, group: str, column: str) -> None:
-    """A line of one group of films, its least marked; nothing is drawn where nobody has a pose."""
+    """A line of one group of films, a ring at its least error; nothing where nobody has a pose.
+
+    Only errors have a best value: of the largest change no least is marked.
+    """
     color, marker, dashes = _STYLES[group]
     own = rows[rows["films"] == group].dropna(subset=[column])
     values = own[column].to_numpy(float)
@@ -72,6 +90,10 @@ def _line(axis: Axes, rows: pd.DataFrame, group: str, column: str) -> None:
 
 
 def _axes(axis: Axes, rows: pd.DataFrame, name: str, column: str, studied: float) -> None:
+    """Scales and labels, and a grey line at the study's own choice.
+
+    ``studied`` : the study's enlargement, percent; its scale is 1.
+    """
     if name == "scale":
         ends = float(rows["value"].min()), float(rows["value"].max())
         axis.set_xscale("log")
@@ -100,6 +122,7 @@ def _explain(figure: Figure, groups: Sequence[str], rows: pd.DataFrame) -> None:
     )
     handles.append(Line2D([], [], color=GREY, lw=0.6, label="as the study has it"))
     words = ["" if "held_out" in groups else "Nothing is held out."]
+    # a point pools the patients with a pose on every film of its group: fewer at some values
     lost = rows["n_patients"].max() - rows["n_patients"].min()
     if lost:
         words.append(
