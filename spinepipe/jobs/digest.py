@@ -161,12 +161,13 @@ def provenance(
     """
     settings = settings_of(study, kind_of(study.kind).job(job).ignores)
     name = "cohort_digest" if specimens is None else "specimens_digest"
+    read = cohort.digest if specimens is None else cohort.digest_of(specimens)
     return {
         "study": study.study,
         "kind": study.kind,
         "seed": str(getattr(study, "seed", "")),
-        "data_digest": _data_digest(cohort, specimens),
-        name: cohort.digest if specimens is None else cohort.digest_of(specimens),
+        "data_digest": read,
+        name: read,
         "config_digest": value_digest(settings),
         "code_digest": _code(study, job),
         KEY: digest_of(job, study, cohort, specimens, others),

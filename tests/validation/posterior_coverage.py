@@ -94,7 +94,9 @@ def _phantom(root: str, name: str, one: Joint, seed: int) -> Iterator[dict[str, 
     alone = problem_of(root, settings, name)
     found = fit(alone, 1, seed)
     assert found.status.usable, (name, found.message)
-    own = posterior_of(settings, cohort, alone, landmarks_of(settings, cohort, name), 0.0)
+    own = posterior_of(
+        settings, cohort, alone, landmarks_of(cohort, name, settings.landmark_sd_mm), 0.0
+    )
     target, (low, high) = own.target(), own.bounds
     start = np.zeros(own.unknowns.size)
     start[: len(FREE)] = normal_of(low, high, found.x)

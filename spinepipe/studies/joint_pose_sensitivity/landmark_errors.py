@@ -33,7 +33,7 @@ def run(root: str, study: str, specimen: str, sd_mm: str, output: str) -> None:
     settings, cohort = study_and_cohort(root, study)
     nominal, errors = _nominal(root, settings, specimen)
     as_they_are = {f"nominal_{name}": errors[name] for name in _ERRORS}
-    marks, count = landmarks_of(settings, cohort, specimen), settings.landmark_precision.poses
+    marks, count = landmarks_of(cohort, specimen), settings.landmark_precision.poses
     sets = marks.with_sd(float(sd_mm), count, settings.seed, f"precision/{specimen}")
     rows = []
     for pose, points in enumerate(sets):

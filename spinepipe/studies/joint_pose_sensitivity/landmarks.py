@@ -8,7 +8,6 @@ import numpy as np
 from spinepipe.cohort import Cohort
 from spinepipe.designs import sample_landmarks
 from spinepipe.effects.contract import Array
-from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.units import MM_PER_M
 
 LandmarkPoints = dict[str, dict[str, Array]]
@@ -51,12 +50,17 @@ class Landmarks:
         return (by_vertebra(self.names, points) for points in drawn[:count] / MM_PER_M)
 
 
-def landmarks_of(settings: JointPoseSensitivity, cohort: Cohort, specimen: str) -> Landmarks:
-    """The landmarks as the cohort lists them, with the SD that the study gives them."""
+def landmarks_of(cohort: Cohort, specimen: str, sd_mm: float | None = None) -> Landmarks:
+    """The landmarks as the cohort lists them.
+
+    Parameters
+    ----------
+    sd_mm : SD that a study gives all of them; None: the cohort's own.
+    """
     assert cohort.landmarks is not None  # asked for when the study was checked
     rows = cohort.landmarks[cohort.landmarks["specimen"] == specimen]
     own = rows["sd_mm"].fillna(0.0).to_numpy(float)
-    sd = own if settings.landmark_sd_mm is None else np.full(len(rows), settings.landmark_sd_mm)
+    sd = own if sd_mm is None else np.full(len(rows), sd_mm)
     names = tuple(zip(rows["vertebra"], rows["landmark"], strict=True))
     return Landmarks(names, rows[["x_mm", "y_mm", "z_mm"]].to_numpy(float), sd)
 

@@ -27,7 +27,7 @@ _ANGLES = [f"{name}_deg" for name in ROTATIONS]
 def sample(root: str, study: str, specimen: str, output: str) -> None:
     """Write the landmark sets of one specimen, pose by pose."""
     settings, cohort = study_and_cohort(root, study)
-    marks = landmarks_of(settings, cohort, specimen)
+    marks = landmarks_of(cohort, specimen, settings.landmark_sd_mm)
     sampled, poses = sample_landmarks(
         marks.points_mm, marks.sd_mm, settings.poses, settings.seed, specimen
     )

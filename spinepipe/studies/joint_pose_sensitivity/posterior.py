@@ -108,7 +108,7 @@ def _rows(
         found = fit(alone, settings.calibration.starts, specimen_seed(settings.seed, specimen))
         if not found.status.usable:
             return [refused_row(f"no fit in the cohort's own pose: {found.message}")], [], []
-        marks = landmarks_of(settings, cohort, specimen)
+        marks = landmarks_of(cohort, specimen, settings.landmark_sd_mm)
         own = posterior_of(settings, cohort, alone, marks, scatter_of(settings, found))
         target = own.target()
     except (RefusedModel, ValueError) as error:

@@ -39,7 +39,7 @@ def _rows(
     settings: JointPoseSensitivity, cohort: Cohort, specimen: str, sd_mm: float
 ) -> Iterator[dict[str, Any]]:
     """One row per joint and coordinate; the directions are those of the study's own poses."""
-    marks, found = landmarks_of(settings, cohort, specimen), []
+    marks, found = landmarks_of(cohort, specimen), []
     for points in marks.with_sd(sd_mm, settings.poses, settings.seed, specimen):
         try:
             frames = frames_from_landmarks(cohort.vertebrae, points)

@@ -100,7 +100,7 @@ def results(root: Path) -> DiscrepancyResults:
         }
     )
     folder = root / "config/cohorts/chains"
-    return searched(study, cohorts.read(folder), str(root), at_once)
+    return searched(study, cohorts.read(folder), None, at_once)
 
 
 @pytest.mark.slow

@@ -40,7 +40,7 @@ def verdict_of(folder: Path, root: Path, effects: list[str]) -> dict[str, object
             "bootstrap": 50,
         }
     )
-    found = searched(study, cohorts.read(folder), str(root), at_once)
+    found = searched(study, cohorts.read(folder), None, at_once)
     assert encode(found.verdict)  # can be kept
     return dict(json.loads(json.dumps(plain_data(found.verdict))))
 

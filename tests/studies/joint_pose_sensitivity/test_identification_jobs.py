@@ -752,7 +752,7 @@ def test_landmark_errors_of_every_sd_draw_the_same_directions(tmp_path: Path) ->
     exact = cohort.landmarks.iloc[0]
     offsets = []
     for sd in (0.5, 2.0):
-        sets = landmarks_of(settings, cohort, "a").with_sd(sd, 20, settings.seed, "precision/a")
+        sets = landmarks_of(cohort, "a").with_sd(sd, 20, settings.seed, "precision/a")
         point = [s[exact["vertebra"]][exact["landmark"]] for s in sets]
         offsets.append(1000.0 * np.array(point) - exact[["x_mm", "y_mm", "z_mm"]].to_numpy(float))
     assert len(offsets[0]) == 20
