@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from zlib import crc32
 
 from whereabouts import told_of_the_machine
 
@@ -185,11 +186,16 @@ class Project:
         return [(int(pid), float(start)) for pid, start in map(str.split, lines)]
 
     def files(self) -> dict[str, str]:
-        """Result files, each with its number on the disk and its date; logs left out."""
+        """Result files, each with number on the disk and checksum, then date; logs left out.
+
+        The disk may give a new file the number of one that it replaced.
+        """
         results = self.path("results")
         found = {path: path.stat() for path in results.rglob("*") if path.is_file()}
         return {
-            path.relative_to(results).as_posix(): f"{state.st_ino} {state.st_mtime_ns}"
+            path.relative_to(results).as_posix(): (
+                f"{state.st_ino}-{crc32(path.read_bytes())} {state.st_mtime_ns}"
+            )
             for path, state in found.items()
             if "logs" not in path.parts
         }
