@@ -17,10 +17,16 @@ import numpy as np
 from spinepipe.effects import create
 from spinepipe.model import ScopedEffect
 from spinepipe.statics import free_parameters
-from spinepipe.statics.batched import Cases, Spines, Stack, poses_by
-from spinepipe.statics.batched.spines import stack_spines
 from tests.reference.bridge import load_case, spine_model
 from tests.reference.peers.chain import random_chain
+
+try:
+    from spinepipe.statics.batched import Cases, Spines, Stack, poses_by
+    from spinepipe.statics.batched.spines import stack_spines
+except ModuleNotFoundError:  # an older commit, which calls them so
+    from spinepipe.statics.many.spines import stacked as stack_spines
+
+    from spinepipe.statics.many import Cases, Spines, Stack, poses_by
 
 ROOT = Path(__file__).parents[1]
 JOINTS, SIZES = (3, 6, 17), (1, 10, 100, 1000, 10_000)
