@@ -8,10 +8,10 @@ from typing import Any, Literal
 import pandas as pd
 
 from spinepipe.api.result import Result, frame
-from spinepipe.api.study import Say, model_path, silent, study_of
+from spinepipe.api.study import Say, model_path, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.model.file import ModelFile, read_model
-from spinepipe.progress import Progress
+from spinepipe.progress import Progress, silent
 from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.api.result import Result, with_units
-from spinepipe.api.study import Say, silent, study_of
+from spinepipe.api.study import Say, study_of
 from spinepipe.cohort import Cohort
+from spinepipe.progress import silent
 from spinepipe.studies.global_sensitivity.analyse import analysed, outputs_of
 from spinepipe.studies.global_sensitivity.base import base, stiffness_of
 from spinepipe.studies.global_sensitivity.batch import Batch
@@ -144,9 +145,7 @@ def _responses(study: GlobalSensitivity, cohort: Cohort, specimen: str, values: 
 
 def _headline(table: pd.DataFrame) -> str:
     """The factor with the largest total index in most outputs."""
-    name = next(
-        (one for one in ("ST", "mu_star", "S1", "S1_RBD") if one in set(table["index"])), ""
-    )
+    name = next((one for one in _TOTAL if one in set(table["index"])), "")
     known = table[(table["index"] == name) & table["estimate"].notna()]
     if known.empty:
         return "No index could be computed."

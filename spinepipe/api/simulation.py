@@ -8,6 +8,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames, load_cases, spine_model
+from spinepipe.effects.contract import Array
 from spinepipe.model import RefusedModel
 from spinepipe.model.file import ModelFile, effects_for
 from spinepipe.status import Status
@@ -63,16 +64,16 @@ def _rows(
 ) -> Iterator[dict[str, Any]]:
     cases = load_cases(cohort, specimen, tests, np.zeros(3))
     effects = effects_for(model, specimen, cohort.joint_names)
-    ended: list[Any] = [(None, Status.REFUSED, "the model has no effect for this specimen")]
+    ended: list[tuple[Array | None, Status, str]] = []
+    refusal = "the model has no effect for this specimen"
     if effects:
         frames, damping = joint_frames(cohort, specimen), np.array(Damping().in_order())
         try:
             spine = spine_model(cohort, specimen, frames, effects, damping)
             ended = motions(spine, cases, cohort.zeroed_at_step_0)
         except RefusedModel as error:
-            ended = [(None, Status.REFUSED, str(error))]
-    if len(ended) < len(cases):
-        ended *= len(cases)
+            refusal = str(error)
+    ended = ended or [(None, Status.REFUSED, refusal)] * len(cases)
     for case, (motion, status, message) in zip(cases, ended, strict=True):
         shown = np.full((len(case.steps), len(cohort.joint_names), 6), np.nan)
         if motion is not None:

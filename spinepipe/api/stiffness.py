@@ -9,15 +9,21 @@ import pandas as pd
 
 from spinepipe.api.result import Result, frame
 from spinepipe.api.simulation import simulate
-from spinepipe.api.study import NAME, Say, model_path, silent, study_of
+from spinepipe.api.study import NAME, Say, model_path, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, read_model
+from spinepipe.progress import silent
 from spinepipe.status import USABLE
-from spinepipe.studies.base_model import BUSHING, beside_bushings, own_values
+from spinepipe.studies.base_model import BUSHING
 from spinepipe.studies.cohort_stiffness.fit import fitted
 from spinepipe.studies.cohort_stiffness.left_out import predicted_by_others
 from spinepipe.studies.cohort_stiffness.pool import pooled
-from spinepipe.studies.cohort_stiffness.problem import SEEN, start_stiffness
+from spinepipe.studies.cohort_stiffness.problem import (
+    base_effects,
+    own_values_note,
+    start_stiffness,
+    with_stiffness,
+)
 from spinepipe.studies.cohort_stiffness.representations import POOLED
 from spinepipe.studies.cohort_stiffness.settings import (
     NOBODY,
@@ -27,7 +33,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     tests_of,
 )
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, STIFFNESS
-from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS
+from spinepipe.units import STIFFNESS_COLUMNS
 
 Row = dict[str, Any]
 Rows = dict[str, list[Row]]
@@ -151,10 +157,6 @@ def _rows(
     labels = load_sets(study, tests) if leave_out == "test" else (whole,)
     found: Rows = {one.name: [] for one in (STIFFNESS, FITS, ERRORS)}
 
-    def effects(specimen: str, left_out: bool) -> Any:
-        joints = cohort.joint_names
-        return () if file is None else beside_bushings(file, specimen, joints, left_out)
-
     def add(rows: Mapping[str, list[Row]], **where: str) -> None:
         for table, own in found.items():
             own += [{**where, **row} for row in rows.get(table, ())]
@@ -164,21 +166,21 @@ def _rows(
         folds = [*((label, NOBODY) for label in labels), *((whole, one) for one in newcomers)]
         for label, without in folds:
             say(f"pooled fit to {label}, without {without}")
-            others = {one: effects(one, one == without) for one in cohort.specimen_names}
-            note = "" if without == NOBODY else _note(file, cohort, without)
+            others = {
+                one: base_effects(file, cohort, one, left_out=one == without)
+                for one in cohort.specimen_names
+            }
+            note = "" if without == NOBODY else own_values_note(file, cohort, without)
             rows = pooled(study, cohort, name, label, without, others, note)
             add(rows, representation=name, fitted_to=label)
         return found
     for specimen in cohort.specimen_names:
         for label in labels:
             say(f"{specimen}: fit to {label}")
-            rows = fitted(study, cohort, specimen, name, label, effects(specimen, False))
-            add(
-                rows,
-                specimen=specimen,
-                representation=name,
-                fitted_to=label,
+            rows = fitted(
+                study, cohort, specimen, name, label, base_effects(file, cohort, specimen)
             )
+            add(rows, specimen=specimen, representation=name, fitted_to=label)
     of_all = [row for row in found["stiffness"] if row["fitted_to"] == whole]
     for specimen in newcomers:
         say(f"{specimen}: predicted from the others")
@@ -187,15 +189,11 @@ def _rows(
             for one in cohort.specimen_names
             if one != specimen
         ]
-        beside, note = effects(specimen, True), _note(file, cohort, specimen)
+        beside = base_effects(file, cohort, specimen, left_out=True)
+        note = own_values_note(file, cohort, specimen)
         rows = predicted_by_others(study, cohort, specimen, name, whole, fits, beside, note)
         add(rows, specimen=specimen, representation=name, fitted_to=whole)
     return found
-
-
-def _note(file: ModelFile | None, cohort: Cohort, specimen: str) -> str:
-    seen = file is not None and own_values(file, specimen, cohort.joint_names)
-    return SEEN if seen else ""
 
 
 def _model(
@@ -210,11 +208,7 @@ def _model(
     specimens = tuple(dict.fromkeys(usable["specimen"]))
     values = []
     for specimen, rows in usable.groupby("specimen", sort=False):
-        k = start.copy()
-        for joint, coordinate, value in rows[["joint", "coordinate", "stiffness"]].itertuples(
-            index=False
-        ):
-            k[cohort.joint_names.index(joint), COORDINATES.index(coordinate)] = value
+        k = with_stiffness(start, cohort.joint_names, rows)
         for joint, row in zip(cohort.joint_names, k.tolist(), strict=True):
             given = dict(zip(STIFFNESS_COLUMNS, row, strict=True))
             values.append(Values(specimen=str(specimen), joint=joint, **given))

@@ -20,10 +20,6 @@ Say = Callable[[str], None]
 AnyStudy = TypeVar("AnyStudy", bound=Study)
 
 
-def silent(line: str) -> None:
-    """Say nothing."""
-
-
 def study_of(kind: type[AnyStudy], cohort: Cohort, asked: Mapping[str, Any]) -> AnyStudy:
     """The study with these settings, and the default of every other.
 

@@ -187,12 +187,14 @@ class Evaluator:
     def _evaluation(self, x: Array, seen: CaseResiduals | str) -> Evaluation:
         if isinstance(seen, str):
             return Evaluation(None, None, (), self.coordinate, self.sharing, seen)
-        residual = self._residuals(x, seen.readings)
-        of_readings = [
-            counted(self._errors(number, one))[1][:, None] * self._jacobian(number, by_x)
-            for number, (one, by_x) in enumerate(zip(seen.readings, seen.by_x, strict=True))
+        told = [counted(self._errors(number, one)) for number, one in enumerate(seen.readings)]
+        priors = self.problem.by_priors
+        residual = np.concatenate([*(one for one, _ in told), priors @ x])
+        by_x = [
+            slopes[:, None] * self._jacobian(number, by_x)
+            for number, ((_, slopes), by_x) in enumerate(zip(told, seen.by_x, strict=True))
         ]
-        jacobian = np.concatenate([*of_readings, self.problem.by_priors])
+        jacobian = np.concatenate([*by_x, priors])
         return Evaluation(residual, jacobian, seen.poses, self.coordinate, self.sharing)
 
     def on_record(self, x: Array) -> Evaluation | None:

@@ -201,13 +201,7 @@ class Settling:
     def solve(
         self, points: Sequence[tuple[int, Array]], models: Sequence[SpineModel] = ()
     ) -> list[CaseResiduals | str]:
-        """What is seen with the unknowns at x (m,), or why there is nothing.
-
-        Parameters
-        ----------
-        points : x of each of some searches, with the search's number.
-        models : of each point, where they are not all of this one; they differ from it in numbers.
-        """
+        """What is seen at the ends of settling runs; parameters as of `AtRest.solve`."""
         models = models or [self._model] * len(points)
         bases = _at_points(models, self._free, points)
         steps = STEP * np.eye(len(self._free))

@@ -38,6 +38,7 @@ from spinepipe.studies.cohort_stiffness.predict import predict_motion
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
     base_effects,
+    base_of,
     calibration_problem,
     origin,
     specimen_tests,
@@ -188,7 +189,7 @@ def run(
     """Write the tables of one specimen; ``fitted`` is the file of its own stiffness, if any."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     tests = specimen_tests(settings, cohort, specimen)
-    others = base_effects(root, settings, cohort, specimen)
+    others = base_effects(base_of(root, settings), cohort, specimen)
     name = finest(representations_of(settings, cohort.joint_names))
     frame = read_frame(fitted[0]) if fitted else None
     model, why = _simulation(settings, cohort, specimen, tests, others, name, frame)

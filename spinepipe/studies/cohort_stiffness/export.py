@@ -5,7 +5,13 @@ from spinepipe.cohort.specimen import joint_frames
 from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError, one_of
 from spinepipe.status import USABLE
-from spinepipe.studies.cohort_stiffness.problem import base_effects, start_stiffness, stiff_model
+from spinepipe.studies.cohort_stiffness.problem import (
+    base_effects,
+    base_of,
+    start_stiffness,
+    stiff_model,
+    with_stiffness,
+)
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, NUISANCE, STIFFENING
 from spinepipe.studies.cohort_stiffness.settings import (
     ALL,
@@ -16,7 +22,6 @@ from spinepipe.studies.cohort_stiffness.settings import (
 from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.tables import read_frame
-from spinepipe.units import COORDINATES
 
 CRITERIA = ("left_out_specimen", "left_out_case", "fitted")
 """What recommends a representation: motion that no fit has seen, as far as any was held out."""
@@ -48,7 +53,7 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
         k = _fitted(study, cohort, wanted, name, k)
     if name in STIFFENING and not wanted.start:
         told += ", at rest: that it grows with motion is not in the file"
-    others = base_effects(str(wanted.root), study, cohort, wanted.specimen)
+    others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
     frames = joint_frames(cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)
     return opensim_document(model, f"the cohort's own joints, stiffness: {told}")
@@ -92,9 +97,4 @@ def _fitted(
         found = f"no fit of {wanted.specimen} by {name}{why}"
         remedy = "choose another --representation, or add --start"
         raise InputError([problem("SPECIMEN", found, "a specimen that was fitted", remedy)])
-    k = start.copy()
-    for joint, coordinate, value in fitted[["joint", "coordinate", "stiffness"]].itertuples(
-        index=False
-    ):
-        k[cohort.joint_names.index(joint), COORDINATES.index(coordinate)] = value
-    return k
+    return with_stiffness(start, cohort.joint_names, fitted)

@@ -30,6 +30,7 @@ from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
     base_effects,
+    base_of,
     calibration_problem,
     origin,
     specimen_tests,
@@ -70,7 +71,7 @@ def run(
     And what was fitted beside: errors of joint centres and axes.
     """
     settings, cohort = study_of_kind(CohortStiffness, root, study)
-    others = base_effects(root, settings, cohort, specimen)
+    others = base_effects(base_of(root, settings), cohort, specimen)
     rows = fitted(settings, cohort, specimen, representation, fitted_to, others)
     made = origin("fit", root, settings, cohort, [specimen])
     paths = {STIFFNESS: stiffness, FITS: fits, ERRORS: errors, NUISANCES: nuisances}

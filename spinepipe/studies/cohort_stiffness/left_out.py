@@ -15,16 +15,17 @@ from spinepipe.studies.cohort_stiffness.fit_rows import stiffness_rows
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
+    base_of,
     origin,
     own_values_note,
     specimen_tests,
     start_stiffness,
+    with_stiffness,
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stiffening import Growth, laws, median_growth
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.units import COORDINATES
 
 SOURCE = "others_median"
 
@@ -41,11 +42,12 @@ def run(
 ) -> None:
     """Write the median of the other specimens' stiffness and the errors it leaves."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
+    base = base_of(root, settings)
     rows = predicted_by_others(
         *(settings, cohort, specimen, representation, fitted_to),
         [read_frame(path) for path in others],
-        base_effects(root, settings, cohort, specimen, left_out=True),
-        own_values_note(root, settings, cohort, specimen),
+        base_effects(base, cohort, specimen, left_out=True),
+        own_values_note(base, cohort, specimen),
     )
     read = [mark_of(path) for path in others]
     made = origin("left_out", root, settings, cohort, [specimen], read)
@@ -99,8 +101,7 @@ def _median(
     keys, values = ["joint", "coordinate"], ["stiffness", "growth"]
     rows = pd.concat(fitted).astype(dict.fromkeys(values, float))
     median = rows.groupby(keys, as_index=False)[values].median()
-    joints = [cohort.joint_names.index(joint) for joint in median["joint"]]
-    k[joints, [COORDINATES.index(name) for name in median["coordinate"]]] = median["stiffness"]
+    k = with_stiffness(k, cohort.joint_names, median)
     growth = median_growth(settings, cohort.joint_names, representation, median)
     return k, growth, len(fitted)
 

@@ -19,6 +19,7 @@ from spinepipe.studies.cohort_stiffness.predict import error_rows, predict_motio
 from spinepipe.studies.cohort_stiffness.problem import (
     SpecimenTests,
     base_effects,
+    base_of,
     driven,
     origin,
     specimen_tests,
@@ -55,7 +56,7 @@ def run(
     """Write published stiffness, its errors, and the sign checks of the specimen."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
     tests = specimen_tests(settings, cohort, specimen)
-    others = base_effects(root, settings, cohort, specimen)
+    others = base_effects(base_of(root, settings), cohort, specimen)
     values: list[Row] = []
     seen: list[Row] = []
     levels = has_levels(settings, cohort.joint_names)

@@ -23,6 +23,7 @@ from spinepipe.studies.cohort_stiffness.fit_rows import (
 from spinepipe.studies.cohort_stiffness.predict import error_rows
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
+    base_of,
     calibration_problem,
     origin,
     own_values_note,
@@ -74,11 +75,12 @@ def run(
 ) -> None:
     """Write what the pooled fit says of its specimens, or of the one that was left out."""
     settings, cohort = study_of_kind(CohortStiffness, root, study)
+    base = base_of(root, settings)
     others = {
-        name: base_effects(root, settings, cohort, name, left_out=name == without)
+        name: base_effects(base, cohort, name, left_out=name == without)
         for name in cohort.specimen_names
     }
-    note = "" if without == NOBODY else own_values_note(root, settings, cohort, without)
+    note = "" if without == NOBODY else own_values_note(base, cohort, without)
     rows = pooled(settings, cohort, representation, fitted_to, without, others, note)
     made = origin("pool", root, settings, cohort)
     paths = {STIFFNESS: stiffness, ERRORS: errors, FITS: fits, POOLING: pooling}

@@ -11,6 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from spinepipe.calibration import MeasuredCase, Problem
 from spinepipe.cohort import Cohort
@@ -167,6 +168,14 @@ def start_stiffness(study: CohortStiffness, cohort: Cohort, representation: str)
     return stiffness_of_joints(cohort, study.stiffness, levels)
 
 
+def with_stiffness(start: Array, joints: Sequence[str], rows: pd.DataFrame) -> Array:
+    """(J, 6) ``start`` with what rows have of ``joint``, ``coordinate`` and ``stiffness``, SI."""
+    k = start.copy()
+    places = [joints.index(joint) for joint in rows["joint"]]
+    k[places, [COORDINATES.index(name) for name in rows["coordinate"]]] = rows["stiffness"]
+    return k
+
+
 def stiff_model(
     cohort: Cohort,
     specimen: str,
@@ -183,20 +192,24 @@ def stiff_model(
 
 
 def base_effects(
-    root: str, study: CohortStiffness, cohort: Cohort, specimen: str, left_out: bool = False
+    model: ModelFile | None, cohort: Cohort, specimen: str, left_out: bool = False
 ) -> tuple[ScopedEffect, ...]:
-    """Effects that act on a specimen besides bushings; ``left_out`` as in `effects_for`."""
-    model = _of_study(root, study)
+    """Effects of a base that act on a specimen besides bushings; ``left_out`` as in `effects_for`.
+
+    Parameters
+    ----------
+    model : the base, see `base_of`; None for none.
+    """
     return () if model is None else beside_bushings(model, specimen, cohort.joint_names, left_out)
 
 
-def own_values_note(root: str, study: CohortStiffness, cohort: Cohort, specimen: str) -> str:
+def own_values_note(model: ModelFile | None, cohort: Cohort, specimen: str) -> str:
     """What must be told of a left-out specimen whose effects have values found on itself."""
-    model = _of_study(root, study)
     return SEEN if model and own_values(model, specimen, cohort.joint_names) else ""
 
 
-def _of_study(root: str, study: CohortStiffness) -> ModelFile | None:
+def base_of(root: str, study: CohortStiffness) -> ModelFile | None:
+    """The model that a study builds on; ``root`` is the folder of the Snakefile."""
     return None if study.base is None else _model(stamp(study.base.path(Path(root))))
 
 
