@@ -43,7 +43,7 @@ test-kernels: dev-env  ## numeric tests under each kernel of the linear algebra 
 
 lint: dev-env  ## format, lint and type checks, and Snakemake's own linter
 	$(BIN)/ruff format --check .
-	$(BIN)/ruff check .
+	$(BIN)/ruff check --no-cache .
 	$(BIN)/mypy
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint

@@ -24,9 +24,8 @@ try:
     from spinepipe.statics.batched import Cases, Spines, Stack, poses_by
     from spinepipe.statics.batched.spines import stack_spines
 except ModuleNotFoundError:  # an older commit, which calls them so
-    from spinepipe.statics.many.spines import stacked as stack_spines
-
     from spinepipe.statics.many import Cases, Spines, Stack, poses_by
+    from spinepipe.statics.many.spines import stacked as stack_spines
 
 ROOT = Path(__file__).parents[1]
 JOINTS, SIZES = (3, 6, 17), (1, 10, 100, 1000, 10_000)
