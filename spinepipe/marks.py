@@ -33,6 +33,7 @@ BLANK = "0" * _LENGTH
 
 _TEXTS = {
     ".svg": "<!-- {} -->\n",
+    ".pdf": "% {}\n",
     ".html": "<!-- {} -->\n",
     ".osim": "<!-- {} -->\n",
     ".yaml": "# {}\n",
@@ -43,7 +44,10 @@ _TEXTS = {
 _TAIL_BYTES = 512
 _CONTENT, _KEY = CONTENT.encode(), KEY.encode()
 _AT_END = re.compile(
-    _CONTENT + rb": ([0-9a-f]{64})(?: -->\n<!-- |\n# )" + _KEY + rb": ([0-9a-f]{64})(?: -->\n|\n)\Z"
+    _CONTENT
+    + rb": ([0-9a-f]{64})(?: -->\n<!-- |\n# |\n% )"
+    + _KEY
+    + rb": ([0-9a-f]{64})(?: -->\n|\n)\Z"
 )
 _BEFORE_END_OF_PNG = re.compile(
     _CONTENT + rb"\0([0-9a-f]{64}.{4}).{4}tEXt" + _KEY + rb"\0([0-9a-f]{64}).{4}\0{4}IEND.{4}\Z",

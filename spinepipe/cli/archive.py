@@ -21,7 +21,7 @@ from spinepipe.jobs.report import descriptor_of
 from spinepipe.marks import mark_in
 from spinepipe.muscles.myo_sim import origin_of_myo_sim
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.report.page.document import origin
+from spinepipe.report.page.origin import origin
 from spinepipe.report.words import count
 from spinepipe.schema.datapackage import FILE
 from spinepipe.studies import read as studies

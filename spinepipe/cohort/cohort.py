@@ -79,6 +79,10 @@ class CohortHeader(BaseModel):
         description="true: nobody was measured; what was put in comes out again, and findings say "
         "that it is no evidence",
     )
+    rebuilt: bool = Field(
+        default=False,
+        description="true: nobody's own readings, but entered or rebuilt from numbers in print",
+    )
     vertebrae: tuple[VertebraName, ...] = Field(
         strict=False,
         description="names from caudal to cranial, the first is fixed to ground",
@@ -128,6 +132,7 @@ class Cohort:
     supports : joint coordinates that rigs fix; names may be ``*``.
     preload : loads that act before step 0 and all along; specimen and test may be ``*``.
     made_up : whether nobody was measured.
+    rebuilt : whether it was entered or rebuilt from numbers in print.
     further : tables that a kind of study reads besides, by the stem of their file; rows keep the
         number of their line in it.
     acknowledged_warnings : groups of what looks impossible and is meant.
@@ -153,6 +158,7 @@ class Cohort:
     supports: pd.DataFrame | None = None
     preload: pd.DataFrame | None = None
     made_up: bool = False
+    rebuilt: bool = False
     acknowledged_warnings: tuple[Group, ...] = ()
 
     @property

@@ -267,6 +267,7 @@ def _cohort(
         supports=final.get("supports"),
         preload=final.get("preload"),
         made_up=header.made_up,
+        rebuilt=header.rebuilt,
         acknowledged_warnings=header.acknowledged_warnings,
         digest=_digest(folder, forms),
         further={stem: table for stem, table in tables.items() if stem not in TABLES},

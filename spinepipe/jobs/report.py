@@ -6,20 +6,27 @@ says nothing that the tables and their code do not, so no digest holds it and no
 
 from collections.abc import Collection
 from dataclasses import replace
+from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
 from spinepipe.jobs.digest import mark_of, report_digest
 from spinepipe.jobs.inputs import study_of
-from spinepipe.marks import write_marked
+from spinepipe.marks import KEY, write_marked
+from spinepipe.report.conclusions import rows_of
+from spinepipe.report.forms.chart import Drawing
+from spinepipe.report.page.comparison import AGAINST, comparison, paper_of
 from spinepipe.report.page.document import Picture, ResultTables
+from spinepipe.report.page.study_page import Results
+from spinepipe.report.tables import CONCLUSIONS
 from spinepipe.report.words import listed
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
-from spinepipe.tables import StudyTables, read_metadata
+from spinepipe.tables import StudyTables, from_rows, read_metadata, write
 
 
 def run(
@@ -35,6 +42,12 @@ def run(
     """Write a page from the files of all tables, pictures (SVG), captions and ``others``."""
     settings, cohort = study_of(root, study)
     kind_page = import_module(f"{PACKAGE}.{settings.kind}.page")
+    read = [mark_of(path) for path in [*tables, *figures, *others.values()]]
+    folder = Path(output).parent
+    if hasattr(kind_page, "page"):
+        _write_page(kind_page, settings, cohort, page, tables, figures, output, others, read)
+        _describe(settings, cohort, folder)
+        return
     titles = {figure.name: figure.title for figure in kind_of(settings.kind).figures}
     results = results_of(kind_page.READ, titles, tables, figures, captions, others)
     document = kind_page.document(settings, cohort, results)
@@ -42,14 +55,53 @@ def run(
     if page == "report" and added:
         more = f"{listed(added)} (`make full` makes them and the page full.html, which shows them)"
         document = replace(document, left_out=(*document.left_out, more))
-    read = [mark_of(path) for path in [*tables, *figures, *others.values()]]
     read += [_text(path) for path in captions]
     digest = report_digest(page, settings, cohort, read)
     write_marked(document.html(settings, cohort), output, digest)
-    folder = Path(output).parent
-    told = descriptor_of(settings, cohort, folder)
+    _describe(settings, cohort, folder)
+
+
+def _describe(study: Study, cohort: Cohort, folder: Path) -> None:
+    """Write what the tables are that the study has by now."""
     with appearing(folder / FILE) as temporary:
-        temporary.write_text(told, "utf-8")
+        temporary.write_text(descriptor_of(study, cohort, folder), "utf-8")
+
+
+def _write_page(
+    kind_page: Any,
+    study: Study,
+    cohort: Cohort,
+    page: str,
+    tables: list[str],
+    figures: list[str],
+    output: str,
+    others: dict[str, str],
+    read: list[str],
+) -> None:
+    """Write the page, beside it its conclusions as a table, and pages of comparisons."""
+    results = Results(
+        StudyTables.read([path for path in tables if Path(path).stem in kind_page.READ], others),
+        {Path(path).stem: read_metadata(path) for path in tables},
+        {Path(path).stem: Drawing.read(Path(path).stem, _text(path)) for path in figures},
+    )
+    made = kind_page.page(study, cohort, results)
+    digest = report_digest(page, study, cohort, read)
+    newest = max((Path(path).stat().st_mtime for path in tables), default=0.0)
+    date = datetime.fromtimestamp(newest, UTC).date().isoformat()
+    folder = Path(output).parent
+    papers = {}
+    for shape in kind_of(study.kind).tables:
+        rows = results.table(shape.name)
+        if shape.name.startswith(AGAINST) and len(rows):
+            papers[f"{shape.name}.html"] = title = f"Beside {paper_of(shape.name)}"
+            write_marked(
+                comparison(shape, title, rows, study), folder / f"{shape.name}.html", digest
+            )
+    write_marked(made.html(study, cohort, results, papers=papers, date=date), output, digest)
+    if page == "report":
+        metadata = {"study": study.study, "kind": study.kind, KEY: digest}
+        told = from_rows(CONCLUSIONS, rows_of(made.told))
+        write(told, folder / f"{CONCLUSIONS.name}.parquet", metadata)
 
 
 def descriptor_of(study: Study, cohort: Cohort, folder: Path) -> str:

@@ -1,5 +1,6 @@
 """What figures and findings call coordinates, units, numbers, load cases and lists of names."""
 
+import re
 from collections.abc import Iterable
 from math import floor, isfinite, log10
 
@@ -81,6 +82,13 @@ def fixed(value: float, decimals: int = 2) -> str:
     return zero if text == f"-{zero}" else text.replace("-", _MINUS)
 
 
+def rounded_to(value: float, exponent: int) -> str:
+    """A number rounded to a power of ten: 2 150 to 10², 0.05 to 10⁻²."""
+    shown = round(value, -exponent) or 0.0  # never -0
+    text = f"{shown:,.{max(0, -exponent)}f}"
+    return text.replace(",", _THIN_SPACE).replace("-", _MINUS)
+
+
 def percent(part: int, whole: int) -> str:
     """A share as a whole percentage; a share that is not quite 0 or 100 % is not rounded to it."""
     if not whole:
@@ -137,3 +145,12 @@ def listed(names: Iterable[str], most: int = _MOST, last: str | None = "and") ->
     if len(every) < 2 or last is None:
         return ", ".join(every)
     return f"{', '.join(every[:-1])} {last} {every[-1]}"
+
+
+_JOINT = re.compile(r"([CTLS]\d+)([CTLS]\d+)")
+
+
+def level(joint: str) -> str:
+    """A joint by its vertebrae: ``L4L5`` is L4–L5; another name as it is."""
+    found = _JOINT.fullmatch(joint)
+    return f"{found[1]}–{found[2]}" if found else joint

@@ -14,6 +14,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.form import TableForm
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem
+from spinepipe.report.tables import CONCLUSIONS
 from spinepipe.schema import Table
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles
@@ -152,7 +153,7 @@ class Kind:
 
     def table(self, name: str) -> Table:
         """The table of that name."""
-        return next(table for table in self.tables if table.name == name)
+        return next(table for table in (*self.tables, CONCLUSIONS) if table.name == name)
 
     def figure(self, name: str) -> Figure:
         """The figure of that name."""

@@ -21,7 +21,7 @@ from spinepipe.documents.names import folder_fault, name_fault
 from spinepipe.marks import marked
 from spinepipe.report.page import document as page
 from spinepipe.report.page import space
-from spinepipe.report.page.document import origin
+from spinepipe.report.page.origin import origin
 from spinepipe.report.style import picture, style
 from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.tracking import in_space as tracking_space

@@ -22,7 +22,8 @@ def outputs_of(place, kind, job):
 
 
 def caption_of_figure(wildcards):
-    return Path(layout(wildcards.study).caption(wildcards.figure)).read_text("utf-8")
+    caption = Path(layout(wildcards.study).caption(wildcards.figure))
+    return caption.read_text("utf-8") if caption.is_file() else ""
 
 
 # One set of rules for each kind of study that has a study file: their patterns name the studies, so
@@ -103,6 +104,7 @@ for kind in PROJECT.kinds:
                     caption="../report/figure.rst",
                     category="{study}",
                 ),
+                pdf=update(f"{drawn}.pdf"),
                 png=update(f"{drawn}.png"),
             log:
                 f"{LOGS}/figure_{{figure}}.log",

@@ -7,13 +7,8 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import (
-    Document,
-    ResultTables,
-    Sortable,
-    beside_paper,
-    sortable,
-)
+from spinepipe.report.page.document import Document, ResultTables
+from spinepipe.report.page.tables import Sortable, beside_paper, sortable
 from spinepipe.schema import Column, Table, all_declared
 from spinepipe.studies.cohort_stiffness.page_findings import findings
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS

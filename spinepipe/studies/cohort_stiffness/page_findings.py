@@ -6,7 +6,8 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.page.document import ResultTables, judged
+from spinepipe.report.page.document import ResultTables
+from spinepipe.report.page.tables import judged
 from spinepipe.report.words import AXIS, after_number, case, count, number, percent
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones

@@ -14,13 +14,8 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import (
-    Document,
-    Headline,
-    ResultTables,
-    Sortable,
-    sortable,
-)
+from spinepipe.report.page.document import Document, Headline, ResultTables
+from spinepipe.report.page.tables import Sortable, sortable
 from spinepipe.report.words import listed, plain
 from spinepipe.schema import Column
 from spinepipe.studies.discrepancy.field_tables import (

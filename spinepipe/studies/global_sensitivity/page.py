@@ -6,7 +6,8 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, ResultTables, Sortable, page_tables, sortable
+from spinepipe.report.page.document import Document, ResultTables
+from spinepipe.report.page.tables import Sortable, page_tables, sortable
 from spinepipe.report.words import fixed, number
 from spinepipe.schema import Column
 from spinepipe.sensitivity_analysis.global_indices.design import DUMMY

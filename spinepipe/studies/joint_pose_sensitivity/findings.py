@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
-from spinepipe.report.page.document import ResultTables, judged
+from spinepipe.report.page.document import ResultTables
+from spinepipe.report.page.tables import judged
 from spinepipe.report.words import count, fixed, number, percent, tick
 from spinepipe.studies.joint_pose_sensitivity.figures.bootstrap import LOADING_NAMES
 from spinepipe.studies.joint_pose_sensitivity.figures.landmark_precision import (

@@ -9,14 +9,8 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import (
-    Document,
-    Picture,
-    ResultTables,
-    Sortable,
-    page_tables,
-    sortable,
-)
+from spinepipe.report.page.document import Document, Picture, ResultTables
+from spinepipe.report.page.tables import Sortable, page_tables, sortable
 from spinepipe.schema import Column, all_declared
 from spinepipe.studies.joint_pose_sensitivity.figures.agreement import in_rows
 from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (

@@ -25,13 +25,11 @@ class RangeOfMotionFiles(StudyFiles):
 
     joined = (*OF_JOBS, *BY_SPECIMEN)
     drawings = (
-        Figure(
-            "range_of_motion", "Range of motion", "figures.motion:levels_figure", ("rom_summary",)
-        ),
+        Figure("range_of_motion", "Range of motion", "charts:motion", ("rom_summary",)),
         Figure(
             "rom_variance",
-            "What motion hangs on",
-            "figures.motion:variance_figure",
+            "Where the variance comes from",
+            "charts:shares",
             ("rom_variance",),
         ),
     )

@@ -5,7 +5,8 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.page.document import ResultTables, judged
+from spinepipe.report.page.document import ResultTables
+from spinepipe.report.page.tables import judged
 from spinepipe.report.words import capital, count, fixed, listed, number, percent, plain
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.headline import DECIDING, SIGNIFICANT, ModelRanking, p_of

@@ -2,13 +2,8 @@
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import (
-    Document,
-    Headline,
-    ResultTables,
-    Sortable,
-    page_tables,
-)
+from spinepipe.report.page.document import Document, Headline, ResultTables
+from spinepipe.report.page.tables import Sortable, page_tables
 from spinepipe.studies.scoliosis.films import HELD_OUT
 from spinepipe.studies.scoliosis.findings import findings
 from spinepipe.studies.scoliosis.headline import headline

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import ResultTables, judged
+from spinepipe.report.page.document import ResultTables
+from spinepipe.report.page.tables import judged
 from spinepipe.report.words import capital, count, fixed, listed, number, percent, plain, tick
 from spinepipe.status import Status
 from spinepipe.studies.tracking.findings_of_errors import (

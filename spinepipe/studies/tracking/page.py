@@ -10,7 +10,8 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import Document, Headline, ResultTables, Sortable, page_tables
+from spinepipe.report.page.document import Document, Headline, ResultTables
+from spinepipe.report.page.tables import Sortable, page_tables
 from spinepipe.report.words import capital, count, listed
 from spinepipe.status import Status
 from spinepipe.studies.tracking.findings import findings, vibrating_approaches

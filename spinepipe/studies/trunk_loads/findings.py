@@ -6,7 +6,8 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import ResultTables, judged
+from spinepipe.report.page.document import ResultTables
+from spinepipe.report.page.tables import judged
 from spinepipe.report.words import capital, count, fixed, listed, number, percent, plain
 from spinepipe.studies.trunk_loads.findings_of_loads import (
     by_level,

@@ -17,8 +17,9 @@ from sweeps import sweep
 from spinepipe.cohort import Cohort
 from spinepipe.frames import Pose
 from spinepipe.jobs import report
-from spinepipe.report.page.document import Picture, ResultTables, sortable
+from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
+from spinepipe.report.page.tables import sortable
 from spinepipe.report.specimen import view_of
 from spinepipe.schema import Column
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort

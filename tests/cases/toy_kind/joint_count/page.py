@@ -4,7 +4,8 @@ from spinepipe.studies.joint_count.settings import JointCount
 from spinepipe.studies.joint_count.tables import TOTALS
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, ResultTables, sortable
+from spinepipe.report.page.document import Document, ResultTables
+from spinepipe.report.page.tables import sortable
 
 READ = ("totals",)
 

@@ -1,0 +1,1 @@
+"""Figures by forms: a kind of study selects rows and names axes, a form draws them."""

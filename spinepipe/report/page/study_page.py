@@ -1,0 +1,181 @@
+"""The page of a study, whatever its kind: made of conclusions, drawings and tables."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.resources import files
+
+import pandas as pd
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
+
+import spinepipe
+from spinepipe.cohort import Cohort
+from spinepipe.report.conclusions import Conclusion, Sentence, Told, told
+from spinepipe.report.forms.chart import Drawing
+from spinepipe.report.page.origin import origin
+from spinepipe.report.page.tables import Sortable
+from spinepipe.report.words import count, listed
+from spinepipe.studies.study import Study
+from spinepipe.tables import StudyTables
+
+MOST_FINDINGS = 5
+"""Of those that have something to say the first; all others stand folded."""
+
+MOST_KEYS = 4
+
+_MOST_NAMES = 6
+"""Specimens that the head of the page names; of more it tells how many."""
+
+LEVELS = {"stop": "stop", "check": "check", "ok": "fine"}
+"""Of lights, the worst first, with the word that follows their number."""
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """Results of one study, as its page reads them.
+
+    Attributes
+    ----------
+    tables : rows of each table that the page reads (its ``READ``); in ``tables.files`` paths of
+        other result files.
+    metadata : what each table's file says of where it comes from.
+    drawings : each figure, by its name.
+    """
+
+    tables: StudyTables
+    metadata: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    drawings: Mapping[str, Drawing] = field(default_factory=dict)
+
+    def table(self, name: str) -> pd.DataFrame:
+        """Rows of a table; a frame without rows or columns where it was not made, or not read."""
+        return self.tables.get(name, pd.DataFrame())
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """What differs between pages of studies.
+
+    Attributes
+    ----------
+    conclusions : what the kind's rules came to. sentences : the kind's table of sentences.
+    key_figure : beside the answer, by name; nothing where there is none to show it.
+    tables : folded below; those of a paper's comparison are not among them.
+    left_out : parts that the settings leave out, in words.
+    viewer : the 3-D view as HTML, see `spinepipe.report.viewer`; nothing without one.
+    """
+
+    conclusions: Sequence[Conclusion]
+    sentences: Sequence[Sentence]
+    key_figure: str
+    tables: Sequence[Sortable]
+    left_out: Sequence[str] = ()
+    viewer: str = ""
+
+    @cached_property
+    def told(self) -> list[Told]:
+        """All conclusions in words, in the order of the page."""
+        return told(self.conclusions, self.sentences)
+
+    def at(self, place: str) -> list[Told]:
+        """Those of a place."""
+        return [one for one in self.told if one.place == place]
+
+    def html(
+        self,
+        study: Study,
+        cohort: Cohort,
+        results: Results,
+        *,
+        papers: Mapping[str, str] | None = None,
+        date: str = "",
+    ) -> str:
+        """The page. It loads nothing from the network, and the same results make the same bytes.
+
+        Parameters
+        ----------
+        papers : pages of comparisons with papers, by file, with the words of the link.
+        date : of the results.
+        """
+        findings, lights = self.at("finding"), self.at("light")
+        drawings = dict(results.drawings)
+        key_figure = drawings.pop(self.key_figure, None)
+        used = {one.figure for one in findings[:MOST_FINDINGS]}
+        counts = [
+            (level, words, sum(one.level == level for one in lights))
+            for level, words in LEVELS.items()
+        ]
+        run = origin(study, results.metadata)
+        shown = {
+            "tag": tag(cohort),
+            "data": f"{cohort.title} · {_specimens(cohort)}",
+            "study": study.study,
+            "answer": self.at("answer")[0],
+            "key_numbers": [_key(one) for one in self.at("key")[:MOST_KEYS]],
+            "depends": self.at("depends"),
+            "key_figure": key_figure,
+            "findings": findings[:MOST_FINDINGS],
+            "others": findings[MOST_FINDINGS:],
+            "drawings": drawings,
+            "further": [one for name, one in drawings.items() if name not in used],
+            "lights": sorted(lights, key=lambda one: list(LEVELS).index(one.level)),
+            "counts": [one for one in counts if one[2]],
+            "viewer": Markup(self.viewer),
+            "tables": self.tables,
+            "methods": self.at("methods"),
+            "origin": run,
+            "date": date,
+            "left_out": self.left_out,
+            "source": cohort.source,
+            "papers": (papers or {}).items(),
+            "version": spinepipe.__version__,
+            "cite": f"spinepipe {spinepipe.__version__}, study {study.study} ({study.kind}) of the "
+            f"cohort {cohort.name}"
+            + (f", results of {date}" if date else "")
+            + ". Data: "
+            + cohort.source,
+        }
+        title = f"{study.study}: {self.at('answer')[0].text}"
+        return rendered("study_page.html", page=shown, title=title, index="../index.html")
+
+
+def rendered(template: str, **values: object) -> str:
+    """A template of this folder with the style sheet and script that all pages share."""
+    environment = Environment(
+        loader=FunctionLoader(part),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    style, script = (Markup(part(f"study_page.{end}")) for end in ("css", "js"))
+    return environment.get_template(template).render(style=style, script=script, **values)
+
+
+def part(name: str) -> str:
+    """Text of a file that lies beside this one."""
+    return files("spinepipe.report.page").joinpath(name).read_text(encoding="utf-8")
+
+
+def tag(cohort: Cohort) -> str:
+    """Where the data come from, in a word or two."""
+    if cohort.made_up:
+        return "Simulated data"
+    return "Rebuilt from print" if cohort.rebuilt else "Measured data"
+
+
+def _specimens(cohort: Cohort) -> str:
+    names = cohort.specimen_names
+    few = f": {listed(names, last=None)}" if len(names) <= _MOST_NAMES else ""
+    return f"{count(len(names), 'specimen')}{few}"
+
+
+def _key(one: Told) -> dict[str, str]:
+    """A key number: the value of that name in large type, its interval below it."""
+    value = one.values["value"]
+    return {
+        "number": f"{value:unit}",
+        "interval": f"{value:interval}",
+        "text": one.text,
+        "note": one.note,
+    }
