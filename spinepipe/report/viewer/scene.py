@@ -6,6 +6,7 @@ Axes of the product: x anterior, y superior, z right. mm and degrees.
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from spinepipe.effects.contract import Array
 from spinepipe.report.viewer.meshes import SIDES, Mesh
 
-_ARC_DEG = np.arange(-40.0, 231.0, 18.0)
+_ARC_DEG = np.arange(-40.0, 231.0, 15.0)
 """A moment is drawn as an arc about it, right-handed."""
 
 _SHORTEST, _LONGEST_PER_BODY = 0.45, 0.9
@@ -119,9 +120,14 @@ def rotation_vector(rotation: Array) -> Array:
     return Rotation.from_matrix(rotation).as_rotvec(degrees=True)
 
 
+def posed_axes(poses: Array) -> Array:
+    """(N, 3, 3) axes of bodies as columns, for their poses (N, 6)."""
+    return Rotation.from_rotvec(poses[:, 3:], degrees=True).as_matrix()
+
+
 def posed(points: Array, pose: Array) -> Array:
     """(…, 3) points of a body in ground, for its pose (6,)."""
-    return points @ Rotation.from_rotvec(pose[3:], degrees=True).as_matrix().T + pose[:3]
+    return points @ posed_axes(pose[None, :])[0].T + pose[:3]
 
 
 def load_path(load: Load, scene: Scene) -> Array:
@@ -202,7 +208,7 @@ def _rows(points: Array, decimals: int = 1) -> list[list[float | None]]:
 
 def _plain(values: Array, decimals: int) -> list[float | None]:
     """Rounded, None for NaN; whole numbers without a point, for they are shorter."""
-    rounded = [round(float(value), decimals) if np.isfinite(value) else None for value in values]
+    rounded = [round(x, decimals) if isfinite(x) else None for x in np.asarray(values).tolist()]
     return [int(value) if value is not None and value == int(value) else value for value in rounded]
 
 

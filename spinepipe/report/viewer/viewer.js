@@ -316,7 +316,7 @@ const SpineViewer = (function () {
     new ResizeObserver(redraw).observe(canvas);
     new MutationObserver(redraw).observe(document.documentElement, { attributes: true });
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-    open(0, Number(slider.value));
+    open(chooser ? chooser.selectedIndex : 0, Number(slider.value));
   }
 
   return { mount, posed, viewMatrix, partsOf, unpack };
