@@ -105,6 +105,8 @@ class Scene:
     ----------
     title : of the choice. slider : what the steps are, e.g. "Load". bodies : caudal to cranial;
         between two that follow each other a disc is drawn.
+    pause_ms : how long each step stands when they play.
+    one_scale : whether all steps are drawn at the same scale; else each fills the view.
     """
 
     title: str
@@ -113,6 +115,8 @@ class Scene:
     steps: Sequence[Step]
     caption: str
     camera: Camera = Camera()
+    pause_ms: int = 700
+    one_scale: bool = True
 
 
 def rotation_vector(rotation: Array) -> Array:
@@ -162,6 +166,8 @@ def scenes_as_data(scenes: Sequence[Scene]) -> dict[str, Any]:
             "title": scene.title,
             "slider": scene.slider,
             "caption": scene.caption,
+            "pause": scene.pause_ms,
+            "oneScale": scene.one_scale,
             "camera": [scene.camera.azimuth_deg, scene.camera.elevation_deg],
             "bodies": [
                 {"name": b.name, "mesh": mesh_of(b.mesh), "fixed": b.fixed} for b in scene.bodies

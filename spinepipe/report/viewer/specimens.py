@@ -10,17 +10,11 @@ from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose, transform_of
 from spinepipe.report.specimen import SpecimenView, view_of
+from spinepipe.report.specimen_curves import main_coordinate
 from spinepipe.report.viewer.meshes import Endplate, spine_meshes
 from spinepipe.report.viewer.scene import Body, Load, Scene, Step, rotation_vector
 from spinepipe.report.words import AXIS, after_number, case, fixed, number
-from spinepipe.units import (
-    COORDINATE_UNITS,
-    COORDINATES,
-    MM_PER_M,
-    ROTATIONS,
-    TRANSLATIONS,
-    from_si,
-)
+from spinepipe.units import COORDINATE_UNITS, COORDINATES, MM_PER_M, from_si
 
 MOST_SPECIMENS = 6
 _MOST_JOINTS = 3
@@ -116,14 +110,8 @@ def _loaded(cohort: Cohort, view: SpecimenView, cycle: MeasuredCycle, neutral: A
 
 
 def _motion_in_words(cohort: Cohort, cycle: MeasuredCycle, motion: Array) -> str:
-    """What was measured of the coordinate that moments drive, by joint from above.
-
-    A force turns joints by its lever arms: there it is the rotation that is largest.
-    """
-    driven = cycle.loaded
-    turned = np.nansum(np.abs(motion[:, len(TRANSLATIONS) :]), axis=0)
-    if cycle.is_pushed and turned.any():
-        driven = ROTATIONS[int(np.argmax(turned))]
+    """What was measured of the test's main coordinate, by joint from above."""
+    driven = main_coordinate(cycle)
     if driven is None:
         return "Measured pose dashed."
     unit = after_number(COORDINATE_UNITS[driven])

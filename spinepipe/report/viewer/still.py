@@ -58,7 +58,10 @@ def view_matrix(camera: Camera) -> Array:
 
 
 def telling_step(scene: Scene) -> int:
-    """The step whose bodies are farthest, on average, from where they are in the first."""
+    """The step whose bodies are farthest, on average, from where they are in the first.
+
+    One with muscles, where there are any.
+    """
 
     def places(step: Step) -> Array:
         if step.measured is None:
@@ -66,15 +69,19 @@ def telling_step(scene: Scene) -> int:
         return np.where(np.isfinite(step.measured), step.measured, step.poses)[:, :3]
 
     start = places(scene.steps[0])
-    apart = [np.linalg.norm(places(step) - start, axis=1).mean() for step in scene.steps]
-    return int(np.argmax(apart))
+    apart = [
+        (bool(step.muscles), np.linalg.norm(places(step) - start, axis=1).mean())
+        for step in scene.steps
+    ]
+    return apart.index(max(apart))
 
 
 def still(scene: Scene, number: int) -> str:
     """A step as an SVG; colours are variables of the page's style, so that dark mode has its own."""
     step, view = scene.steps[number], view_matrix(scene.camera)
     parts = sorted(_parts(scene, step, view), key=lambda part: part.depth)
-    flat = np.vstack([part.at[:, :2] for part in parts])
+    # muscles may leave the picture: some reach far beyond the vertebrae, which would then be small
+    flat = np.vstack([part.at[:, :2] for part in parts if part.look != "muscle"])
     low, high = flat.min(axis=0), flat.max(axis=0)
     scale = _FILLED * float(np.min([WIDTH, HEIGHT] / np.maximum(high - low, 1.0)))
     middle = 0.5 * (low + high)

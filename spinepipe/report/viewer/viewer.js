@@ -112,15 +112,15 @@ const SpineViewer = (function () {
     return parts.sort((a, b) => a.depth - b.depth);
   }
 
-  // Points that the view of a scene must hold at every step, ground
-  function reachOf(data, scene) {
+  // Points that the view must hold at all of these steps, ground. Muscles may leave it: some
+  // reach far beyond the vertebrae, which would then be small
+  function reachOf(data, scene, steps) {
     const found = [];
-    scene.steps.forEach(function (step) {
+    steps.forEach(function (step) {
       [step.poses, step.measured || []].forEach((poses) => poses.forEach(function (pose, k) {
         if (pose) { found.push(...posed(data.meshes[scene.bodies[k].mesh].box, pose)); }
       }));
       (step.loads || []).forEach((load) => found.push(...pathOf(load, step.poses)));
-      (step.muscles || []).forEach((muscle) => found.push(...muscle.path));
       (step.markers || []).forEach(function (row) {
         [row.slice(0, 3), row.slice(3)].forEach((p) => p[0] !== null && found.push(p));
       });
@@ -241,6 +241,7 @@ const SpineViewer = (function () {
     };
     function moveTo(k) {
       number = Math.max(0, Math.min(scene.steps.length - 1, k));
+      if (!scene.oneScale) { reach = reachOf(data, scene, [scene.steps[number]]); }
       slider.value = String(number);
       slider.setAttribute("aria-valuetext", scene.steps[number].label);
       says.textContent = scene.steps[number].says;
@@ -255,13 +256,12 @@ const SpineViewer = (function () {
     function start() {
       play.textContent = "Pause";
       says.setAttribute("aria-live", "off"); // nobody wants every frame read out
-      const pause = scene.steps.length > 15 ? 90 : 600;
-      timer = window.setInterval(() => moveTo((number + 1) % scene.steps.length), pause);
+      timer = window.setInterval(() => moveTo((number + 1) % scene.steps.length), scene.pause);
     }
     function open(k, first) {
       stop();
       scene = data.scenes[k];
-      reach = reachOf(data, scene);
+      reach = reachOf(data, scene, scene.steps);
       if (!camera) { camera = scene.camera.slice(); }
       find("figcaption").textContent = scene.caption;
       find(".slider").textContent = scene.slider;

@@ -86,7 +86,7 @@ def _scene(
     person = (str(rows["specimen"].iloc[0]), *names)
     if person not in shaped:
         shaped[person] = _bodies(names, poses[0])
-    return Scene(title, "Time", shaped[person], steps, caption)
+    return Scene(title, "Time", shaped[person], steps, caption, pause_ms=100)
 
 
 def _bodies(names: list[str], poses: Array) -> list[Body]:

@@ -1,6 +1,7 @@
 """The trunk in 3-D for the page: of each person the spine and the muscles, task by task."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -96,12 +97,12 @@ def _scene(
         disc = np.clip(rows["compression_n"].to_numpy(float) / top_n, 0.0, 1.0)
         told = asked[asked["task"] == task] if len(asked) else asked
         loads, says = _hands(told, poses[-1], len(bodies) - 1)
-        says = f"{capital(plain(task))}{says}. {_loads_in_words(rows)}"
+        says = f"{capital(plain(task))}{says}. {_loads_in_words(rows, cohort.vertebrae)}"
         says += "" if muscles else " Its muscle forces are not stored by line."
         steps.append(
             Step(capital(plain(task)), says, poses, loads=loads, disc=disc, muscles=muscles)
         )
-    return Scene(person, "Task", bodies, steps, caption)
+    return Scene(person, "Task", bodies, steps, caption, one_scale=False)
 
 
 def _poses(centres: Array) -> Array:
@@ -136,14 +137,16 @@ def _hands(asked: pd.DataFrame, thorax: Array, body: int) -> tuple[list[Load], s
     return [Load("force", body, at, kg * STANDARD_GRAVITY)], words
 
 
-def _loads_in_words(rows: pd.DataFrame) -> str:
+def _loads_in_words(rows: pd.DataFrame, vertebrae: Sequence[str]) -> str:
     """Largest compression and its level; and how the task ended where it did not converge."""
+    sides = dict(zip(rows.index, pairwise(vertebrae), strict=True))
     loads = rows["compression_n"].dropna()
     ended = [ENDED[s] for s in rows["status"].dropna().unique() if s in ENDED]
     doubt = f" Do not use: it ended {ended[0]}." if ended else ""
     if loads.empty:
         return f"No forces were found.{doubt}"
-    level = str(loads.idxmax())
+    lower, upper = sides[str(loads.idxmax())]
+    level = f"{upper}–{lower}"
     return f"Largest compression {newton(float(loads.max()))}, at {level}.{doubt}"
 
 
