@@ -6,6 +6,7 @@ spinous and two transverse processes that are drawn out of its facets. Lengths i
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -88,11 +89,11 @@ def vertebra(
     across = 0.5 * depth_mm * np.cos(angles) * hollow
     aside = 0.5 * width_mm * np.sin(angles)
     rings = []
-    for share, size in _SACRUM_RINGS if sacrum else _VERTEBRA_RINGS:
+    for share, scale in _SACRUM_RINGS if sacrum else _VERTEBRA_RINGS:
         centre = (1.0 - share) * low.centre + share * high.centre
         axes = (1.0 - share) * low.axes + share * high.axes
         x, z = (axes[:, k] / np.linalg.norm(axes[:, k]) for k in (0, 2))
-        rings.append(centre + size * (np.outer(across, x) + np.outer(aside, z)))
+        rings.append(centre + scale * (np.outer(across, x) + np.outer(aside, z)))
     # both rims first, then the rings between; `order` finds a ring's place from below
     mesh = _Builder([rings[0], rings[-1], *rings[1:-1]])
     order = [0, *range(2, len(rings)), 1]
@@ -100,7 +101,7 @@ def vertebra(
     mesh.faces.append(tuple(first))
     mesh.faces.append(tuple(SIDES + k for k in reversed(first)))
     facets = {}
-    for band, (below, above) in enumerate(zip(order, order[1:], strict=False)):
+    for band, (below, above) in enumerate(pairwise(order)):
         a, b = below * SIDES, above * SIDES
         for i, j in zip(first, following, strict=True):
             facets[band, i] = len(mesh.faces)
@@ -111,8 +112,8 @@ def vertebra(
         size = np.array([depth_mm, height, width_mm])
         for facet, sections in _PROCESSES:
             face = facets[_PEDICLE_BAND, facet]
-            for *way, scale in sections:
-                mesh.extrude(face, axes @ (np.array(way) * size), scale)
+            for back, up, right, scale in sections:
+                mesh.extrude(face, axes @ (np.array([back, up, right]) * size), scale)
     return Mesh(np.vstack(mesh.vertices), tuple(mesh.faces))
 
 

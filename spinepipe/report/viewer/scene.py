@@ -135,7 +135,7 @@ def posed(points: Array, pose: Array) -> Array:
 
 
 def load_path(load: Load, scene: Scene) -> Array:
-    """(P, 3) mm from the load's point, ground axes: an arrow that ends there, or an arc about it."""
+    """(P, 3) mm from the load's point, ground axes: an arrow that ends there, or an arc."""
     size = float(np.linalg.norm(load.vector))
     alike = [other for step in scene.steps for other in step.loads if other.kind == load.kind]
     share = size / max(float(np.linalg.norm(other.vector)) for other in alike)

@@ -49,7 +49,9 @@ def specimen_scene(cohort: Cohort, view: SpecimenView, with_loads: bool = True) 
     origins = [0.5 * (m.vertices.min(axis=0) + m.vertices.max(axis=0)) for m in meshes]
     bodies = [
         Body(name, mesh.seen_from(origin, np.eye(3)), fixed=k == 0)
-        for k, (name, mesh, origin) in enumerate(zip(cohort.vertebrae, meshes, origins, strict=True))
+        for k, (name, mesh, origin) in enumerate(
+            zip(cohort.vertebrae, meshes, origins, strict=True)
+        )
     ]
     neutral = np.column_stack([origins, np.zeros((len(bodies), 3))])
     steps = [Step("Neutral", "Neutral pose.", neutral)]
@@ -137,8 +139,8 @@ def _caption(cohort: Cohort, steps: Sequence[Step]) -> str:
         "Vertebrae in the neutral pose; their shape is schematic, between the endplates that "
         "landmarks tell."
         if cohort.landmarks is not None
-        else "Vertebrae in the neutral pose; their shape is schematic, sized by the distance of the "
-        "joints."
+        else "Vertebrae in the neutral pose; their shape is schematic, sized by how far "
+        "joints are apart."
     ]
     if any(step.measured is not None for step in steps):
         parts.append(

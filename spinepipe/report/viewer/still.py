@@ -30,7 +30,7 @@ _HEAD, _HEAD_RAD = 11.0, 0.42
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class Part:
     """Something to draw.
 
     Attributes
@@ -77,9 +77,9 @@ def telling_step(scene: Scene) -> int:
 
 
 def still(scene: Scene, number: int) -> str:
-    """A step as an SVG; colours are variables of the page's style, so that dark mode has its own."""
+    """A step as an SVG; its colours are variables of the page, so that dark mode has its own."""
     step, view = scene.steps[number], view_matrix(scene.camera)
-    parts = sorted(_parts(scene, step, view), key=lambda part: part.depth)
+    parts = sorted(projected_parts(scene, step, view), key=lambda part: part.depth)
     # muscles may leave the picture: some reach far beyond the vertebrae, which would then be small
     flat = np.vstack([part.at[:, :2] for part in parts if part.look != "muscle"])
     low, high = flat.min(axis=0), flat.max(axis=0)
@@ -97,7 +97,8 @@ def still(scene: Scene, number: int) -> str:
     )
 
 
-def _parts(scene: Scene, step: Step, view: Array) -> Iterator[_Part]:
+def projected_parts(scene: Scene, step: Step, view: Array) -> Iterator[Part]:
+    """All that a step shows, in the frame of the reader (`view_matrix`), not yet sorted."""
     corners = [
         posed(b.mesh.vertices, pose) for b, pose in zip(scene.bodies, step.poses, strict=True)
     ]
@@ -124,31 +125,31 @@ def _parts(scene: Scene, step: Step, view: Array) -> Iterator[_Part]:
         for model, read in step.markers.reshape(-1, 2, 3):
             for place, look in ((model, "model"), (read, "marker")):
                 if np.isfinite(place).all():
-                    yield _Part(place[None, :] @ view.T, _NEAR, look)
+                    yield Part(place[None, :] @ view.T, _NEAR, look)
     for body, pose in zip(scene.bodies, step.poses, strict=True):
         front = np.array([[1.24 * body.mesh.vertices[: 2 * SIDES, 0].max(), 0.0, 0.0]])
         middle = body.mesh.vertices[: 2 * SIDES].mean(axis=0) * [0.0, 1.0, 1.0]
-        yield _Part(posed(front + middle, pose) @ view.T, _NAME, "name", text=body.name)
+        yield Part(posed(front + middle, pose) @ view.T, _NAME, "name", text=body.name)
 
 
-def _face(view: Array, corners: Array, look: str, tint: float | None = None) -> Iterator[_Part]:
+def _face(view: Array, corners: Array, look: str, tint: float | None = None) -> Iterator[Part]:
     """A face, if its front is seen: bodies are closed, so nobody sees the back of one."""
     at = corners @ view.T
     normal = np.cross(at[1] - at[0], at[2] - at[0])
     if normal[2] > 0.0:
         light = float(abs(LIGHT @ normal) / np.linalg.norm(normal))
-        yield _Part(at, float(at[:, 2].mean()), look, 0.45 + 0.55 * min(light, 1.0), tint)
+        yield Part(at, float(at[:, 2].mean()), look, 0.45 + 0.55 * min(light, 1.0), tint)
 
 
 def _line(
     view: Array, path: Array, look: str, width: float, alpha: float = 1.0, near: bool = False
-) -> _Part:
+) -> Part:
     at = path @ view.T
     depth = _NEAR if near else float(at[:, 2].mean())
-    return _Part(at, depth, look, width=width, alpha=alpha)
+    return Part(at, depth, look, width=width, alpha=alpha)
 
 
-def _ghost(scene: Scene, measured: Array, view: Array) -> Iterator[_Part]:
+def _ghost(scene: Scene, measured: Array, view: Array) -> Iterator[Part]:
     """Both rims of every measured body, and four lines between them."""
     for body, pose in zip(scene.bodies, measured, strict=True):
         if np.isfinite(pose).all() and not body.fixed:
@@ -159,7 +160,7 @@ def _ghost(scene: Scene, measured: Array, view: Array) -> Iterator[_Part]:
                 yield _line(view, points[[k, k + SIDES]], "measured", 1.5, near=True)
 
 
-def _element(part: _Part, at: Array) -> str:
+def _element(part: Part, at: Array) -> str:
     """A part as an element of an SVG; ``at`` (P, 2) px."""
     x, y = at[0]
     if part.text:

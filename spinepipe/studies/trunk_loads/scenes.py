@@ -1,6 +1,6 @@
 """The trunk in 3-D for the page: of each person the spine and the muscles, task by task."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -126,14 +126,13 @@ def _hands(asked: pd.DataFrame, thorax: Array, body: int) -> tuple[list[Load], s
     """Weight in the hands, held by the uppermost vertebra of pose (6,), and in words."""
     if asked.empty or not {"hand_load_kg", *HANDS} <= set(asked):
         return [], ""
-    row: Mapping[str, float] = asked.iloc[0][["hand_load_kg", *HANDS]].astype(float).to_dict()
-    kg, place = row["hand_load_kg"], np.array([row[name] for name in HANDS])
+    kg, *place = asked.iloc[0][["hand_load_kg", *HANDS]].to_numpy(float).tolist()
     if not kg > 0.0:
         return [], ""
     words = f" with {number(kg)} kg in the hands"
     if not np.isfinite(place).all():
         return [], words
-    at = (place - thorax[:3]) @ posed_axes(thorax[None, :])[0]
+    at = (np.array(place) - thorax[:3]) @ posed_axes(thorax[None, :])[0]
     return [Load("force", body, at, kg * STANDARD_GRAVITY)], words
 
 
@@ -154,7 +153,8 @@ def _caption(top_mpa: float, top_n: float, shown: int, every: int) -> str:
     more = f" The first {shown} of {count(every, 'person')}." if every > shown else ""
     return (
         f"Discs: the warmer, the more compression (up to {newton(top_n)}). Lines: muscles, the "
-        f"wider and darker, the more stress (up to {fixed(top_mpa)} MPa); one scale for all. "
+        f"wider and darker, the more stress (up to {fixed(top_mpa)} MPa; in print, those above a "
+        "tenth of it); one scale for all. "
         "Vertebrae are schematic, lie between joint centres and are drawn without twist; ribs, "
         f"arms and head are not drawn.{more}"
     )
