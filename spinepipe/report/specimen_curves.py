@@ -16,7 +16,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.report.panels import explain_marks, side_by_side
 from spinepipe.report.specimen import SpecimenView
 from spinepipe.report.style import BLUE, GREEN, GREY, PURPLE, SKY, VERMILLION, blank
-from spinepipe.report.words import AXIS, POSITIVE, SIGNS, case
+from spinepipe.report.words import AXIS, POSITIVE, SIGNS, case, short
 from spinepipe.units import (
     COORDINATE_UNITS,
     COORDINATES,
@@ -120,7 +120,9 @@ def _figure(cohort: Cohort, coordinate: str, curves: Sequence[MeasuredCurve]) ->
         panel.tick_params(labelbottom=True)
         panel.set_xlabel(f"{POSITIVE[coordinate]} ({SIGNS[COORDINATE_UNITS[coordinate]]})")
     handles = [
-        Line2D([], [], color=_COLORS[k % 6], marker=_MARKERS[k % 6], ms=3.0, label=case(test))
+        Line2D(
+            [], [], color=_COLORS[k % 6], marker=_MARKERS[k % 6], ms=3.0, label=short(case(test))
+        )
         for k, test in enumerate(tests)
     ]
     cycles = "Faint: cycles before the last." if any(n > 1 for n in last.values()) else ""

@@ -77,7 +77,7 @@ def _scene(
     steps = [
         Step(
             f"{fixed(times[frame])} s",
-            _says(title, float(times[frame]), both),
+            _says(float(times[frame]), both),
             pose,
             markers=both if len(markers) else None,
         )
@@ -103,11 +103,11 @@ def _bodies(names: list[str], poses: Array) -> list[Body]:
     ]
 
 
-def _says(title: str, time_s: float, markers: Array) -> str:
+def _says(time_s: float, markers: Array) -> str:
     """Time, and how far the markers of the model (first three columns) are from the measured."""
     apart = np.linalg.norm(markers[:, :3] - markers[:, 3:], axis=1)
     apart = apart[np.isfinite(apart)]
-    words = f"{title}, {fixed(time_s)} s."
+    words = f"{fixed(time_s)} s."
     if not len(apart):
         return words
     rms = fixed(float(np.sqrt(np.mean(apart**2))), 1)

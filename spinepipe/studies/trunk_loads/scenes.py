@@ -86,14 +86,7 @@ def _scene(
     for task in order:
         rows, centres = tasks[task]
         poses = _poses(centres)
-        fascicles = paths[paths["task"] == task].groupby("muscle", sort=False)
-        muscles = [
-            Muscle(
-                one.sort_values("point")[_XYZ].to_numpy(float),
-                float(one["stress_mpa"].iloc[0]) / top_mpa,
-            )
-            for _, one in fascicles
-        ]
+        muscles = _muscles(paths[paths["task"] == task], top_mpa)
         disc = np.clip(rows["compression_n"].to_numpy(float) / top_n, 0.0, 1.0)
         told = asked[asked["task"] == task] if len(asked) else asked
         loads, says = _hands(told, poses[-1], len(bodies) - 1)
@@ -120,6 +113,20 @@ def _poses(centres: Array) -> Array:
     angle_deg = np.rad2deg(np.arctan2(sine, along[:, 1]))
     turns = across * (angle_deg / np.maximum(sine, 1e-12))[:, None]
     return np.column_stack([np.vstack([centres[:1], centres]), turns])
+
+
+def _muscles(paths: pd.DataFrame, top_mpa: float) -> list[Muscle]:
+    """Fascicles of one task; ``paths``: rows of the table paths, maybe none."""
+    if paths.empty:
+        return []
+    rows = paths.sort_values(["muscle", "point"])
+    names, stress = rows["muscle"].to_numpy(), rows["stress_mpa"].to_numpy(float)
+    starts = np.flatnonzero(np.append(True, names[1:] != names[:-1]))
+    lines = np.split(rows[_XYZ].to_numpy(float), starts[1:])
+    return [
+        Muscle(path, share)
+        for path, share in zip(lines, (stress[starts] / top_mpa).tolist(), strict=True)
+    ]
 
 
 def _hands(asked: pd.DataFrame, thorax: Array, body: int) -> tuple[list[Load], str]:
