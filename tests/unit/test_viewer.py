@@ -297,6 +297,7 @@ def test_a_specimen_is_neutral_then_loaded(tmp_path: Path) -> None:
     cohort = read(ROOT / "config/cohorts/l4l5_disc")
     scene = specimen_scenes(cohort)[0]
     assert [step.label for step in scene.steps[:2]] == ["Neutral", "Flexion 7.50 N m"]
+    assert "schematic and of a usual lumbar size." in scene.caption, "one joint tells no distance"
     flexion = scene.steps[1]
     row = cohort.motion
     assert row is not None

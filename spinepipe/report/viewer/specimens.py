@@ -135,13 +135,13 @@ def _motion_in_words(cohort: Cohort, cycle: MeasuredCycle, motion: Array) -> str
 
 
 def _caption(cohort: Cohort, steps: Sequence[Step]) -> str:
-    parts = [
-        "Vertebrae in the neutral pose; their shape is schematic, between the endplates that "
-        "landmarks tell."
-        if cohort.landmarks is not None
-        else "Vertebrae in the neutral pose; their shape is schematic, sized by how far "
-        "joints are apart."
-    ]
+    if cohort.landmarks is not None:
+        size = ", between the endplates that landmarks tell"
+    elif len(cohort.joint_names) > 1:
+        size = ", sized by how far joints are apart"
+    else:
+        size = " and of a usual lumbar size"
+    parts = [f"Vertebrae in the neutral pose; their shape is schematic{size}."]
     if any(step.measured is not None for step in steps):
         parts.append(
             "Dashed: the measured pose under the largest load of a test; components of the motion "
