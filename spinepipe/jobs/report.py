@@ -4,6 +4,7 @@ Beside it is written what the tables are that the study has by then, for other p
 says nothing that the tables and their code do not, so no digest holds it and nothing reads it here.
 """
 
+import os
 from collections.abc import Collection
 from dataclasses import replace
 from importlib import import_module
@@ -21,6 +22,14 @@ from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
 from spinepipe.tables import StudyTables, read_metadata
 
+_LEADING = """\
+<!DOCTYPE html>
+<html lang="en"><meta charset="utf-8"><title>This page has moved</title>
+<meta http-equiv="refresh" content="0; url={address}">
+<p>This page has moved to <a href="{address}">{address}</a>.</p></html>
+"""
+"""What stands where a page once was; its address is made of names of ours."""
+
 
 def run(
     root: str,
@@ -30,9 +39,16 @@ def run(
     figures: list[str],
     captions: list[str],
     output: str,
+    former: str = "",
     **others: str,
 ) -> None:
-    """Write a page from the files of all tables, pictures (SVG), captions and ``others``."""
+    """Write a page from the files of all tables, pictures (SVG), captions and ``others``.
+
+    Parameters
+    ----------
+    former : where the page once was, if elsewhere: what is written there leads to it. A copy could
+        be the older of two; so could a page that an earlier version left there.
+    """
     settings, cohort = study_of(root, study)
     kind_page = import_module(f"{PACKAGE}.{settings.kind}.page")
     titles = {figure.name: figure.title for figure in kind_of(settings.kind).figures}
@@ -46,7 +62,10 @@ def run(
     read += [_text(path) for path in captions]
     digest = report_digest(page, settings, cohort, read)
     write_marked(document.html(settings, cohort), output, digest)
-    folder = Path(output).parent
+    if former:
+        address = Path(os.path.relpath(output, Path(former).parent)).as_posix()
+        write_marked(_LEADING.format(address=address), former, digest)
+    folder = Path(output).parent / kind_of(settings.kind).files.subfolder
     told = descriptor_of(settings, cohort, folder)
     with appearing(folder / FILE) as temporary:
         temporary.write_text(told, "utf-8")

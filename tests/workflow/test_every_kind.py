@@ -82,7 +82,7 @@ def look_at_results(project: Project, kind: str, full: bool) -> None:
     files = layout(project, kind)
     assert {name.removeprefix("results/") for name in files.results(full)} <= set(project.files())
     assert not list(project.path(f"results/{kind}").rglob("*.log"))
-    page = project.path(f"{files.folder}/report.html").read_text()
+    page = project.path(files.page()).read_text()
     look_at_page(page, files, full=False)
     if files.adds:
         assert "`make full` makes them" in page
