@@ -7,7 +7,6 @@ along, a killed run that loses or mixes results, a run that starts though it can
 import os
 import re
 import shutil
-from html import unescape
 from pathlib import Path
 
 import psutil
@@ -71,7 +70,8 @@ def test_failing_jobs_are_named_the_others_kept_and_a_killed_run_goes_on(
     index = toy_copy.path("results/index.html").read_text()
     assert "1 study: 1 failed" in index
     assert "job count_joints study=counted specimen=a: " in index
-    assert f"{ACCIDENTS['a'][1]} (and 3 jobs more)" in unescape(index)
+    assert ACCIDENTS["a"][1] in index
+    assert "(and 3 jobs more)" in index
 
     snakefile.write_text(whole)
     toy_copy.edit("config/studies/counted.yaml", "times: 2", "times: 3")
