@@ -49,13 +49,14 @@ def run(options: argparse.Namespace) -> int:
         place = "command line", None, "-o"
         raise InputError([InputProblem(*place, options.output.name, "FILE.html", "rename it")])
     both = side_by_side(*(_folder(name, options.root) for name in (options.a, options.b)))
-    print("\n".join(lines(both)))
-    if options.output:
+    told = [*lines(both)]
+    if options.output:  # first: who reads the lines may stop early, as `head` does
         title = f"{both.names[0]} and {both.names[1]}"
         with appearing(options.output) as temporary:
             page = rendered("compare.html", title=title, both=both, levels=LEVELS)
             temporary.write_text(page, "utf-8")
-        print(f"\npage: {options.output}")
+        told.append(f"\npage: {options.output}")
+    print("\n".join(told))
     return 0
 
 
