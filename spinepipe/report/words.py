@@ -81,6 +81,13 @@ def fixed(value: float, decimals: int = 2) -> str:
     return zero if text == f"-{zero}" else text.replace("-", _MINUS)
 
 
+def rounded_to(value: float, exponent: int) -> str:
+    """A number rounded to a power of ten: 2 150 to 10², 0.05 to 10⁻²."""
+    shown = round(value, -exponent) or 0.0  # never -0
+    text = f"{shown:,.{max(0, -exponent)}f}"
+    return text.replace(",", _THIN_SPACE).replace("-", _MINUS)
+
+
 def percent(part: int, whole: int) -> str:
     """A share as a whole percentage; a share that is not quite 0 or 100 % is not rounded to it."""
     if not whole:

@@ -18,7 +18,7 @@ COLUMNS = (
 )
 TYPES = {"order": pa.int32(), "n": pa.int32(), **dict.fromkeys(("value", "low", "high"), "double")}
 ANSWER = "In flexion, joints move 9.0°."
-KEY_NUMBER = "9.0 (8.0 to 10) °"
+KEY_NUMBER = "Median motion in flexion"
 
 
 def project(root: Path) -> Path:

@@ -199,10 +199,12 @@ def test_intervals_are_apart_where_they_have_no_number_in_common(
     "given, told",
     [
         (StoredValue(2.03, "°", 1.5, 2.4), "2.03 (1.50 to 2.40)°"),
-        (StoredValue(2149.0, "N", 1950.0, 2250.0), "2,150 (1,950 to 2,250)\u00a0N"),
+        (StoredValue(2149.0, "N", 1950.0, 2250.0), "2\u2009150 (1\u2009950 to 2\u2009250)\u00a0N"),
         (StoredValue(-0.004, "mm", -1.5, 1.5), "0.0 (\u22121.5 to 1.5)\u00a0mm"),
-        (StoredValue(3.0, "", None, None), "3.00"),
-        (StoredValue(5000.0, "N/m", 4450.0, None), "5\u2009000 (above 4\u2009450)\u00a0N/m"),
+        (StoredValue(3.0, "", None, None), "3"),
+        (StoredValue(1800.0, "", None, None), "1\u2009800"),
+        (StoredValue(0.5961, "°", None, None), "0.60°"),
+        (StoredValue(5000.0, "N/m", 4400.0, None), "5\u2009000 (above 4\u2009400)\u00a0N/m"),
     ],
 )
 def test_numbers_are_rounded_by_their_interval(given: StoredValue, told: str) -> None:
@@ -241,7 +243,7 @@ def test_an_open_end_that_is_stored_as_infinite_is_open(root: Path) -> None:
     both = side_by_side(*(root / "results" / name for name in (FIRST, SECOND)))
     (answer,) = [one for one in both.conclusions if one.place == "answer"]
     assert APART not in answer.remarks
-    assert answer.values[0].a == "9.00°"
+    assert answer.values[0].a == "9°"
 
 
 def test_texts_of_people_never_become_markup(root: Path, compare: Compare, tmp_path: Path) -> None:

@@ -61,11 +61,27 @@ def test_both_studies_stand_below_their_question_in_the_order_of_config(root: Pa
         "second/report.html",
         "first/report.html",
     ]
-    assert told.count(cases.ANSWER) == told.count(cases.KEY_NUMBER) == 2
+    key_number = f"9.0 (8.0 to 10.0)°: {cases.KEY_NUMBER}"
+    assert told.count(cases.ANSWER) == told.count(key_number) == 2
     assert told.count("Simulated data</span>") == 2
     assert told.count("3 specimens, L1–L4") == 2
     assert "2 studies, all up to date" in told
     assert "No answer is stored" not in told
+
+
+@sweep(
+    "header, tag",
+    [
+        ("made_up: true", "Simulated data"),
+        ("rebuilt: true", "Rebuilt from print"),
+        ("made_up: false", "Measured data"),
+        ("vertebrae: [unclosed", ""),
+    ],
+)
+def test_a_tag_tells_whether_anybody_was_measured(header: str, tag: str, tmp_path: Path) -> None:
+    root = cases.project(tmp_path)
+    (root / "config/cohorts/stack/cohort.yaml").write_text(f"cohort: stack\n{header}\n")
+    assert entry(root, FIRST, {}).tag == tag
 
 
 def test_every_kind_has_a_question() -> None:

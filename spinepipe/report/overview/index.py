@@ -6,6 +6,7 @@ It is written anew at the end of each run, from what is stored. No page and no t
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -75,15 +76,15 @@ class Entry:
     @property
     def answer(self) -> str:
         """The sentence that answers the question; empty where none is stored."""
-        return self._first("answer")
+        return next((one.text for one in self.told if one.place == "answer"), "")
 
     @property
     def key(self) -> str:
-        """The first of the key numbers, in words."""
-        return self._first("key")
-
-    def _first(self, place: str) -> str:
-        return next((one.text for one in self.told if one.place == place), "")
+        """The first of the key numbers and what it is; empty where there is none."""
+        for one in (one for one in self.told if one.place == "key"):
+            values = map(str, one.values.values())
+            return ": ".join([*islice(values, 1), one.text])
+        return ""
 
     @property
     def level(self) -> str:
@@ -225,7 +226,9 @@ def _cohort(root: Path, name: str) -> tuple[str, str]:
     header = _yaml(folder / COHORT_YAML)
     if not header:
         return "", ""
-    return _size(folder, header), "Simulated data" if header.get("made_up") else "Measured data"
+    tags = {"made_up": "Simulated data", "rebuilt": "Rebuilt from print"}
+    tag = next((tags[key] for key in tags if header.get(key) is True), "Measured data")
+    return _size(folder, header), tag
 
 
 def _size(folder: Path, header: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.words import number
+from spinepipe.report.words import number, rounded_to
 from spinepipe.tables import read_frame
 
 CONCLUSIONS = "conclusions"
@@ -32,19 +32,17 @@ class StoredValue:
     high: float | None
 
     def __str__(self) -> str:
-        """Number, interval and unit: two digits of the interval's half-width, else three."""
+        """Number, interval, unit: two digits of the half-width, else two; counts have all."""
         unit = "" if not self.unit else self.unit if self.unit == "°" else f"\u00a0{self.unit}"
-        if self.low is None or self.high is None or self.high <= self.low:
-            ends = (("above", self.low), ("below", self.high))
-            known = [f"{side} {number(end)}" for side, end in ends if end is not None]
-            open_end = f" ({known[0]})" if len(known) == 1 else ""
-            return f"{number(self.value)}{open_end}{unit}"
-        last = floor(log10(0.5 * (self.high - self.low))) - 1
-        value, low, high = (
-            f"{round(one, -last) + 0.0:,.{max(0, -last)}f}".replace("-", "\u2212")
-            for one in (self.value, self.low, self.high)
-        )
-        return f"{value} ({low} to {high}){unit}"
+        if self.low is not None and self.high is not None and self.high > self.low:
+            last = floor(log10(0.5 * (self.high - self.low))) - 1
+            value, low, high = (rounded_to(one, last) for one in (self.value, self.low, self.high))
+            return f"{value} ({low} to {high}){unit}"
+        whole = self.value.is_integer() and abs(self.value) < 1e6
+        value = rounded_to(self.value, 0) if whole else number(self.value, 2)
+        ends = (("above", self.low), ("below", self.high))
+        known = [f" ({side} {number(end, 2)})" for side, end in ends if end is not None]
+        return f"{value}{known[0] if len(known) == 1 else ''}{unit}"
 
 
 @dataclass(frozen=True)
