@@ -69,9 +69,7 @@ def run(
         document = kind_page.document(settings, cohort, results)
         added = files_of(settings, cohort).adds
         if page == "report" and added:
-            more = (
-                f"{listed(added)} (`make full` makes them and the page full.html, which has them)"
-            )
+            more = f"{listed(added)} (`make full` makes them and the page full.html)"
             document = replace(document, left_out=(*document.left_out, more))
         write_marked(document.html(settings, cohort), output, digest)
     if former:

@@ -1,20 +1,13 @@
-"""Pages over studies: one file each that loads nothing, from the templates beside this file."""
+"""Pages over studies, from the templates beside this file and the frame of all pages."""
 
 from importlib.resources import files
-from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from spinepipe.report.page.study_page import rendered as with_frame
+
+_HERE = "spinepipe.report.overview"
 
 
-def rendered(template: str, **shown: Any) -> str:
+def rendered(template: str, **shown: object) -> str:
     """A page; whatever is shown is text, never markup."""
-    environment = Environment(
-        loader=PackageLoader("spinepipe.report.overview", ""),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    style = files("spinepipe.report.overview").joinpath("pages.css").read_text("utf-8")
-    return environment.get_template(template).render(style=Markup(style), **shown)
+    style = files(_HERE).joinpath("pages.css").read_text("utf-8")
+    return with_frame(template, (_HERE,), style, **shown)
