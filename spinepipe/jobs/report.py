@@ -93,7 +93,9 @@ def _write_page(
             write_marked(
                 comparison(shape, title, rows, study), folder / f"{shape.name}.html", digest
             )
-    write_marked(made.html(study, cohort, results, papers=papers, date=date), output, digest)
+    subfolder = kind_of(study.kind).files.subfolder
+    html = made.html(study, cohort, results, papers=papers, date=date, folder=subfolder)
+    write_marked(html, output, digest)
     if page == "report":
         metadata = {"study": study.study, "kind": study.kind, KEY: digest}
         told = from_rows(CONCLUSIONS, rows_of(made.told))
