@@ -254,13 +254,14 @@ class Drawing:
 
     Attributes
     ----------
-    panels : SVG elements.
+    panels : SVG elements. least_px : narrower than this text of a panel is too small.
     """
 
     name: str
     title: str
     caption: str
     panels: tuple[str, ...]
+    least_px: int = 260
 
     @classmethod
     def read(cls, name: str, svg: str) -> "Drawing":
@@ -270,13 +271,15 @@ class Drawing:
         root = ElementTree.fromstring(svg)
         title = root.findtext(f"{{{SVG}}}title", "")
         caption = root.findtext(f"{{{SVG}}}desc", "")
-        panels = []
+        panels, widest = [], 0.0
         for child in root.findall(f"{{{SVG}}}svg"):
             for place in ("x", "y"):
                 child.attrib.pop(place, None)
+            if "legend" not in child.attrib["class"]:
+                widest = max(widest, float(child.attrib["width"]))
             text = ElementTree.tostring(child, encoding="unicode")
             panels.append(_own_ids(_with_variables(text), f"{name}-"))
-        return cls(name, title, caption, tuple(panels))
+        return cls(name, title, caption, tuple(panels), round(0.9 * widest))
 
     def labelled(self, says: str) -> list[Markup]:
         """The panels as elements of a page; a reader who cannot see them is told ``says``."""
