@@ -52,7 +52,7 @@ class Rows(Panel):
     @property
     def height(self) -> float:
         """By the number of rows, and of series in a row."""
-        row = max(ROW, 7.5 * len(self.series) + 5.0)
+        row = max(ROW, 7.5 * len(self.series) + 5.0) if self.shared else ROW
         return (
             row * len(self.names)
             + ABOVE_AND_BELOW
@@ -70,6 +70,13 @@ class Rows(Panel):
             dict.fromkeys(self.frame["series"])
         )
 
+    @property
+    def shared(self) -> bool:
+        """Whether some row has several series, which then stand below each other."""
+        if "series" not in self.frame:
+            return False
+        return bool((self.frame.groupby("row")["series"].nunique() > 1).any())
+
     def draw(self, axes: Axes) -> None:
         """Symbols, intervals, notes and marks."""
         names, series = self.names, self.series
@@ -83,7 +90,7 @@ class Rows(Panel):
         for number, one in enumerate(series):
             rows = self.frame if one == "" else self.frame[self.frame["series"] == one]
             look = self.looks.get(one, SEVERAL[number % len(SEVERAL)])
-            shift = _WITHIN * (number + 0.5) / len(series) - 0.5 * _WITHIN
+            shift = _WITHIN * (number + 0.5) / len(series) - 0.5 * _WITHIN if self.shared else 0.0
             y = np.array([names.index(str(name)) for name in rows["row"]]) + shift
             self._draw_series(axes, rows, y, look)
         axes.set_ylim(len(names) - 0.45, -0.55)
@@ -91,7 +98,7 @@ class Rows(Panel):
         axes.tick_params(axis="y", colors=COLORS["ink"])
         axes.grid(axis="y", visible=False)
         axes.spines["left"].set_visible(False)
-        if self.log and not self.x_limits:
+        if self.log:
             log_ticks(axes.xaxis, *axes.get_xlim())
         if "note" in self.frame:
             told = self.frame.drop_duplicates("row").set_index("row")["note"]
