@@ -189,7 +189,7 @@ def kinematics(study: Tracking, cohort: Cohort, tables: Tables) -> Chart:
     room = 0.06 * (high - low) or 1.0
     kind = next(kind for (_, name), kind in kinds.items() if name == trial)
     how: dict[str, Any] = {"x_label": "cycle of the motion (%)", "x_limits": (0.0, 100.0)}
-    how["y_label"] = f"rotation (°), + {POSITIVE[ROTATIONS[AXIS[kind]]]}"
+    how["y_label"] = "rotation (°)"
     how |= {"y_limits": (low - room, high + room), "looks": looks, "high": 190.0}
     panels = [
         Curves(title=level(joint), frame=rows[rows["joint"] == joint], **how)
@@ -197,7 +197,9 @@ def kinematics(study: Tracking, cohort: Cohort, tables: Tables) -> Chart:
     ]
     most = max(len(one[name]) for name in looks)
     band = "; band: one SD to each side" if most > 1 else ""
-    caption = f"{case(trial)}, mean over {count(most, 'subject')}{band}.{_left_out(wild)}"
+    sign = POSITIVE[ROTATIONS[AXIS[kind]]]
+    caption = f"{case(trial)}, + {sign}; mean over {count(most, 'subject')}{band}."
+    caption += _left_out(wild)
     return Chart(title, panels, caption, _keys(looks, as_line=True))
 
 

@@ -7,11 +7,12 @@ from spinepipe.report.page.study_page import Page, Results
 from spinepipe.report.page.tables import Sortable, page_tables
 from spinepipe.studies.tracking import tables as shapes
 from spinepipe.studies.tracking.conclusions import conclusions, window_rows
+from spinepipe.studies.tracking.scenes import tracking_scenes
 from spinepipe.studies.tracking.settings import Tracking
 
 READ = (
-    *("accuracy", "against_wang_2021", "clusters", "errors", "fits", "profiles", "profile_points"),
-    *("ranges", "remarks", "sharing", "similarity", "sizes", "stiffness", "weights"),
+    *("accuracy", "against_wang_2021", "clusters", "drawn", "errors", "fits", "profile_points"),
+    *("profiles", "ranges", "remarks", "sharing", "similarity", "sizes", "stiffness", "weights"),
 )
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
@@ -19,7 +20,6 @@ _SHOWN = (
     (shapes.ACCURACY, "Errors over all subjects"),
     (shapes.FITS, "How every fit ended"),
     (shapes.PROFILES, "Whether markers tell stiffness"),
-    (shapes.SHARING, "How lumbar joints share a motion"),
     (shapes.SIMILARITY, "How alike subjects share a motion"),
     (shapes.WEIGHTS, "What the weight of loads does"),
     (shapes.SIZES, "How large subjects are"),
@@ -48,6 +48,8 @@ def page(study: Tracking, cohort: Cohort, results: Results) -> Page:
         key_figure="approach_errors",
         tables=shown_tables(results),
         left_out=(*parts, *papers.left_out("Wang et al. 2021")),
+        scenes=tracking_scenes(results.table("drawn")),
+        chooser="Motion",
     )
 
 
