@@ -131,7 +131,7 @@ def judged_likeness(
         elif trial not in known:
             verdict, rank = ("untested_undefined", 1.0) if cmc is None else ("untested", 0.0)
         elif true is None:
-            verdict, rank = "differ", 1.0
+            verdict, rank = "differ", 1.5
         elif cmc is None:
             verdict, rank = "undefined", 4.0
         else:

@@ -13,12 +13,15 @@ PHRASES = {
     "optk_generic": "dynamics with generic stiffness",
     "optk_generic_lower": "dynamics with low generic stiffness",
     "optk_generic_upper": "dynamics with high generic stiffness",
-    "optk_calibrated": "dynamics calibrated on the same kind of motion",
+    "optk_calibrated": "dynamics calibrated on similar motions",
     "optk_from_flexion": "dynamics calibrated on flexion",
     "optk_from_bending": "dynamics calibrated on bending",
     "optk_from_both": "dynamics calibrated on flexion and bending",
 }
-"""Approaches inside a sentence; stiffness is that of joints."""
+"""Approaches inside a sentence, in six words at most; stiffness is that of joints.
+
+Similar motions are those of the same kind as the motion that is tracked, and that motion itself.
+"""
 
 SHORT = {
     **PHRASES,
@@ -28,7 +31,7 @@ SHORT = {
     "optk_generic": "dynamics, generic",
     "optk_generic_lower": "dynamics, low generic",
     "optk_generic_upper": "dynamics, high generic",
-    "optk_calibrated": "calibrated, same motion",
+    "optk_calibrated": "calibrated, own motions",
     "optk_from_flexion": "calibrated on flexion",
     "optk_from_bending": "calibrated on bending",
     "optk_from_both": "calibrated on both",
