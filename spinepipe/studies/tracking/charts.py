@@ -15,6 +15,7 @@ from spinepipe.report.forms.look import BASE, MEASURED, MODEL, SOFT, Look
 from spinepipe.report.forms.rows import Rows
 from spinepipe.report.words import POSITIVE, case, count, level, number, short
 from spinepipe.studies.tracking.conclusions import judged_likeness, window_rows
+from spinepipe.studies.tracking.conclusions_of_errors import Tables
 from spinepipe.studies.tracking.error_metrics import SAGITTAL
 from spinepipe.studies.tracking.ranking import (
     ANGLES,
@@ -31,8 +32,6 @@ from spinepipe.studies.tracking.trials import AXIS, kinds_of_trials
 from spinepipe.studies.tracking.true_motions import TRUTH, true_motions
 from spinepipe.studies.tracking.words import phrase, short_of
 from spinepipe.units import DEG_PER_RAD, ROTATIONS
-
-Tables = Mapping[str, pd.DataFrame]
 
 LEVELS = {CENTRES: BODIES[1:], ANGLES: JOINTS[SAGITTAL]}
 LABELS = {CENTRES: "error of centres (mm)", ANGLES: "error of angles (°)"}
@@ -176,7 +175,7 @@ def kinematics(study: Tracking, cohort: Cohort, tables: Tables) -> Chart:
     chosen = chosen_approach(cohort, tables.get("errors"), there)
     kinds = kinds_of_trials(cohort)
     alike = pd.DataFrame(similarity_rows(true_motions(cohort), kinds))
-    told = [one.trial for one in judged_likeness(tables.get("similarity"), alike, chosen)]
+    told = [trial for trial, _ in judged_likeness(tables.get("similarity"), alike, chosen)]
     trial = next((name for name in told if chosen in courses.get(name, {})), next(iter(courses)))
     one = courses[trial]
     reach = {name: float(np.abs(curves).max()) for name, curves in one.items()}

@@ -13,7 +13,7 @@ from spinepipe.report.forms.curves import Curves
 from spinepipe.report.forms.look import COLORS, MODEL, SEVERAL, SOFT, Look
 from spinepipe.report.forms.rows import Rows, ordered
 from spinepipe.report.words import AXIS, capital, count, level, plain, short
-from spinepipe.studies.tracking.charts import Tables
+from spinepipe.studies.tracking.conclusions_of_errors import Tables
 from spinepipe.studies.tracking.conclusions_of_stiffness import (
     calibrated_values,
     judged_profiles,
@@ -56,6 +56,7 @@ def stiffness_profiles(study: Tracking, cohort: Cohort, tables: Tables) -> Chart
     limit = pd.DataFrame({"x": reach, "y": LIMIT, "series": "limit"})
     how: dict[str, Any] = {"x_log": True, "x_limits": reach, "y_limits": (-0.5, TOP * LIMIT)}
     how |= {"looks": {"limit": SOFT, **lines, **marks}, "points": tuple(marks), "high": 200.0}
+    how["y_label"] = "cost over the least"
     panels = []
     for coordinate, region in product(PROFILED, REGIONS):
         own, verdicts = (
@@ -70,8 +71,7 @@ def stiffness_profiles(study: Tracking, cohort: Cohort, tables: Tables) -> Chart
         heading = ": ".join([capital(plain(region)), *(words if len(words) == 1 else [])])
         label = f"{AXIS[coordinate].lower()}: stiffness over generic"
         frame = pd.concat([limit, drawn, symbols], ignore_index=True)[["x", "y", "series"]]
-        texts = {"title": heading, "x_label": label, "y_label": "cost over the least"}
-        panels.append(Curves(frame=frame, **texts, **how))
+        panels.append(Curves(title=heading, x_label=label, frame=frame, **how))
     keys = [Key(look, short(name)) for name, look in lines.items()]
     keys.append(Key(SOFT, f"95 % limit, {LIMIT}", as_line=True))
     caption = "What lies above the dashed line is excluded; lines that leave a panel cost more."

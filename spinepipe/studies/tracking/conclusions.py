@@ -2,7 +2,6 @@
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -23,7 +22,7 @@ from spinepipe.studies.tracking.conclusions_of_stiffness import conclusions_of_s
 from spinepipe.studies.tracking.ranking import FEWEST, Ranking, chosen_approach, rankings
 from spinepipe.studies.tracking.settings import CONSTRAINED, Tracking
 from spinepipe.studies.tracking.sharing import sharing_rows, similarity_rows
-from spinepipe.studies.tracking.tables import DONE, TOLD, TOO_FEW, WINDOW
+from spinepipe.studies.tracking.tables import TOLD, TOO_FEW, WINDOW
 from spinepipe.studies.tracking.trials import kinds_of_trials
 from spinepipe.studies.tracking.true_motions import true_motions
 from spinepipe.studies.tracking.words import phrase, sort_approaches
@@ -31,7 +30,7 @@ from spinepipe.studies.tracking.words import phrase, sort_approaches
 ACCELERATION = "acceleration_rms_deg_per_s2"
 
 CLEARLY = 0.1
-"""A coefficient of multiple correlation that is lower by more than this is lower."""
+"""Coefficients of multiple correlation that differ by more than this are not alike."""
 
 UNLIKE = 10.0
 """Percent by which a size differs from the skeleton's before it matters."""
@@ -53,8 +52,7 @@ def conclusions(study: Tracking, cohort: Cohort, results: Results) -> Iterator[C
         kinds = kinds_of_trials(cohort)
         yield _sharing(moved, pd.DataFrame(sharing_rows(true, kinds)), name)
         alike = pd.DataFrame(similarity_rows(true, kinds))
-        for one in judged_likeness(tables["similarity"], alike, name)[:1]:
-            yield _likeness(one, name)
+        yield from (told for _, told in judged_likeness(tables["similarity"], alike, name)[:1])
         yield from _against(moved)
     yield from _lights(study, tables, cohort, found)
     yield from _methods(study, cohort, tables, found)
@@ -94,62 +92,43 @@ def _sharing(rows: pd.DataFrame, truth: pd.DataFrame, name: str) -> Conclusion:
     return Conclusion("sharing", "tested", values, names)
 
 
-@dataclass(frozen=True)
-class TrialLikeness:
-    """How alike subjects share a motion by an approach (CMC), beside how alike they truly do.
-
-    Attributes
-    ----------
-    rank : the larger, the more it matters. cmc, true : None where not defined or not known.
-    """
-
-    trial: str
-    verdict: str
-    rank: float
-    n: int
-    cmc: float | None
-    true: float | None
-
-
 def judged_likeness(
     rows: pd.DataFrame | None, truth: pd.DataFrame, name: str
-) -> list[TrialLikeness]:
-    """Of the motions of three subjects or more, that which matters most first."""
+) -> list[tuple[str, Conclusion]]:
+    """How alike subjects share each motion by an approach, beside how alike they truly do.
+
+    Motions of three subjects or more by name, that in which the approach is furthest off first.
+    """
     if rows is None or rows.empty:
         return []
     own = window_rows(rows)
     own = own[(own["approach"] == name) & (own["n_specimens"] >= FEWEST)]
-    known = window_rows(truth)
-    known = known[known["status"] != TOO_FEW].set_index("trial")["cmc"] if len(known) else {}
+    known = {
+        str(row["trial"]): row["cmc"]
+        for row in window_rows(truth).to_dict("records")
+        if row["status"] != TOO_FEW
+    }
     found = []
     for row in own.to_dict("records"):
-        trial = str(row["trial"])
-        cmc = float(row["cmc"]) if row["status"] == DONE else None
-        true = float(known[trial]) if trial in known and pd.notna(known[trial]) else None
+        trial, values = str(row["trial"]), {}
+        for told, cmc in (("cmc", row["cmc"]), ("true", known.get(trial))):
+            if pd.notna(cmc):
+                source = "similarity: cmc" if told == "cmc" else "CMC of shares of true motions"
+                values[told] = Value(float(cmc), n=int(row["n_specimens"]), source=source)
+        verdict, off = "differ", 0.0
         if name.startswith(CONSTRAINED):
-            verdict, rank = "fixed", 0.0
+            verdict = "fixed"
         elif trial not in known:
-            verdict, rank = ("untested_undefined", 1.0) if cmc is None else ("untested", 0.0)
-        elif true is None:
-            verdict, rank = "differ", 1.5
-        elif cmc is None:
-            verdict, rank = "undefined", 4.0
-        else:
-            verdict, rank = ("lower", 3.0) if true - cmc > CLEARLY else ("alike", 2.0)
-            rank += 0.5 * (true - cmc)
-        found.append(TrialLikeness(trial, verdict, rank, int(row["n_specimens"]), cmc, true))
-    return sorted(found, key=lambda one: -one.rank)
-
-
-def _likeness(one: TrialLikeness, name: str) -> Conclusion:
-    sources = {"cmc": "similarity: cmc", "true": "CMC of the shares of true motions"}
-    values = {
-        told: Value(value, n=one.n, source=source)
-        for told, source in sources.items()
-        if (value := getattr(one, told)) is not None
-    }
-    names = {"approach": phrase(name), "trial": plain(one.trial)}
-    return Conclusion("likeness", one.verdict, values, names)
+            verdict = "untested" if "cmc" in values else "untested_undefined"
+        elif "true" in values and "cmc" not in values:
+            verdict, off = "undefined", 2.0
+        elif "true" in values:
+            over = values["cmc"].number - values["true"].number
+            verdict = "alike" if abs(over) <= CLEARLY else "lower" if over < 0.0 else "higher"
+            off = 0.1 + abs(over)
+        names = {"approach": phrase(name), "trial": plain(trial)}
+        found.append((off, trial, Conclusion("likeness", verdict, values, names)))
+    return [(trial, told) for _, trial, told in sorted(found, key=lambda one: -one[0])]
 
 
 def _against(rows: pd.DataFrame) -> Iterator[Conclusion]:

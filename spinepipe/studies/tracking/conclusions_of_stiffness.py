@@ -1,6 +1,6 @@
 """What markers tell of stiffness, and what calibrations tell beyond what they began with."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,12 @@ from spinepipe.motion.skeleton import JOINTS
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.words import AXIS, count, level, listed, plain, tick
 from spinepipe.status import Status
+from spinepipe.studies.tracking.conclusions_of_errors import Tables, counted
 from spinepipe.studies.tracking.settings import LEARNT, Tracking
 from spinepipe.studies.tracking.tables import LIMIT
 from spinepipe.studies.tracking.trials import PASSIVE
 from spinepipe.studies.tracking.words import phrase
 from spinepipe.units import COORDINATES
-
-Tables = Mapping[str, pd.DataFrame]
 
 WIDE = 1.96
 """SDs to each side that hold 95 % of a normal distribution."""
@@ -53,6 +52,7 @@ def judged_profiles(tables: Tables) -> pd.DataFrame:
     rows: list[dict[str, Any]] = []
     points = tables["profile_points"]
     for row in tables["profiles"].to_dict("records"):
+        cells = {str(name): cell for name, cell in row.items()}
         own = points[(points[PLACE] == [row[name] for name in PLACE]).all(axis=1)]
         cost = own.sort_values("point")["cost_over_best"].dropna().to_numpy(float)
         says, end, only = str(row["verdict"]), "", False
@@ -65,7 +65,7 @@ def judged_profiles(tables: Tables) -> pd.DataFrame:
             says = "edge" if end else "gap"
             only = bool((cost > LIMIT).sum() == len(cost) - 1)
         most = float(cost.max()) if len(cost) else np.nan
-        rows.append({**row, "says": says, "only": only, "end": end, "most": most})
+        rows.append({**cells, "says": says, "only": only, "end": end, "most": most})
     return pd.DataFrame(rows)
 
 
@@ -95,18 +95,19 @@ def _profiles(rows: pd.DataFrame, ratios: "pd.Series[float]") -> Iterator[Conclu
         verdict = "edge_only"
     source = "profiles and profile_points"
     values = {
-        "profiles": Value(len(rows), source=source),
-        **{name: Value(counts.get(name, 0), source=source) for name in order},
+        "profiles": counted(len(rows), source),
+        **{name: counted(counts.get(name, 0), source) for name in order},
     }
     sizes = {"most": rows["most"].max(), "low": ratios.min(), "high": ratios.max()}
     values |= {n: Value(float(x), source="profile_points") for n, x in sizes.items() if pd.notna(x)}
     who = list(dict.fromkeys(map(str, rows["specimen"])))
     subjects = listed(who) if len(who) <= MOST_NAMES else count(len(who), "subject")
     end = listed(dict.fromkeys(edges["end"]), last="or")
-    names = {"whose": subjects, "end": end, "places": _places(rows[rows["says"] == verdict])}
+    own = rows[rows["says"] == verdict.removeprefix("all_")]
+    names = {"whose": subjects, "end": end, "places": _places(own)}
     yield Conclusion("profiles", verdict, values, names)
     partly = rows["message"].fillna("").str.contains("did not settle") | (rows["says"] == "lost")
-    lost = {"lost": Value(int(partly.sum()), source=source), "profiles": values["profiles"]}
+    lost = {"lost": counted(int(partly.sum()), source), "profiles": values["profiles"]}
     yield Conclusion("profile_fits", "check" if partly.any() else "ok", lost)
 
 
@@ -124,8 +125,7 @@ def _places(rows: pd.DataFrame) -> str:
 def _ended(rows: pd.DataFrame) -> Iterator[Conclusion]:
     fits = rows.drop_duplicates(["specimen", "law"])
     lost = int((fits["status"] != Status.CONVERGED.value).sum())
-    source = "stiffness: status by subject and calibration"
-    values = {"lost": Value(lost, source=source), "fits": Value(len(fits), source=source)}
+    values = {"lost": counted(lost, "stiffness: status"), "fits": counted(len(fits), "stiffness")}
     yield Conclusion("calibrations", "check" if lost else "ok", values)
 
 
@@ -167,12 +167,10 @@ def _prior(values: pd.DataFrame) -> Iterator[Conclusion]:
     outside = int(own["outside"].sum())
     source = "stiffness: ratio_to_generic beside the prior of A and B"
     moved = own.loc[own["outside"], "joint"].value_counts()
-    told = {
-        "values": Value(len(own), source=source),
-        "outside": Value(outside, source=source),
-        "inside": Value(len(own) - outside, source=source),
-        "median": Value(float(own["ratio_to_generic"].median()), n=len(own), source=source),
-    }
+    counts = {"values": len(own), "outside": outside, "inside": len(own) - outside}
+    told = {name: counted(n, source) for name, n in counts.items()}
+    median = float(own["ratio_to_generic"].median())
+    told["median"] = Value(median, n=len(own), source="stiffness: median of ratio_to_generic")
     names = {"approach": phrase(law), "joint": level(str(moved.index[0])) if outside else ""}
     verdict = "beyond" if outside > EXPECTED * len(own) else "within"
     yield Conclusion("prior", verdict, told, names)
@@ -185,14 +183,15 @@ def _between(values: pd.DataFrame) -> Iterator[Conclusion]:
     both = one.index.intersection(other.index)
     if both.empty:
         return
-    apart = np.abs(np.log(one["ratio_to_generic"][both] / other["ratio_to_generic"][both]))
+    ratio = one["ratio_to_generic"][both] / other["ratio_to_generic"][both]
+    apart = np.log(ratio.astype(float)).abs()
     moved = (one["outside"][both] | other["outside"][both]).to_numpy(bool)
     within = moved.sum() <= EXPECTED * len(both)
-    told = np.exp(apart if within else apart[moved])
+    told = np.exp((apart if within else apart[moved]).to_numpy(float))
     source = "stiffness: larger over smaller ratio_to_generic less 1, median of elements"
     values_told = {
-        "apart": Value(100.0 * (float(told.median()) - 1.0), "%", n=len(told), source=source),
-        "elements": Value(len(both), source=source),
-        "moved": Value(int(moved.sum()), source=source),
+        "apart": Value(100.0 * (float(np.median(told)) - 1.0), "%", n=len(told), source=source),
+        "elements": counted(len(both), source),
+        "moved": counted(int(moved.sum()), source),
     }
     yield Conclusion("between", "prior" if within else "moved", values_told)

@@ -15,7 +15,7 @@ from scipy import stats
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Value
-from spinepipe.statistics.outcome import corrected, family_size, mean_of
+from spinepipe.statistics.outcome import SAME, Array, corrected, family_size, mean_of
 from spinepipe.studies.tracking.settings import LEARNT, OWN
 from spinepipe.studies.tracking.tables import MEASURES
 from spinepipe.studies.tracking.trials import STANCE, kinds_of_trials
@@ -84,7 +84,7 @@ class Ranking:
             return 0
         return int(np.sign(self.differences(one, other).mean()))
 
-    def differences(self, one: str, other: str) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
+    def differences(self, one: str, other: str) -> Array:
         """(n,) error of one approach less that of another."""
         return np.asarray(self.values[one] - self.values[other], dtype=float)
 
@@ -126,15 +126,20 @@ def rankings(cohort: Cohort, errors: pd.DataFrame) -> list[Ranking]:
         for one in _ranking(measure, where, rows[rows["measure"] == measure])
     ]
     pairs = [(k, *pair) for k, one in enumerate(found) for pair in combinations(one.approaches, 2)]
-    raw = [
-        mean_of(found[k].differences(one, other)).p if found[k].n >= FEWEST else None
-        for k, one, other in pairs
-    ]
+    raw = [_p(found[k].differences(one, other)) for k, one, other in pairs]
     p: list[dict[frozenset[str], float | None]] = [{} for _ in found]
     for (k, *pair), value in zip(pairs, corrected(raw, "holm"), strict=True):
         p[k][frozenset(pair)] = value
     tests = family_size(raw)
     return [replace(one, p=own, tests=tests) for one, own in zip(found, p, strict=True)]
+
+
+def _p(apart: Array) -> float | None:
+    """Of a paired t test; 0 of a difference that is the same in all subjects, none of too few."""
+    found = mean_of(apart)
+    if found.n < FEWEST or found.value is None:
+        return None
+    return 0.0 if found.interval is None and abs(found.value) > SAME else found.p
 
 
 def _ranking(measure: str, where: str, rows: pd.DataFrame) -> Iterator[Ranking]:
@@ -147,7 +152,7 @@ def _ranking(measure: str, where: str, rows: pd.DataFrame) -> Iterator[Ranking]:
     # a subject counts once: the mean over levels, then over trials
     values = whole.groupby(level="specimen", sort=False).mean()
     names = sort_approaches(map(str, values))
-    order = sorted(names, key=lambda name: float(values[name].mean()))
+    order = sorted(names, key=lambda name: float(values[name].to_numpy(float).mean()))
     lacking = tuple(sort_approaches(set(wide.columns) - set(whole.columns)))
     trials = tuple(dict.fromkeys(map(str, rows["trial"])))
     yield Ranking(measure, where, trials, values[order], lacking)
