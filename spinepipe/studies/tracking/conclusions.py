@@ -115,17 +115,17 @@ def judged_likeness(
             if pd.notna(cmc):
                 source = "similarity: cmc" if told == "cmc" else "CMC of shares of true motions"
                 values[told] = Value(float(cmc), n=int(row["n_specimens"]), source=source)
-        verdict, off = "differ", 0.0
+        verdict, off = "differ", 0.1
         if name.startswith(CONSTRAINED):
             verdict = "fixed"
         elif trial not in known:
-            verdict = "untested" if "cmc" in values else "untested_undefined"
+            verdict, off = "untested" if "cmc" in values else "untested_undefined", 0.0
         elif "true" in values and "cmc" not in values:
             verdict, off = "undefined", 2.0
         elif "true" in values:
             over = values["cmc"].number - values["true"].number
             verdict = "alike" if abs(over) <= CLEARLY else "lower" if over < 0.0 else "higher"
-            off = 0.1 + abs(over)
+            off = 0.2 + abs(over)
         names = {"approach": phrase(name), "trial": plain(trial)}
         found.append((off, trial, Conclusion("likeness", verdict, values, names)))
     return [(trial, told) for _, trial, told in sorted(found, key=lambda one: -one[0])]

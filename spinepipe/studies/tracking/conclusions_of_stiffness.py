@@ -184,7 +184,7 @@ def _between(values: pd.DataFrame) -> Iterator[Conclusion]:
     if both.empty:
         return
     ratio = one["ratio_to_generic"][both] / other["ratio_to_generic"][both]
-    apart = np.log(ratio.astype(float)).abs()
+    apart = np.abs(np.log(ratio.astype(float)))
     moved = (one["outside"][both] | other["outside"][both]).to_numpy(bool)
     within = moved.sum() <= EXPECTED * len(both)
     told = np.exp((apart if within else apart[moved]).to_numpy(float))
