@@ -78,17 +78,15 @@ def approach_errors(study: Tracking, cohort: Cohort, tables: Tables) -> Chart:
     panels = []
     for one in (same for same in found if same.where == first.where):
         rows = []
-        for name in sorted(one.approaches, key=order.index):
-            error = one.error(name)
-            row = {"row": short_of(name), "series": kinds.get(name, "others")}
-            row |= {"note": number(error.number, 2)}
+        for name in (name for name in order if name in one.approaches):
+            error, series = one.error(name), kinds.get(name, "others")
+            row = {"row": short_of(name), "series": series, "note": number(error.number, 2)}
             rows.append({**row, "value": error.number, "low": error.low, "high": error.high})
         frame = pd.DataFrame(rows).astype({"low": float, "high": float})
         most = float(frame["value"].max())
         end = float(np.nanmin([1.5 * most, frame["high"].max()])) or 1.0
-        how: dict[str, Any] = {"x_limits": (0.0, end)}
-        heading = f"{TITLES[one.measure]} {one.where}"
-        how |= {"title": heading, "x_label": LABELS[one.measure], "width": 340.0}
+        how: dict[str, Any] = {"x_limits": (0.0, end), "x_label": LABELS[one.measure]}
+        how |= {"title": f"{TITLES[one.measure]} {one.where}", "width": 340.0}
         panels.append(Rows(frame=frame, looks=looks, **how))
     interval = "; line: its 95 % interval" if first.n >= FEWEST else ""
     caption = (
@@ -180,25 +178,25 @@ def kinematics(study: Tracking, cohort: Cohort, tables: Tables) -> Chart:
     one = courses[trial]
     reach = {name: float(np.abs(curves).max()) for name, curves in one.items()}
     looks = looks_of(chosen, one)
-    wild = [name for name in looks if reach[name] > WILD * max(reach.get(chosen, 0.0), 1.0)]
+    limit = WILD * reach.get(chosen, max(reach.values()))
+    wild = [name for name in looks if reach[name] > limit]
     looks = {name: look for name, look in looks.items() if name not in wild}
     rows = _courses_rows({name: one[name] for name in looks})
     sizes = np.append(rows[["y", "y_low", "y_high"]].to_numpy(float).ravel(), 0.0)
     low, high = np.nanmin(sizes), np.nanmax(sizes)
     room = 0.06 * (high - low) or 1.0
-    kind = next(kind for (_, name), kind in kinds.items() if name == trial)
+    axis = next(AXIS[kind] for (_, name), kind in kinds.items() if name == trial and kind in AXIS)
     how: dict[str, Any] = {"x_label": "cycle of the motion (%)", "x_limits": (0.0, 100.0)}
-    how["y_label"] = "rotation (°)"
-    how |= {"y_limits": (low - room, high + room), "looks": looks, "high": 190.0}
+    how |= {"y_label": "rotation (°)", "y_limits": (low - room, high + room)}
+    how |= {"looks": looks, "high": 190.0}
     panels = [
         Curves(title=level(joint), frame=rows[rows["joint"] == joint], **how)
         for joint in LUMBAR_JOINTS
     ]
     most = max(len(one[name]) for name in looks)
     band = "; band: one SD to each side" if most > 1 else ""
-    sign = POSITIVE[ROTATIONS[AXIS[kind]]]
-    caption = f"{case(trial)}, + {sign}; mean over {count(most, 'subject')}{band}."
-    caption += _left_out(wild)
+    caption = f"{case(trial)}, + {POSITIVE[ROTATIONS[axis]]}; mean over "
+    caption += f"{count(most, 'subject')}{band}.{_left_out(wild)}"
     return Chart(title, panels, caption, _keys(looks, as_line=True))
 
 

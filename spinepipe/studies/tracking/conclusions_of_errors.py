@@ -90,10 +90,10 @@ def _keys(tables: Tables, found: Sequence[Ranking], one: Ranking) -> Iterator[Co
     yield Conclusion("error", one.measure.partition("_")[0], {"value": one.error(best)}, names)
     if IK in one.approaches[1:]:
         yield Conclusion("reference", "kinematics", {"value": one.error(IK)}, names)
-    for angles in found:
-        same = (angles.measure, angles.where) == (ANGLES, one.where)
-        if same and angles is not one and best in angles.approaches:
-            values, moved = {"value": angles.error(best)}, _lumbar_range(tables["ranges"], one)
+    for other in found:
+        same = (other.measure, other.where) == (ANGLES, one.where)
+        if same and other is not one and best in other.approaches:
+            values, moved = {"value": other.error(best)}, _lumbar_range(tables["ranges"], one)
             values |= {"range": moved} if moved else {}
             yield Conclusion("angle", "moving" if moved else "alone", values, names)
 

@@ -26,8 +26,6 @@ WIDE = 1.96
 EXPECTED = 0.05
 """Share of values that the prior alone leaves outside its range."""
 
-MOST_NAMES = 3
-
 PAIR = ("optk_from_flexion", "optk_from_bending")
 """Calibrations on one kind of motion each."""
 
@@ -101,7 +99,7 @@ def _profiles(rows: pd.DataFrame, ratios: "pd.Series[float]") -> Iterator[Conclu
     sizes = {"most": rows["most"].max(), "low": ratios.min(), "high": ratios.max()}
     values |= {n: Value(float(x), source="profile_points") for n, x in sizes.items() if pd.notna(x)}
     who = list(dict.fromkeys(map(str, rows["specimen"])))
-    subjects = listed(who) if len(who) <= MOST_NAMES else count(len(who), "subject")
+    subjects = listed(who) if len(who) <= 3 else count(len(who), "subject")
     end = listed(dict.fromkeys(edges["end"]), last="or")
     own = rows[rows["says"] == verdict.removeprefix("all_")]
     names = {"whose": subjects, "end": end, "places": _places(own)}
@@ -114,12 +112,12 @@ def _profiles(rows: pd.DataFrame, ratios: "pd.Series[float]") -> Iterator[Conclu
 def _places(rows: pd.DataFrame) -> str:
     """A few profiles with their ends; of more than three the first."""
     parts = []
-    for row in rows.head(MOST_NAMES).to_dict("records"):
+    for row in rows.head(3).to_dict("records"):
         low, high = row["low"], row["high"]
         ends = f"{tick(round(low, 2))} to" if pd.notna(low) else "below"
         between = f"{ends} {tick(round(high, 2))}" if pd.notna(high) else f"above {low:.2g}"
         parts.append(f"{plain(row['region'])} {AXIS[row['coordinate']].lower()} {between}")
-    return listed(parts, MOST_NAMES)
+    return listed(parts)
 
 
 def _ended(rows: pd.DataFrame) -> Iterator[Conclusion]:
@@ -184,10 +182,10 @@ def _between(values: pd.DataFrame) -> Iterator[Conclusion]:
     if both.empty:
         return
     ratio = one["ratio_to_generic"][both] / other["ratio_to_generic"][both]
-    apart = np.abs(np.log(ratio.astype(float)))
+    apart = np.abs(np.log(ratio.to_numpy(float)))
     moved = (one["outside"][both] | other["outside"][both]).to_numpy(bool)
     within = moved.sum() <= EXPECTED * len(both)
-    told = np.exp((apart if within else apart[moved]).to_numpy(float))
+    told = np.exp(apart if within else apart[moved])
     source = "stiffness: larger over smaller ratio_to_generic less 1, median of elements"
     values_told = {
         "apart": Value(100.0 * (float(np.median(told)) - 1.0), "%", n=len(told), source=source),
