@@ -7,6 +7,7 @@ for papers, all panels stand in a grid.
 
 import io
 import re
+import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -149,17 +150,26 @@ def saying(title: str, message: str) -> Chart:
     return Chart(title, [_Message(message=message)], message)
 
 
+_LETTERS = 40
+"""In a line of a message."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Message(Panel):
     message: str
 
     @property
+    def lines(self) -> list[str]:
+        return textwrap.wrap(self.message, _LETTERS)
+
+    @property
     def height(self) -> float:
-        return 24.0
+        return 8.0 + 16.0 * len(self.lines)
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        axes.text(0.0, 0.5, self.message, transform=axes.transAxes, color=COLORS["soft"], wrap=True)
+        text = axes.text(0.0, 0.5, "\n".join(self.lines), transform=axes.transAxes, va="center")
+        text.set(color=COLORS["soft"], in_layout=False)  # it is wider than the axes
 
 
 def _draw(panel: Panel, figure: FigureBase) -> None:
