@@ -91,7 +91,7 @@ class Rows(Panel):
         axes.tick_params(axis="y", colors=COLORS["ink"])
         axes.grid(axis="y", visible=False)
         axes.spines["left"].set_visible(False)
-        if self.log and not self.x_limits:
+        if self.log:
             log_ticks(axes.xaxis, *axes.get_xlim())
         if "note" in self.frame:
             told = self.frame.drop_duplicates("row").set_index("row")["note"]
