@@ -44,13 +44,12 @@ def _stiffness(title: str, stiffness: pd.DataFrame, by: str, of: str) -> Chart:
     if values.empty:
         return saying(title, "No fit to all load cases has a stiffness.")
     published = stiffness[stiffness["representation"] == PUBLISHED[0]]
-    start = published.drop_duplicates("coordinate").set_index("coordinate")["stiffness"]
+    start = dict(zip(published["coordinate"], published["stiffness"], strict=True))
     panels = []
     for name, rows in values.groupby("coordinate", sort=False):
-        (unit,) = set(rows["unit"])
-        factor = dict(FIELD.values())[unit]
-        mark = {float(start[name]) * factor: ""} if name in start else {}
-        panels.append(_panel(rows, by, f"each {of}", AXIS[str(name)], f"stiffness ({unit})", mark))
+        unit = rows["unit"].iloc[0]
+        marks = {start[name] * dict(FIELD.values())[unit]: ""} if name in start else {}
+        panels.append(_panel(rows, by, f"each {of}", AXIS[str(name)], f"stiffness ({unit})", marks))
     shared = values.duplicated([by, "coordinate"]).any()
     described = IN_WORDS[values["representation"].iloc[0]]
     keys = [Key(SOFT, f"each {of}"), Key(MODEL, "median")] if shared else [Key(MODEL, described)]

@@ -13,6 +13,7 @@ from spinepipe.report.words import SIGNS, count, level, listed, plain, short
 from spinepipe.status import USABLE
 from spinepipe.studies.cohort_stiffness.claims import FEWEST
 from spinepipe.studies.cohort_stiffness.conclusions_of_claims import (
+    UNSEEN,
     claim_conclusions,
     covariate_conclusions,
 )
@@ -35,7 +36,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     load_cases,
     representations_of,
 )
-from spinepipe.studies.cohort_stiffness.stages import LEFT_OUT_SPECIMEN, joint_label_of
+from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.studies.cohort_stiffness.tables import MEASURED, WHOLE
 
 LARGE, SMALL = 1.5, 0.7
@@ -45,6 +46,9 @@ MANY = 0.1
 """Share of fits lost, or of curves beyond noise, above which the rest no longer stands for all."""
 
 MOST_PLACES = 4
+
+MOTION = {"fitted": "fitted motion", **UNSEEN}
+"""Whose error a criterion of the table ``ranking`` is."""
 
 SAME = 0.01
 """Errors of one joint that differ by a smaller share are the same; pooling alone makes any."""
@@ -61,22 +65,23 @@ def conclusions(study: CohortStiffness, cohort: Cohort, results: Results) -> Ite
     scatter = _scatter(fits, values)
     yield from stiffness_conclusions(values)
     yield from _trust(study, signs, values, scatter)
-    needed = {"n": _count(specimens, "cohort"), "needed": _count(FEWEST, "claims")}
+    needed = _counts({"n": specimens, "needed": FEWEST}, "cohort: specimens")
     words = {"specimens": count(specimens, "specimen")}
     yield Conclusion("sample", "few" if specimens < FEWEST else "ok", needed, words)
-    same = same_errors(table("ranking"), len(cohort.joint_names))
-    if same is not None:
-        yield Conclusion("descriptions", "same", {"error": same})
+    same = one_joint_errors(table("ranking"), len(cohort.joint_names))
+    if len(same):
+        row = same.sort_values("criterion").to_dict("records")[-1]
+        error = Value(row["value"], SIGNS[row["unit"]], n=row["specimens"], source="ranking: value")
+        yield Conclusion(
+            "descriptions", "same", {"error": error}, {"what": MOTION[row["criterion"]]}
+        )
     if specimens >= FEWEST:
         told = claim_conclusions(study, values, table("findings"))
-        yield from (one for one in told if not (same and one.rule == "descriptions"))
+        yield from (one for one in told if one.rule != "descriptions" or same.empty)
     if study.base is not None:
         yield Conclusion("left_out", "base")
     yield from covariate_conclusions(table("covariates"))
-    yield from _fits(fits)
-    yield from _bounded(values)
-    yield from _noise(study, scatter)
-    yield from _signs(signs)
+    yield from _quality(study, fits, values, scatter)
     yield from _checks(study, specimens, stiffness, signs, values)
     if set(study.representations) - set(representations_of(study, cohort.joint_names)):
         yield Conclusion("ratios", "check")
@@ -85,12 +90,8 @@ def conclusions(study: CohortStiffness, cohort: Cohort, results: Results) -> Ite
     yield from _methods(study, stiffness, specimens)
 
 
-def _count(n: int, source: str) -> Value:
-    return Value(int(n), source=source)
-
-
 def _counts(numbers: Mapping[str, int], source: str) -> dict[str, Value]:
-    return {name: _count(n, source) for name, n in numbers.items()}
+    return {name: Value(int(n), source=source) for name, n in numbers.items()}
 
 
 def _scatter(fits: pd.DataFrame, values: pd.DataFrame) -> Value | None:
@@ -108,93 +109,70 @@ def _trust(
     study: CohortStiffness, signs: pd.DataFrame, values: pd.DataFrame, scatter: Value | None
 ) -> Iterator[Conclusion]:
     """What the answer depends on, what forbids it first."""
-    counts = _sign_counts(signs)
-    if counts and counts["flipped"].number:
-        flipped = signs[signs["verdict"] == "flipped"].to_dict("records")
+    names = {"flipped": "flipped", "wrong": "implausible", "moved": "as_expected"}
+    rows = {name: signs[signs["verdict"] == word] for name, word in names.items() if len(signs)}
+    if rows:
+        counts = {name: len(part) for name, part in rows.items()} | {"n": len(signs)}
+        counts["moved"] += counts["wrong"]
+        numbers = _counts(counts, "sign_checks: verdict")
         places = [
-            f"{short(r['specimen'])} {level(r['joint'])} in {plain(r['test'])}" for r in flipped
+            f"{short(row['specimen'])} {level(row['joint'])} in {plain(row['test'])}"
+            for row in rows["flipped"].to_dict("records")
         ]
-        verdict = "stop_flipped_many" if len(flipped) > MOST_PLACES else "stop_flipped"
-        yield Conclusion("trust", verdict, counts, {"places": listed(places)})
-    if counts and counts["wrong"].number:
-        yield Conclusion("trust", "sizes", counts)
+        light = "check_untold" if counts["moved"] < len(signs) else "ok"
+        if counts["wrong"]:
+            yield Conclusion("trust", "sizes", numbers)
+            light = "check_sizes"
+        if places:
+            verdict = "stop_flipped_many" if len(places) > MOST_PLACES else "stop_flipped"
+            yield Conclusion("trust", verdict, numbers, {"places": listed(places)})
+            light = "stop"
+        yield Conclusion("signs", light, numbers)
     if study.base is not None:
         yield Conclusion("trust", "base")
-    if scatter is None:
-        return
-    name = str(values["representation"].iloc[0])
-    words = {"described": named(name).sentence}
-    words["centres"] = "fitted, too" if name in NUISANCE else "as stated"
-    large = scatter.number >= LARGE
-    verdict = "no_noise" if study.cost == "published" else "misfit" if large else "law"
-    if verdict != "law" or study.base is None:
-        yield Conclusion("trust", verdict, {"scatter": scatter}, words)
-
-
-def _sign_counts(signs: pd.DataFrame) -> dict[str, Value]:
-    if signs.empty:
-        return {}
-    names = {"flipped": "flipped", "wrong": "implausible", "moved": "as_expected"}
-    counts = {name: int((signs["verdict"] == word).sum()) for name, word in names.items()}
-    counts |= {"n": len(signs), "moved": counts["moved"] + counts["wrong"]}
-    return _counts(counts, "sign_checks: verdict")
-
-
-def _signs(signs: pd.DataFrame) -> Iterator[Conclusion]:
-    values = _sign_counts(signs)
-    if values:
-        flipped, wrong = values["flipped"].number, values["wrong"].number
-        whole = values["moved"].number == len(signs)
-        verdict = "check_sizes" if wrong else "ok" if whole else "check_untold"
-        yield Conclusion("signs", "stop" if flipped else verdict, values)
+    if scatter is not None:
+        name = str(values["representation"].iloc[0])
+        words = {"described": named(name).sentence}
+        words["centres"] = "fitted, too" if name in NUISANCE else "as stated"
+        verdict = "misfit" if scatter.number >= LARGE else "law"
+        verdict = "no_noise" if study.cost == "published" else verdict
+        if verdict != "law" or study.base is None:
+            yield Conclusion("trust", verdict, {"scatter": scatter}, words)
 
 
 def one_joint_errors(ranking: pd.DataFrame, joints: int) -> pd.DataFrame:
     """Errors of linear descriptions that are the same, as there is one joint; else no rows.
 
-    They differ where readings left out are predicted with a stiffness that no other bounds.
+    They differ where a load case is predicted with a stiffness that the others do not bound.
     """
-    linear = ranking["representation"].map(lambda x: x not in {*PUBLISHED, *STIFFENING, *NUISANCE})
-    rows = ranking[linear.astype(bool) & ranking["value"].notna()]
-    fitted = rows.loc[rows["criterion"] == "fitted", "value"].astype(float)
-    if joints > 1 or len(fitted) < 2 or np.ptp(fitted) > SAME * fitted.max():
-        return rows[:0]
-    least = rows.groupby("criterion")["value"].transform("min")
-    return rows[rows["value"] <= (1.0 + SAME) * least]
+    if joints > 1 or ranking.empty:
+        return ranking[:0]
+    special = ranking["representation"].isin({*PUBLISHED, *STIFFENING, *NUISANCE})
+    rows = ranking[~special & ranking["criterion"].isin(MOTION)].dropna(subset="value")
+    groups = rows.groupby("criterion")["value"]
+    far = groups.transform("max") > (1.0 + SAME) * groups.transform("min")
+    same = rows[~far & groups.transform("count").gt(1)]
+    return same if (same["criterion"] == "fitted").any() else same[:0]
 
 
-def same_errors(ranking: pd.DataFrame, joints: int) -> Value | None:
-    """That error, of left-out specimens where there are such, else of fitted motion."""
-    rows = one_joint_errors(ranking, joints) if len(ranking) else ranking
-    for criterion in (LEFT_OUT_SPECIMEN, "fitted"):
-        if len(rows) and len(part := rows[rows["criterion"] == criterion]) > 1:
-            first, n = part.iloc[0], int(part["specimens"].iloc[0])
-            return Value(float(first["value"]), SIGNS[first["unit"]], n=n, source="ranking: value")
-    return None
-
-
-def _fits(fits: pd.DataFrame) -> Iterator[Conclusion]:
-    if fits.empty:
-        return
-    lost = fits.loc[~fits["status"].isin(USABLE), "status"]
-    several = int((fits["n_optima"] > 1).sum())
-    values = _counts(
-        {"n": len(fits), "lost": len(lost), "several": several}, "fits: status, n_optima"
-    )
-    verdict = "ok" if lost.empty else "check" if len(lost) <= MANY * len(fits) else "stop"
-    why = [f"{n} {plain(str(name))}" for name, n in lost.value_counts().items()]
-    yield Conclusion("fits", verdict, values, {"why": listed(why)})
-    yield Conclusion("starts", "check" if several else "ok", values)
-
-
-def _bounded(values: pd.DataFrame) -> Iterator[Conclusion]:
+def _quality(
+    study: CohortStiffness, fits: pd.DataFrame, values: pd.DataFrame, scatter: Value | None
+) -> Iterator[Conclusion]:
+    """Fits that ended without a stiffness or hang on their start, values not bounded, residuals."""
+    if len(fits):
+        lost = fits.loc[~fits["status"].isin(USABLE), "status"]
+        several = int((fits["n_optima"] > 1).sum())
+        counts = {"n": len(fits), "lost": len(lost), "several": several}
+        numbers = _counts(counts, "fits: status, n_optima")
+        verdict = "ok" if lost.empty else "check" if len(lost) <= MANY * len(fits) else "stop"
+        why = [f"{n} {plain(str(name))}" for name, n in lost.value_counts().items()]
+        yield Conclusion("fits", verdict, numbers, {"why": listed(why)})
+        yield Conclusion("starts", "check" if several else "ok", numbers)
     if len(values):
-        lost = int(values["value"].isna().sum())
-        numbers = _counts({"n": len(values), "lost": lost}, "stiffness: identifiable, at_bound")
-        yield Conclusion("bounded", "check" if lost else "ok", numbers)
-
-
-def _noise(study: CohortStiffness, scatter: Value | None) -> Iterator[Conclusion]:
+        lost_values = int(values["value"].isna().sum())
+        counts = {"n": len(values), "lost": lost_values}
+        numbers = _counts(counts, "stiffness: identifiable, at_bound")
+        yield Conclusion("bounded", "check" if lost_values else "ok", numbers)
     if study.cost == "published":
         yield Conclusion("noise", "check_none")
     elif scatter is not None:
@@ -315,7 +293,7 @@ def _methods(study: CohortStiffness, stiffness: pd.DataFrame, n: int) -> Iterato
     tests = load_cases(stiffness["fitted_to"]) if len(stiffness) else ()
     words = {"directions": directions(study.free), "tests": count(len(tests), "load case")}
     verdict = "published" if study.cost == "published" else "noise"
-    yield Conclusion("methods", verdict, {"n": _count(n, "cohort: specimens")}, words)
+    yield Conclusion("methods", verdict, _counts({"n": n}, "cohort: specimens"), words)
     if set(study.representations) & set(POOLED):
         yield Conclusion("methods_more", "pooled")
     if n >= FEWEST:

@@ -8,8 +8,9 @@ import pandas as pd
 
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.words import AXIS, level, listed, short
-from spinepipe.studies.cohort_stiffness.representations import FITTED, SHARED, finest, named
+from spinepipe.studies.cohort_stiffness.representations import FITTED, SHARED, named
 from spinepipe.studies.cohort_stiffness.stages import own_fits
+from spinepipe.studies.cohort_stiffness.tables import STIFFNESS
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 FIELD = {"N m/rad": ("N m/deg", pi / 180.0), "N/m": ("N/mm", 1e-3)}
@@ -22,7 +23,7 @@ HOW = "stiffness: own fits to all load cases"
 
 
 def joint_values(stiffness: pd.DataFrame) -> pd.DataFrame:
-    """The stiffness that a page tells: each specimen's own fit to all load cases, described one way.
+    """The stiffness that a page tells: own fits of specimens to all load cases, described one way.
 
     Of the descriptions it is the finest of those that have a typical value in most directions.
     A value that is not identifiable or at a bound is none: it is empty, and of its region the ends
@@ -30,54 +31,37 @@ def joint_values(stiffness: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    One row per specimen, joint (`ALL_JOINTS` where they share a value) and coordinate, rotations
-    first: ``representation``, ``specimen``, ``joint``, ``coordinate``, ``unit``, ``value``, ``low``,
-    ``high``, ``place`` (the value for medians: infinite where only one end is known), ``growth``.
+    Rows of the table in units of the field, rotations first, one for `ALL_JOINTS` where they share
+    a value. More columns are ``value`` and ``place``, which is that for medians: infinite where
+    one end alone is known.
     """
-    own = own_fits(stiffness) if len(stiffness) else stiffness.reindex(columns=_READ)
-    names = _from_fine_to_coarse([one for one in FITTED if one in set(own["representation"])])
-    found = [_rows(own[own["representation"] == name]) for name in names]
-    if not found:
-        return _rows(own)
+    own = own_fits(stiffness) if len(stiffness) else pd.DataFrame(columns=STIFFNESS.names)
+    names = [one for one in sorted(FITTED, key=_order) if one in set(own["representation"])]
+    found = [_rows(own[own["representation"] == name]) for name in names] or [_rows(own)]
     return max(found, key=lambda rows: sum(v is not None for v in typical_by(rows).values()))
 
 
-_READ = (
-    *("representation", "specimen", "joint", "coordinate", "unit", "stiffness", "low", "high"),
-    *("identifiable", "at_bound", "growth", "fitted_to", "source"),
-)
-
-
-def _from_fine_to_coarse(names: Sequence[str]) -> list[str]:
-    """Those fitted specimen by specimen and with joints as stated first."""
-    left, order = list(names), []
-    while name := finest(left):
-        order.append(name)
-        left.remove(name)
-    return [*order, *reversed(left)]
+def _order(name: str) -> tuple[bool, bool, bool]:
+    """Each joint its own first, before these all by itself and with centres as stated."""
+    one = named(name)
+    return one.pooled or bool(one.without_nuisances), one.grouping != "per_joint", one.stiffens
 
 
 def _rows(own: pd.DataFrame) -> pd.DataFrame:
-    kept = own[[name for name in _READ if name in own]].copy()
-    kept = kept[kept["stiffness"].notna() | kept["low"].notna() | kept["high"].notna()]
-    shared = kept["representation"].map(lambda name: name in SHARED and not named(name).by_level)
-    kept.loc[shared.astype(bool), "joint"] = ALL_JOINTS
-    kept = kept.drop_duplicates(["specimen", "joint", "coordinate"])
-    factor = kept["unit"].map(lambda unit: FIELD[unit][1]).astype(float)
-    sure = kept["identifiable"].eq(True) & kept["at_bound"].eq("no")
-    kept["value"] = (kept["stiffness"].astype(float) * factor).where(sure)
-    for end in ("low", "high"):
-        kept[end] = kept[end].astype(float) * factor
-    above, below = (
-        kept["low"].notna() & kept["high"].isna(),
-        kept["high"].notna() & kept["low"].isna(),
-    )
-    one_end = np.select([above & ~sure, below & ~sure], [np.inf, -np.inf], np.nan)
-    kept["place"] = kept["value"].fillna(pd.Series(one_end, kept.index))
-    kept["unit"] = kept["unit"].map(lambda unit: FIELD[unit][0])
-    order = {name: place for place, name in enumerate((*ROTATIONS, *TRANSLATIONS))}
-    kept = kept.sort_values("coordinate", key=lambda names: names.map(order), kind="stable")
-    return kept.drop(columns=["stiffness", "identifiable", "at_bound", "fitted_to", "source"])
+    own = own[own[["stiffness", "low", "high"]].notna().any(axis=1)].copy()
+    shared = [name in SHARED and not named(name).by_level for name in own["representation"]]
+    own.loc[shared, "joint"] = ALL_JOINTS
+    own = own.drop_duplicates(["specimen", "joint", "coordinate"])
+    factor = np.array([FIELD[unit][1] for unit in own["unit"]], dtype=float)
+    value, low, high = (own[name].astype(float) * factor for name in ("stiffness", "low", "high"))
+    sure = own["identifiable"].eq(True) & own["at_bound"].eq("no")
+    above = (low.notna() & high.isna()) | own["at_bound"].eq("upper")
+    below = (low.isna() & high.notna()) | own["at_bound"].eq("lower")
+    place = np.select([sure, above, below], [value, np.inf, -np.inf], np.nan)
+    told = {"value": value.where(sure), "low": low, "high": high, "place": place}
+    own = own.assign(**told, unit=[FIELD[unit][0] for unit in own["unit"]])
+    order = {name: number for number, name in enumerate((*ROTATIONS, *TRANSLATIONS))}
+    return own.sort_values("coordinate", key=lambda names: names.map(order), kind="stable")
 
 
 def typical_by(values: pd.DataFrame) -> dict[str, Value | None]:
@@ -91,22 +75,15 @@ def typical(rows: pd.DataFrame) -> Value | None:
     A specimen counts by the median over its joints. A single value has its own 95 % interval. None
     where the median is not bounded.
     """
-    known = rows.dropna(subset="place")
-    if known.empty:
+    known, kind = rows.dropna(subset="place"), kind_of(rows)
+    by = known["specimen"] if kind == "specimens" else known["joint"]
+    numbers = known.groupby(by, sort=False)["place"].median().dropna()
+    if numbers.empty or not isfinite(numbers.median()):
         return None
-    unit = str(known["unit"].iloc[0])
-    if len(known) == 1:
-        (one,) = known.to_dict("records")
-        ends = (None if pd.isna(one[end]) else float(one[end]) for end in ("low", "high"))
-        return Value(one["value"], unit, *ends, 1, HOW) if pd.notna(one["value"]) else None
-    numbers = known.set_index("joint")["place"]
-    if kind_of(known) == "specimens":
-        numbers = known.groupby("specimen", sort=False)["place"].median().dropna()
-    middle = float(numbers.median())
-    if not isfinite(middle):
-        return None
-    least, most = (float(x) if isfinite(x) else None for x in (numbers.min(), numbers.max()))
-    return Value(middle, unit, least, most, len(numbers), f"{HOW}, median and range")
+    ends = known[["low", "high"]].iloc[0] if kind == "single" else numbers.agg(["min", "max"])
+    low, high = (float(end) if isfinite(end) else None for end in ends)
+    unit, n = str(known["unit"].iloc[0]), len(numbers)
+    return Value(float(numbers.median()), unit, low, high, n, f"{HOW}, {kind}")
 
 
 def kind_of(rows: pd.DataFrame) -> str:
