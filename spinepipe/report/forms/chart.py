@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
+from textwrap import wrap
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
@@ -157,11 +158,16 @@ class _Message(Panel):
 
     @property
     def height(self) -> float:
-        return 24.0
+        return 18.0 * len(self._lines) + 6.0
+
+    @property
+    def _lines(self) -> list[str]:
+        return wrap(self.message, 42)  # letters that fit a panel
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        axes.text(0.0, 0.5, self.message, transform=axes.transAxes, color=COLORS["soft"], wrap=True)
+        how = {"va": "center", "color": COLORS["soft"], "in_layout": False}
+        axes.text(0.0, 0.5, "\n".join(self._lines), transform=axes.transAxes, **how)
 
 
 def _draw(panel: Panel, axes: Axes) -> None:

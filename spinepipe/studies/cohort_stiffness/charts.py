@@ -11,7 +11,7 @@ from spinepipe.report.forms.chart import Chart, Key, saying
 from spinepipe.report.forms.curves import Scatter
 from spinepipe.report.forms.look import BASE, MODEL, SOFT, THIRD
 from spinepipe.report.forms.rows import Rows
-from spinepipe.report.words import AXIS, SIGNS, capital, case, level
+from spinepipe.report.words import AXIS, SIGNS, case, level
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import loaded_ratios
 from spinepipe.studies.cohort_stiffness.conclusions import one_joint_errors
 from spinepipe.studies.cohort_stiffness.conclusions_of_stiffness import FIELD, joint_values
@@ -26,7 +26,7 @@ MOST_TIMES = 12.0
 """Largest over least value from which on an axis is logarithmic."""
 
 MOST_POINTS = 250
-"""Of a panel of rows; where there are more, only medians are drawn."""
+"""Where there are more in a panel of rows only medians are drawn; in others no intervals."""
 
 
 def stiffness_by_specimen(study: CohortStiffness, cohort: Cohort, tables: Tables) -> Chart:
@@ -71,21 +71,22 @@ def _panel(
     """
     singles = values.assign(row=values[by].map(level), series=each)
     shared = singles["row"].duplicated().any()
-    parts = [singles[["row", "series", "value", "low", "high"]]]
+    parts = [singles]
     if shared:
         middle = singles.groupby("row", sort=False)["place"].median().replace(float("inf"), None)
         middle = middle.astype(float).where(middle.astype(float) > 0.0)
         one = pd.DataFrame({"row": middle.index, "series": "median", "value": middle.to_numpy()})
         parts = [*parts[: len(singles) <= MOST_POINTS], one]
-    frame = pd.concat(parts, ignore_index=True)
+    columns = ["row", "series", "value", "low", "high"]
+    frame = pd.concat(parts, ignore_index=True).reindex(columns=columns)
     seen = [*frame[["value", "low", "high"]].stack().dropna(), *marks]
     log = bool(seen) and max(seen) > MOST_TIMES * min(seen)
     ends = (min(seen, default=1.0) / 1.3 if log else 0.0, max(seen, default=1.0) * 1.08)
     looks = {each: SOFT if shared else MODEL, "median": MODEL}
     frame = frame[::-1] if by == "joint" else frame  # cranial at the top
-    return Rows(
-        title=title, x_label=label, frame=frame, looks=looks, marks=marks, log=log, x_limits=ends
-    )
+    width = 300.0 + 5.0 * max(0, min(26, singles["row"].str.len().max()) - 12)
+    how = {"looks": looks, "marks": marks, "log": log, "x_limits": ends, "width": width}
+    return Rows(title=title, x_label=label, frame=frame, **how)
 
 
 STAGES = {
@@ -105,7 +106,8 @@ def held_out_error(study: CohortStiffness, cohort: Cohort, tables: Tables) -> Ch
     if rows.empty:
         return saying(title, "No fit has an error: there is nothing to compare.")
     same = one_joint_errors(rows, len(cohort.joint_names))  # equal results once
-    names = rows["representation"].map(IN_WORDS)
+    alike = {"per_joint": "per_specimen"} if len(cohort.joint_names) == 1 else {}
+    names = rows["representation"].replace(alike).map(IN_WORDS)
     rows = rows.assign(row=names.where(~rows.index.isin(same.index), "all linear descriptions"))
     published = rows["representation"].isin(PUBLISHED)
     rows = rows.assign(series=rows["criterion"].where(~published, "published"))
@@ -118,15 +120,16 @@ def held_out_error(study: CohortStiffness, cohort: Cohort, tables: Tables) -> Ch
         x_label=f"root mean square error ({unit})",
         frame=rows[["row", "series", "value", "low", "high"]],
         looks={name: look for name, (_, look) in STAGES.items()},
-        width=560.0,
+        width=430.0,
         log=bool(value.max() > MOST_TIMES * value[value > 0.0].min()),
     )
     found = set(rows["series"])
     keys = [Key(look, words) for name, (words, look) in STAGES.items() if name in found]
-    base = "; the base model's effects are left out nowhere" if study.base is not None else ""
+    last = "More unknowns always fit better; whether they are worth it, motion left out shows."
+    if study.base is not None:
+        last = "The base model's effects are left out nowhere."
     caption = (
-        f"Mean over specimens with its 95 % interval, by where the stiffness comes from{base}. "
-        "More unknowns always fit better; whether they are worth it, motion left out shows."
+        f"Mean over specimens with its 95 % interval, by where the stiffness comes from. {last}"
     )
     return Chart(title, [panel], caption, keys)
 
@@ -146,12 +149,12 @@ def load_case_stiffness(study: CohortStiffness, cohort: Cohort, tables: Tables) 
     logs = {"value": found["ratio"], "low": found["ratio"] - reach, "high": found["ratio"] + reach}
     found = found.assign(**{name: np.exp(log) for name, log in logs.items()})
     found = found.assign(place=found["value"], test=[case(str(name)) for name in found["test"]])
-    panel = _panel(found, "test", "each joint", "", "ratio of stiffness", {1.0: ""})
+    panel = _panel(found, "test", "each fit", "", "ratio of stiffness", {1.0: ""})
     caption = (
         "Stiffness of the loaded direction by the load case alone, over that by the other load "
         "cases; where both are bounded, with 95 % intervals."
     )
-    return Chart(title, [panel], caption, [Key(SOFT, "each joint"), Key(MODEL, "median")])
+    return Chart(title, [panel], caption, [Key(SOFT, "each fit"), Key(MODEL, "median")])
 
 
 def range_of_motion(study: CohortStiffness, cohort: Cohort, tables: Tables) -> Chart:
@@ -162,6 +165,10 @@ def range_of_motion(study: CohortStiffness, cohort: Cohort, tables: Tables) -> C
     if found.empty:
         return saying(title, "No range of motion was both measured and modelled.")
     found = found[found["cycle"] == found.groupby("test")["cycle"].transform("max")]
+    lines = "Lines are 95 % intervals, by the noise of one reading and by the stiffness."
+    many = len(found) > MOST_POINTS
+    if many:
+        lines = "Intervals of so many curves are in the result files."
     panels = []
     for test, here in found.groupby("test", sort=False):
         x, y = here["measured"], here["simulated"]
@@ -171,17 +178,16 @@ def range_of_motion(study: CohortStiffness, cohort: Cohort, tables: Tables) -> C
         }  # fmt: skip
         panels.append(
             Scatter(
-                title=capital(case(str(test)).replace("+", "and")),
+                title=case(str(test)).replace("+", " and "),
                 x_label="measured (°)",
                 y_label="modelled (°)",
-                frame=pd.DataFrame({"x": x, "y": y, **ends}),
+                frame=pd.DataFrame({"x": x, "y": y, **({} if many else ends)}),
                 looks={"": MODEL},
                 identity=True,
                 high=250.0,
             )
         )
     caption = (
-        "On the line the fitted model moves as the joint did, in the last cycle of each test. "
-        "Lines are 95 % intervals, by the noise of one reading and by the stiffness."
+        f"On the line the fitted model moves as the joint did, in the last cycle of each test. {lines}"
     )
-    return Chart(title, panels, caption)
+    return Chart(title, panels, caption, [Key(MODEL, "each joint")])
