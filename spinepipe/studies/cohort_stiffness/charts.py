@@ -187,7 +187,6 @@ def range_of_motion(study: CohortStiffness, cohort: Cohort, tables: Tables) -> C
                 high=250.0,
             )
         )
-    caption = (
-        f"On the line the fitted model moves as the joint did, in the last cycle of each test. {lines}"
-    )
+    line = "On the line the fitted model moves as the joint did, in the last cycle of each test."
+    caption = f"{line} {lines}"
     return Chart(title, panels, caption, [Key(MODEL, "each joint")])

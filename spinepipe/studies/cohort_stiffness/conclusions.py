@@ -230,7 +230,7 @@ def _priors(rows: pd.DataFrame) -> Iterator[Conclusion]:
 def _experiments(curves: pd.DataFrame, axes: pd.DataFrame) -> Iterator[Conclusion]:
     """What laboratories report of the tests: measured, and by the fitted model."""
     if len(curves):
-        yield from _ranges(paired_curves(curves, "range_of_motion", "deg"))
+        yield from ranges(paired_curves(curves, "range_of_motion", "deg"))
         yield from _zones(curves)
         loops = paired_curves(curves, "hysteresis_area", "j").dropna(subset=["measured"])
         sure = int((loops["measured"] - loops["measured_way"] > 0.0).sum())
@@ -252,7 +252,7 @@ def _experiments(curves: pd.DataFrame, axes: pd.DataFrame) -> Iterator[Conclusio
         yield Conclusion("axes", verdict, values)
 
 
-def _ranges(pairs: pd.DataFrame) -> Iterator[Conclusion]:
+def ranges(pairs: pd.DataFrame) -> Iterator[Conclusion]:
     """How far joints move, and how far the fitted model does.
 
     The model was fitted to these readings, so what it is unsure of is part of their noise:
