@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from spinepipe.report.forms.axes import log_ticks
 from spinepipe.report.forms.chart import Panel
@@ -105,6 +106,8 @@ class Rows(Panel):
         axes.spines["left"].set_visible(False)
         if self.log:
             log_ticks(axes.xaxis, *axes.get_xlim())
+        else:  # as many ticks whatever the width, which the layout is still to find
+            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         if "note" in self.frame:
             told = self.frame.drop_duplicates("row").set_index("row")["note"]
             for place, name in enumerate(names):
