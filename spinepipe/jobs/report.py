@@ -94,9 +94,8 @@ def _write_page(
         rows = results.table(shape.name)
         if shape.name.startswith(AGAINST) and len(rows):
             papers[f"{shape.name}.html"] = title = f"Beside {paper_of(shape.name)}"
-            write_marked(
-                comparison(shape, title, rows, study), folder / f"{shape.name}.html", digest
-            )
+            beside = comparison(shape, title, rows, study, cohort)
+            write_marked(beside, folder / f"{shape.name}.html", digest)
     write_marked(made.html(study, cohort, results, papers=papers, date=date), output, digest)
     if page == "report":
         metadata = {"study": study.study, "kind": study.kind, KEY: digest}

@@ -195,12 +195,14 @@ def judged(rows: pd.DataFrame) -> str:
     if rows.empty:
         return ""
     counted = rows[rows["evidence"] == "independent"]
-    inside, outside, lacking = (
-        int((counted["verdict"] == name).sum()) for name in ("inside", "outside", "not_computed")
+    inside, outside, undecided, lacking = (
+        int((counted["verdict"] == name).sum())
+        for name in ("inside", "outside", "undecided", "not_computed")
     )
     told = (
         f"Of {len(counted)} published quantities that are evidence ours are inside the paper's "
         f"range for {inside} and outside for {outside}"
+        + (f"; {undecided} are undecided" if undecided else "")
         + (f"; {lacking} are not computed" if lacking else "")
     )
     kinds = rows["evidence"].fillna("")
@@ -220,6 +222,7 @@ _NO_EVIDENCE = (
 _WORDS_OF_LIMITS = {
     "two_sided": "lie in a range with two ends whose width the paper gives",
     "chosen": "in one whose width was chosen here",
+    "borrowed": "in one whose width the paper prints of something else",
     "wide": "in one so wide (half to twice, or more) that inside is no agreement",
     "one_sided": "are on the right side of a single limit or of zero",
     "binary": "are the same yes, no or count",
