@@ -133,7 +133,7 @@ def pressure_error(
 
 
 def agreement(run: StudyRun, column: str, tier: str) -> Computed:
-    """Correlation, or root mean square error, of computed and measured pressures: where all hold."""
+    """Correlation, or root mean square error, of pressures, where all tasks are held."""
     if loose := run.number("agreement", "n_not_held", tier=tier):
         raise NotComputed(f"{loose:g} of its tasks are not held by the muscles")
     value = run.number("agreement", column, tier=tier)

@@ -1,6 +1,6 @@
 """Figures of trunk loads: loads beside measured pressures, by level, by flexion and by muscle."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import pandas as pd
 
@@ -21,7 +21,6 @@ from spinepipe.studies.trunk_loads.selection import (
     extensor_forces,
     named,
     of_person,
-    of_task,
     shown_person,
     sound,
 )
@@ -32,51 +31,42 @@ MOST_BODIES, MOST_ROWS, MOST_LEVELS = len(SEVERAL), 16, 3
 WHOLE_COURSE = 7
 """Number of the paper's task that is a course of angles, not one posture."""
 
+LOADS = {
+    COMPRESSION: "compression of L4–L5 (N)",
+    "l4l5_shear_n": "shear of L4–L5 (N), + forwards",
+}
 NOT_HELD = "computed, not held by the model: do not use"
 
 
 def pressures(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
     """Computed beside measured pressures, then the compression of all tasks and bodies."""
-    title = "Pressure in and compression of L4–L5"
-    tasks = tables["tasks"]
+    title, tasks = "Pressure in and compression of L4–L5", tables["tasks"]
     body = shown_person(study, tasks[sound(tasks)]) if len(tasks) else None
     if body is None or tasks[COMPRESSION].isna().all():
         return saying(title, "The model holds no task: there is no load to show.")
-    panels: list[Panel] = []
-    beside = beside_measured(study, tables).dropna(subset=["computed_mpa"])
     keys = [Key(MODEL, "computed"), Key(MODEL, NOT_HELD, hollow=True)]
-    if len(beside):
-        rows = beside["task"].map(case)
-        frames = [
-            pd.DataFrame(
-                {"row": rows, "series": "measured", "value": beside["measured_mpa"], "low": None,
-                 "high": None, "hollow": ~beside["confirmed"]}
-            ),
-            pd.DataFrame(
-                {"row": rows, "series": "computed", "value": beside["computed_mpa"],
-                 "low": beside["low"], "high": beside["high"], "hollow": ~beside["held"]}
-            ),
-        ]  # fmt: skip
-        panels.append(
-            Rows(
-                title="Pressure",
-                x_label="pressure in L4–L5 (MPa)",
-                frame=pd.concat(frames).astype({"low": float, "high": float}),
-                looks={"measured": MEASURED, "computed": MODEL},
-                width=300.0,
-            )
-        )
-        keys = [Key(MEASURED, "measured"), *keys]
-        keys.append(Key(MEASURED, "measured, not confirmed in print", hollow=True))
-    panels.append(
-        Rows(
-            title="Compression",
-            x_label="compression of L4–L5 (N)",
-            frame=_compressions(tables, body),
-            looks={"": MODEL},
-            width=300.0,
-        )
+    compressed = Rows(
+        title="Compression",
+        x_label="compression (N)",
+        frame=_compressions(tables, body),
+        looks={"": MODEL},
     )
+    panels: list[Panel] = [compressed]
+    beside = beside_measured(study, tables).dropna(subset=["computed_mpa"])
+    if len(beside):
+        beside = beside.assign(row=beside["task"].map(case))
+        measured = {"value": beside["measured_mpa"], "hollow": ~beside["confirmed"]}
+        computed = {"value": beside["computed_mpa"], "hollow": ~beside["held"]}
+        frames = [
+            beside[["row"]].assign(series="measured", **measured),
+            beside[["row", "low", "high"]].assign(series="computed", **computed),
+        ]
+        looks, label = {"measured": MEASURED, "computed": MODEL}, "pressure in L4–L5 (MPa)"
+        panels.insert(
+            0, Rows(title="Pressure", x_label=label, frame=pd.concat(frames), looks=looks)
+        )
+        keys.insert(0, Key(MEASURED, "measured"))
+        keys.append(Key(MEASURED, "measured, not confirmed in print", hollow=True))
     held = "thick line: range over bodies that hold the task"
     caption = f"{short(plain(body))}; thin line: 95 % of samples that hold the task; {held}."
     return Chart(title, panels, capital(caption), keys)
@@ -111,11 +101,9 @@ def _compressions(tables: Tables, body: str) -> pd.DataFrame:
 
 def by_level(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
     """Compression and shear from the top down, of up to three tasks."""
-    title = "Load on every joint"
+    title, levels = "Load on every joint", tables["levels"]
     found = answer_of(study, cohort, tables)
-    levels = tables["levels"]
-    rows = of_task(levels, found.task) if found else levels.iloc[:0]
-    if found is None or rows.empty:
+    if found is None or levels.empty:
         return saying(title, "The model holds no task: there is no load to show.")
     wanted = [found.task["task"], *([found.standing["task"]] if found.standing else [])]
     own = of_person(tables["tasks"], found.task["specimen"])
@@ -124,30 +112,26 @@ def by_level(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
         wanted.insert(1, str(known["task"].iloc[len(known) // 2]))
     looks = {case(name): look for name, look in zip(wanted[:MOST_LEVELS], SEVERAL, strict=False)}
     mine = of_person(levels, found.task["specimen"])
-    panels = []
-    for column, words in (
-        ("compression_n", "compression (N)"),
-        ("shear_anterior_n", "shear (N), + upper vertebra forwards"),
-    ):
-        frames = [
-            pd.DataFrame(
-                {"row": own["level"].map(level), "series": case(name), "value": own[column],
-                 "low": float("nan"), "high": float("nan")}
-            )
-            for name in wanted[:MOST_LEVELS]
-            for own in [_downwards(mine[mine["task"] == name])]
-        ]  # fmt: skip
-        panels.append(
-            Rows(x_label=words, frame=pd.concat(frames), looks=looks, marks={0.0: ""}, width=400.0)
+    mine = of_person(levels, found.task["specimen"])
+    mine = mine.sort_values("level", key=lambda names: -names.map(LEVELS.index), kind="stable")
+    rows = mine[mine["task"].isin(wanted[:MOST_LEVELS])]
+    rows = rows.assign(row=rows["level"].map(level), series=rows["task"].map(case))
+    panels = [
+        Rows(
+            x_label=words,
+            frame=rows.assign(value=rows[column].astype(float))[["row", "series", "value"]],
+            looks=looks,
+            marks={0.0: ""},
+            width=400.0,
         )
+        for column, words in (
+            ("compression_n", "compression (N)"),
+            ("shear_anterior_n", "shear (N), + upper vertebra forwards"),
+        )
+    ]
     keys = [Key(look, name) for name, look in looks.items()]
     caption = f"{short(plain(found.task['specimen']))}, with every input as it is."
     return Chart(title, panels, capital(caption), keys)
-
-
-def _downwards(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows of table levels, the highest level first."""
-    return rows.sort_values("level", key=lambda names: -names.map(LEVELS.index), kind="stable")
 
 
 def over_flexion(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
@@ -160,26 +144,24 @@ def over_flexion(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
     names = list(courses)[:MOST_BODIES]
     looks = {plain(name): look for name, look in zip(names, SEVERAL, strict=False)}
     panels = []
-    for column, words in (
-        (COMPRESSION, "compression of L4–L5 (N)"),
-        ("l4l5_shear_n", "shear of L4–L5 (N), + forwards"),
-    ):
+    for column, words in LOADS.items():
         frames = []
         for name in names:
             course = courses[name]
-            line = {"x": course["flexion_deg"], "y": course[column].astype(float)}
-            frames.append(pd.DataFrame({**line, "series": plain(name)}))
-            spreads = [spread_of(tables, row, column) for row in named(course)]
-            ends = {f"y_{end}": [one.get(end) for one in spreads] for end in ("low", "high")}
-            known = pd.DataFrame({**line, **ends}).dropna()
-            frames.append(known.assign(series=f"{plain(name)}, sampled"))
+            ends = [spread_of(tables, row, column) for row in named(course)]
+            line = pd.DataFrame(
+                {"x": course["flexion_deg"], "y": course[column].astype(float),
+                 "y_low": [one.get("low") for one in ends],
+                 "y_high": [one.get("high") for one in ends]}, dtype=float
+            )  # fmt: skip
+            frames.append(line[["x", "y"]].assign(series=plain(name)))
+            frames.append(line.dropna().assign(series=f"{plain(name)}, sampled"))
         points = {f"{name}, sampled": look for name, look in looks.items()}
-        frame = pd.concat([one for one in frames if len(one)], ignore_index=True)
         panels.append(
             Curves(
                 x_label="flexion of the trunk (°)",
                 y_label=words,
-                frame=frame,
+                frame=pd.concat([one for one in frames if len(one)], ignore_index=True),
                 looks={**looks, **points},
                 points=tuple(points),
                 width=400.0,
@@ -236,23 +218,14 @@ def tuned(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
     if rows.empty:
         return saying(title, "No pressure was computed for a task whose pressure was measured.")
     looks = {"measured": MEASURED, "nothing fitted": BASE, "predicted from the others": MODEL}
-    measured = rows[rows["tier"] == "untuned"].assign(value=rows["measured_mpa"], held=True)
-    parts: Sequence[pd.DataFrame] = [
-        measured.assign(series="measured"),
-        *(
-            rows[rows["tier"] == tier].assign(series=words, value=rows["computed_mpa"])
-            for tier, words in zip(("untuned", "left_out"), list(looks)[1:], strict=True)
-        ),
-    ]
+    first = rows[rows["tier"] == "untuned"]
+    parts = [first.assign(series="measured", value=first["measured_mpa"], hollow=False)]
+    for tier, words in (("untuned", "nothing fitted"), ("left_out", "predicted from the others")):
+        own = rows[rows["tier"] == tier]
+        parts.append(own.assign(series=words, value=own["computed_mpa"], hollow=~sound(own)))
     frame = pd.concat(parts).sort_values("measured_mpa", kind="stable")
-    hollow = ~sound(frame) & (frame["series"] != "measured")
-    frame = frame.assign(row=frame["task"].map(case), hollow=hollow, low=None, high=None)
-    panel = Rows(
-        x_label="pressure in L4–L5 (MPa)",
-        frame=frame.astype({"low": float, "high": float}),
-        looks=looks,
-        width=420.0,
-    )
+    frame = frame.assign(row=frame["task"].map(case))[["row", "series", "value", "hollow"]]
+    panel = Rows(x_label="pressure in L4–L5 (MPa)", frame=frame, looks=looks, width=420.0)
     keys = [Key(look, name) for name, look in looks.items()]
     caption = "Hollow: the model does not hold the task, so it is in no error."
     return Chart(title, [panel], caption, keys)

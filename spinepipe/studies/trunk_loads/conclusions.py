@@ -10,7 +10,13 @@ from spinepipe.report.page.study_page import Results
 from spinepipe.report.words import level, listed, plain, short
 from spinepipe.studies.trunk_loads.conclusions_of_trust import of_trust
 from spinepipe.studies.trunk_loads.measured import beside_measured, counted_and_held, error
-from spinepipe.studies.trunk_loads.samples import Tables, spread_of, times, with_interval
+from spinepipe.studies.trunk_loads.samples import (
+    Tables,
+    counts,
+    spread_of,
+    times,
+    with_interval,
+)
 from spinepipe.studies.trunk_loads.selection import (
     COMPRESSION,
     PRESSURE,
@@ -27,7 +33,7 @@ from spinepipe.studies.trunk_loads.selection import (
     upright,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import SIMPLIFIED
+from spinepipe.studies.trunk_loads.words import SIMPLIFIED, task_words
 
 EASY = 0.5
 """Share of the strength: people stand upright with much less of theirs."""
@@ -41,7 +47,7 @@ SILENT, AS_STRONG = 0.1, 0.9
 SMALL = 5.0
 """Percent of a load: a change that no interval here would show."""
 
-_MOST_LETTERS, _MOST_NAMES = 30, 4
+_MOST_NAMES = 4
 
 GROUPS = {
     "load": "lifting",
@@ -73,15 +79,9 @@ def conclusions(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator
     if found is not None:
         yield from _range(found, tables)
         yield from _levels(found, tables)
-        yield from _muscles(found, tables)
     yield from _simplified(tables.get("simplified", pd.DataFrame()))
     yield from of_trust(study, tables, found, beside, missed)
     yield _methods(study, cohort, tasks)
-
-
-def task_words(name: str) -> str:
-    """A task in a sentence."""
-    return short(plain(name), _MOST_LETTERS)
 
 
 def _answer(
@@ -96,42 +96,33 @@ def _answer(
         yield Conclusion("load", "none")
         return
     row = found.task
-    names = {"task": task_words(row["task"]), "body": short(plain(row["specimen"]), _MOST_LETTERS)}
+    names = {"task": task_words(row["task"]), "body": task_words(row["specimen"])}
     load, pressure = (
         with_interval(tables, row, *what) for what in ((COMPRESSION, "N"), (PRESSURE, "MPa"))
     )
     ratio = times(tables, found, COMPRESSION)
-    verdict = {
-        (True, True): "both",
-        (True, False): "standing",
-        (False, True): "measured",
-        (False, False): "alone",
-    }[ratio is not None, missed is not None]
+    with_error = "both" if missed is not None else "standing"
+    without = "measured" if missed is not None else "alone"
+    verdict = without if ratio is None else with_error
     told = {"load": load, "times": ratio, "error": missed}
     yield Conclusion("load", verdict, {k: v for k, v in told.items() if v is not None}, names)
-    spread = spread_of(tables, row, COMPRESSION)
-    drawn = {}
+    spread, drawn = spread_of(tables, row, COMPRESSION), {}
     if spread:
         lost, held = int(spread["n_failed"]), int(spread["n_samples"])
-        drawn = {
-            "lost": Value(lost, source="intervals: n_failed"),
-            "samples": Value(lost + held, source="intervals: n_samples and n_failed"),
-        }
+        drawn = counts("intervals: n_samples and n_failed", lost=lost, samples=lost + held)
     sampled = "single" if load.low is None else "sampled"
     yield Conclusion("compression", sampled, {"value": load, **drawn}, names)
     own = study.volunteer is not None and row["specimen"] == study.volunteer.specimen
     measured = named(beside[beside["task"] == row["task"]]) if own else []
-    if not measured:
-        yield Conclusion("pressure", f"alone_{sampled}", {"value": pressure, **drawn}, names)
-    else:
+    known = "alone"
+    if measured:
         known = "measured" if measured[0]["confirmed"] else "unconfirmed"
-        beside_it = Value(measured[0]["measured_mpa"], "MPa", source="measured_pressures.csv")
-        told = {"value": pressure, "measured": beside_it, **drawn}
-        yield Conclusion("pressure", f"{known}_{sampled}", told, names)
+        mpa = measured[0]["measured_mpa"]
+        drawn["measured"] = Value(mpa, "MPa", source="measured_pressures.csv")
+    yield Conclusion("pressure", f"{known}_{sampled}", {"value": pressure, **drawn}, names)
     if missed is not None:
-        counted = int(beside["counted"].sum())
-        of = {"held": Value(missed.n or 0), "counted": Value(counted, source="tasks of the paper")}
-        yield Conclusion("error", "held", {"value": missed, **of})
+        n = counts("tasks", held=missed.n or 0, counted=int(beside["counted"].sum()))
+        yield Conclusion("error", "held", {"value": missed, **n})
     if ratio is not None:
         yield Conclusion("times", "standing", {"value": ratio}, names)
 
@@ -157,7 +148,7 @@ def _not_to_use(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
                 few = ", ".join(map(task_words, some))
                 whole = f"all {n}" if len(some) == n else f"{len(some)} of {n}"
                 told.append(f"{words} ({few if len(some) <= _MOST_NAMES else whole})")
-        values = {"tasks": Value(len(own), source="tasks: status, of every body")}
+        values = counts("tasks: status, of every body", tasks=len(own))
         yield Conclusion(
             "not_to_use", str(verdict), values, {"which": listed(told, len(told), None)}
         )
@@ -185,17 +176,13 @@ def _effort(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
     source = "tasks: strength_used, empty hands, largest of all bodies"
     values = {"worst": Value(100.0 * worst["strength_used"], "%", source=source)}
     names = {"task": task_words(worst["task"])}
-    standing = free[upright(free)]
+    standing = free[upright(free)]["strength_used"]
+    share = float(standing.max()) if len(standing) else 0.0
     if len(standing):
-        share = float(standing["strength_used"].max())
         values["standing"] = Value(100.0 * share, "%", source=source)
-        if share > EASY or worst["strength_used"] > 1.0:
-            yield Conclusion("effort", "weak", values, names)
-            return
-    elif worst["strength_used"] > 1.0:
-        yield Conclusion("effort", "weak_task", values, names)
-        return
-    yield Conclusion("effort", "enough", values, names)
+    weak = "weak" if len(standing) else "weak_task"
+    fails = share > EASY or worst["strength_used"] > 1.0
+    yield Conclusion("effort", weak if fails else "enough", values, names)
 
 
 def _relaxation(tasks: pd.DataFrame, muscles: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
@@ -209,10 +196,8 @@ def _relaxation(tasks: pd.DataFrame, muscles: pd.DataFrame, cohort: Cohort) -> I
     if not left:
         return
     how = "muscles: active force of the long extensors, deepest bend over largest"
-    values = {
-        "least": Value(100.0 * min(left), "%", n=len(left), source=how),
-        "most": Value(100.0 * max(left), "%", n=len(left), source=how),
-    }
+    ends = {"least": min(left), "most": max(left)}
+    values = {end: Value(100.0 * x, "%", n=len(left), source=how) for end, x in ends.items()}
     verdict = "relaxed" if max(left) <= SILENT else "none" if min(left) >= AS_STRONG else "partly"
     yield Conclusion("relaxation", verdict, values)
 
@@ -224,24 +209,18 @@ def _range(found: AnsweredTask, tables: Tables) -> Iterator[Conclusion]:
     if len(rows) < 2:
         return
     ranked = named(rows.sort_values(COMPRESSION, kind="stable"))
-    least, most = ranked[0], ranked[-1]
+    ends = {"least": ranked[0], "most": ranked[-1]}
     how = "tasks: compression of L4L5, held tasks"
-    values = {
-        "least": Value(least[COMPRESSION], "N", source=how),
-        "most": Value(most[COMPRESSION], "N", source=how),
-        "bodies": Value(len(rows), source=how),
-    }
-    names = {"task": task_words(found.task["task"])}
-    names |= {
-        k: short(plain(row["specimen"]), 20)
-        for k, row in (("least_body", least), ("most_body", most))
-    }
-    one = with_interval(tables, found.task, COMPRESSION, "N")
-    verdict = "unsampled"
+    values = {end: Value(row[COMPRESSION], "N", source=how) for end, row in ends.items()}
+    names = {f"{end}_body": short(plain(row["specimen"]), 20) for end, row in ends.items()}
+    one, verdict = with_interval(tables, found.task, COMPRESSION, "N"), "unsampled"
     if one.low is not None and one.high is not None:
-        wide = most[COMPRESSION] - least[COMPRESSION] > one.high - one.low
-        verdict = "differ" if wide else "alike"
-        values["wide"] = Value(one.high - one.low, "N", source="intervals: high less low")
+        wide = one.high - one.low
+        apart = values["most"].number - values["least"].number
+        verdict = "differ" if apart > wide else "alike"
+        values["wide"] = Value(wide, "N", source="intervals: high less low")
+    values |= counts(how, bodies=len(rows))
+    names["task"] = task_words(found.task["task"])
     yield Conclusion("range", verdict, values, names)
 
 
@@ -252,32 +231,13 @@ def _levels(found: AnsweredTask, tables: Tables) -> Iterator[Conclusion]:
     if len(ranked) < 2:
         return
     ranked.sort(key=lambda row: float(row["compression_n"]))
-    least, most = ranked[0], ranked[-1]
-    values = {
-        name: Value(row["compression_n"], "N", source="levels: compression_n")
-        for name, row in (("least", least), ("most", most))
-    }
-    names = {"least_level": level(least["level"]), "most_level": level(most["level"])}
-    down = (least["level"], most["level"]) == ("T11T12", "L5S1")
+    ends = {"least": ranked[0], "most": ranked[-1]}
+    how = "levels: compression_n"
+    values = {end: Value(row["compression_n"], "N", source=how) for end, row in ends.items()}
+    names = {f"{end}_level": level(row["level"]) for end, row in ends.items()}
     names["task"] = task_words(found.task["task"])
+    down = (ranked[0]["level"], ranked[-1]["level"]) == ("T11T12", "L5S1")
     yield Conclusion("levels", "down" if down else "elsewhere", values, names)
-
-
-def _muscles(found: AnsweredTask, tables: Tables) -> Iterator[Conclusion]:
-    """Who pulls in the answer's task."""
-    rows = of_task(tables.get("muscles", pd.DataFrame()), found.task)
-    total = float(rows["force_n"].sum()) if len(rows) else 0.0
-    if total <= 0.0:
-        return
-    summed = rows.groupby("group", sort=False)["force_n"].sum()
-    passive = float(rows["passive_n"].sum()) / total
-    how = "muscles: forces summed over fascicles"
-    values = {
-        "first": Value(100.0 * float(summed.max()) / total, "%", source=how),
-        "passive": Value(100.0 * passive, "%", source=how),
-    }
-    names = {"group": plain(str(summed.idxmax())), "task": task_words(found.task["task"])}
-    yield Conclusion("muscles", "stretched" if passive > 0.5 else "active", values, names)
 
 
 def changes(simplified: pd.DataFrame) -> pd.DataFrame:
@@ -303,24 +263,17 @@ def _simplified(simplified: pd.DataFrame) -> Iterator[Conclusion]:
         return
     worst = found.loc[found["percent"].abs().idxmax()]
     own = found[found["simplification"] == worst["simplification"]]["percent"]
-    how = "simplified: compression of L4L5, held tasks of all bodies"
-    values = {
-        "low": Value(float(own.min()), "%", n=len(own), source=how),
-        "high": Value(float(own.max()), "%", n=len(own), source=how),
-        "size": Value(abs(float(worst["percent"])), "%", n=len(own), source=how),
-    }
+    how, worst_percent = "simplified: compression of L4L5", abs(float(worst["percent"]))
+    ends = {"low": float(own.min()), "high": float(own.max()), "size": worst_percent}
+    values = {end: Value(value, "%", n=len(own), source=how) for end, value in ends.items()}
     names = {"what": SIMPLIFIED.get(worst["simplification"], plain(worst["simplification"]))}
-    small = abs(float(worst["percent"])) < SMALL
-    yield Conclusion("simplified", "small" if small else "matters", values, names)
+    yield Conclusion("simplified", "small" if worst_percent < SMALL else "matters", values, names)
 
 
 def _methods(study: TrunkLoads, cohort: Cohort, tasks: pd.DataFrame) -> Conclusion:
     n = tasks["task"].nunique() if len(tasks) else 0
-    values = {
-        "bodies": Value(len(cohort.specimen_names), source="specimens.csv"),
-        "tasks": Value(n, source="tasks"),
-    }
+    values = counts("specimens.csv and tasks", bodies=len(cohort.specimen_names), tasks=n)
     if not study.uncertain.tasks:
         return Conclusion("methods", "single", values)
-    values["samples"] = Value(study.uncertain.runs, source="settings: samples")
+    values |= counts("settings: samples", samples=study.uncertain.runs)
     return Conclusion("methods", "sampled", values)

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.words import listed, plain, short
+from spinepipe.report.words import listed, plain
 from spinepipe.studies.trunk_loads.measured import FEWEST, counted_and_held, error
 from spinepipe.studies.trunk_loads.samples import (
     Tables,
     carried_by_lost,
+    counts,
     lost_and_all,
     shares,
 )
@@ -22,7 +23,7 @@ from spinepipe.studies.trunk_loads.selection import (
     sound,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import assumed, input_words
+from spinepipe.studies.trunk_loads.words import assumed, input_words, task_words
 
 TELLABLE_MPA = 0.1
 """Two series of one man's measurements differ by this (Wilke 1999 and 2001, load held close)."""
@@ -76,14 +77,11 @@ def _inside(beside: pd.DataFrame) -> Iterator[Conclusion]:
     measured = known["measured_mpa"]
     out = known[(measured < known["low"]) | (measured > known["high"])]
     lost, held = int(known["n_failed"].sum()), int(known["n_samples"].sum())
-    how = "intervals: pressure, beside measured_pressures.csv"
-    values = {
-        "outside": Value(len(out), source=how),
-        "tasks": Value(len(known), source=how),
-        "unconfirmed": Value(int((~known["confirmed"]).sum()), source=how),
-        "lost": Value(lost, source="intervals: n_failed"),
-        "samples": Value(lost + held, source="intervals: n_samples and n_failed"),
-    }
+    values = counts(
+        "intervals: pressure, beside measured_pressures.csv",
+        outside=len(out), tasks=len(known), unconfirmed=int((~known["confirmed"]).sum()),
+        lost=lost, samples=lost + held,
+    )  # fmt: skip
     some = "outside" if len(out) <= _MOST_NAMES else "outside_many"
     names = {"which": listed(plain(name) for name in out["task"])}
     yield Conclusion("inside", some if len(out) else "all", values, names)
@@ -93,19 +91,17 @@ def _compared(beside: pd.DataFrame, missed: Value | None) -> Iterator[Conclusion
     """Over how many tasks pressures are compared, and how sure the measured ones are."""
     if beside.empty:
         return
-    how = "tasks: status, of those with a measured pressure"
-    values = {
-        "held": Value(len(counted_and_held(beside)), source=how),
-        "counted": Value(int(beside["counted"].sum()), source=how),
-        "measured": Value(len(beside), source="measured_pressures.csv"),
-        "unconfirmed": Value(int((~beside["confirmed"]).sum()), source="measured_pressures.csv"),
-        "fewest": Value(FEWEST),
-    }
+    held, counted = len(counted_and_held(beside)), int(beside["counted"].sum())
+    values = counts(
+        "tasks: status, beside measured_pressures.csv",
+        held=held, counted=counted, measured=len(beside), fewest=FEWEST,
+        unconfirmed=int((~beside["confirmed"]).sum()),
+    )  # fmt: skip
     if missed is None:
         yield Conclusion("compared", "stop", values)
     else:
-        whole = values["held"].number == values["counted"].number
-        yield Conclusion("compared", "ok" if whole else "check", {**values, "error": missed})
+        whole = "ok" if held == counted else "check"
+        yield Conclusion("compared", whole, {**values, "error": missed})
     yield Conclusion("measured", "check", values)
 
 
@@ -125,17 +121,17 @@ def _tuned(tables: Tables) -> Iterator[Conclusion]:
             )
             for tier, own in tiers.items()
         )
+        counted = rows[rows["tier"] == "untuned"]["task"].nunique()
+        n = counts("pressures: status", held=len(both), fewest=FEWEST, counted=counted)
         if before is None or after is None:
-            yield Conclusion("tuned", "few", {"held": Value(len(both)), "fewest": Value(FEWEST)})
+            yield Conclusion("tuned", "few", n)
         else:
             change = after.number - before.number
             verdict = (
                 "same" if abs(change) < TELLABLE_MPA else "worse" if change > 0.0 else "better"
             )
-            counted = rows[rows["tier"] == "untuned"]["task"].nunique()
-            values = {"before": before, "after": after, "held": Value(len(both))}
-            values |= {"counted": Value(counted), "tellable": Value(TELLABLE_MPA, "MPa")}
-            yield Conclusion("tuned", verdict, values)
+            values = {"before": before, "after": after, "tellable": Value(TELLABLE_MPA, "MPa")}
+            yield Conclusion("tuned", verdict, {**values, **n})
     fitted = tables.get("tuning", pd.DataFrame())
     own = named(fitted[fitted["tier"] == "tuned"]) if len(fitted) else []
     if own:
@@ -159,14 +155,13 @@ def _drivers(study: TrunkLoads, tables: Tables, task: Row) -> Iterator[Conclusio
     """Which assumed input makes most of the spread of each load of the answer's task."""
     if tables.get("intervals", pd.DataFrame()).empty:
         return
-    values, names, sources = {}, {"task": short(plain(task["task"]), 30)}, []
+    values, names, sources = {}, {"task": task_words(task["task"])}, []
     for name, quantity in (("pressure", PRESSURE), ("compression", COMPRESSION)):
         ranked, source = shares(study, tables, task, quantity)
         sources.append(source)
         first = named(ranked.head(2))
         if first and (len(first) < 2 or first[0]["low"] > first[1]["share"]):
-            ends = (float(first[0][end]) for end in ("share", "low", "high"))
-            share, low, high = ends
+            share, low, high = (float(first[0][end]) for end in ("share", "low", "high"))
             values[name] = Value(share, "%", low, high, source=f"drivers or responses: {source}")
             of = input_words(first[0]["factor"])
             names[name] = f"{of} ({assumed(study.uncertain, first[0]['factor'])})"
@@ -182,20 +177,18 @@ def _samples(tables: Tables) -> Iterator[Conclusion]:
     if rows.empty:
         return
     lost, drawn = lost_and_all(rows)
-    source = "intervals: n_samples and n_failed, over tasks"
-    values = {"lost": Value(lost, source=source), "samples": Value(drawn, source=source)}
     empty = rows[rows["low"].isna()].drop_duplicates(["specimen", "task"])
+    source = "intervals: n_samples and n_failed, over tasks"
+    values = counts(source, lost=lost, samples=drawn, tasks=len(empty))
     if not lost:
         yield Conclusion("samples", "ok", values)
         return
     names, verdict = {}, "stop" if len(empty) else "check"
-    values["tasks"] = Value(len(empty), source="intervals: low, empty")
     carried = carried_by_lost(tables, tuple(LOADS))
     if verdict == "check" and carried is not None and abs(carried[0]) > BIASED:
         more, place = carried
-        values["more"] = Value(
-            abs(100.0 * more), "%", source="responses: medians of lost and held samples"
-        )
+        how = "responses: medians of lost and held samples"
+        values["more"] = Value(abs(100.0 * more), "%", source=how)
         names = {"load": LOADS[place["quantity"]], "task": plain(place["task"])}
         verdict = "check_low" if more > 0.0 else "check_high"
     yield Conclusion("samples", verdict, values, names)
@@ -210,13 +203,10 @@ def _held(tasks: pd.DataFrame) -> Conclusion:
         int((tasks["status"] == status).sum()) for status in ("beyond_strength", "out_of_reach")
     )
     lost = int((~sound(tasks)).sum())
-    values = {
-        name: Value(n, source="tasks: status")
-        for name, n in (
-            *(("pairs", len(tasks)), ("lost", lost), ("weak", weak), ("reach", reach)),
-            ("unsolved", lost - weak - reach),
-        )
-    }
+    values = counts(
+        "tasks: status",
+        pairs=len(tasks), lost=lost, weak=weak, reach=reach, unsolved=lost - weak - reach,
+    )  # fmt: skip
     return Conclusion("held", "stop" if lost else "ok", values)
 
 
@@ -224,10 +214,7 @@ def _range_of_formula(held: pd.DataFrame) -> Iterator[Conclusion]:
     known = held.dropna(subset=["inside_eq_6"])
     if len(known):
         out = int((~known["inside_eq_6"].astype(bool)).sum())
-        values = {
-            "outside": Value(out),
-            "pressures": Value(len(known), source="tasks: inside_eq_6"),
-        }
+        values = counts("tasks: inside_eq_6", outside=out, pressures=len(known))
         yield Conclusion("formula", "check" if out else "ok", values)
 
 
@@ -236,17 +223,13 @@ def _left_over(held: pd.DataFrame) -> Iterator[Conclusion]:
     slack = held["largest_slack_nm"].dropna().astype(float)
     if slack.empty:
         return
-    values = {"slack": Value(float(slack.max()), "N\u00a0m", source="tasks: largest_slack_nm")}
     over = held[held["strength_used"].astype(float) > 1.0]
-    if over.empty:
-        values["slack"] = Value(
-            round(float(slack.max()), 3), "N\u00a0m", source=values["slack"].source
-        )
-        yield Conclusion("balance", "ok", values)
-        return
-    values["pairs"] = Value(len(over), source="tasks: strength_used above 1")
-    values["most"] = Value(100.0 * float(over["strength_used"].max()), "%", source="tasks")
-    yield Conclusion("balance", "check", values)
+    # to 0.001, as less is what a solver leaves
+    values = {"slack": Value(round(float(slack.max()), 3), "N\u00a0m", source="tasks")}
+    if len(over):
+        values |= counts("tasks: strength_used above 1", pairs=len(over))
+        values["most"] = Value(100.0 * float(over["strength_used"].max()), "%", source="tasks")
+    yield Conclusion("balance", "check" if len(over) else "ok", values)
 
 
 def _stability(held: pd.DataFrame) -> Iterator[Conclusion]:
@@ -255,10 +238,7 @@ def _stability(held: pd.DataFrame) -> Iterator[Conclusion]:
     if known.empty:
         return
     stable = known["stable"].astype(bool)
-    values = {
-        "falling": Value(int((~stable).sum()), source="tasks: stable"),
-        "postures": Value(len(known), source="tasks: stable"),
-    }
+    values = counts("tasks: stable", falling=int((~stable).sum()), postures=len(known))
     never = known[~stable & (known["tone"] == "stable")]["task"]
     names = {"which": listed(plain(str(name)) for name in dict.fromkeys(never))}
     verdict = "stop_tone" if len(never) else "ok" if stable.all() else "check"
@@ -268,5 +248,5 @@ def _stability(held: pd.DataFrame) -> Iterator[Conclusion]:
 def _upright(rows: pd.DataFrame) -> Iterator[Conclusion]:
     if len(rows):
         bound = int(rows["bound"].sum())
-        values = {"bound": Value(bound), "rotations": Value(len(rows), source="upright: bound")}
+        values = counts("upright: bound", bound=bound, rotations=len(rows))
         yield Conclusion("upright", "check" if bound else "ok", values)

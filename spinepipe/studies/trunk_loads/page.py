@@ -22,43 +22,37 @@ from spinepipe.studies.trunk_loads.tables import (
     TUNING,
 )
 
-SHOWN: Mapping[Table, tuple[str, tuple[str, ...]]] = {
+SHOWN: Mapping[Table, tuple[str, str]] = {
     TASKS: (
         "Loads by body and task",
-        (
-            *("specimen", "task", "l4l5_compression_n", "l4l5_pressure_mpa", "l4l5_shear_n"),
-            *("l5s1_compression_n", "l5s1_shear_n", "strength_used", "inside_eq_6", "stable"),
-            *("status", "message"),
-        ),
+        "specimen task l4l5_compression_n l4l5_pressure_mpa l4l5_shear_n l5s1_compression_n "
+        "l5s1_shear_n strength_used inside_eq_6 stable status message",
     ),
     PRESSURES: (
         "Computed and measured pressures",
-        ("tier", "task", "measured_mpa", "measured_status", "computed_mpa", "counted", "status"),
+        "tier task measured_mpa measured_status computed_mpa counted status",
     ),
     TUNING: (
         "What was fitted to measured pressures",
-        ("tier", "left_out", "parameter", "value", "default", "low", "high", "identifiable"),
+        "tier left_out parameter value default low high identifiable",
     ),
     INTERVALS: (
         "Intervals of loads",
-        (
-            *("specimen", "task", "quantity", "nominal", "low", "median", "high", "n_samples"),
-            "n_failed",
-        ),
+        "specimen task quantity nominal low median high n_samples n_failed",
     ),
     DRIVERS: (
         "Shares of the spread by input",
-        ("task", "quantity", "factor", "total", "total_low", "total_high", "message"),
+        "task quantity factor total total_low total_high message",
     ),
     LEVELS_TABLE: (
         "Load on every joint",
-        ("task", "level", "compression_n", "shear_anterior_n", "shear_right_n", "status"),
+        "task level compression_n shear_anterior_n shear_right_n status",
     ),
     SIMPLIFIED: (
         "What simplifications change",
-        ("specimen", "task", "simplification", "l4l5_compression_n", "imbalance_nm", "status"),
+        "specimen task simplification l4l5_compression_n imbalance_nm status",
     ),
-    REMARKS: ("What was put right, added or assumed in the geometry", ("remark",)),
+    REMARKS: ("What was put right, added or assumed in the geometry", "remark"),
 }
 """Tables of the page with their titles and the columns that a reader compares."""
 
@@ -94,7 +88,7 @@ def _tables(study: TrunkLoads, results: Results) -> list[Sortable]:
             rows = of_person(rows, body)
         elif shape is REMARKS and len(rows):
             rows = rows.drop_duplicates("remark")
-        columns = tuple(map(shape.column, names))
+        columns = tuple(map(shape.column, names.split()))
         table = sortable(shape.name, title, shape.about, rows, columns)
         found += [table] if table.rows else []
     return found

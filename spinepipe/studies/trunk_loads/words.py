@@ -1,7 +1,17 @@
-"""Uncertain inputs and simplifications in plain words, for figures and sentences."""
+"""Tasks, uncertain inputs and simplifications in plain words, for figures and sentences."""
 
-from spinepipe.report.words import number, plain
+from spinepipe.report.words import number, plain, short
+from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.settings import FACTOR_UNITS, Uncertain
+
+ENDED = {
+    Balanced.BEYOND_STRENGTH.value: "beyond the strength of the model's muscles",
+    Balanced.NOT_CONVERGED.value: "not converged",
+    Balanced.CYCLING.value: "going to and fro between answers",
+    Balanced.TWO_ANSWERS.value: "with two answers, by where the search begins",
+    Balanced.OUT_OF_REACH.value: "without a posture: the arms are too short",
+}
+"""How tasks ended that the model does not hold."""
 
 INPUTS = {
     "height_cm": "body height",
@@ -39,6 +49,11 @@ def assumed(uncertain: Uncertain, name: str) -> str:
     if not unit:
         return f"±{100.0 * sd:g}{NO_BREAK}%"
     return f"±{sd:g}{_UNITS.get(unit, NO_BREAK + unit)}"
+
+
+def task_words(name: str) -> str:
+    """A task or a body in a sentence."""
+    return short(plain(name), 30)
 
 
 def input_words(name: str) -> str:
