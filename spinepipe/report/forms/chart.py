@@ -7,6 +7,7 @@ for papers, all panels stand in a grid.
 
 import io
 import re
+import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -155,11 +156,16 @@ class _Message(Panel):
 
     @property
     def height(self) -> float:
-        return 24.0
+        return 16.0 * len(self._lines) + 12.0
+
+    @property
+    def _lines(self) -> list[str]:
+        return textwrap.wrap(self.message, int(self.width // 7.5))
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        axes.text(0.0, 0.5, self.message, transform=axes.transAxes, color=COLORS["soft"], wrap=True)
+        how = {"va": "center", "color": COLORS["soft"], "in_layout": False}
+        axes.text(0.0, 0.5, "\n".join(self._lines), transform=axes.transAxes, **how)
 
 
 def _draw(panel: Panel, figure: FigureBase) -> None:

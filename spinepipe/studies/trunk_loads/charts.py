@@ -198,11 +198,11 @@ def extensors(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
             Curves(
                 title=case(group),
                 x_label="flexion of the trunk (°)",
-                y_label="force of both sides (N)",
+                y_label="force (N), both sides",
                 frame=pd.concat(parts),
                 looks=PARTS,
                 width=400.0,
-                high=170.0,
+                high=190.0,
             )
         )
     keys = [Key(look, f"{part} force", as_line=True) for part, look in PARTS.items()]

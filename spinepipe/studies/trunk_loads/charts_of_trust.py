@@ -6,7 +6,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.forms.chart import Chart, Key, saying
 from spinepipe.report.forms.look import BASE, MODEL
 from spinepipe.report.forms.rows import Rows
-from spinepipe.report.words import capital, case, count
+from spinepipe.report.words import capital, case, count, short
 from spinepipe.studies.trunk_loads.charts import MOST_ROWS, WHOLE_COURSE
 from spinepipe.studies.trunk_loads.conclusions import changes
 from spinepipe.studies.trunk_loads.samples import CORRELATIONS, Tables, shares
@@ -75,7 +75,7 @@ def drivers(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
     frame = frame.sort_values("factor", key=lambda names: names.map(order.index), kind="stable")
     panels = [
         Rows(
-            title=case(str(task)),
+            title=short(case(str(task)), 24),
             x_label="share of the spread (%)",
             frame=rows,
             looks={name: look for name, (_, look) in LOADS.items()},

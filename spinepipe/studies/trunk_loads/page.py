@@ -9,6 +9,7 @@ from spinepipe.report.page.study_page import Page, Results
 from spinepipe.report.page.tables import Sortable, sortable
 from spinepipe.schema import Table
 from spinepipe.studies.trunk_loads.conclusions import conclusions
+from spinepipe.studies.trunk_loads.scenes import trunk_scenes
 from spinepipe.studies.trunk_loads.selection import of_person, shown_person, sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads, reproduces
 from spinepipe.studies.trunk_loads.tables import (
@@ -74,6 +75,7 @@ def page(study: TrunkLoads, cohort: Cohort, results: Results) -> Page:
             *left_out(study),
             *papers.left_out("Ghezelbash et al. 2016", reproduces(cohort.name)),
         ),
+        scenes=trunk_scenes(cohort, results.table("paths"), results.table("levels")),
     )
 
 

@@ -31,9 +31,9 @@ from trunk_table_cases import FOLDER, Size, cohort_of, study_of, tables_of
 
 from spinepipe.jobs import draw, report
 from spinepipe.report.conclusions import Conclusion, Told, sentences_of, told
+from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.study_page import Results
 from spinepipe.studies.trunk_loads.conclusions import conclusions
-from spinepipe.studies.trunk_loads.in_space import MOST_SCENES, trunk_in_space
 from spinepipe.studies.trunk_loads.kind import KIND
 from spinepipe.studies.trunk_loads.page import left_out, page
 from spinepipe.studies.trunk_loads.samples import INDICES, shares
@@ -190,7 +190,8 @@ CASES = (
          Size(1, ("flexion_50",), volunteer=False, samples=False)),
     Case("load none|held stop|compared stop|not_to_use stop_unsolved", ALL_LOST),
     Case("compression single|pressure measured_single", replace(ONE, samples=False)),
-    Case("pressure unconfirmed_sampled", Size(1, ("standing", "load_away", "full_flexion")), stand_full),
+    Case("pressure unconfirmed_sampled", Size(1, ("standing", "load_away", "full_flexion")),
+         stand_full),
     Case("pressure unconfirmed_single", Size(1, ("full_flexion",), samples=False)),
     # what is not to be used, and what bodies are
     Case("not_to_use stop_weak|not_to_use stop_reach|held stop|bodies_from check_rebuilt"),
@@ -255,18 +256,18 @@ CASES = (
 """Each verdict of the table of sentences, and its opposite, by numbers written here."""
 
 
+@cache
+def concluded(case: Case) -> tuple[Conclusion, ...]:
+    return tuple(case.come_to())
+
+
 def named(expected: str) -> set[tuple[str, str]]:
     return {tuple(one.split()) for one in expected.split("|")}  # type: ignore[misc]
 
 
-@cache
-def verdicts_of(case: Case) -> set[tuple[str, str]]:
-    return verdicts(case.come_to())
-
-
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.expected.partition("|")[0])
 def test_numbers_decide_what_is_concluded(case: Case) -> None:
-    found = case.come_to()
+    found = concluded(case)
     assert named(case.expected) <= verdicts(found)
     one_each = [one.rule for one in found if one.rule != "not_to_use"]
     assert len(one_each) == len(set(one_each)), "a rule comes to one verdict"
@@ -275,7 +276,7 @@ def test_numbers_decide_what_is_concluded(case: Case) -> None:
 
 def test_every_sentence_is_said_by_some_study() -> None:
     assert not list(faults_of_sentences(PACKAGE))
-    said = set().union(*map(verdicts_of, CASES))
+    said = set().union(*(verdicts(concluded(case)) for case in CASES))
     assert all_verdicts(sentences_of(PACKAGE)) == said
 
 
@@ -424,11 +425,15 @@ EDGES = {
 
 @pytest.mark.parametrize("case", EDGES.values(), ids=EDGES.keys())
 def test_figures_and_page_of_any_study(case: Case) -> None:
-    study, cohort, results = study_of(case.size), cohort_of(case.size), case.results()
+    study, cohort, tables = study_of(case.size), cohort_of(case.size), StudyTables(case.tables)
+    drawn = {}
     for name, figure in drawings("trunk_loads").items():
         needed = {table for one in KIND.figures if one.name == name for table in one.reads}
-        if needed <= set(results.tables):
-            assert not list(faults_of_chart(figure(study, cohort, results.tables)))
+        if needed <= set(tables):
+            chart = figure(study, cohort, tables)
+            assert not list(faults_of_chart(chart))
+            drawn[name] = Drawing.read(name, chart.svg())
+    results = Results(tables, {}, drawn)
     made = page(study, cohort, results)
     assert not list(faults_of_told(made.told))
     html = made.html(study, cohort, results)
@@ -455,13 +460,6 @@ def test_what_the_study_leaves_out_is_told_with_its_reason() -> None:
     files = KIND.files.of(study_of(replace(ONE, samples=False)), cohort_of(ONE))
     assert "pressure_against_measured" in files.figures(full=False)
     assert not {"drivers", "tuned_pressures"} & set(files.figures(full=False))
-
-
-def test_no_more_than_some_scenes_and_that_is_said() -> None:
-    made = tables_of(Size())
-    space = trunk_in_space(cohort_of(Size()), made["paths"], made["levels"])
-    assert len(space.scenes) == MOST_SCENES < 15
-    assert f"The first {MOST_SCENES} of 15 postures." in space.caption
 
 
 def test_a_figure_and_the_report_are_made_from_files(tmp_path: Path) -> None:
