@@ -164,8 +164,8 @@ class _Message(Panel):
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        how = {"va": "center", "color": COLORS["soft"], "in_layout": False}
-        axes.text(0.0, 0.5, "\n".join(self._lines), transform=axes.transAxes, **how)
+        text = axes.text(0.0, 0.5, "\n".join(self._lines), transform=axes.transAxes, va="center")
+        text.set(color=COLORS["soft"], in_layout=False)
 
 
 def _draw(panel: Panel, figure: FigureBase) -> None:

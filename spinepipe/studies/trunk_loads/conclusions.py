@@ -261,11 +261,13 @@ def _simplified(simplified: pd.DataFrame) -> Iterator[Conclusion]:
     found = changes(simplified)
     if found.empty:
         return
-    worst = found.loc[found["percent"].abs().idxmax()]
+    worst = named(found.sort_values("percent", key=abs, kind="stable"))[-1]
     own = found[found["simplification"] == worst["simplification"]]["percent"]
     how, worst_percent = "simplified: compression of L4L5", abs(float(worst["percent"]))
     ends = {"low": float(own.min()), "high": float(own.max()), "size": worst_percent}
     values = {end: Value(value, "%", n=len(own), source=how) for end, value in ends.items()}
+    fewest = int(found["simplification"].value_counts().min())
+    values |= counts("simplified: status", pairs=len(own), fewest=fewest)
     names = {"what": SIMPLIFIED.get(worst["simplification"], plain(worst["simplification"]))}
     yield Conclusion("simplified", "small" if worst_percent < SMALL else "matters", values, names)
 
