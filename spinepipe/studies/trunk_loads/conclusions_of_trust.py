@@ -135,17 +135,13 @@ def _tuned(tables: Tables) -> Iterator[Conclusion]:
     fitted = tables.get("tuning", pd.DataFrame())
     own = named(fitted[fitted["tier"] == "tuned"]) if len(fitted) else []
     if own:
-        loose = [row for row in own if row["at_bound"] or row["identifiable"] is not True]
-        nominal = [row for row in own if _holds_default(row)]
+        closed = [pd.notna(row["identifiable"]) and bool(row["identifiable"]) for row in own]
+        loose = [row for row, one in zip(own, closed, strict=True) if row["at_bound"] or not one]
+        nominal = [row for row in own if not loose and row["low"] <= row["default"] <= row["high"]]
         which = loose or nominal or own
         verdict = "check_loose" if loose else "check_nominal" if nominal else "ok"
         names = {"which": listed(input_words(row["parameter"]) for row in which)}
         yield Conclusion("fitted", verdict, names=names)
-
-
-def _holds_default(row: Row) -> bool:
-    """Whether a fitted number's region holds the number that was not fitted."""
-    return bool(pd.notna(row["low"]) and row["low"] <= row["default"] <= row["high"])
 
 
 # --- samples --------------------------------------------------------------------------------------
