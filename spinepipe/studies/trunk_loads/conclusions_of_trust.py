@@ -135,13 +135,17 @@ def _tuned(tables: Tables) -> Iterator[Conclusion]:
     fitted = tables.get("tuning", pd.DataFrame())
     own = named(fitted[fitted["tier"] == "tuned"]) if len(fitted) else []
     if own:
-        closed = [pd.notna(row["identifiable"]) and bool(row["identifiable"]) for row in own]
-        loose = [row for row, one in zip(own, closed, strict=True) if row["at_bound"] or not one]
+        loose = [row for row in own if row["at_bound"] or not _closed(row)]
         nominal = [row for row in own if not loose and row["low"] <= row["default"] <= row["high"]]
         which = loose or nominal or own
         verdict = "check_loose" if loose else "check_nominal" if nominal else "ok"
         names = {"which": listed(input_words(row["parameter"]) for row in which)}
         yield Conclusion("fitted", verdict, names=names)
+
+
+def _closed(row: Row) -> bool:
+    """Whether the region of a fitted number has both ends."""
+    return bool(pd.notna(row["identifiable"]) and row["identifiable"])
 
 
 # --- samples --------------------------------------------------------------------------------------
