@@ -488,6 +488,6 @@ def test_a_figure_and_the_report_are_made_from_files(tmp_path: Path) -> None:
     read = [files[name] for name in (*figure.reads, *figure.also)]
     draw.run(str(tmp_path), "s", figure.name, read, *drawn)
     made = str(tmp_path / "report.html")
-    report.run(str(tmp_path), "s", "report", list(files.values()), drawn[:1], [], made)
+    report.run(str(tmp_path), "s", "report", list(files.values()), drawn[:1], made)
     assert f"{figure.title}." in Path(made).read_text(encoding="utf-8")
     assert (tmp_path / "conclusions.parquet").is_file()
