@@ -57,6 +57,15 @@ def test_limit_follows_from_the_row(paper: str) -> None:
     }
 
 
+def test_a_tolerance_borrowed_from_another_number_is_chosen_here() -> None:
+    """The paper's error over all tasks, and how far apart two of its persons are."""
+    rows = [judge(claim, NOTHING) for claim in claims_of("ghezelbash_2016")]
+    borrowed = ("paper's RMSE over its tasks", "two persons of Fig 9 differ")
+    found = [row for row in rows if any(words in row["reason"] for words in borrowed)]
+    assert len(found) == 35
+    assert {row["limit"] for row in found} == {"chosen"}
+
+
 @sweep("paper", PAPERS)
 def test_a_sign_alone_is_never_called_contradicted(paper: str) -> None:
     """Where the paper's sign is known, ours agrees with it or does not."""

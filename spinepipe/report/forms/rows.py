@@ -85,9 +85,6 @@ class Rows(Panel):
             axes.set_xscale("log")
         if self.x_limits:
             axes.set_xlim(*self.x_limits)
-        for place, words in self.marks.items():
-            axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
-            _small(axes, place, 1.0, words, "bottom", "center")
         for number, one in enumerate(series):
             rows = self.frame if one == "" else self.frame[self.frame["series"] == one]
             look = self.looks.get(one, SEVERAL[number % len(SEVERAL)])
@@ -99,6 +96,9 @@ class Rows(Panel):
                 ]
             )
             self._draw_series(axes, rows, y, look)
+        for place, words in self.marks.items():  # alone on a logarithmic axis it has no limits
+            axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
+            _small(axes, place, 1.0, words, "bottom", "center")
         axes.set_ylim(len(names) - 0.45, -0.55)
         axes.set_yticks(range(len(names)), [short(name, _MOST_LETTERS) for name in names])
         axes.tick_params(axis="y", colors=COLORS["ink"])

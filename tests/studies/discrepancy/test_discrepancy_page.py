@@ -26,9 +26,9 @@ from discrepancy_cases import (
     tables,
 )
 from matplotlib.figure import Figure
+from spinepipe.report.page.document import Picture, ResultTables
 from sweeps import sweep
 
-from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.style import picture, style
 from spinepipe.studies.discrepancy.figures.load_displacement import worst_places
 from spinepipe.studies.discrepancy.findings import (
