@@ -57,13 +57,13 @@ def test_limit_follows_from_the_row(paper: str) -> None:
     }
 
 
-def test_a_tolerance_borrowed_from_another_number_is_chosen_here() -> None:
+def test_a_tolerance_of_another_number_is_borrowed() -> None:
     """The paper's error over all tasks, and how far apart two of its persons are."""
     rows = [judge(claim, NOTHING) for claim in claims_of("ghezelbash_2016")]
     borrowed = ("paper's RMSE over its tasks", "two persons of Fig 9 differ")
     found = [row for row in rows if any(words in row["reason"] for words in borrowed)]
     assert len(found) == 35
-    assert {row["limit"] for row in found} == {"chosen"}
+    assert {row["limit"] for row in found} == {"borrowed"}
 
 
 @sweep("paper", PAPERS)
