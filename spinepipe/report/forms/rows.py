@@ -32,7 +32,7 @@ class Rows(Panel):
         ``hollow`` (not to be trusted), ``inner_low`` and ``inner_high`` (a thicker line, such as
         the middle half) where they are told.
     looks : of each series, in the order from the top of a row down.
-    marks : a dashed vertical line at each value, with its words.
+    marks : a dashed vertical line at each value, with its words; zero has a solid one.
     bars : whether a bar from zero stands in the place of a symbol.
     log : whether the axis is logarithmic. x_limits : its ends.
     """
@@ -93,6 +93,9 @@ class Rows(Panel):
         axes.spines["left"].set_visible(False)
         if self.log and not self.x_limits:
             log_ticks(axes.xaxis, *axes.get_xlim())
+        low, high = axes.get_xlim()
+        if not self.log and low < 0.0 < high:
+            axes.axvline(0.0, color=COLORS["soft"], lw=0.8, zorder=1)
         if "note" in self.frame:
             told = self.frame.drop_duplicates("row").set_index("row")["note"]
             for place, name in enumerate(names):

@@ -1,0 +1,222 @@
+"""Figures of scoliotic spines: errors of laws, and what bending films tell of stiffness."""
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.conclusions import Value
+from spinepipe.report.forms.chart import Chart, Key, Panel, saying
+from spinepipe.report.forms.curves import Curves
+from spinepipe.report.forms.heat_map import Shares
+from spinepipe.report.forms.look import BASE, FOURTH, MODEL, SOFT, THIRD, Look
+from spinepipe.report.forms.rows import Rows
+from spinepipe.report.words import count, level
+from spinepipe.statistics import mean_of
+from spinepipe.studies.scoliosis.conclusions import (
+    DECIDING,
+    MEASURED,
+    NOT_COMPARED,
+    NOT_PERSONAL,
+    tried,
+)
+from spinepipe.studies.scoliosis.errors_compared import FILMS, Compared, Difference
+from spinepipe.studies.scoliosis.settings import Scoliosis
+
+SHORT = {
+    "tangent": "tangent, published",
+    "tangent_fitted": "tangent, fitted",
+    "linear_regions": "linear, by region",
+    "linear_per_segment": "linear, by segment",
+    "uniform": "uniform",
+}
+"""Laws beside an axis."""
+
+LOOKS = {
+    "tangent": MODEL,
+    "tangent_fitted": THIRD,
+    "linear_regions": BASE,
+    "linear_per_segment": FOURTH,
+    "uniform": SOFT,
+}
+
+OF_FILMS = {FILMS["held_out"]: MODEL, FILMS["fitted"]: BASE}
+
+Tables = Mapping[str, pd.DataFrame]
+
+
+def fitted_and_held_out(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
+    """Rotation errors of each law on fitted and on left-out films, over the same spines."""
+    title = "Rotation errors of each law"
+    groups = [one for one in (Compared.of(tables, g, DECIDING) for g in FILMS) if len(one.same)]
+    if not groups:
+        return saying(title, "No spine has the poses of all laws: there are no errors to compare.")
+    found = [_errors(one).assign(series=FILMS[one.group]) for one in groups]
+    n = " and ".join(f"{len(one.same)} ({FILMS[one.group]})" for one in groups)
+    caption = (
+        f"Symbol: mean of the same spines for all laws, n = {n}; line: 95 % interval. "
+        "The top vertebra is given."
+    )
+    keys = [Key(OF_FILMS[FILMS[one.group]], FILMS[one.group]) for one in groups]
+    rows = Rows(
+        x_label="rotation error (°)",
+        frame=pd.concat(found),
+        looks=OF_FILMS,
+        marks=_reading(groups[0]),
+    )
+    return Chart(title, [rows], caption, keys)
+
+
+def _errors(compared: Compared) -> pd.DataFrame:
+    """A row for each law, the least error first."""
+    return pd.DataFrame([_row(SHORT[law], compared.error(law)) for law in compared.laws])
+
+
+def _row(name: str, value: Value) -> dict[str, object]:
+    return {"row": name, "value": value.number, "low": value.low, "high": value.high}
+
+
+def _reading(compared: Compared) -> dict[float, str]:
+    """A mark where reading alone lies."""
+    return {} if compared.noise is None else {compared.noise: "reading alone"}
+
+
+def differences(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
+    """By how much laws differ on left-out films: from the first, and from uniform stiffness."""
+    title = "Differences between laws"
+    compared = Compared.of(tables, "held_out", DECIDING)
+    if compared.verdict in NOT_COMPARED:
+        return saying(title, "Fewer than two laws or three spines: there is nothing to compare.")
+    panels: list[Panel] = [_differences(compared, compared.laws[0], compared.beside_best)]
+    if NOT_PERSONAL in compared.laws[1:]:
+        others = [name for name in compared.laws if name != NOT_PERSONAL]
+        found = [compared.difference(NOT_PERSONAL, other) for other in others]
+        panels.append(_differences(compared, NOT_PERSONAL, found))
+    detectable = "" if compared.detectable is None else "dashed: least detectable difference; "
+    caption = (
+        "Rotation error of each law less that of the first or of uniform stiffness, on left-out "
+        f"films. Line: 95 % interval over spines; {detectable}hollow: cannot be distinguished."
+    )
+    return Chart(title, panels, caption)
+
+
+def _differences(compared: Compared, law: str, found: list[Difference]) -> Rows:
+    limit = compared.detectable
+    frame = pd.DataFrame(
+        [_row(SHORT[one.other], one.margin) | {"hollow": not one.significant} for one in found]
+    )
+    ends = [*frame["value"], *frame["low"].dropna(), *frame["high"].dropna(), 0.0]
+    ends += [] if limit is None else [limit, -limit]
+    room = 0.06 * (max(ends) - min(ends)) or 1.0
+    return Rows(
+        title=f"against {SHORT[law]}",
+        x_label="difference of errors (°)",
+        frame=frame,
+        marks={} if limit is None else {limit: "", -limit: ""},
+        looks={"": MODEL},
+        x_limits=(min(ends) - room, max(ends) + room),
+    )
+
+
+def other_errors(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
+    """Errors of places, tilts and clinical angles on left-out films, a panel for each."""
+    title = "Other errors on left-out films"
+    panels, n = [], 0
+    for measure, words in MEASURED.items():
+        compared = Compared.of(tables, "held_out", measure)
+        if len(compared.same):
+            n = max(n, len(compared.same))
+            label = f"error ({compared.sign})"
+            frame = _errors(compared)
+            panels.append(
+                Rows(
+                    title=words[:1].upper() + words[1:],
+                    x_label=label,
+                    frame=frame,
+                    looks={"": MODEL},
+                    marks=dict.fromkeys(_reading(compared), ""),
+                    x_limits=(0.0, 1.12 * float(frame[["value", "high"]].max(axis=None)) or 1.0),
+                )
+            )
+    if not panels:
+        return saying(title, "No spine has the poses of all laws on left-out films.")
+    caption = f"Symbol: mean of the same spines (up to {n}); line: 95 % interval; dashed: reading alone."
+    return Chart(title, panels, caption)
+
+
+def identifiable_ratios(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
+    """Of how many spines bending films bound a segment's stiffness ratio."""
+    title = "Stiffness ratios that bending films bound"
+    laws = tables["laws"]
+    asked = laws[laws["identifiable"].notna()]
+    if asked.empty:
+        return saying(title, "The study does not ask which ratios bending films bound.")
+    both = asked["identifiable"].astype(bool)
+    neither = asked["open_below"].astype(bool) & asked["open_above"].astype(bool)
+    names = {"both ends": both, "one end": ~both & ~neither, "neither": neither}
+    shares = pd.DataFrame({name: flags.astype(float) for name, flags in names.items()})
+    shares = shares.groupby(asked["joint"].astype(str), sort=False).mean()[::-1]
+    frame = shares.rename(index=level).rename_axis("row").reset_index()
+    frame = frame.melt("row", var_name="series", value_name="share")
+    looks = dict(zip(names, (MODEL, THIRD, SOFT), strict=True))
+    keys = [Key(look, name) for name, look in looks.items()]
+    caption = (
+        f"Share of {count(asked['specimen'].nunique(), 'spine')} whose films bound the ratio of a "
+        "segment on both sides, on one or on neither, the fitted tangent's 95 % region."
+    )
+    panel = Shares(x_label="share of spines (%)", frame=frame, looks=looks, width=400.0)
+    return Chart(title, [panel], caption, keys)
+
+
+def enlargement(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
+    """Errors over the enlargement of the ends, and over the size of stiffness."""
+    title = "Enlargement of the ends, and size of stiffness"
+    labels = {"enlargement": "enlargement (%)", "scale": "lateral stiffness, times"}
+    panels = []
+    for varied, label in labels.items():
+        parts = []
+        for group, films in FILMS.items():
+            errors = tried(tables["variants"], varied, group)
+            means = [mean_of(errors[value].to_numpy(float)) for value in errors]
+            ends = [one.interval or (one.value, one.value) for one in means]
+            parts.append(
+                pd.DataFrame(
+                    {
+                        "x": errors.columns.to_numpy(float),
+                        "y": [one.value for one in means],
+                        "y_low": [low for low, _ in ends],
+                        "y_high": [high for _, high in ends],
+                        "series": f"{films}, n = {len(errors)}",
+                        "films": films,
+                    }
+                )
+            )
+        frame = pd.concat([part for part in parts if len(part)] or parts)
+        if frame.empty:
+            continue
+        looks = _of_series(frame)
+        panels.append(
+            Curves(
+                x_label=label,
+                y_label="rotation error (°)",
+                frame=frame,
+                looks=looks,
+                points=tuple(looks),
+                zeros=False,
+                x_log=varied == "scale",
+                y_limits=(0.0, 1.1 * float(frame["y_high"].max()) or 1.0),
+            )
+        )
+    if not panels:
+        return saying(title, "Nothing was varied, or no spine has poses at all values.")
+    keys = [Key(look, films) for films, look in OF_FILMS.items()]
+    caption = "Published tangent, mean over the same spines at all values; line: 95 % interval."
+    return Chart(title, panels, caption, keys)
+
+
+def _of_series(frame: pd.DataFrame) -> dict[str, Look]:
+    named = frame.drop_duplicates("series")
+    return {
+        str(series): OF_FILMS[films]
+        for series, films in zip(named["series"], named["films"], strict=True)
+    }
