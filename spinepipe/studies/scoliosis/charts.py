@@ -9,7 +9,7 @@ from spinepipe.report.conclusions import Value
 from spinepipe.report.forms.chart import Chart, Key, Panel, saying
 from spinepipe.report.forms.curves import Curves
 from spinepipe.report.forms.heat_map import Shares
-from spinepipe.report.forms.look import BASE, FOURTH, MODEL, SOFT, THIRD, Look
+from spinepipe.report.forms.look import BASE, FOURTH, MODEL, SOFT, THIRD
 from spinepipe.report.forms.rows import Rows
 from spinepipe.report.words import count, level
 from spinepipe.statistics import mean_of
@@ -51,20 +51,25 @@ def fitted_and_held_out(study: Scoliosis, cohort: Cohort, tables: Tables) -> Cha
     groups = [one for one in (Compared.of(tables, g, DECIDING) for g in FILMS) if len(one.same)]
     if not groups:
         return saying(title, "No spine has the poses of all laws: there are no errors to compare.")
-    found = [_errors(one).assign(series=FILMS[one.group]) for one in groups]
-    n = " and ".join(f"{len(one.same)} ({FILMS[one.group]})" for one in groups)
-    caption = (
-        f"Symbol: mean of the same spines for all laws, n = {n}; line: 95 % interval. "
-        "The top vertebra is given."
-    )
-    keys = [Key(OF_FILMS[FILMS[one.group]], FILMS[one.group]) for one in groups]
-    rows = Rows(
-        x_label="rotation error (°)",
-        frame=pd.concat(found),
-        looks=OF_FILMS,
-        marks=_reading(groups[0]),
-    )
-    return Chart(title, [rows], caption, keys)
+    found = [_errors(one).assign(series=one.group_words) for one in groups]
+    n = " and ".join(f"{len(one.same)} ({one.group_words})" for one in groups)
+    panels: list[Panel] = [
+        Rows(
+            title="Error",
+            x_label="rotation error (°)",
+            frame=pd.concat(found),
+            looks=OF_FILMS,
+            marks=_reading(groups[0]),
+        )
+    ]
+    first = groups[0]
+    beside = ""
+    if first.verdict not in NOT_COMPARED:
+        panels.append(_differences(first, first.laws[0], first.beside_best))
+        beside = f" Right: {first.group_words}, hollow: cannot be distinguished."
+    caption = f"Mean of the same spines for all laws, n = {n}, with 95 % interval.{beside}"
+    keys = [Key(OF_FILMS[one.group_words], one.group_words) for one in groups]
+    return Chart(title, panels, caption, keys)
 
 
 def _errors(compared: Compared) -> pd.DataFrame:
@@ -82,22 +87,18 @@ def _reading(compared: Compared) -> dict[float, str]:
 
 
 def differences(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
-    """By how much laws differ on left-out films: from the first, and from uniform stiffness."""
-    title = "Differences between laws"
+    """How much laws differ on left-out films from one that takes nothing from bending films."""
+    title = "Laws against uniform stiffness"
     compared = Compared.of(tables, "held_out", DECIDING)
-    if compared.verdict in NOT_COMPARED:
-        return saying(title, "Fewer than two laws or three spines: there is nothing to compare.")
-    panels: list[Panel] = [_differences(compared, compared.laws[0], compared.beside_best)]
-    if NOT_PERSONAL in compared.laws[1:]:
-        others = [name for name in compared.laws if name != NOT_PERSONAL]
-        found = [compared.difference(NOT_PERSONAL, other) for other in others]
-        panels.append(_differences(compared, NOT_PERSONAL, found))
-    detectable = "" if compared.detectable is None else "dashed: least detectable difference; "
+    if compared.verdict in NOT_COMPARED or NOT_PERSONAL not in compared.laws:
+        return saying(title, "There is nothing to compare with uniform stiffness.")
+    others = [name for name in compared.laws if name != NOT_PERSONAL]
+    found = [compared.difference(NOT_PERSONAL, other) for other in others]
     caption = (
-        "Rotation error of each law less that of the first or of uniform stiffness, on left-out "
-        f"films. Line: 95 % interval over spines; {detectable}hollow: cannot be distinguished."
+        "Error in rotations on left-out films, less that of uniform stiffness, with 95 % interval "
+        "over spines. Hollow: cannot be distinguished."
     )
-    return Chart(title, panels, caption)
+    return Chart(title, [_differences(compared, NOT_PERSONAL, found)], caption)
 
 
 def _differences(compared: Compared, law: str, found: list[Difference]) -> Rows:
@@ -112,7 +113,7 @@ def _differences(compared: Compared, law: str, found: list[Difference]) -> Rows:
         title=f"against {SHORT[law]}",
         x_label="difference of errors (°)",
         frame=frame,
-        marks={} if limit is None else {limit: "", -limit: ""},
+        marks={} if limit is None else {limit: "detectable", -limit: ""},
         looks={"": MODEL},
         x_limits=(min(ends) - room, max(ends) + room),
     )
@@ -134,13 +135,13 @@ def other_errors(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
                     x_label=label,
                     frame=frame,
                     looks={"": MODEL},
-                    marks=dict.fromkeys(_reading(compared), ""),
+                    marks=_reading(compared),
                     x_limits=(0.0, 1.12 * float(frame[["value", "high"]].max(axis=None)) or 1.0),
                 )
             )
     if not panels:
         return saying(title, "No spine has the poses of all laws on left-out films.")
-    caption = f"Symbol: mean of the same spines (up to {n}); line: 95 % interval; dashed: reading alone."
+    caption = f"Symbol: mean of the same spines (up to {n}); line: 95 % interval."
     return Chart(title, panels, caption)
 
 
@@ -179,44 +180,17 @@ def enlargement(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
             errors = tried(tables["variants"], varied, group)
             means = [mean_of(errors[value].to_numpy(float)) for value in errors]
             ends = [one.interval or (one.value, one.value) for one in means]
-            parts.append(
-                pd.DataFrame(
-                    {
-                        "x": errors.columns.to_numpy(float),
-                        "y": [one.value for one in means],
-                        "y_low": [low for low, _ in ends],
-                        "y_high": [high for _, high in ends],
-                        "series": f"{films}, n = {len(errors)}",
-                        "films": films,
-                    }
-                )
-            )
+            part = {"x": errors.columns.to_numpy(float), "y": [one.value for one in means]}
+            part |= {"y_low": [low for low, _ in ends], "y_high": [high for _, high in ends]}
+            parts.append(pd.DataFrame(part).assign(series=films))
         frame = pd.concat([part for part in parts if len(part)] or parts)
-        if frame.empty:
-            continue
-        looks = _of_series(frame)
-        panels.append(
-            Curves(
-                x_label=label,
-                y_label="rotation error (°)",
-                frame=frame,
-                looks=looks,
-                points=tuple(looks),
-                zeros=False,
-                x_log=varied == "scale",
-                y_limits=(0.0, 1.1 * float(frame["y_high"].max()) or 1.0),
-            )
-        )
+        if len(frame):
+            shown = {"x_label": label, "y_label": "rotation error (°)", "frame": frame}
+            top = 1.1 * float(frame["y_high"].max()) or 1.0
+            shown |= {"looks": OF_FILMS, "points": tuple(OF_FILMS), "y_limits": (0.0, top)}
+            panels.append(Curves(**shown, zeros=False, x_log=varied == "scale"))
     if not panels:
         return saying(title, "Nothing was varied, or no spine has poses at all values.")
     keys = [Key(look, films) for films, look in OF_FILMS.items()]
-    caption = "Published tangent, mean over the same spines at all values; line: 95 % interval."
+    caption = "Published tangent, mean over the same spines at all values, with 95 % interval."
     return Chart(title, panels, caption, keys)
-
-
-def _of_series(frame: pd.DataFrame) -> dict[str, Look]:
-    named = frame.drop_duplicates("series")
-    return {
-        str(series): OF_FILMS[films]
-        for series, films in zip(named["series"], named["films"], strict=True)
-    }

@@ -75,7 +75,9 @@ def film_overlay(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
             )
         )
     keys = [Key(LOOKS[law], SHORT[law], as_line=True) for law in LOOKS if law in set(own["model"])]
-    caption = "The spine of the median error, seen from behind; its lowest and top vertebra are given."
+    caption = (
+        "The spine of the median error, seen from behind; its lowest and top vertebra are given."
+    )
     return Chart(title, panels, caption, keys)
 
 

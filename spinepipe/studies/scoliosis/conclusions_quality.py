@@ -17,9 +17,6 @@ from spinepipe.studies.scoliosis.personal import FARTHEST_MULTIPLIER
 MANY = 0.1
 """Share of poses or fits lost above which the others no longer stand for all."""
 
-SCALED = 1e-9
-"""A film's size differs from that of the erect one by more than rounding."""
-
 
 def counted(source: str, **counts: int) -> dict[str, Value]:
     """Whole numbers of a sentence."""
@@ -31,14 +28,12 @@ def quality(results: Results, *groups: Compared) -> Iterator[Conclusion]:
     positions, laws = results.table("positions"), results.table("laws")
     if len(positions):
         yield from _poses(positions)
-        yield from _sizes(positions)
     for compared in groups:
         yield from _spines(compared)
     yield from _sample(groups[0])
     if len(laws):
         yield from _fits(laws)
         yield from _segments(laws)
-    yield from _beyond(results.table("displacements"))
     population = results.table("population")
     if "status" in population and (population["status"] == Status.NOT_CONVERGED.value).any():
         yield Conclusion("population", "check")
@@ -57,13 +52,6 @@ def _poses(positions: pd.DataFrame) -> Iterator[Conclusion]:
         most = Value(float(missed["missed_mm"].max()), "mm", source="positions: missed_mm")
         values = counted("positions: status", missed=len(missed), poses=poses)
         yield Conclusion("reached", "check", {**values, "mm": most})
-
-
-def _sizes(positions: pd.DataFrame) -> Iterator[Conclusion]:
-    films = positions.drop_duplicates(["specimen", "position"])
-    scaled = int(((films["film_scale"] - 1.0).abs() > SCALED).sum())
-    values = counted("positions: film_scale", scaled=scaled, films=len(films))
-    yield Conclusion("size", "ok" if scaled else "check", values)
 
 
 def _spines(compared: Compared) -> Iterator[Conclusion]:
@@ -118,15 +106,3 @@ def _segments(laws: pd.DataFrame) -> Iterator[Conclusion]:
     against = int(segments["opposite"].astype(bool).sum())
     values = counted("laws: opposite", against=against, segments=len(segments))
     yield Conclusion("opposite", "check" if against else "ok", values)
-
-
-def _beyond(displacements: pd.DataFrame) -> Iterator[Conclusion]:
-    """Left-out rotations that the published law has no load for."""
-    if displacements.empty:
-        return
-    own = displacements[~displacements["fitted"].astype(bool)]
-    own = own.drop_duplicates(["specimen", "position", "joint"])
-    over = int((own["share_of_range"] > 1.0).sum())
-    if over:
-        values = counted("displacements: share_of_range", over=over, all=len(own))
-        yield Conclusion("beyond", "check", values)

@@ -112,6 +112,11 @@ class Compared:
         return [str(name) for name in order.index]
 
     @property
+    def group_words(self) -> str:
+        """The films."""
+        return FILMS[self.group]
+
+    @property
     def sign(self) -> str:
         """Unit of errors."""
         return SIGNS[MEASURES[self.measure][0]]

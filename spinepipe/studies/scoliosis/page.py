@@ -1,7 +1,5 @@
 """The page of a study of scoliotic spines."""
 
-import pandas as pd
-
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import sentences_of
