@@ -7,6 +7,7 @@ for papers, all panels stand in a grid.
 
 import io
 import re
+import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -143,6 +144,10 @@ class Chart:
         return content.getvalue()
 
 
+_LETTERS = 40
+"""Of a line of a message."""
+
+
 def saying(title: str, message: str) -> Chart:
     """A figure that has nothing to show and says why."""
     return Chart(title, [_Message(message=message)], message)
@@ -153,12 +158,17 @@ class _Message(Panel):
     message: str
 
     @property
+    def lines(self) -> list[str]:
+        return textwrap.wrap(self.message, _LETTERS)
+
+    @property
     def height(self) -> float:
-        return 24.0
+        return 8.0 + 16.0 * len(self.lines)
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        axes.text(0.0, 0.5, self.message, transform=axes.transAxes, color=COLORS["soft"], wrap=True)
+        how = {"transform": axes.transAxes, "color": COLORS["soft"], "va": "center"}
+        axes.text(0.0, 0.5, "\n".join(self.lines), in_layout=False, **how)  # wider than the axes
 
 
 def _draw(panel: Panel, figure: FigureBase) -> None:

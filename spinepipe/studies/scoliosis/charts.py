@@ -7,7 +7,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Value
 from spinepipe.report.forms.chart import Chart, Key, Panel, saying
-from spinepipe.report.forms.curves import Curves
+from spinepipe.report.forms.curves import Curves, Scatter
 from spinepipe.report.forms.heat_map import Shares
 from spinepipe.report.forms.look import BASE, FOURTH, MODEL, SOFT, THIRD
 from spinepipe.report.forms.rows import Rows
@@ -18,6 +18,7 @@ from spinepipe.studies.scoliosis.conclusions import (
     MEASURED,
     NOT_COMPARED,
     NOT_PERSONAL,
+    most_moved,
     tried,
 )
 from spinepipe.studies.scoliosis.errors_compared import FILMS, Compared, Difference
@@ -170,27 +171,52 @@ def identifiable_ratios(study: Scoliosis, cohort: Cohort, tables: Tables) -> Cha
 
 
 def enlargement(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
-    """Errors over the enlargement of the ends, and over the size of stiffness."""
-    title = "Enlargement of the ends, and size of stiffness"
-    labels = {"enlargement": "enlargement (%)", "scale": "lateral stiffness, times"}
-    panels = []
-    for varied, label in labels.items():
-        parts = []
-        for group, films in FILMS.items():
-            errors = tried(tables["variants"], varied, group)
-            means = [mean_of(errors[value].to_numpy(float)) for value in errors]
-            ends = [one.interval or (one.value, one.value) for one in means]
-            part = {"x": errors.columns.to_numpy(float), "y": [one.value for one in means]}
-            part |= {"y_low": [low for low, _ in ends], "y_high": [high for _, high in ends]}
-            parts.append(pd.DataFrame(part).assign(series=films))
-        frame = pd.concat([part for part in parts if len(part)] or parts)
-        if len(frame):
-            shown = {"x_label": label, "y_label": "rotation error (°)", "frame": frame}
-            top = 1.1 * float(frame["y_high"].max()) or 1.0
-            shown |= {"looks": OF_FILMS, "points": tuple(OF_FILMS), "y_limits": (0.0, top)}
-            panels.append(Curves(**shown, zeros=False, x_log=varied == "scale"))
-    if not panels:
+    """Errors of the published tangent over the enlargement of its ends."""
+    title = "Enlargement of the ends"
+    parts = []
+    for group, films in FILMS.items():
+        errors = tried(tables["variants"], "enlargement", group)
+        means = [mean_of(errors[value].to_numpy(float)) for value in errors]
+        ends = [one.interval or (one.value, one.value) for one in means]
+        part = {"x": errors.columns.to_numpy(float), "y": [one.value for one in means]}
+        part |= {"y_low": [low for low, _ in ends], "y_high": [high for _, high in ends]}
+        parts.append(pd.DataFrame(part).assign(series=films))
+    frame = pd.concat([part for part in parts if len(part)] or parts)
+    if frame.empty:
         return saying(title, "Nothing was varied, or no spine has poses at all values.")
-    keys = [Key(look, films) for films, look in OF_FILMS.items()]
+    panel = Curves(
+        x_label="ends beyond the bending films (%)",
+        y_label="rotation error (°)",
+        frame=frame,
+        looks=OF_FILMS,
+        points=tuple(OF_FILMS),
+        zeros=False,
+        y_limits=(0.0, 1.1 * float(frame["y_high"].max()) or 1.0),
+    )
     caption = "Published tangent, mean over the same spines at all values, with 95 % interval."
-    return Chart(title, panels, caption, keys)
+    return Chart(title, [panel], caption, [Key(look, films) for films, look in OF_FILMS.items()])
+
+
+def scale(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
+    """How far segments turn where all lateral stiffness is multiplied, and the law's own error."""
+    title = "Size of stiffness"
+    rows = tables["variants"]
+    rows = rows[rows["varied"] == "scale"].dropna(subset=["moved_deg"])
+    found = most_moved(tables)
+    if found is None:
+        return saying(title, "The size of stiffness was not varied, or no spine has poses.")
+    names = {flag: FILMS["fitted" if flag else "held_out"] for flag in (False, True)}
+    most = rows.groupby(["fitted", "value"])["moved_deg"].max().reset_index()
+    frame = most.rename(columns={"value": "x", "moved_deg": "y"})
+    frame["series"] = frame["fitted"].map(names)
+    compared, _, error = found
+    panel = Scatter(
+        x_label="lateral stiffness, times",
+        y_label="largest change of a rotation (°)",
+        frame=frame,
+        looks=OF_FILMS,
+        limits={error.number: f"own error, {compared.group_words}"},
+        x_log=True,
+    )
+    caption = "Published tangent, all other rotations unchanged: largest change of any segment."
+    return Chart(title, [panel], caption, [Key(look, films) for films, look in OF_FILMS.items()])

@@ -27,8 +27,8 @@ DECIDING = "rotation"
 """The measure that the answer depends on: rotations of segments since the erect film."""
 
 MEASURED = {
-    "place": "places of vertebrae",
-    "tilt": "tilts of vertebrae",
+    "place": "vertebral places",
+    "tilt": "vertebral tilts",
     "cobb": "Cobb angles",
     "ferguson": "Ferguson angles",
 }
@@ -61,7 +61,7 @@ def conclusions(study: Scoliosis, cohort: Cohort, results: Results) -> Iterator[
     yield from _ratios(results.table("laws"))
     variants = results.table("variants")
     if len(variants):
-        yield from _scale(variants, left_out if len(left_out.each) else fitted)
+        yield from _scale(tables)
         yield from _enlargement(study, variants)
     yield from quality(results, left_out, fitted)
     sizes = {
@@ -224,51 +224,63 @@ def tried(variants: pd.DataFrame, varied: str, group: str) -> pd.DataFrame:
     return kept
 
 
-def _scale(variants: pd.DataFrame, compared: Compared) -> Iterator[Conclusion]:
+def most_moved(tables: Mapping[str, pd.DataFrame]) -> tuple[Compared, Value, Value] | None:
+    """How far a segment turns with another size of stiffness, and the law's own error there.
+
+    On the films where that is most beside the error; None where nothing was varied or has a pose.
+    """
+    rows = tables.get("variants", pd.DataFrame())
+    if rows.empty:
+        return None
+    rows = rows[rows["varied"] == "scale"].dropna(subset=["moved_deg"])
+    found = []
+    for group in FILMS:
+        compared = Compared.of(tables, group, DECIDING)
+        moved = rows.loc[rows["fitted"] == (group == "fitted"), "moved_deg"]
+        if len(moved) and PUBLISHED in compared.each:
+            error = compared.mean(compared.each[PUBLISHED].dropna())
+            most = Value(float(moved.max()), "°", source="variants: varied scale, moved_deg")
+            found.append((compared, most, error))
+    return max(found, key=lambda one: one[1].number - one[2].number, default=None)
+
+
+def _scale(tables: Mapping[str, pd.DataFrame]) -> Iterator[Conclusion]:
     """Whether the size of stiffness, which films do not show, moves the spine."""
-    moved = variants[variants["varied"] == "scale"].dropna(subset=["moved_deg"])
-    if moved.empty or PUBLISHED not in compared.each:
+    found = most_moved(tables)
+    if found is None:
         return
-    source = "variants: varied scale"
-    error = compared.mean(compared.each[PUBLISHED].dropna())
-    most = Value(float(moved["moved_deg"].max()), "°", source=f"{source}, largest moved_deg")
+    compared, most, error = found
+    factors = tables["variants"].query("varied == 'scale'")["value"]
     ends = {
-        name: Value(float(end), source=source)
-        for name, end in (("low", moved["value"].min()), ("high", moved["value"].max()))
+        name: Value(float(end), source="variants: varied scale")
+        for name, end in (("low", factors.min()), ("high", factors.max()))
     }
     verdict = "beyond" if most.number > error.number else "within"
-    yield Conclusion("scale", verdict, {"moved": most, "error": error, **ends})
+    names = {"films": compared.group_words}
+    yield Conclusion("scale", verdict, {"moved": most, "error": error, **ends}, names)
 
 
 def _enlargement(study: Scoliosis, variants: pd.DataFrame) -> Iterator[Conclusion]:
     """Which enlargement of the ends errs least; one at the end of what was tried is none."""
-    own, told, ends = 100.0 * (study.enlargement - 1.0), False, dict[str, list[str]]()
+    own = Value(round(100.0 * (study.enlargement - 1.0), 6), "%", source="settings: enlargement")
+    found: list[Conclusion] = []
+    groups: dict[str, list[str]] = {}
     for group, films in FILMS.items():
-        rows = variants[variants["fitted"] == (group == "fitted")]
-        if rows.empty:
+        if not (variants["fitted"] == (group == "fitted")).any():
             continue
         errors = tried(variants, "enlargement", group)
         if errors.empty:
-            ends.setdefault("check_unlike", []).append(films)
+            groups.setdefault("check_unlike", []).append(films)
             continue
-        means = errors.mean()
-        best, low, high = float(means.idxmin()), float(means.index[0]), float(means.index[-1])
-        at_end = best in (low, high)
-        ends.setdefault("check_end" if at_end else "ok", []).append(films)
-        if told:
-            continue
-        told, how = True, "variants: varied enlargement, mean over the same spines"
-        of = {"best": best, "low": low, "high": high, "own": round(own, 6)}
-        values = {name: Value(value, "%", source=how) for name, value in of.items()}
-        values["error"] = Value(float(means.min()), "°", n=len(errors), source=how)
-        values["n"] = Value(len(errors), source=how)
-        nearest = float(means.index[np.abs(means.index - own).argmin()])
-        is_own = abs(nearest - own) < 1e-6
-        if is_own:
-            values["own_error"] = Value(float(means[nearest]), "°", n=len(errors), source=how)
-        verdict = "end" if at_end else "own" if is_own and best == nearest else "inside"
-        if verdict == "inside" and not is_own:
-            verdict = "inside_alone"
-        yield Conclusion("enlargement", verdict, values, {"films": films})
-    for verdict, groups in ends.items():
-        yield Conclusion("tried", verdict, {}, {"films": listed(groups)})
+        means, n, how = errors.mean(), len(errors), "variants: mean over the same spines"
+        at = {"best": means.idxmin(), "low": means.index[0], "high": means.index[-1]}
+        values = {name: Value(float(value), "%", source=how) for name, value in at.items()}
+        values["error"] = Value(float(means.min()), "°", n=n, source=how)
+        values |= {"own": own, "n": Value(n, source=how)}
+        at_end = at["best"] in (at["low"], at["high"])
+        groups.setdefault("check_end" if at_end else "ok", []).append(films)
+        verdict = "end" if at_end else "inside"
+        found.append(Conclusion("enlargement", verdict, values, {"films": films}))
+    yield from found[:1]
+    for verdict, films_of in groups.items():
+        yield Conclusion("tried", verdict, {}, {"films": listed(films_of)})

@@ -94,7 +94,8 @@ class Compared:
         if all(len(rows) for rows in parts):
             chosen = [of_group(rows, group) for rows in parts]
             each = by_patient(squares(measure, *chosen)).dropna(axis=1, how="all")
-            each = each[[name for name in LAWS if name in each]]
+            names = [name for name in LAWS if name in each]
+            each = each[names] if names else pd.DataFrame()
         accuracy, tests = (tables.get(name, pd.DataFrame()) for name in ("accuracy", "statistics"))
         noise = reading_floor(accuracy, measure) if len(accuracy) else np.nan
         own = tests[tests["family"] == f"{group}/{measure}"] if len(tests) else tests

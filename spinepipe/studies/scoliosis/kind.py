@@ -72,7 +72,8 @@ class ScoliosisFiles(StudyFiles):
             "charts_of_films:load_displacement",
             ("laws", "displacements", "positions"),
         ),
-        Figure("enlargement", "Enlargement and scale", "charts:enlargement", ("variants",)),
+        Figure("enlargement", "Enlargement of the ends", "charts:enlargement", ("variants",)),
+        Figure("scale", "Size of stiffness", "charts:scale", ("variants", *COMPARED)),
     )
 
     study: Scoliosis

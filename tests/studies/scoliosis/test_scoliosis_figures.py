@@ -4,7 +4,6 @@ Would catch words off a panel, figures that fail for few spines or films, and ma
 where the tables have them.
 """
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -71,9 +70,7 @@ def test_tables_without_rows_are_told_not_drawn(name: str) -> None:
     assert chart.panels[0].message == chart.caption
 
 
-def test_differences_have_the_detectable_one_on_both_sides_and_hollow_ones_are_not_significant() -> (
-    None
-):
+def test_differences_have_the_detectable_one_on_both_sides() -> None:
     """Errors of 0.3, 0.4, 0.5, 0.6 and 0.8 deg, times 1, 1.1 and 1.2 of three spines."""
     (panel,) = draw("differences", Size()).panels
     rows = panel.frame.set_index("row")
@@ -87,7 +84,7 @@ def test_differences_have_the_detectable_one_on_both_sides_and_hollow_ones_are_n
 
 
 def test_shares_of_bounded_ratios_are_counted_by_segment() -> None:
-    """Ten segments from below are bounded on both sides, two on one, two on neither; p01 differs."""
+    """Ten segments from below are bounded on both sides, two on one, two on neither; but p01."""
     laws = tables(Size())["laws"]
     first = (laws["specimen"] == "p01") & (laws["model"] == "tangent_fitted")
     laws.loc[first & (laws["joint"] == "L3L4"), ["open_below", "identifiable"]] = [True, False]
