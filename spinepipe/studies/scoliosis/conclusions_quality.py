@@ -12,7 +12,6 @@ from spinepipe.report.words import listed
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.errors import REFERENCE
 from spinepipe.studies.scoliosis.errors_compared import FILMS, LAWS, SIGNIFICANT, Compared
-from spinepipe.studies.scoliosis.personal import FARTHEST_MULTIPLIER
 
 MANY = 0.1
 """Share of poses or fits lost above which the others no longer stand for all."""
@@ -90,7 +89,6 @@ def _fits(laws: pd.DataFrame) -> Iterator[Conclusion]:
     if len(reference):
         held = int((reference["fit_status"] == Status.CONVERGED_AT_BOUND.value).sum())
         values = counted("laws: fit_status", held=held, spines=len(reference))
-        values["factor"] = Value(round(float(np.exp(FARTHEST_MULTIPLIER)), 9), source="bound")
         yield Conclusion("bounds", "check" if held else "ok", values, {"law": LAWS[REFERENCE]})
 
 

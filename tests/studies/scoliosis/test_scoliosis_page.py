@@ -316,7 +316,7 @@ def test_enlargements_are_compared_over_the_same_spines() -> None:
 
 
 def test_the_size_of_stiffness_is_judged_on_the_films_where_it_turns_segments_most() -> None:
-    """By 4.2 deg on fitted films where the law errs by 0.3 deg; 0.2 deg on left-out ones is less."""
+    """4.2 deg on fitted films, where the law errs by 0.3 deg; 0.2 deg on left-out ones."""
     tables = study() | errors_in({"tangent": [0.4] * 3}, {"tangent": [0.2, 0.3, 0.4]})
     variants = varied(RISING, moved=0.2)["variants"]
     on_fitted = varied(RISING, moved=4.2)["variants"].assign(fitted=True)
