@@ -105,7 +105,8 @@ class Chart:
                 kind = "panel legend" if self.keys and index == 0 else "panel"
                 placed.append(
                     f'<svg class="{kind}" x="{x:.0f}" y="{y:.0f}" width="{wide:.0f}" '
-                    f'height="{high:.0f}" viewBox="0 0 {wide:.0f} {high:.0f}">{part}</svg>'
+                    f'height="{high:.0f}" viewBox="0 0 {wide:.0f} {high:.0f}" '
+                    f'style="max-width: {1.4 * wide:.0f}px">{part}</svg>'
                 )
                 x += wide + GAP
             width = max(width, x - GAP)
