@@ -168,8 +168,10 @@ class _Message(Panel):
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        how = {"transform": axes.transAxes, "color": COLORS["soft"], "va": "center"}
-        axes.text(0.0, 0.5, "\n".join(self.lines), in_layout=False, **how)  # wider than the axes
+        axes.text(
+            0.0, 0.5, "\n".join(self.lines), transform=axes.transAxes, color=COLORS["soft"],
+            va="center", in_layout=False,  # it is wider than the axes
+        )  # fmt: skip
 
 
 def _draw(panel: Panel, figure: FigureBase) -> None:

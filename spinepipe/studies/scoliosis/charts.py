@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
@@ -137,7 +138,10 @@ def other_errors(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
                     frame=frame,
                     looks={"": MODEL},
                     marks=_reading(compared),
-                    x_limits=(0.0, 1.12 * float(frame[["value", "high"]].max(axis=None)) or 1.0),
+                    x_limits=(
+                        0.0,
+                        1.12 * float(np.nanmax(frame[["value", "high"]].to_numpy(float))) or 1.0,
+                    ),
                 )
             )
     if not panels:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from math import sqrt
 
-import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
@@ -219,8 +218,8 @@ def tried(variants: pd.DataFrame, varied: str, group: str) -> pd.DataFrame:
     rows = variants[(variants["varied"] == varied) & (variants["fitted"] == (group == "fitted"))]
     rows = rows.assign(square=rows["rotation_rmse_deg"].astype(float) ** 2)
     cells = rows.groupby(["specimen", "value"], sort=False)["square"]
-    each = np.sqrt(cells.apply(lambda x: x.mean(skipna=False)).unstack("value"))
-    kept: pd.DataFrame = each.dropna(axis=1, how="all").dropna().sort_index(axis=1)
+    squares = cells.apply(lambda x: x.mean(skipna=False)).unstack("value")
+    kept: pd.DataFrame = squares.dropna(axis=1, how="all").dropna().sort_index(axis=1) ** 0.5
     return kept
 
 
