@@ -12,7 +12,7 @@ from spinepipe.report.forms.curves import Curves, Scatter
 from spinepipe.report.forms.heat_map import Shares
 from spinepipe.report.forms.look import BASE, FOURTH, MODEL, SOFT, THIRD
 from spinepipe.report.forms.rows import Rows
-from spinepipe.report.words import count, level
+from spinepipe.report.words import capital, count, level
 from spinepipe.statistics import mean_of
 from spinepipe.studies.scoliosis.conclusions import (
     DECIDING,
@@ -124,28 +124,24 @@ def _differences(compared: Compared, law: str, found: list[Difference]) -> Rows:
 def other_errors(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
     """Errors of places, tilts and clinical angles on left-out films, a panel for each."""
     title = "Other errors on left-out films"
-    panels, n = [], 0
-    for measure, words in MEASURED.items():
-        compared = Compared.of(tables, "held_out", measure)
-        if len(compared.same):
-            n = max(n, len(compared.same))
-            label = f"error ({compared.sign})"
-            frame = _errors(compared)
-            panels.append(
-                Rows(
-                    title=words[:1].upper() + words[1:],
-                    x_label=label,
-                    frame=frame,
-                    looks={"": MODEL},
-                    marks=_reading(compared),
-                    x_limits=(
-                        0.0,
-                        1.12 * float(np.nanmax(frame[["value", "high"]].to_numpy(float))) or 1.0,
-                    ),
-                )
-            )
+    every = [(words, Compared.of(tables, "held_out", name)) for name, words in MEASURED.items()]
+    found = [(words, one) for words, one in every if len(one.same)]
+    panels = []
+    for words, one in found:
+        frame = _errors(one)
+        most = float(np.nanmax(frame[["value", "high"]].to_numpy(float)))
+        panel = Rows(
+            title=capital(words),
+            x_label=f"error ({one.sign})",
+            frame=frame,
+            looks={"": MODEL},
+            marks=_reading(one),
+            x_limits=(0.0, 1.12 * most or 1.0),
+        )
+        panels.append(panel)
     if not panels:
         return saying(title, "No spine has the poses of all laws on left-out films.")
+    n = max(len(one.same) for _, one in found)
     caption = f"Symbol: mean of the same spines (up to {n}); line: 95 % interval."
     return Chart(title, panels, caption)
 

@@ -3,8 +3,6 @@
 The spine is that of the median error. It is not named: films are of a person.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
@@ -14,23 +12,19 @@ from spinepipe.report.forms.chart import Chart, Key, Panel, saying
 from spinepipe.report.forms.curves import Curves
 from spinepipe.report.forms.look import MEASURED
 from spinepipe.report.words import case, level
-from spinepipe.studies.scoliosis.charts import LOOKS, SHORT
+from spinepipe.studies.scoliosis.charts import LOOKS, SHORT, Tables
 from spinepipe.studies.scoliosis.errors import held_out_error
 from spinepipe.studies.scoliosis.films import ERECT, HELD_OUT, LEFT, RIGHT, read_films
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import EndRotations
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-MOST_POSITIONS, MOST_JOINTS = 4, 6
-
-POINTS = 41
-"""Of a curve."""
+MOST_POSITIONS, MOST_JOINTS, POINTS = 4, 6, 41
+"""Films and segments that are shown; points of a curve."""
 
 _ENDS = ["lower_end_deg", "upper_end_deg"]
 _LARGEST = 1.25
 """Axes reach this far beyond the largest moment on a bending film."""
-
-Tables = Mapping[str, pd.DataFrame]
 
 
 def median_spine(positions: pd.DataFrame) -> str | None:

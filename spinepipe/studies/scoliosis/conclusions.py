@@ -63,13 +63,10 @@ def conclusions(study: Scoliosis, cohort: Cohort, results: Results) -> Iterator[
         yield from _scale(tables)
         yield from _enlargement(study, variants)
     yield from quality(results, left_out, fitted)
-    sizes = {
-        "apical_moment": Value(study.scale.apical_moment_nm, "N m", source="settings: scale"),
-        "mean_stiffness": Value(
-            study.scale.mean_stiffness_nm_per_rad, "N m/rad", source="settings: scale"
-        ),
-    }
-    yield Conclusion("methods", study.scale.of, {"size": sizes[study.scale.of]})
+    scale = study.scale
+    sizes = {"apical_moment": (scale.apical_moment_nm, "N m")}
+    sizes["mean_stiffness"] = (scale.mean_stiffness_nm_per_rad, "N m/rad")
+    yield Conclusion("methods", scale.of, {"size": Value(*sizes[scale.of], source="settings")})
 
 
 def _answer(left_out: Compared, fitted_only: bool) -> Iterator[Conclusion]:
@@ -92,10 +89,10 @@ def _answer(left_out: Compared, fitted_only: bool) -> Iterator[Conclusion]:
     nearest = left_out.nearest
     values, names = _told(nearest)
     if left_out.detectable is not None:
-        values["detectable"] = _detectable(left_out)
+        values["detectable"] = left_out.told_detectable
     yield Conclusion("best", verdict, values, names)
-    if nearest.margin.number:
-        yield Conclusion("margin", "nearest", {"value": nearest.margin, "n": values["n"]}, names)
+    told = "alike" if verdict == "alike" else "nearest"
+    yield Conclusion("margin", told, {"value": nearest.margin, "n": values["n"]}, names)
     if verdict == "small" and left_out.noise and left_out.detectable:
         tilt, share = _tilt(left_out.noise), nearest.margin.number / left_out.detectable
         exact = {
@@ -117,12 +114,6 @@ def _tilt(noise: float) -> Value:
     return Value(noise / sqrt(READINGS_OF_A_ROTATION), "°", source="accuracy: reading_noise")
 
 
-def _detectable(compared: Compared) -> Value:
-    return Value(
-        compared.detectable or 0.0, compared.sign, source="accuracy: 1.96 √2 reading_noise"
-    )
-
-
 def _noise(cohort: Cohort, compared: Compared) -> Iterator[Conclusion]:
     """How exactly films are read, and what can be detected then."""
     if compared.noise is None:
@@ -133,7 +124,7 @@ def _noise(cohort: Cohort, compared: Compared) -> Iterator[Conclusion]:
     value = Value(compared.noise, "°", source="accuracy: reading_noise")
     told = {"value": value, "tilt": _tilt(compared.noise)}
     yield Conclusion("noise", "ok" if repeated else "check_stated", told)
-    yield Conclusion("detectable", "known", {"value": _detectable(compared)})
+    yield Conclusion("detectable", "known", {"value": compared.told_detectable})
 
 
 def _personal(left_out: Compared) -> Iterator[Conclusion]:

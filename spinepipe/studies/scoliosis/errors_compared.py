@@ -127,6 +127,12 @@ class Compared:
         """Least difference of two readings that can be detected, deg or mm."""
         return None if self.noise is None else float(DETECTABLE * self.noise)
 
+    @property
+    def told_detectable(self) -> Value:
+        """The same as a number of a sentence; only where the reading noise is known."""
+        how = "accuracy: 1.96 √2 reading_noise"
+        return Value(self.detectable or 0.0, self.sign, source=how)
+
     def error(self, law: str) -> Value:
         """Mean over the same spines, with its interval."""
         return self.mean(self.same[law])
