@@ -33,7 +33,7 @@ class Rows(Panel):
         ``hollow`` (not to be trusted), ``inner_low`` and ``inner_high`` (a thicker line, such as
         the middle half) where they are told.
     looks : of each series, in the order from the top of a row down.
-    marks : a dashed vertical line at each value, with its words.
+    marks : a dashed vertical line at each value, with its words; zero has a solid one.
     bars : whether a bar from zero stands in the place of a symbol.
     log : whether the axis is logarithmic. x_limits : its ends.
     """
@@ -108,6 +108,9 @@ class Rows(Panel):
             log_ticks(axes.xaxis, *axes.get_xlim())
         else:  # as many ticks whatever the width, which the layout is still to find
             axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        low, high = axes.get_xlim()
+        if not self.log and low < 0.0 < high:
+            axes.axvline(0.0, color=COLORS["soft"], lw=0.8, zorder=1)
         if "note" in self.frame:
             told = self.frame.drop_duplicates("row").set_index("row")["note"]
             for place, name in enumerate(names):
