@@ -1,0 +1,294 @@
+"""Figures of stiffness: over palpations, over load points, by the sampler, from other starts."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.forms.chart import Chart, Key, saying
+from spinepipe.report.forms.curves import Curves
+from spinepipe.report.forms.look import BASE, MODEL, SOFT, THIRD, Look
+from spinepipe.report.forms.rows import Rows
+from spinepipe.report.words import AXIS
+from spinepipe.status import USABLE, Status
+from spinepipe.studies.joint_pose_sensitivity.conclusions_of_parts import REST
+from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap
+from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A, stiffness_quartiles
+from spinepipe.studies.joint_pose_sensitivity.retained import (
+    COLUMN,
+    EVERY_JOINT,
+    FACTOR,
+    MIDDLE_HALF,
+    UNIT,
+    Array,
+    Stiffness,
+    effect_on,
+    moved_by_load,
+    place_of,
+    stiffnesses,
+)
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.tables import region_columns
+from spinepipe.units import COORDINATES
+
+Tables = Mapping[str, pd.DataFrame]
+
+MOST_ROWS = 24
+"""Of a panel: where there are more, those that spread most are drawn."""
+
+PALPATION, LOAD, READINGS = "palpation", "place of the load", "readings of one fit"
+LOOKS = {PALPATION: MODEL, LOAD: THIRD, READINGS: SOFT}
+
+PERCENTS = (2.5, 25.0, 50.0, 75.0, 97.5)
+SPREAD = ("low", "inner_low", "value", "inner_high", "high")
+"""Percentiles, and the columns of a form that show them."""
+
+SHORT = {REST: "at rest", "quasi_static": "not at rest", "dynamic": "load ramp"}
+
+TWO_SDS = 1.959964
+"""Half the middle 95 % of a normal distribution, in SDs."""
+
+
+def stiffness(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
+    """What palpation, the load's place and the readings leave of each stiffness, and a paper's."""
+    title = "Stiffness, and what it depends on"
+    found = stiffnesses(study, cohort, tables)
+    if not found:
+        return saying(title, "No fit is retained: there is no stiffness to show.")
+    effects = tables.get("load_point_effect", pd.DataFrame())
+    paper = GOULD_2024A.beside(cohort.name)
+    looks = {**LOOKS, **({paper[0]: BASE} if paper else {})}
+    panels = []
+    for name in dict.fromkeys(one.coordinate for one in found):
+        every = [one for one in found if one.coordinate == name]
+        alone = len(every) == 1
+        most = sorted(every, key=lambda one: -one.moved[0] if one.told else 0.0)[:MOST_ROWS]
+        rows = [
+            {**row, "series": source, "row": source if alone else one.place}
+            for one in every
+            if one in most
+            for source, row in _sources(one, effects, alone)
+        ]
+        published = stiffness_quartiles(cohort.name, COLUMN[name])
+        if published and paper:
+            low, middle, high = (FACTOR[name] * one for one in published)
+            inner = {"inner_low": low, "inner_high": high, "low": low, "high": high}
+            row = paper[0] if alone else "all"
+            rows.append({"series": paper[0], "row": row, "value": middle, **inner})
+        panels.append(_on_log_axis(AXIS[name], f"stiffness ({UNIT[name]})", rows, looks))
+    n = len(found[0].values) if len(found) == len(panels) else None
+    fits = f"{n} retained fits" if n else "retained fits"
+    few = len(found) > MOST_ROWS * len(panels)
+    more = f" ({MOST_ROWS} stiffnesses that palpation moves most)" if few else ""
+    caption = (
+        f"Symbol: median; thick: middle half; thin: middle 95 % over {fits}{more}, of readings the "
+        "95 % region. No symbol: most fits do not identify it, and the line goes on to the edge."
+    )
+    drawn = {row for panel in panels for row in panel.frame["series"]}
+    keys = [Key(look, name) for name, look in looks.items() if name in drawn]
+    return Chart(title, panels, caption, keys if len(found) > len(panels) else ())
+
+
+def _sources(
+    one: Stiffness, effects: pd.DataFrame, alone: bool
+) -> list[tuple[str, dict[str, Any]]]:
+    """What leaves how much of a stiffness; of one without a number the region alone."""
+    low, high = one.region
+    open_ends = {"low": np.nan if low is None else low, "high": np.nan if high is None else high}
+    empty = dict.fromkeys(("value", "inner_low", "inner_high"), np.nan)
+    readings = [(READINGS, {**empty, **open_ends})] if low is not None or high is not None else []
+    if not one.told:
+        return [(PALPATION, {**empty, "low": np.nan, "high": np.nan})] * alone + readings
+    found = [(PALPATION, dict(zip(SPREAD, map(float, one.at(*PERCENTS)), strict=True)))]
+    effect = effect_on(one, effects)
+    moved = None if effect is None else moved_by_load(effect)
+    if effect is not None and moved is not None:
+        middle = FACTOR[one.coordinate] * float(effect["stated"])
+        half = 0.01 * moved * middle / 2.0
+        wide = half * 2.0 * TWO_SDS / MIDDLE_HALF
+        ends = (middle - wide, middle - half, middle, middle + half, middle + wide)
+        found.append((LOAD, dict(zip(SPREAD, ends, strict=True))))
+    return found + readings
+
+
+def _on_log_axis(
+    title: str, label: str, rows: Sequence[dict[str, Any]], looks: Mapping[str, Look]
+) -> Rows:
+    """Rows on a logarithmic axis around all ends, with room beyond for those that are open."""
+    frame = pd.DataFrame(rows)
+    ends = frame[["low", "value", "high"]].to_numpy(float)
+    ends = ends[np.isfinite(ends) & (ends > 0.0)]
+    low, high = (float(ends.min()), float(ends.max())) if len(ends) else (1.0, 1.0)
+    room = max(1.2, (high / low) ** 0.12)
+    frame["low"] = frame["low"].mask(frame["low"] <= 0.0)  # goes on to the edge
+    limits = (low / room, high * room)
+    return Rows(title=title, x_label=label, frame=frame, looks=looks, log=True, x_limits=limits)
+
+
+def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
+    """Each stiffness over the load's place, where the fit identifies it, and the cost of the fit."""
+    title = "Stiffness over where the load acts"
+    tried = tables["stiffness_over_load_point"]
+    solved = tried[tried["status"].isin(USABLE)]
+    names = [
+        name
+        for name in COORDINATES
+        if solved[f"{name}_identifiable"].eq(True).any() and name in study.calibration.free
+    ]
+    if solved.empty or not names:
+        return saying(title, "At no load point does the fit identify a stiffness.")
+    ways = {"superior": "superior_shift_mm", "anterior": "anterior_shift_mm"}
+    along = max(ways, key=lambda way: tried[ways[way]].nunique())
+    across = next(way for way in ways if way != along)
+    alone = len(solved[["specimen", "joint"]].drop_duplicates()) == 1
+    rows = solved.rename(columns={ways[along]: "x", ways[across]: "across"}).sort_values("x")
+    rows = rows if alone else rows[rows["across"] == 0.0]
+    own = rows[(rows["x"] == 0.0) & (rows["across"] == 0.0)].drop_duplicates("specimen")
+    stated = own.set_index("specimen")["cost"].replace(0.0, np.nan)
+    label = f"load point moved {along} (mm)"
+    panels = []
+    for name in names:
+        _, low, high, *_, identifiable = region_columns(name)
+        own = rows[rows[identifiable].eq(True)]
+        lines = _lines(own, FACTOR[name] * own[COLUMN[name]], across, alone)
+        if alone:
+            ends = {
+                f"y_{end}": FACTOR[name] * own[of] for end, of in (("low", low), ("high", high))
+            }
+            lines = lines.assign(**ends)
+            lines.loc[own["across"] != 0.0, list(ends)] = np.nan
+        axis = f"stiffness ({UNIT[name]})"
+        top = 1.7 * float(lines["y"].max())
+        panels.append(
+            _over_shift(
+                AXIS[name] if len(names) > 1 else "Stiffness", label, axis, lines, (0.0, top)
+            )
+        )
+    each = rows.drop_duplicates(["specimen", "x", "across"])
+    cost = _lines(each, each["cost"] / each["specimen"].map(stated), across, alone).dropna(
+        subset=["y"]
+    )
+    if len(cost):
+        top = 1.2 * float(cost["y"].max())
+        panels.append(_over_shift("Misfit", label, "cost over stated", cost, (0.0, top)))
+    beside = f"beside lines: mm moved {across}" if alone else "a line for each specimen and joint"
+    band = "; band: 95 % region of the fit" if alone else ""
+    caption = f"{beside[:1].upper()}{beside[1:]}{band}. A load point that costs no more than the stated one is not excluded."
+    return Chart(title, panels, caption)
+
+
+def _lines(rows: pd.DataFrame, y: pd.Series, across: str, alone: bool) -> pd.DataFrame:
+    """Lines over one shift: of every other shift, or of every specimen and joint."""
+    frame = pd.DataFrame({"x": rows["x"].astype(float), "y": y.astype(float)})
+    if not alone:
+        return frame.assign(series="0", part=rows["specimen"] + " " + rows["joint"])
+    return frame.assign(series=rows["across"].map(lambda mm: f"{mm:+g}" if mm else "0"))
+
+
+def _over_shift(
+    title: str, x_label: str, y_label: str, lines: pd.DataFrame, limits: tuple[float, float]
+) -> Curves:
+    """Curves over the shift; of many other shifts the outermost and 0 have words beside them."""
+    names = sorted(set(lines["series"]), key=float)
+    ends = {names[0], names[-1], "0"} & set(names) if len(names) > 1 else set()
+    last = lines.drop_duplicates("series", keep="last").set_index("series")["y"]
+    if len(ends) > 1 and float(np.ptp(last[sorted(ends)])) < 0.15 * limits[1]:
+        labels = {"0": "all"}
+    else:
+        labels = {name: name for name in ends}
+    looks = {name: SOFT for name in names if name != "0"} | {"0": MODEL}
+    reach = float(np.ptp(lines["x"])) or 1.0
+    x_limits = (float(lines["x"].min()) - 0.03 * reach, float(lines["x"].max()) + 0.12 * reach)
+    return Curves(
+        title=title, x_label=x_label, y_label=y_label, frame=lines, looks=looks, labels=labels,
+        x_limits=x_limits, y_limits=limits,
+    )  # fmt: skip
+
+
+def posterior(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
+    """Intervals of each stiffness by the sampler and by Laplace's approximation."""
+    title = "Stiffness with landmarks as unknowns too"
+    every = tables["posterior"]
+    good = every[(every["status"] == Status.CONVERGED.value) & (every["quantity"] == "stiffness")]
+    good = good[good["median"].notna()]
+    if good.empty:
+        return saying(title, "The sampler did not converge for any specimen.")
+    looks = {"sampler": MODEL, "Laplace's approximation": BASE}
+    panels = []
+    for name in (name for name in COORDINATES if COLUMN[name] in set(good["unknown"])):
+        rows = []
+        for row in good[good["unknown"] == COLUMN[name]].head(MOST_ROWS).to_dict("records"):
+            place = place_of(row["specimen"], row["joint"], cohort) or "all joints"
+            is_open = {
+                end: row[f"open_{side}"] for end, side in (("low", "below"), ("high", "above"))
+            }
+            for series, start in (("sampler", ""), ("Laplace's approximation", "laplace_")):
+                ends = {
+                    end: np.nan if is_open[end] else FACTOR[name] * row[f"{start}{end}"]
+                    for end in ("low", "high")
+                }
+                told = series == "sampler" and not any(is_open.values())
+                middle = FACTOR[name] * row["median"] if told else np.nan
+                rows.append({"row": place, "series": series, "value": middle, **ends})
+        panels.append(_on_log_axis(AXIS[name], f"stiffness ({UNIT[name]})", rows, looks))
+    keys = [Key(look, name, as_line=True) for name, look in looks.items()]
+    caption = "Line: 95 % interval; symbol: median. A line that goes on to the edge has no end there that the readings set."
+    return Chart(title, panels, caption, keys)
+
+
+def bootstrap(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
+    """Change of each stiffness from other starts, with other damping, and under other loadings."""
+    title = "Stiffness from other starts, with other damping"
+    found = [one for one in stiffnesses(study, cohort, tables) if one.told]
+    fits = tables["bootstrap"]
+    keys = ["specimen", "bootstrap", "loading", "set"]
+    judged = judge_bootstrap(study, fits)
+    kept = fits.merge(judged.loc[judged["reduced"], keys], on=keys)
+    if not found or kept.empty:
+        return saying(title, "No fit with a stiffness that has a number is retained.")
+    panels = []
+    for name in dict.fromkeys(one.coordinate for one in found):
+        own = [one for one in found if one.coordinate == name]
+        changes = {PALPATION: np.concatenate([one.values / one.at(50.0)[0] for one in own])}
+        for (what, loading), part in kept.groupby(["bootstrap", "loading"], sort=False):
+            told = "start values" if what == "start" else "damping"
+            changes[f"{told}, {SHORT[str(loading)]}"] = _relative(part, kept, own)
+        rows = []
+        for row, values in changes.items():
+            if len(values):
+                spread = 100.0 * (np.percentile(values, PERCENTS) - 1.0)
+                series = PALPATION if row == PALPATION else "other"
+                rows.append(
+                    {**dict(zip(SPREAD, spread, strict=True)), "row": row, "series": series}
+                )
+        label = "change of stiffness (%)"
+        looks = {PALPATION: MODEL, "other": THIRD}
+        frame = pd.DataFrame(rows)
+        panels.append(Rows(title=AXIS[name], x_label=label, frame=frame, looks=looks))
+    caption = (
+        "Symbol: median; thick: middle half; thin: middle 95 % of retained fits. Palpation: change "
+        "from its median; others: from the median of other starts at rest."
+    )
+    return Chart(title, panels, caption)
+
+
+def _relative(part: pd.DataFrame, every: pd.DataFrame, chosen: Sequence[Stiffness]) -> Array:
+    """Values over the median of the same stiffness at rest (from all fits where none is at rest)."""
+    found = []
+    for one in chosen:
+        own, reference = (
+            rows[rows["specimen"] == one.specimen]
+            .pipe(
+                lambda own, one=one: (
+                    own if one.joint == EVERY_JOINT else own[own["joint"] == one.joint]
+                )
+            )
+            .drop_duplicates(["bootstrap", "loading", "set"])
+            for rows in (part, every)
+        )
+        rest = reference[reference["loading"] == REST]
+        middle = (rest if len(rest) else reference)[COLUMN[one.coordinate]].median()
+        found.append(own[COLUMN[one.coordinate]].to_numpy(float) / middle)
+    return np.concatenate(found)
