@@ -1,6 +1,6 @@
 """Figures of stiffness: over palpations, over load points, by the sampler, from other starts."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,25 +13,23 @@ from spinepipe.report.forms.look import BASE, MODEL, SOFT, THIRD, Look
 from spinepipe.report.forms.rows import Rows
 from spinepipe.report.words import AXIS
 from spinepipe.status import USABLE, Status
-from spinepipe.studies.joint_pose_sensitivity.conclusions_of_parts import REST
-from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A, stiffness_quartiles
 from spinepipe.studies.joint_pose_sensitivity.retained import (
     COLUMN,
-    EVERY_JOINT,
     FACTOR,
     MIDDLE_HALF,
+    REST,
     UNIT,
-    Array,
     Stiffness,
     effect_on,
     moved_by_load,
+    other_fits,
     place_of,
     stiffnesses,
 )
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import region_columns
-from spinepipe.units import COORDINATES
+from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -45,7 +43,13 @@ PERCENTS = (2.5, 25.0, 50.0, 75.0, 97.5)
 SPREAD = ("low", "inner_low", "value", "inner_high", "high")
 """Percentiles, and the columns of a form that show them."""
 
-SHORT = {REST: "at rest", "quasi_static": "not at rest", "dynamic": "load ramp"}
+SHORT = {REST: "at rest", "quasi_static": "quasi-static", "dynamic": "load ramp"}
+
+LEAST = 0.05
+"""Share of a stiffness by which it must change over load points to be drawn."""
+
+ROOM = 0.075
+"""Share of a panel's height that a label beside a line takes."""
 
 TWO_SDS = 1.959964
 """Half the middle 95 % of a normal distribution, in SDs."""
@@ -61,7 +65,9 @@ def stiffness(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
     paper = GOULD_2024A.beside(cohort.name)
     looks = {**LOOKS, **({paper[0]: BASE} if paper else {})}
     panels = []
-    for name in dict.fromkeys(one.coordinate for one in found):
+    told = {one.coordinate for one in found if one.told}
+    names = _in_order({one.coordinate for one in found})
+    for name in sorted(names, key=lambda name: name not in told):
         every = [one for one in found if one.coordinate == name]
         alone = len(every) == 1
         most = sorted(every, key=lambda one: -one.moved[0] if one.told else 0.0)[:MOST_ROWS]
@@ -89,6 +95,11 @@ def stiffness(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
     drawn = {row for panel in panels for row in panel.frame["series"]}
     keys = [Key(look, name) for name, look in looks.items() if name in drawn]
     return Chart(title, panels, caption, keys if len(found) > len(panels) else ())
+
+
+def _in_order(names: Collection[str]) -> list[str]:
+    """Coordinates as spines are compared: rotations first."""
+    return [name for name in (*ROTATIONS, *TRANSLATIONS) if name in names]
 
 
 def _sources(
@@ -128,15 +139,15 @@ def _on_log_axis(
 
 
 def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
-    """Each stiffness over the load's place, where the fit identifies it, and the cost of the fit."""
+    """Each stiffness over the load's place, where the fit identifies it, and the cost of fits."""
     title = "Stiffness over where the load acts"
     tried = tables["stiffness_over_load_point"]
     solved = tried[tried["status"].isin(USABLE)]
-    names = [
-        name
-        for name in COORDINATES
-        if solved[f"{name}_identifiable"].eq(True).any() and name in study.calibration.free
-    ]
+    known = {
+        name: solved.loc[solved[f"{name}_identifiable"].eq(True), COLUMN[name]].astype(float)
+        for name in _in_order(study.calibration.free)
+    }
+    names = [name for name, values in known.items() if len(values)]
     if solved.empty or not names:
         return saying(title, "At no load point does the fit identify a stiffness.")
     ways = {"superior": "superior_shift_mm", "anterior": "anterior_shift_mm"}
@@ -149,7 +160,9 @@ def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> C
     stated = own.set_index("specimen")["cost"].replace(0.0, np.nan)
     label = f"load point moved {along} (mm)"
     panels = []
-    for name in names:
+    # those that the place of the load changes, or one that it does not
+    changed = [one for one in names if known[one].max() > (1.0 + LEAST) * known[one].min()]
+    for name in changed or names[:1]:
         _, low, high, *_, identifiable = region_columns(name)
         own = rows[rows[identifiable].eq(True)]
         lines = _lines(own, FACTOR[name] * own[COLUMN[name]], across, alone)
@@ -160,10 +173,14 @@ def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> C
             lines = lines.assign(**ends)
             lines.loc[own["across"] != 0.0, list(ends)] = np.nan
         axis = f"stiffness ({UNIT[name]})"
-        top = 1.7 * float(lines["y"].max())
+        top = 1.35 * float(lines["y"].max())
         panels.append(
             _over_shift(
-                AXIS[name] if len(names) > 1 else "Stiffness", label, axis, lines, (0.0, top)
+                AXIS[name],
+                label,
+                axis,
+                lines,
+                (-0.06 * top, top),
             )
         )
     each = rows.drop_duplicates(["specimen", "x", "across"])
@@ -172,10 +189,12 @@ def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> C
     )
     if len(cost):
         top = 1.2 * float(cost["y"].max())
-        panels.append(_over_shift("Misfit", label, "cost over stated", cost, (0.0, top)))
-    beside = f"beside lines: mm moved {across}" if alone else "a line for each specimen and joint"
-    band = "; band: 95 % region of the fit" if alone else ""
-    caption = f"{beside[:1].upper()}{beside[1:]}{band}. A load point that costs no more than the stated one is not excluded."
+        panels.append(_over_shift("Misfit", label, "cost over stated", cost, (-0.06 * top, top)))
+    beside = f"Beside lines: mm moved {across}; band: 95 % region of the fit"
+    caption = (
+        f"{beside if alone else 'A line for each specimen and joint'}. Where the cost "
+        "hardly rises, the readings exclude no load point."
+    )
     return Chart(title, panels, caption)
 
 
@@ -194,16 +213,16 @@ def _over_shift(
     names = sorted(set(lines["series"]), key=float)
     ends = {names[0], names[-1], "0"} & set(names) if len(names) > 1 else set()
     last = lines.drop_duplicates("series", keep="last").set_index("series")["y"]
-    if len(ends) > 1 and float(np.ptp(last[sorted(ends)])) < 0.15 * limits[1]:
+    if len(ends) > 1 and np.diff(np.sort(last[sorted(ends)])).min() < ROOM * limits[1]:
         labels = {"0": "all"}
     else:
-        labels = {name: name for name in ends}
+        labels = {name: name.replace("-", "\u2212") for name in ends}
     looks = {name: SOFT for name in names if name != "0"} | {"0": MODEL}
     reach = float(np.ptp(lines["x"])) or 1.0
     x_limits = (float(lines["x"].min()) - 0.03 * reach, float(lines["x"].max()) + 0.12 * reach)
     return Curves(
         title=title, x_label=x_label, y_label=y_label, frame=lines, looks=looks, labels=labels,
-        x_limits=x_limits, y_limits=limits,
+        x_limits=x_limits, y_limits=limits, high=190.0,
     )  # fmt: skip
 
 
@@ -217,7 +236,7 @@ def posterior(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
         return saying(title, "The sampler did not converge for any specimen.")
     looks = {"sampler": MODEL, "Laplace's approximation": BASE}
     panels = []
-    for name in (name for name in COORDINATES if COLUMN[name] in set(good["unknown"])):
+    for name in _in_order({one for one in COORDINATES if COLUMN[one] in set(good["unknown"])}):
         rows = []
         for row in good[good["unknown"] == COLUMN[name]].head(MOST_ROWS).to_dict("records"):
             place = place_of(row["specimen"], row["joint"], cohort) or "all joints"
@@ -234,7 +253,10 @@ def posterior(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
                 rows.append({"row": place, "series": series, "value": middle, **ends})
         panels.append(_on_log_axis(AXIS[name], f"stiffness ({UNIT[name]})", rows, looks))
     keys = [Key(look, name, as_line=True) for name, look in looks.items()]
-    caption = "Line: 95 % interval; symbol: median. A line that goes on to the edge has no end there that the readings set."
+    caption = (
+        "Symbol: median; line: 95 % interval. A line that goes on to the edge has no end "
+        "there that the readings set."
+    )
     return Chart(title, panels, caption, keys)
 
 
@@ -242,53 +264,28 @@ def bootstrap(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
     """Change of each stiffness from other starts, with other damping, and under other loadings."""
     title = "Stiffness from other starts, with other damping"
     found = [one for one in stiffnesses(study, cohort, tables) if one.told]
-    fits = tables["bootstrap"]
-    keys = ["specimen", "bootstrap", "loading", "set"]
-    judged = judge_bootstrap(study, fits)
-    kept = fits.merge(judged.loc[judged["reduced"], keys], on=keys)
-    if not found or kept.empty:
-        return saying(title, "No fit with a stiffness that has a number is retained.")
     panels = []
-    for name in dict.fromkeys(one.coordinate for one in found):
+    for name in _in_order({one.coordinate for one in found}):
         own = [one for one in found if one.coordinate == name]
-        changes = {PALPATION: np.concatenate([one.values / one.at(50.0)[0] for one in own])}
-        for (what, loading), part in kept.groupby(["bootstrap", "loading"], sort=False):
-            told = "start values" if what == "start" else "damping"
-            changes[f"{told}, {SHORT[str(loading)]}"] = _relative(part, kept, own)
+        changes = {PALPATION: [one.values / one.at(50.0)[0] for one in own]}
+        for one in own:
+            for (what, loading), values in other_fits(study, tables["bootstrap"], one).items():
+                told = "start values" if what == "start" else "damping"
+                changes.setdefault(f"{told}, {SHORT[loading]}", []).append(values)
         rows = []
-        for row, values in changes.items():
-            if len(values):
-                spread = 100.0 * (np.percentile(values, PERCENTS) - 1.0)
-                series = PALPATION if row == PALPATION else "other"
-                rows.append(
-                    {**dict(zip(SPREAD, spread, strict=True)), "row": row, "series": series}
-                )
-        label = "change of stiffness (%)"
-        looks = {PALPATION: MODEL, "other": THIRD}
-        frame = pd.DataFrame(rows)
-        panels.append(Rows(title=AXIS[name], x_label=label, frame=frame, looks=looks))
+        for row, parts in changes.items():
+            ends = 100.0 * np.percentile(np.concatenate(parts), PERCENTS, method="nearest") - 100.0
+            series = PALPATION if row == PALPATION else "other"
+            ends = np.where(np.isfinite(ends), ends, np.nan)
+            rows.append({**dict(zip(SPREAD, ends, strict=True)), "row": row, "series": series})
+        if len(rows) > 1:
+            looks = {PALPATION: MODEL, "other": THIRD}
+            label, frame = "change of stiffness (%)", pd.DataFrame(rows)
+            panels.append(Rows(title=AXIS[name], x_label=label, frame=frame, looks=looks))
+    if not panels:
+        return saying(title, "No fit of a stiffness that has a number is retained.")
     caption = (
         "Symbol: median; thick: middle half; thin: middle 95 % of retained fits. Palpation: change "
         "from its median; others: from the median of other starts at rest."
     )
     return Chart(title, panels, caption)
-
-
-def _relative(part: pd.DataFrame, every: pd.DataFrame, chosen: Sequence[Stiffness]) -> Array:
-    """Values over the median of the same stiffness at rest (from all fits where none is at rest)."""
-    found = []
-    for one in chosen:
-        own, reference = (
-            rows[rows["specimen"] == one.specimen]
-            .pipe(
-                lambda own, one=one: (
-                    own if one.joint == EVERY_JOINT else own[own["joint"] == one.joint]
-                )
-            )
-            .drop_duplicates(["bootstrap", "loading", "set"])
-            for rows in (part, every)
-        )
-        rest = reference[reference["loading"] == REST]
-        middle = (rest if len(rest) else reference)[COLUMN[one.coordinate]].median()
-        found.append(own[COLUMN[one.coordinate]].to_numpy(float) / middle)
-    return np.concatenate(found)

@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.report.forms.chart import Chart, Key, saying
 from spinepipe.report.forms.curves import Curves
-from spinepipe.report.forms.look import BASE, FOURTH, MODEL, SOFT, THIRD
+from spinepipe.report.forms.look import BASE, MODEL, SOFT, THIRD
 from spinepipe.report.forms.rows import Rows
 from spinepipe.report.words import AXIS, POSITIVE, tick, unit
 from spinepipe.statistics import bland_altman
@@ -56,7 +56,6 @@ def agreement(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
     runs = tables["simulations"]
     own = runs[(runs["stiffness"] == "calibrated") & runs["status"].isin(USABLE)]
     own = readings(retained(own, tables["success"]), cohort.zeroed_at_step_0)
-    looks = {"lower limit": SOFT, "bias": MODEL, "upper limit": SOFT}
     panels, frames = [], []
     for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True):
         rows = []
@@ -68,40 +67,20 @@ def agreement(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
                 continue
             place = {"row": place_of(specimen, joint, cohort)}
             rows += [
-                {
-                    **place,
-                    "series": "bias",
-                    "value": found.bias,
-                    "low": found.bias_low,
-                    "high": found.bias_high,
-                },
-                {
-                    **place,
-                    "series": "lower limit",
-                    "value": found.lower_limit,
-                    "low": found.lower_limit_low,
-                    "high": found.lower_limit_high,
-                },
-                {
-                    **place,
-                    "series": "upper limit",
-                    "value": found.upper_limit,
-                    "low": found.upper_limit_low,
-                    "high": found.upper_limit_high,
-                },
+                {**place, "hollow": what != "bias", "value": getattr(found, what)}
+                | {end: getattr(found, f"{what}_{end}") for end in ("low", "high")}
+                for what in ("bias", "lower_limit", "upper_limit")
             ]
         if rows:
-            frame = pd.DataFrame(rows).astype({end: float for end in ("value", "low", "high")})
+            frame = pd.DataFrame(rows).astype(dict.fromkeys(("value", "low", "high"), float))
             frames.append(frame)
             label = f"predicted less measured ({unit(name)}), + {POSITIVE[name]}"
             chosen = _most(frame.assign(size=frame["value"].abs()), "size")
-            panels.append(
-                Rows(title=AXIS[name], x_label=label, frame=chosen, looks=looks, marks={0.0: ""})
-            )
+            panels.append(Rows(title=AXIS[name], x_label=label, frame=chosen, marks={0.0: ""}))
     if not panels:
         return saying(title, "No motion was measured of which a retained fit has two readings.")
     caption = (
-        "Circle: mean difference (bias); triangles: limits of agreement, bias ± 1.96 SD; lines: 95 % "
+        "Filled: mean difference (bias); hollow: limits of agreement, bias ± 1.96 SD; lines: 95 % "
         f"intervals, over the retained fits.{_only_most(panels, frames)}"
     )
     return Chart(title, panels, caption)
@@ -144,8 +123,8 @@ def errors_by_source(study: JointPoseSensitivity, cohort: Cohort, tables: Tables
         )
     first = done.iloc[0]
     caption = (
-        f"Symbol: share; line: 95 % interval; {first['n_poses']} joint poses of retained fits, each run "
-        f"with {first['n_stiffness']} stiffness sets.{_only_most(panels, frames)}"
+        f"Symbol: share; line: 95 % interval; {first['n_poses']} joint poses of retained fits, "
+        f"each run with {first['n_stiffness']} stiffness sets.{_only_most(panels, frames)}"
     )
     return Chart(title, panels, caption, [Key(look, name) for name, look in looks.items()])
 
@@ -157,10 +136,12 @@ def frames(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart
     kept = retained(poses[poses["status"] == Status.CONVERGED.value], tables["success"])
     paper = GOULD_2024A.beside(cohort.name)
     panels, every = [], []
+    centre = dict(zip(TRANSLATIONS, ("x_mm", "y_mm", "z_mm"), strict=True))
+    axes = {name: f"{name}_deg" for name in ROTATIONS}
     for kind, symbol, names, printed in (
-        ("Joint centre", "mm", dict(zip(TRANSLATIONS, ("x_mm", "y_mm", "z_mm"), strict=True)), "joint_origin"),
-        ("Joint axes", "°", {name: f"{name}_deg" for name in ROTATIONS}, "joint_orientation"),
-    ):  # fmt: skip
+        ("Joint centre", "mm", centre, "joint_origin"),
+        ("Joint axes", "°", axes, "joint_orientation"),
+    ):
         rows = []
         for (specimen, joint), part in list(kept.groupby(["specimen", "joint"], sort=False))[::-1]:
             seed = specimen_seed(study.seed, f"frames/{specimen}/{joint}")
@@ -182,7 +163,9 @@ def frames(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart
             every.append(frame)
             looks = {OURS: MODEL, **({paper[0]: BASE} if paper else {})}
             label = f"width of the middle half ({symbol})"
-            panels.append(Rows(title=kind, x_label=label, frame=_most(frame, "value"), looks=looks))
+            wide = (0.0, 1.06 * float(frame[["value", "high"]].max(axis=None)))
+            rows_ = _most(frame, "value")
+            panels.append(Rows(title=kind, x_label=label, frame=rows_, looks=looks, x_limits=wide))
     if not panels:
         return saying(title, "Fewer than two palpations of a specimen have a retained fit.")
     caption = (
@@ -256,7 +239,7 @@ def precision(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
                     labels={"asked": words},
                     x_limits=(0.0, end),
                     y_limits=(0.0, top),
-                )  # fmt: skip
+                )
             )
     n = int(curves["n"].max())
     caption = (

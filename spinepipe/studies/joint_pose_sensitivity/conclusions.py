@@ -57,7 +57,7 @@ def conclusions(
     yield from of_motion.conclusions(study, cohort, results)
     yield from of_parts.conclusions(study, results)
     yield from _fits(study, results)
-    yield from _methods(study)
+    yield from _methods(study, results)
 
 
 def _palpation(
@@ -75,7 +75,7 @@ def _palpation(
     moved = Value(share, "%", low, high, n, how)
     effect = effect_on(main, results.table("load_point_effect"))
     load = None if effect is None else moved_by_load(effect)
-    values, names = {"value": moved}, {"stiffness": main.name}
+    values, names = {"value": Value(share, "%", n=n, source=how)}, {"stiffness": main.name}
     if load is not None and effect is not None:
         how = "load_point_effect: change per mm times SD, middle half of a normal distribution"
         values["load"] = Value(load, "%", source=how)
@@ -139,12 +139,13 @@ def _readings(main: Stiffness) -> Iterator[Conclusion]:
     if low is None or high is None:
         return
     first, last = map(float, main.at(2.5, 97.5))
-    how = "calibrations: median ends of the 95 % regions of retained fits"
-    ends = {"low": Value(low, main.unit, source=how), "high": Value(high, main.unit, source=how)}
-    between = Value(0.5 * (first + last), main.unit, first, last)
+    how = "calibrations: median and median ends of the 95 % regions of retained fits"
+    middle = float(main.at(50.0)[0])
+    region = Value(middle, main.unit, low, high, len(main.values), how)
+    between = Value(middle, main.unit, first, last)
     verdict = "wider" if high - low > last - first else "narrower"
-    names = {"stiffness": main.name, "between": f"{between:interval} {main.unit}"}
-    yield Conclusion("readings", verdict, ends, names)
+    names = {"between": f"{between:interval} {main.unit}", "unit": main.unit}
+    yield Conclusion("readings", verdict, {"value": region}, {"stiffness": main.name, **names})
 
 
 def _identified(found: Sequence[Stiffness]) -> Conclusion:
@@ -167,7 +168,7 @@ def _identified(found: Sequence[Stiffness]) -> Conclusion:
 
 
 def _lost_share(chosen: Sequence[Stiffness]) -> Value:
-    lost, fits = (sum(numbers) for numbers in zip(*((one.lost, len(one.values)) for one in chosen)))
+    lost, fits = sum(one.lost for one in chosen), sum(len(one.values) for one in chosen)
     return Value(
         100.0 * lost / max(1, fits), "%", n=fits, source="calibrations: identifiable is false"
     )
@@ -241,16 +242,16 @@ def _fits(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]
     yield Conclusion("sample", "ok" if least >= MANY else "check", fewest)
 
 
-def _methods(study: JointPoseSensitivity) -> Iterator[Conclusion]:
+def _methods(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]:
     values = {
         "poses": Value(study.poses, source="settings: poses"),
         "times": Value(study.success.outlier_times_start, source="settings: success"),
     }
     ways = [AXIS[name].lower() for name in study.calibration.free if name in AXIS]
     yield Conclusion("methods", "fitted", values, {"directions": listed(ways, most=6)})
-    if study.load_point.asked:
+    if len(results.table("load_point_effect")):
         n = len(study.load_point.anterior_mm) * len(study.load_point.superior_mm)
         points = Value(n, source="settings: load_point")
         yield Conclusion("methods_load", "fitted", {"points": points})
-    if study.posterior.draws:
+    if len(results.table("posterior")):
         yield Conclusion("methods_posterior", "sampled")

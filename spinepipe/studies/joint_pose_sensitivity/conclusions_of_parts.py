@@ -1,7 +1,8 @@
 """What further parts of a joint-pose study conclude: other starts, damping, precision, sampler."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
+import numpy as np
 import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
@@ -9,11 +10,19 @@ from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.page.study_page import Results
 from spinepipe.report.words import listed
 from spinepipe.status import Status
-from spinepipe.studies.joint_pose_sensitivity.retained import COLUMN, FACTOR, FEWEST, Stiffness
-from spinepipe.studies.joint_pose_sensitivity.settings import DEFAULT, EXACT, JointPoseSensitivity
+from spinepipe.studies.joint_pose_sensitivity.retained import (
+    COLUMN,
+    FACTOR,
+    REST,
+    Stiffness,
+    other_fits,
+    quartiles,
+)
+from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
-FEWEST_OF_A_RATE = 10
-"""Trials of which a rate is told: all of 3 leave 44 to 100 %, all of 10 leave 72 to 100 %."""
+FIT = ["specimen", "bootstrap", "loading", "set"]
+FEWEST_FITS = 10
+"""Fits from other starts or with other damping of which quartiles are told."""
 
 ALIKE = 0.5
 """Where weights count for more than this share of the poses, the data hardly prefer any."""
@@ -21,10 +30,9 @@ ALIKE = 0.5
 IN_BAND = 0.9
 """Of the readings that lie in a 95 % band: fewer speak against the model."""
 
-REST = "equilibrium"
 READ = {
     REST: "at rest",
-    "quasi_static": "a while after loading",
+    "quasi_static": "quasi-statically",
     "dynamic": "at the end of a load ramp",
 }
 """When motion is read under each loading."""
@@ -36,11 +44,16 @@ def conclusions(study: JointPoseSensitivity, results: Results) -> Iterator[Concl
     if len(counts):
         rows = counts[counts["part"] != "poses"]
         fits, lost = int(rows["fits"].sum()), int((rows["fits"] - rows["solved"]).sum())
+        boots = results.table("bootstrap")
+        at_bound = (
+            boots[boots["status"] == Status.CONVERGED_AT_BOUND.value] if len(boots) else boots
+        )
+        bounded = len(at_bound.drop_duplicates(FIT)) if len(at_bound) else 0
         values = {"fits": Value(fits), "lost": Value(lost, source="counts: fits less solved")}
+        values["bounded"] = Value(bounded, source="bootstrap: status")
         if fits:
-            yield Conclusion("boots", "check" if lost else "ok", values)
+            yield Conclusion("boots", "check" if lost or bounded else "ok", values)
     yield from _precision(study, results.table("required_precision"))
-    yield from _ways(results)
     yield from _sampled(results)
 
 
@@ -48,41 +61,39 @@ def bootstraps(
     study: JointPoseSensitivity, main: Stiffness, results: Results
 ) -> Iterator[Conclusion]:
     """How far start values, loading and damping move the stiffness that the answer tells."""
-    summary = results.table("summary")
-    if summary.empty:
-        return
-    same = (summary["quantity"] == "stiffness") & (summary["dataset"] == "reduced")
-    for name in ("specimen", "joint", "coordinate"):
-        same &= summary[name] == getattr(main, name)
-    rows = summary[same & (summary["n"] >= FEWEST)]
-    moved = main.moved[0]
-    for rule in ("start", "damping"):
-        own = rows[rows["part"] == f"{rule}_bootstrap"].set_index("loading")
-        if own.empty:
-            continue
-        spread = (100.0 * own["iqr"] / own["median"]).astype(float)
-        at = str(spread.idxmax())
-        # start values are told where stiffness is fitted as in the study, damping where it counts
-        at = REST if rule == "start" and REST in own.index else at
-        share = round(float(spread[at]), 2)
-        source = f"summary: {rule}_bootstrap of retained fits, {at}"
-        value = {"value": Value(share, "%", n=int(own.loc[at, "n"]), source=source)}
-        names = {"stiffness": main.name, "loading": READ[at]}
-        verdict = "more" if share >= moved else "less"
-        yield Conclusion({"start": "starts"}.get(rule, rule), verdict, value, names)
-        if rule == "start" and REST in own.index and len(own) > 1:
-            yield _loading(own["median"].astype(float), main)
+    found = other_fits(study, results.table("bootstrap"), main)
+    # quartiles of few say nothing, those at a bound have no number
+    ends = {key: quartiles(values) for key, values in found.items() if len(values) >= FEWEST_FITS}
+    ends = {key: three for key, three in ends.items() if np.isfinite(three).all()}
+    spread = {key: 100.0 * (three[2] - three[0]) / three[1] for key, three in ends.items()}
+    moved, names = main.moved[0], {"stiffness": main.name}
+    if ("start", REST) in ends:
+        at_rest = ends["start", REST][1]
+        yield _moved("starts", spread["start", REST], moved, names)
+        changes = {
+            loading: 100.0 * (three[1] / at_rest - 1.0)
+            for (what, loading), three in ends.items()
+            if what == "start" and loading != REST
+        }
+        if changes:
+            at = max(changes, key=lambda loading: abs(changes[loading]))
+            yield _moved("loading", changes[at], moved, {**names, "loading": READ[at]})
+    damped = {loading: share for (what, loading), share in spread.items() if what == "damping"}
+    if damped:
+        at = max(damped, key=lambda loading: damped[loading])
+        factor = Value(study.damping_bootstrap.factor, source="settings: factor")
+        told = {**names, "loading": READ[at]}
+        yield _moved("damping", damped[at], moved, told, factor=factor)
 
 
-def _loading(medians: pd.Series, main: Stiffness) -> Conclusion:
-    """What reading under another loading changes of the median at rest."""
-    change = 100.0 * (medians / medians[REST] - 1.0)
-    at = str(change.abs().idxmax())
-    source = f"summary: start_bootstrap of retained fits, {at} over {REST}"
-    value = {"value": Value(round(float(change[at]), 2), "%", source=source)}
-    names = {"stiffness": main.name, "loading": READ[at]}
-    verdict = "more" if abs(change[at]) > main.moved[0] else "less"
-    return Conclusion("loading", verdict, value, names)
+def _moved(
+    rule: str, share: float, moved: float, names: Mapping[str, str], **more: Value
+) -> Conclusion:
+    """By how much, %, beside what palpation does."""
+    source = "bootstrap: retained fits, quartiles and medians"
+    value = Value(round(share, 2), "%", source=source)
+    verdict = "more" if abs(share) > moved else "less"
+    return Conclusion(rule, verdict, {"value": value, **more}, names)
 
 
 def _precision(study: JointPoseSensitivity, rows: pd.DataFrame) -> Iterator[Conclusion]:
@@ -129,28 +140,6 @@ def _precision(study: JointPoseSensitivity, rows: pd.DataFrame) -> Iterator[Conc
         value = Value(float(row["sd_mm"]), "mm", *ends, n, f"{source}sd_mm")
         verdict = "known"
     yield Conclusion("precision", verdict, {"value": value, "share": share}, names)
-
-
-def _ways(results: Results) -> Iterator[Conclusion]:
-    """Fits that reach the least cost by exact derivatives and by the published forward runs."""
-    rows, fits = results.table("success_by_method"), results.table("method_fits")
-    if rows.empty or fits.empty:
-        return
-    refused = fits[fits["status"] == Status.REFUSED.value]
-    tried = fits.groupby("method").size()
-    lost = refused.groupby("method").size().reindex(tried.index, fill_value=0)
-    if (tried == lost)[[EXACT, DEFAULT]].any():
-        why = listed(dict.fromkeys(refused["message"]), last=None)
-        yield Conclusion("ways", "refused", names={"why": why})
-        return
-    arrived = rows.groupby("method")["arrived"].sum()
-    n, source = int(tried[EXACT]), "success_by_method: arrived"
-    values = {
-        "fits": Value(n, source="success_by_method: fits"),
-        "ours": Value(int(arrived[EXACT]), n=n, source=source),
-        "theirs": Value(int(arrived[DEFAULT]), n=n, source=source),
-    }
-    yield Conclusion("ways", "few" if n < FEWEST_OF_A_RATE else "counted", values)
 
 
 def posterior(main: Stiffness, results: Results) -> Iterator[Conclusion]:

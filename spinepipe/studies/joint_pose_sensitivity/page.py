@@ -7,63 +7,59 @@ from spinepipe.comparison import papers
 from spinepipe.report.conclusions import sentences_of
 from spinepipe.report.page.study_page import Page, Results
 from spinepipe.report.page.tables import Sortable, sortable
-from spinepipe.schema import Column, Table, all_declared
+from spinepipe.schema import Column, all_declared
 from spinepipe.studies.joint_pose_sensitivity.conclusions import conclusions
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.retained import FACTOR, MOST_LOST, UNIT
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
+_IQR = "median low_quartile high_quartile"
 SHOWN = {
     "summary": (
         "Stiffness and errors over the retained fits",
-        *("specimen", "quantity", "joint", "coordinate", "unit", "n", "median", "low_quartile"),
-        *("high_quartile", "percent_of_measured", "open_share", "lower_end_median"),
+        f"quantity joint coordinate unit n {_IQR} percent_of_measured open_share lower_end_median",
     ),
     "counts": (
         "Fits and what filters keep of them",
-        *("specimen", "part", "loading", "fits", "solved", "near_start_any", "near_start_all"),
-        *("outliers", "reduced"),
+        "part loading fits solved near_start_any near_start_all outliers reduced",
     ),
     "load_point_effect": (
         "Where the load acts",
-        *("specimen", "joint", "coordinate", "unit", "stated", "stated_low", "stated_high"),
-        *("per_mm_anterior", "per_mm_superior", "uncertain_low", "uncertain_median"),
-        *("uncertain_high", "message"),
+        "joint coordinate unit stated stated_low stated_high per_mm_anterior per_mm_superior "
+        "uncertain_low uncertain_median uncertain_high message",
     ),
     "posterior": (
         "Stiffness with landmarks as unknowns too",
-        *("specimen", "joint", "coordinate", "unit", "median", "low", "high", "laplace_low"),
-        *("laplace_high", "r_hat", "ess_bulk", "status", "message"),
+        "joint coordinate unit median low high laplace_low laplace_high r_hat ess_bulk message",
     ),
     "required_precision": (
         "Landmark precision needed",
-        *("specimen", "stiffness", "motion", "n", "sd_mm", "sd_low_mm", "sd_high_mm", "message"),
+        "stiffness motion n sd_mm sd_low_mm sd_high_mm message",
     ),
     "variance_shares": (
         "Shares of joint pose and stiffness in errors",
-        *("specimen", "joint", "coordinate", "factor", "signed_share", "signed_share_low"),
-        *("signed_share_high", "n_poses", "n_stiffness", "message"),
+        "joint coordinate factor signed_share signed_share_low signed_share_high message",
     ),
     "agreement": (
         "Agreement of predicted and measured motion",
-        *("specimen", "joint", "coordinate", "unit", "n", "bias", "bias_low", "bias_high"),
-        *("lower_limit", "upper_limit", "message"),
+        "joint coordinate unit n bias bias_low bias_high lower_limit upper_limit message",
     ),
     "success_by_method": (
         "Ways of fitting",
-        *("specimen", "method", "fits", "successful", "success_low", "success_high", "arrived"),
-        *("evaluations_median", "derivative_error_median"),
+        "method fits successful success_low success_high arrived evaluations_median",
     ),
 }
-"""Tables of the page in their order: a title, and the columns that a reader compares."""
+"""Tables of the page in their order: a title, and what a reader compares beside the specimen."""
 
 READ = (
-    *("calibrations", "success", "simulations", "stiffness_over_load_point", "method_fits"),
+    *("calibrations", "success", "simulations", "bootstrap", "stiffness_over_load_point"),
     *("posterior_motion", "pose_weights", "statistics", "against_gould_2024a", *SHOWN),
 )
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 _STIFFNESS = ("N/m", "N m/rad")
+_NO_STIFFNESS = ("percent_of_measured", "open_share", "r_hat", "ess_bulk")
+_COORDINATE = Column("coordinate", "text", "coordinate whose stiffness it is")
 _SHAPES = {table.name: table for table in all_declared(__file__)}
 
 _FOLD = ["specimen", "family", "test", "joint", "response", "factor"]
@@ -109,12 +105,12 @@ def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
 def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:
     """Tables that the study has, of retained fits where there are others too."""
     found = []
-    for name, (title, *columns) in SHOWN.items():
+    for name, (title, columns) in SHOWN.items():
         rows = results.table(name)
         if len(rows):
-            rows, shape = _chosen(rows, name), _SHAPES[name]
-            kept = [_column(shape, one) for one in columns if one in rows]
-            found.append(sortable(name, title, shape.about, rows, kept))
+            known = {one.name: one for one in (_COORDINATE, *_SHAPES[name].columns)}
+            kept = [known[one] for one in ("specimen", *columns.split())]
+            found.append(sortable(name, title, _SHAPES[name].about, _chosen(rows, name), kept))
     tests = results.table("statistics")
     if len(tests):
         title = "Tests of significance"
@@ -124,12 +120,6 @@ def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable
         rows = folded(tests, study.significance)
         found.append(sortable("statistics", title, about, rows, FOLDED))
     return [table for table in found if table.rows]
-
-
-def _column(shape: Table, name: str) -> Column:
-    if name == "coordinate" and shape.name == "posterior":
-        return Column("coordinate", "text", "coordinate whose stiffness it is")
-    return shape.column(name)
 
 
 def _chosen(rows: pd.DataFrame, name: str) -> pd.DataFrame:
@@ -164,12 +154,8 @@ def _in_field_units(rows: pd.DataFrame) -> pd.DataFrame:
     """Numbers of stiffness in N/mm and N m/deg."""
     stiff = rows["unit"].isin(_STIFFNESS)
     factor = rows["coordinate"].map(FACTOR).where(stiff, 1.0)
-    numbers = {
-        *("median", "low_quartile", "high_quartile", "lower_end_median", "low", "high"),
-        *("stated", "stated_low", "stated_high", "per_mm_anterior", "per_mm_superior"),
-        *("uncertain_low", "uncertain_median", "uncertain_high", "laplace_low", "laplace_high"),
-    } & set(rows)
-    changed = {name: rows[name].astype(float) * factor for name in sorted(numbers)}
+    numbers = rows.select_dtypes("number").columns.difference(["n", *_NO_STIFFNESS])
+    changed = {name: rows[name].astype(float) * factor for name in numbers}
     return rows.assign(**changed, unit=rows["coordinate"].map(UNIT).where(stiff, rows["unit"]))
 
 

@@ -12,6 +12,7 @@ from scipy.stats import norm
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.report.words import AXIS, level
+from spinepipe.studies.joint_pose_sensitivity.filters import judge_bootstrap
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.spread import iqr_with_ends
 from spinepipe.studies.joint_pose_sensitivity.tables import region_columns
@@ -37,6 +38,9 @@ MIDDLE_HALF = 2.0 * float(norm.ppf(0.75))
 """Width of the middle half of a normal distribution, in SDs."""
 
 EVERY_JOINT = "*"
+REST = "equilibrium"
+"""Loading under which motion is read at rest, as by the fits of palpations."""
+
 UNIT = {name: "N/mm" if name in TRANSLATIONS else "N m/deg" for name in COORDINATES}
 FACTOR = {n: 1.0 / (MM_PER_M if n in TRANSLATIONS else DEG_PER_RAD) for n in COORDINATES}
 """From N/m and N m/rad, as tables have them."""
@@ -152,15 +156,22 @@ def _of(study: JointPoseSensitivity, cohort: Cohort, rows: pd.DataFrame, name: s
     factor, wide = FACTOR[name], study.calibration.bound_factor
     start = factor * study.stiffness.in_order()[COORDINATES.index(name)]
     _, low, high, below, above, identifiable = region_columns(name)
-    first = rows.iloc[0]
+    specimen, joint = rows[["specimen", "joint"]].iloc[0]
     values = factor * rows[COLUMN[name]].to_numpy(float)
     return Stiffness(
-        first["specimen"], first["joint"], name, place_of(first["specimen"], first["joint"], cohort),
-        values[np.isfinite(values)], (start / wide, start * wide),
-        int(rows[identifiable].ne(True).sum()),
-        (_end(factor * rows[low], rows[below], 0.0), _end(factor * rows[high], rows[above], np.inf)),
-        study.seed,
-    )  # fmt: skip
+        specimen=specimen,
+        joint=joint,
+        coordinate=name,
+        place=place_of(specimen, joint, cohort),
+        values=values[np.isfinite(values)],
+        bounds=(start / wide, start * wide),
+        lost=int(rows[identifiable].ne(True).sum()),
+        region=(
+            _end(factor * rows[low], rows[below], 0.0),
+            _end(factor * rows[high], rows[above], np.inf),
+        ),
+        seed=study.seed,
+    )
 
 
 def _end(ends: pd.Series, is_open: pd.Series, beyond: float) -> float | None:
@@ -209,3 +220,41 @@ def effect_on(one: Stiffness, effects: pd.DataFrame) -> pd.Series | None:
     ).all(axis=1)
     rows = effects[same & effects["stated"].notna()]
     return None if rows.empty else rows.iloc[0]
+
+
+def quartiles(values: Array) -> tuple[float, float, float]:
+    """Quartiles as values that there are, some of which may be infinite."""
+    low, middle, high = map(float, np.percentile(values, (25.0, 50.0, 75.0), method="nearest"))
+    return low, middle, high
+
+
+def other_fits(
+    study: JointPoseSensitivity, fits: pd.DataFrame, one: Stiffness
+) -> dict[tuple[str, str], Array]:
+    """A stiffness of retained fits from other starts and with other damping.
+
+    By what was drawn and loading, over the median from other starts at rest (of all, where none
+    was at rest). A value at a bound is infinitely far out.
+
+    Parameters
+    ----------
+    fits : the table ``bootstrap``.
+    """
+    if fits.empty:
+        return {}
+    keys = ["specimen", "bootstrap", "loading", "set"]
+    judged = judge_bootstrap(study, fits)
+    own = fits.merge(judged.loc[judged["reduced"], keys], on=keys)
+    own = own[own["specimen"] == one.specimen]
+    own = own if one.joint == EVERY_JOINT else own[own["joint"] == one.joint]
+    own = own.drop_duplicates(keys)
+    column, wide = COLUMN[one.coordinate], study.calibration.bound_factor
+    values, start = (own[name].to_numpy(float) for name in (column, f"start_{column}"))
+    values = np.where(np.isclose(values, start * wide, AT_BOUND, 0.0), np.inf, values)
+    values = np.where(np.isclose(values, start / wide, AT_BOUND, 0.0), -np.inf, values)
+    rest = ((own["bootstrap"] == "start") & (own["loading"] == REST)).to_numpy()
+    middle = np.median(values[rest] if rest.any() else values) if len(values) else 1.0
+    return {
+        (str(what), str(loading)): values[own.index.get_indexer(part.index)] / middle
+        for (what, loading), part in own.groupby(["bootstrap", "loading"], sort=False)
+    }
