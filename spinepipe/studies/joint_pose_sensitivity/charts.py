@@ -132,7 +132,8 @@ def _on_log_axis(
     ends = frame[["low", "value", "high"]].to_numpy(float)
     ends = ends[np.isfinite(ends) & (ends > 0.0)]
     low, high = (float(ends.min()), float(ends.max())) if len(ends) else (1.0, 1.0)
-    room = max(1.2, (high / low) ** 0.12)
+    is_open = (frame["low"].isna() != frame["high"].isna()).any()
+    room = max(2.0 if is_open else 1.2, (high / low) ** 0.12)
     frame["low"] = frame["low"].mask(frame["low"] <= 0.0)  # goes on to the edge
     limits = (low / room, high * room)
     return Rows(title=title, x_label=label, frame=frame, looks=looks, log=True, x_limits=limits)
@@ -240,19 +241,19 @@ def posterior(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
         rows = []
         for row in good[good["unknown"] == COLUMN[name]].head(MOST_ROWS).to_dict("records"):
             place = place_of(row["specimen"], row["joint"], cohort) or "all joints"
-            is_open = {
-                end: row[f"open_{side}"] for end, side in (("low", "below"), ("high", "above"))
-            }
-            for series, start in (("sampler", ""), ("Laplace's approximation", "laplace_")):
-                ends = {
-                    end: np.nan if is_open[end] else FACTOR[name] * row[f"{start}{end}"]
-                    for end in ("low", "high")
-                }
-                told = series == "sampler" and not any(is_open.values())
-                middle = FACTOR[name] * row["median"] if told else np.nan
-                rows.append({"row": place, "series": series, "value": middle, **ends})
+            for series, start in zip(looks, ("", "laplace_"), strict=True):
+                low, high = (
+                    np.nan if row[f"open_{side}"] else FACTOR[name] * row[f"{start}{end}"]
+                    for end, side in (("low", "below"), ("high", "above"))
+                )
+                # by Laplace, the median of the lognormal distribution
+                middle = np.sqrt(low * high) if start else FACTOR[name] * row["median"]
+                middle = middle if np.isfinite(low * high) else np.nan
+                rows.append(
+                    {"row": place, "series": series, "value": middle, "low": low, "high": high}
+                )
         panels.append(_on_log_axis(AXIS[name], f"stiffness ({UNIT[name]})", rows, looks))
-    keys = [Key(look, name, as_line=True) for name, look in looks.items()]
+    keys = [Key(look, name) for name, look in looks.items()]
     caption = (
         "Symbol: median; line: 95 % interval. A line that goes on to the edge has no end "
         "there that the readings set."

@@ -29,6 +29,12 @@ MOST_ROWS = 24
 
 
 OURS = "palpation"
+FITTED_TO = {
+    "calibrated": "stiffness fitted to each pose",
+    "nominal": "stiffness of one pose for all",
+}
+"""Whose stiffness poses are run with."""
+
 WAYS = {
     **{name: name for name in TRANSLATIONS},
     **dict(zip(ROTATIONS, ("flexion", "bending", "rotation"), strict=True)),
@@ -178,73 +184,40 @@ def frames(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart
 
 
 def precision(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
-    """Share of poses within the limits, and the largest error, over the SD of the landmarks."""
+    """Share of poses within the limits over the SD of the landmarks."""
     title = "How precise landmarks must be"
-    curves = tables["landmark_precision"]
-    if curves.empty or not curves["median"].notna().any():
+    shares = tables["landmark_precision"]
+    if shares.empty or not shares["median"].notna().any():
         return saying(title, "No palpation has a result at any landmark SD.")
-    whose = {
-        "calibrated": "stiffness fitted to each pose",
-        "nominal": "stiffness of the pose as palpated",
-    }
-    lines = {
-        name: look
-        for name, look in zip(whose, (MODEL, BASE), strict=True)
-        if name in set(curves["stiffness"])
-    }
-    looks = {**lines, **{f"{name} points": look for name, look in lines.items()}, "asked": SOFT}
-    alone = curves["specimen"].nunique() == 1
-    end = 1.12 * float(curves["sd_mm"].max())
+    alone = shares["specimen"].nunique() == 1
+    found = [name for name in FITTED_TO if name in set(shares["stiffness"])]
+    looks = dict(zip(FITTED_TO, (MODEL, BASE), strict=True)) | {"asked": SOFT}
+    # a single SD makes no line: each also has a symbol
+    looks |= {f"{name} points": looks[name] for name in found}
+    asked, end = 100.0 * study.landmark_precision.share, 1.15 * float(shares["sd_mm"].max())
     panels = []
-    for motion in dict.fromkeys(curves["motion"]):
-        rows = curves[curves["motion"] == motion].sort_values("sd_mm")
-        symbol, limit = (
-            unit("anterior" if motion == "translation" else "extension"),
-            float(rows["limit"].iloc[0]),
+    for motion, rows in shares.sort_values("sd_mm").groupby("motion", sort=False):
+        columns = {"sd_mm": "x", "below": "y", "stiffness": "series", "specimen": "part"}
+        columns |= {"below_low": "y_low", "below_high": "y_high"} if alone else {}
+        lines = rows[list(columns)].rename(columns=columns)
+        ends = lines.columns.intersection(["y", "y_low", "y_high"])
+        lines[ends] *= 100.0
+        mark = pd.DataFrame({"x": [0.0, end], "y": asked, "series": "asked", "part": ""})
+        dots = lines.assign(series=lines["series"] + " points")
+        limit = f"{tick(rows['limit'].iloc[0])}{'°' if motion == 'rotation' else ' mm'}"
+        panels.append(
+            Curves(
+                title=f"{str(motion).capitalize()} within {limit}",
+                x_label="SD of landmarks, per axis (mm)",
+                y_label="share of poses (%)",
+                frame=pd.concat([lines, dots, mark]),
+                looks=looks,
+                points=tuple(f"{name} points" for name in found),
+                labels={"asked": f"{tick(asked)} %"},
+                x_limits=(0.0, end),
+                y_limits=(-6.0, 106.0),
+            )
         )
-        asked = 100.0 * study.landmark_precision.share
-        for what, y, ends, level, words in (
-            (
-                f"{motion.capitalize()}s within {tick(limit)} {symbol}",
-                "below",
-                ("below_low", "below_high"),
-                asked,
-                f"{tick(asked)} %",
-            ),
-            (f"Largest error, {motion}", "p95", (None, None), limit, f"{tick(limit)} {symbol}"),
-        ):
-            factor = 100.0 if y == "below" else 1.0
-            frame = pd.DataFrame(
-                {
-                    "x": rows["sd_mm"],
-                    "y": factor * rows[y],
-                    "series": rows["stiffness"],
-                    "part": rows["specimen"],
-                }
-            )
-            if alone and ends[0]:
-                frame = frame.assign(y_low=factor * rows[ends[0]], y_high=factor * rows[ends[1]])
-            frame = frame.dropna(subset=["y"])
-            dots = frame.assign(series=frame["series"] + " points")
-            mark = pd.DataFrame({"x": [0.0, end], "y": level, "series": "asked", "part": ""})
-            top = 104.0 if y == "below" else 1.15 * max(level, float(frame["y"].max()))
-            panels.append(
-                Curves(
-                    title=what,
-                    x_label="SD of landmarks, per axis (mm)",
-                    y_label="share of poses (%)" if y == "below" else f"95th percentile ({symbol})",
-                    frame=pd.concat([frame, dots, mark]),
-                    looks=looks,
-                    points=tuple(name for name in looks if name.endswith("points")),
-                    labels={"asked": words},
-                    x_limits=(0.0, end),
-                    y_limits=(0.0, top),
-                )
-            )
-    n = int(curves["n"].max())
-    caption = (
-        f"{n} poses at each SD; bands and lines: 95 % intervals (Wilson); dashed: what is asked."
-        if alone
-        else f"A line for each specimen, {n} poses at each SD; dashed: what is asked."
-    )
-    return Chart(title, panels, caption, [Key(lines[name], whose[name]) for name in lines])
+    whose = "bands: 95 % intervals (Wilson)" if alone else "a line for each specimen"
+    caption = f"{shares['n'].max()} poses at each SD; {whose}; dashed: what is asked."
+    return Chart(title, panels, caption, [Key(looks[name], FITTED_TO[name]) for name in found])
