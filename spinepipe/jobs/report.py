@@ -21,11 +21,11 @@ from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.comparison import AGAINST, comparison, paper_of
 from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.page.study_page import Results
-from spinepipe.report.tables import CONCLUSIONS
 from spinepipe.report.words import listed
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
+from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import StudyTables, from_rows, read_metadata, write
 
 

@@ -14,10 +14,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.form import TableForm
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem
-from spinepipe.report.tables import CONCLUSIONS
 from spinepipe.schema import Table
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles
+from spinepipe.studies.tables import CONCLUSIONS
 
 Check = Callable[[YamlDocument, Any, Cohort], Iterator[InputProblem]]
 """What is asked of a study file, the study and its cohort."""

@@ -15,6 +15,9 @@ from spinepipe.report.conclusions import Conclusion, Sentence, Told, told
 from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.origin import origin
 from spinepipe.report.page.tables import Sortable
+from spinepipe.report.viewer.figure import viewer_html, viewer_script, viewer_style
+from spinepipe.report.viewer.scene import Scene
+from spinepipe.report.viewer.specimens import specimen_scenes
 from spinepipe.report.words import count, listed
 from spinepipe.studies.study import Study
 from spinepipe.tables import StudyTables
@@ -62,7 +65,8 @@ class Page:
     key_figure : beside the answer, by name; nothing where there is none to show it.
     tables : folded below; those of a paper's comparison are not among them.
     left_out : parts that the settings leave out, in words.
-    viewer : the 3-D view as HTML, see `spinepipe.report.viewer`; nothing without one.
+    scenes : of the 3-D view; None for the specimens of the cohort with its loads.
+    chooser : what a scene is one of.
     """
 
     conclusions: Sequence[Conclusion]
@@ -70,7 +74,8 @@ class Page:
     key_figure: str
     tables: Sequence[Sortable]
     left_out: Sequence[str] = ()
-    viewer: str = ""
+    scenes: Sequence[Scene] | None = None
+    chooser: str = "Specimen"
 
     @cached_property
     def told(self) -> list[Told]:
@@ -105,6 +110,7 @@ class Page:
             (level, words, sum(one.level == level for one in lights))
             for level, words in LEVELS.items()
         ]
+        scenes = specimen_scenes(cohort) if self.scenes is None else self.scenes
         run = origin(study, results.metadata)
         shown = {
             "tag": tag(cohort),
@@ -120,7 +126,7 @@ class Page:
             "further": [one for name, one in drawings.items() if name not in used],
             "lights": sorted(lights, key=lambda one: list(LEVELS).index(one.level)),
             "counts": [one for one in counts if one[2]],
-            "viewer": Markup(self.viewer),
+            "viewer": viewer_html(scenes, self.chooser),
             "tables": self.tables,
             "methods": self.at("methods"),
             "origin": run,
@@ -148,7 +154,8 @@ def rendered(template: str, **values: object) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    style, script = (Markup(part(f"study_page.{end}")) for end in ("css", "js"))
+    style = Markup(part("study_page.css")) + viewer_style()
+    script = Markup(part("study_page.js")) + viewer_script()
     return environment.get_template(template).render(style=style, script=script, **values)
 
 

@@ -11,12 +11,12 @@ import pandas as pd
 import pytest
 from grid_cases import JOINTS, STUDY, made_up, table_of
 from matplotlib.figure import Figure
+from spinepipe.studies.range_of_motion.figures.motion import levels_figure, variance_figure
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.page.document import ResultTables
 from spinepipe.report.style import picture, style
 from spinepipe.studies.range_of_motion import draw
-from spinepipe.studies.range_of_motion.figures.motion import levels_figure, variance_figure
 from spinepipe.studies.range_of_motion.grid import read_grid
 from spinepipe.studies.range_of_motion.page import document, findings
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
