@@ -261,6 +261,17 @@ def base() -> dict[str, list[Row]]:
     }
 
 
+def whole() -> dict[str, list[Row]]:
+    """All of them."""
+    return base() | {
+        "posterior": posterior(),
+        "posterior_motion": posterior_motion(10),
+        "pose_weights": pose_weights(*[0.1] * 10),
+        "landmark_precision": precision(1.0, 2.0, 4.0),
+        "required_precision": required_precision(),
+    }
+
+
 def frames(rows: Mapping[str, list[Row]]) -> Frames:
     """Tables as a run would have them."""
     return {name: frame(name, list(one)) for name, one in rows.items()}
