@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
+from textwrap import wrap
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
@@ -153,12 +154,25 @@ class _Message(Panel):
     message: str
 
     @property
+    def _lines(self) -> list[str]:
+        return wrap(self.message, int(self.width / 7.2))
+
+    @property
     def height(self) -> float:
-        return 24.0
+        return 8.0 + 16.0 * len(self._lines)
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        axes.text(0.0, 0.5, self.message, transform=axes.transAxes, color=COLORS["soft"], wrap=True)
+        told = "\n".join(self._lines)
+        axes.text(
+            0.0,
+            0.5,
+            told,
+            transform=axes.transAxes,
+            color=COLORS["soft"],
+            va="center",
+            in_layout=False,
+        )
 
 
 def _draw(panel: Panel, figure: FigureBase) -> None:

@@ -1,6 +1,7 @@
-"""Figures of motion and joint frames: agreement, what errors depend on, frames, precision."""
+"""Figures of motion and joint frames: agreement, what errors come from, frames, precision."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -27,33 +28,29 @@ Tables = Mapping[str, pd.DataFrame]
 MOST_ROWS = 24
 """Of a panel: where there are more, those with the largest numbers are drawn."""
 
+LONG_NAME = 16
+"""Letters of a row's name from which a panel is wider."""
 
-OURS = "palpation"
+WHERE = ["specimen", "joint"]
+WAYS = dict(zip(ROTATIONS, ("flexion", "bending", "rotation"), strict=True))
 FITTED_TO = {
     "calibrated": "stiffness fitted to each pose",
     "nominal": "stiffness of one pose for all",
 }
 """Whose stiffness poses are run with."""
 
-WAYS = {
-    **{name: name for name in TRANSLATIONS},
-    **dict(zip(ROTATIONS, ("flexion", "bending", "rotation"), strict=True)),
-}
-"""Short names of directions and axes."""
+
+def _panel(title: str, x_label: str, frame: pd.DataFrame, **how: Any) -> Rows:
+    """Rows with the largest numbers, as wide as their names ask."""
+    sizes = frame["value"].abs().groupby(frame["row"]).max()
+    frame = frame[frame["row"].isin(sizes.nlargest(MOST_ROWS).index)]
+    wide = 380.0 if frame["row"].str.len().max() > LONG_NAME else 300.0
+    return Rows(title=title, x_label=x_label, frame=frame, width=wide, **how)
 
 
-def _most(frame: pd.DataFrame, size: str) -> pd.DataFrame:
-    """Rows of the `MOST_ROWS` rows of a panel whose numbers are largest, in their order."""
-    largest = frame.groupby("row", sort=False)[size].max().nlargest(MOST_ROWS).index
-    return frame[frame["row"].isin(largest)]
-
-
-def _only_most(panels: list[Rows], frames: list[pd.DataFrame]) -> str:
-    """What a caption says where rows are left out."""
-    shown, every = (
-        max(frame["row"].nunique() for frame in one) for one in ([p.frame for p in panels], frames)
-    )
-    return f" The {shown} largest of {every} are shown." if shown < every else ""
+def _only_largest(rows: int) -> str:
+    """What a caption says where there are so many."""
+    return f", {MOST_ROWS} largest of {rows} rows" if rows > MOST_ROWS else ""
 
 
 def agreement(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
@@ -61,33 +58,29 @@ def agreement(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
     title = "Agreement of predicted with measured motion"
     runs = tables["simulations"]
     own = runs[(runs["stiffness"] == "calibrated") & runs["status"].isin(USABLE)]
-    own = readings(retained(own, tables["success"]), cohort.zeroed_at_step_0)
-    panels, frames = [], []
+    places = readings(retained(own, tables["success"]), cohort.zeroed_at_step_0).groupby(
+        WHERE, sort=False
+    )
+    panels = []
     for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True):
         rows = []
-        for (specimen, joint), part in own.groupby(["specimen", "joint"], sort=False):
+        for place, part in places:
             pair = part[[f"measured_{column}", f"predicted_{column}"]].dropna().to_numpy(float)
-            exact = np.abs(pair[:, 1] - pair[:, 0]) < ROUNDING
-            found = bland_altman(pair[:, 0], np.where(exact, pair[:, 0], pair[:, 1]))
-            if found.bias is None:
-                continue
-            place = {"row": place_of(specimen, joint, cohort)}
-            rows += [
-                {**place, "hollow": what != "bias", "value": getattr(found, what)}
-                | {end: getattr(found, f"{what}_{end}") for end in ("low", "high")}
-                for what in ("bias", "lower_limit", "upper_limit")
-            ]
+            rounding = np.abs(pair[:, 1] - pair[:, 0]) < ROUNDING
+            found = bland_altman(pair[:, 0], np.where(rounding, pair[:, 0], pair[:, 1]))
+            for what in ("bias", "lower_limit", "upper_limit") if found.bias is not None else ():
+                ends = {end: getattr(found, f"{what}_{end}") for end in ("low", "high")}
+                row = {"row": place_of(*place, cohort), "hollow": what != "bias", **ends}
+                rows.append({**row, "value": getattr(found, what)})
         if rows:
             frame = pd.DataFrame(rows).astype(dict.fromkeys(("value", "low", "high"), float))
-            frames.append(frame)
-            label = f"predicted less measured ({unit(name)}), + {POSITIVE[name]}"
-            chosen = _most(frame.assign(size=frame["value"].abs()), "size")
-            panels.append(Rows(title=AXIS[name], x_label=label, frame=chosen, marks={0.0: ""}))
+            label = f"error ({unit(name)}), + {POSITIVE[name]}"
+            panels.append(_panel(AXIS[name], label, frame, marks={0.0: ""}))
     if not panels:
         return saying(title, "No motion was measured of which a retained fit has two readings.")
     caption = (
-        "Filled: mean difference (bias); hollow: limits of agreement, bias ± 1.96 SD; lines: 95 % "
-        f"intervals, over the retained fits.{_only_most(panels, frames)}"
+        "Predicted less measured. Filled: mean (bias); hollow: limits of agreement (± 1.96 SD); "
+        f"lines: 95 % intervals, over the retained fits{_only_largest(places.ngroups)}."
     )
     return Chart(title, panels, caption)
 
@@ -102,35 +95,19 @@ def errors_by_source(study: JointPoseSensitivity, cohort: Cohort, tables: Tables
     looks = {"joint pose": MODEL, "stiffness": BASE, "both together": THIRD}
     series = dict(zip(("pose", "stiffness", "interaction"), looks, strict=True))
     names = {"signed_share": "value", "signed_share_low": "low", "signed_share_high": "high"}
-    panels, frames = [], []
+    panels = []
     for name in (name for name in COORDINATES if name in set(done["coordinate"])):
         rows = done[done["coordinate"] == name].rename(columns=names)
-        frame = (
-            rows[["value", "low", "high"]]
-            .mul(100.0)
-            .assign(
-                row=[
-                    place_of(*one, cohort)
-                    for one in zip(rows["specimen"], rows["joint"], strict=True)
-                ],
-                series=rows["factor"].map(series),
-            )
-        )
-        frames.append(frame)
-        label = "share of the variance of the error (%)"
-        panels.append(
-            Rows(
-                title=AXIS[name],
-                x_label=label,
-                frame=_most(frame, "value"),
-                looks=looks,
-                x_limits=(0.0, 100.0),
-            )
-        )
+        frame = 100.0 * rows[["value", "low", "high"]]
+        frame["row"] = [place_of(*place, cohort) for place in rows[WHERE].to_numpy()]
+        frame["series"] = rows["factor"].map(series)
+        label, wide = "share of variance (%)", (0.0, 100.0)
+        panels.append(_panel(AXIS[name], label, frame, looks=looks, x_limits=wide))
     first = done.iloc[0]
     caption = (
         f"Symbol: share; line: 95 % interval; {first['n_poses']} joint poses of retained fits, "
-        f"each run with {first['n_stiffness']} stiffness sets.{_only_most(panels, frames)}"
+        f"each run with {first['n_stiffness']} stiffness sets"
+        f"{_only_largest(done.groupby(WHERE).ngroups)}."
     )
     return Chart(title, panels, caption, [Key(look, name) for name, look in looks.items()])
 
@@ -140,47 +117,43 @@ def frames(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart
     title = "How far palpation moves joint frames"
     poses = tables["poses"]
     kept = retained(poses[poses["status"] == Status.CONVERGED.value], tables["success"])
+    places = list(kept.groupby(WHERE, sort=False))[::-1]  # from above
     paper = GOULD_2024A.beside(cohort.name)
-    panels, every = [], []
+    looks = {"palpation": MODEL} | ({paper[0]: BASE} if paper else {})
     centre = dict(zip(TRANSLATIONS, ("x_mm", "y_mm", "z_mm"), strict=True))
     axes = {name: f"{name}_deg" for name in ROTATIONS}
-    for kind, symbol, names, printed in (
-        ("Joint centre", "mm", centre, "joint_origin"),
-        ("Joint axes", "°", axes, "joint_orientation"),
-    ):
+    panels = []
+    for kind, symbol, names in (("Joint centre", "mm", centre), ("Joint axes", "°", axes)):
+        printed: Any = (
+            paper[1]["joint_orientation" if symbol == "°" else "joint_origin"] if paper else {}
+        )
         rows = []
-        for (specimen, joint), part in list(kept.groupby(["specimen", "joint"], sort=False))[::-1]:
-            seed = specimen_seed(study.seed, f"frames/{specimen}/{joint}")
-            theirs = paper[1][printed]["complete"].get(joint, {}).get("iqr", {}) if paper else {}
+        for place, part in places:
+            seed = specimen_seed(study.seed, f"frames/{'/'.join(place)}")
+            theirs = printed.get("complete", {}).get(place[1], {}).get("iqr", {})
             for name, column in names.items():
                 values = part[column].to_numpy(float)
                 if symbol == "°":  # about the first of them, so that none jumps by a turn
                     values = (values - values[0] + 180.0) % 360.0 - 180.0
-                wide, *ends = map(float, iqr_with_ends(values, seed))
-                row = {"row": f"{place_of(specimen, joint, cohort)} {WAYS[name]}"}
-                row |= {"value": wide, "low": ends[0], "high": ends[1], "series": OURS}
-                theirs_of = theirs.get(column if symbol == "°" else f"{name}_mm")
-                rows.append(row)
-                if theirs_of is not None and paper:
-                    nothing = {"low": np.nan, "high": np.nan}
-                    rows.append({**row, **nothing, "series": paper[0], "value": theirs_of})
-        frame = pd.DataFrame(rows, columns=["row", "value", "low", "high", "series"])
-        if frame["value"].notna().any():
-            every.append(frame)
-            looks = {OURS: MODEL, **({paper[0]: BASE} if paper else {})}
-            label = f"width of the middle half ({symbol})"
-            wide = (0.0, 1.06 * float(frame[["value", "high"]].max(axis=None)))
-            rows_ = _most(frame, "value")
-            panels.append(Rows(title=kind, x_label=label, frame=rows_, looks=looks, x_limits=wide))
+                wide, low, high = map(float, iqr_with_ends(values, seed))
+                row = {"row": f"{place_of(*place, cohort)} {WAYS.get(name, name)}"}
+                rows.append({**row, "series": "palpation", "value": wide, "low": low, "high": high})
+                key = column if symbol == "°" else f"{name}_mm"
+                if paper and key in theirs:
+                    rows.append({**row, "series": paper[0], "value": theirs[key]})
+        if len(kept) and not np.isnan(rows[0]["value"]):
+            frame = pd.DataFrame(rows)
+            limits = (0.0, 1.06 * float(frame[["value", "high"]].max(axis=None)))
+            panels.append(
+                _panel(kind, f"middle half ({symbol})", frame, looks=looks, x_limits=limits)
+            )
     if not panels:
         return saying(title, "Fewer than two palpations of a specimen have a retained fit.")
     caption = (
-        "Interquartile range over the palpations of retained fits, in ground axes; line: 95 % "
-        f"interval (bootstrap).{_only_most(panels, every)}"
+        "Width of the middle half over palpations of retained fits, in ground axes"
+        f"{_only_largest(3 * len(places))}; line: 95 % interval (bootstrap)."
     )
-    return Chart(
-        title, panels, caption, [Key(look, name) for name, look in looks.items()] if paper else ()
-    )
+    return Chart(title, panels, caption, [Key(looks[name], name) for name in looks if paper])
 
 
 def precision(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:

@@ -7,7 +7,7 @@ intervals than theirs, zeros of step 0 as readings, and a paper's numbers beside
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -109,16 +109,12 @@ def test_limits_of_agreement_have_their_exact_intervals(zeroed: bool, study: Set
     differences = np.arange(20) * 0.01
     differences = differences if zeroed else np.r_[differences, np.zeros(20)]
     n, bias, sd = len(differences), differences.mean(), differences.std(ddof=1)
-    middle, lower, upper = (
-        (rows[rows["row"] == "V2–V1"].iloc[k] for k in range(3))
-        if False
-        else (rows[rows["row"] == rows["row"].iloc[0]].iloc[k] for k in range(3))
-    )
+    middle, lower, upper = (rows.iloc[k] for k in range(3))
     assert middle["value"] == pytest.approx(bias)
     assert (lower["value"], upper["value"]) == pytest.approx(
         (bias - 1.96 * sd, bias + 1.96 * sd), abs=1e-5
     )
-    off = 1.959964 * np.sqrt(n)
+    off = 1.96 * np.sqrt(n)
     ends = bias + sd / np.sqrt(n) * nct.ppf([0.025, 0.975], n - 1, off)
     assert (upper["low"], upper["high"]) == pytest.approx(tuple(ends), rel=1e-6)
     assert (lower["low"], lower["high"]) == pytest.approx(tuple(2.0 * bias - ends[::-1]), rel=1e-6)
@@ -169,7 +165,7 @@ def test_what_most_fits_do_not_identify_is_a_line_that_goes_on(study: Settings) 
 
 
 def test_a_value_at_a_bound_is_drawn_as_open(study: Settings) -> None:
-    """Two of twenty fits with other damping at the lower bound: the middle 95 % has no lower end."""
+    """Two of twenty fits with other damping at the lower bound: no lower end of the middle 95 %."""
     fits = [
         {**row, "extension_nm_per_rad": 0.02}
         if row["bootstrap"] == "damping" and row["set"] < 2
@@ -222,6 +218,3 @@ def test_the_same_bytes_twice(study: Settings) -> None:
     first, again = (chart("stiffness", study, {}) for _ in range(2))
     assert first.svg() == again.svg()
     assert first.picture("png") == again.picture("png")
-
-
-def _unused(_: Any) -> None: ...
