@@ -1,10 +1,11 @@
 """Figures of stiffness: over palpations, over load points, by the sampler, from other starts."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import norm
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.forms.chart import Chart, Key, saying
@@ -18,7 +19,7 @@ from spinepipe.studies.joint_pose_sensitivity.retained import (
     COLUMN,
     FACTOR,
     MIDDLE_HALF,
-    REST,
+    READ,
     UNIT,
     Stiffness,
     effect_on,
@@ -38,21 +39,15 @@ MOST_ROWS = 24
 
 PALPATION, LOAD, READINGS = "palpation", "place of the load", "readings of one fit"
 LOOKS = {PALPATION: MODEL, LOAD: THIRD, READINGS: SOFT}
-
 PERCENTS = (2.5, 25.0, 50.0, 75.0, 97.5)
 SPREAD = ("low", "inner_low", "value", "inner_high", "high")
 """Percentiles, and the columns of a form that show them."""
-
-SHORT = {REST: "at rest", "quasi_static": "quasi-static", "dynamic": "load ramp"}
 
 LEAST = 0.05
 """Share of a stiffness by which it must change over load points to be drawn."""
 
 ROOM = 0.075
 """Share of a panel's height that a label beside a line takes."""
-
-TWO_SDS = 1.959964
-"""Half the middle 95 % of a normal distribution, in SDs."""
 
 
 def stiffness(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
@@ -73,8 +68,7 @@ def stiffness(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
         most = sorted(every, key=lambda one: -one.moved[0] if one.told else 0.0)[:MOST_ROWS]
         rows = [
             {**row, "series": source, "row": source if alone else one.place}
-            for one in every
-            if one in most
+            for one in sorted(most, key=every.index)
             for source, row in _sources(one, effects, alone)
         ]
         published = stiffness_quartiles(cohort.name, COLUMN[name])
@@ -83,18 +77,19 @@ def stiffness(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
             inner = {"inner_low": low, "inner_high": high, "low": low, "high": high}
             row = paper[0] if alone else "all"
             rows.append({"series": paper[0], "row": row, "value": middle, **inner})
-        panels.append(_on_log_axis(AXIS[name], f"stiffness ({UNIT[name]})", rows, looks))
-    n = len(found[0].values) if len(found) == len(panels) else None
-    fits = f"{n} retained fits" if n else "retained fits"
-    few = len(found) > MOST_ROWS * len(panels)
-    more = f" ({MOST_ROWS} stiffnesses that palpation moves most)" if few else ""
+        frame = pd.DataFrame(rows, columns=["row", "series", *SPREAD])
+        frame = frame.astype(dict.fromkeys(SPREAD, float))
+        panels.append(_on_log_axis(AXIS[name], f"stiffness ({UNIT[name]})", frame, looks))
+    alone = len(found) == len(panels)
+    fits = f"{len(found[0].values)} retained fits" if alone else "retained fits"
+    few = f", {MOST_ROWS} that spread most" * (len(found) > MOST_ROWS * len(panels))
     caption = (
-        f"Symbol: median; thick: middle half; thin: middle 95 % over {fits}{more}, of readings the "
+        f"Symbol: median; thick: middle half; thin: middle 95 % over {fits}{few}, of readings the "
         "95 % region. No symbol: most fits do not identify it, and the line goes on to the edge."
     )
     drawn = {row for panel in panels for row in panel.frame["series"]}
     keys = [Key(look, name) for name, look in looks.items() if name in drawn]
-    return Chart(title, panels, caption, keys if len(found) > len(panels) else ())
+    return Chart(title, panels, caption, () if alone else keys)
 
 
 def _in_order(names: Collection[str]) -> list[str]:
@@ -107,34 +102,27 @@ def _sources(
 ) -> list[tuple[str, dict[str, Any]]]:
     """What leaves how much of a stiffness; of one without a number the region alone."""
     low, high = one.region
-    open_ends = {"low": np.nan if low is None else low, "high": np.nan if high is None else high}
-    empty = dict.fromkeys(("value", "inner_low", "inner_high"), np.nan)
-    readings = [(READINGS, {**empty, **open_ends})] if low is not None or high is not None else []
+    readings = [(READINGS, {"low": low, "high": high})] if (low, high) != (None, None) else []
     if not one.told:
-        return [(PALPATION, {**empty, "low": np.nan, "high": np.nan})] * alone + readings
-    found = [(PALPATION, dict(zip(SPREAD, map(float, one.at(*PERCENTS)), strict=True)))]
+        return [(PALPATION, {})] * alone + readings
+    found = [(PALPATION, dict(zip(SPREAD, one.at(*PERCENTS), strict=True)))]
     effect = effect_on(one, effects)
     moved = None if effect is None else moved_by_load(effect)
     if effect is not None and moved is not None:
         middle = FACTOR[one.coordinate] * float(effect["stated"])
-        half = 0.01 * moved * middle / 2.0
-        wide = half * 2.0 * TWO_SDS / MIDDLE_HALF
-        ends = (middle - wide, middle - half, middle, middle + half, middle + wide)
-        found.append((LOAD, dict(zip(SPREAD, ends, strict=True))))
+        normal = norm.ppf(np.array(PERCENTS) / 100.0, middle, 0.01 * moved * middle / MIDDLE_HALF)
+        found.append((LOAD, dict(zip(SPREAD, normal, strict=True))))
     return found + readings
 
 
-def _on_log_axis(
-    title: str, label: str, rows: Sequence[dict[str, Any]], looks: Mapping[str, Look]
-) -> Rows:
+def _on_log_axis(title: str, label: str, frame: pd.DataFrame, looks: Mapping[str, Look]) -> Rows:
     """Rows on a logarithmic axis around all ends, with room beyond for those that are open."""
-    frame = pd.DataFrame(rows)
     ends = frame[["low", "value", "high"]].to_numpy(float)
     ends = ends[np.isfinite(ends) & (ends > 0.0)]
     low, high = (float(ends.min()), float(ends.max())) if len(ends) else (1.0, 1.0)
     is_open = (frame["low"].isna() != frame["high"].isna()).any()
     room = max(2.0 if is_open else 1.2, (high / low) ** 0.12)
-    frame["low"] = frame["low"].mask(frame["low"] <= 0.0)  # goes on to the edge
+    frame = frame.assign(low=frame["low"].mask(frame["low"] <= 0.0))  # goes on to the edge
     limits = (low / room, high * room)
     return Rows(title=title, x_label=label, frame=frame, looks=looks, log=True, x_limits=limits)
 
@@ -145,11 +133,11 @@ def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> C
     tried = tables["stiffness_over_load_point"]
     solved = tried[tried["status"].isin(USABLE)]
     known = {
-        name: solved.loc[solved[f"{name}_identifiable"].eq(True), COLUMN[name]].astype(float)
+        name: values
         for name in _in_order(study.calibration.free)
+        if len(values := solved.loc[solved[f"{name}_identifiable"].eq(True), COLUMN[name]])
     }
-    names = [name for name, values in known.items() if len(values)]
-    if solved.empty or not names:
+    if not known:
         return saying(title, "At no load point does the fit identify a stiffness.")
     ways = {"superior": "superior_shift_mm", "anterior": "anterior_shift_mm"}
     along = max(ways, key=lambda way: tried[ways[way]].nunique())
@@ -162,35 +150,19 @@ def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> C
     label = f"load point moved {along} (mm)"
     panels = []
     # those that the place of the load changes, or one that it does not
-    changed = [one for one in names if known[one].max() > (1.0 + LEAST) * known[one].min()]
-    for name in changed or names[:1]:
+    changed = [one for one, of in known.items() if of.max() > (1.0 + LEAST) * of.min()]
+    for name in changed or list(known)[:1]:
         _, low, high, *_, identifiable = region_columns(name)
         own = rows[rows[identifiable].eq(True)]
         lines = _lines(own, FACTOR[name] * own[COLUMN[name]], across, alone)
         if alone:
-            ends = {
-                f"y_{end}": FACTOR[name] * own[of] for end, of in (("low", low), ("high", high))
-            }
-            lines = lines.assign(**ends)
-            lines.loc[own["across"] != 0.0, list(ends)] = np.nan
-        axis = f"stiffness ({UNIT[name]})"
-        top = 1.35 * float(lines["y"].max())
-        panels.append(
-            _over_shift(
-                AXIS[name],
-                label,
-                axis,
-                lines,
-                (-0.06 * top, top),
-            )
-        )
+            stated_only = FACTOR[name] * own[[low, high]].where(own["across"] == 0.0)
+            lines[["y_low", "y_high"]] = stated_only.to_numpy(float)
+        panels.append(_over_shift(AXIS[name], label, f"stiffness ({UNIT[name]})", lines, 1.35))
     each = rows.drop_duplicates(["specimen", "x", "across"])
-    cost = _lines(each, each["cost"] / each["specimen"].map(stated), across, alone).dropna(
-        subset=["y"]
-    )
-    if len(cost):
-        top = 1.2 * float(cost["y"].max())
-        panels.append(_over_shift("Misfit", label, "cost over stated", cost, (-0.06 * top, top)))
+    cost = _lines(each, each["cost"] / each["specimen"].map(stated), across, alone)
+    if cost["y"].notna().any():
+        panels.append(_over_shift("Misfit", label, "cost (1: as stated)", cost, 1.2))
     beside = f"Beside lines: mm moved {across}; band: 95 % region of the fit"
     caption = (
         f"{beside if alone else 'A line for each specimen and joint'}. Where the cost "
@@ -207,14 +179,13 @@ def _lines(rows: pd.DataFrame, y: pd.Series, across: str, alone: bool) -> pd.Dat
     return frame.assign(series=rows["across"].map(lambda mm: f"{mm:+g}" if mm else "0"))
 
 
-def _over_shift(
-    title: str, x_label: str, y_label: str, lines: pd.DataFrame, limits: tuple[float, float]
-) -> Curves:
-    """Curves over the shift; of many other shifts the outermost and 0 have words beside them."""
+def _over_shift(title: str, x_label: str, y_label: str, lines: pd.DataFrame, room: float) -> Curves:
+    """Curves over the shift, up to ``room`` times the highest, with words beside the outermost."""
+    top = room * float(lines["y"].max())
     names = sorted(set(lines["series"]), key=float)
     ends = {names[0], names[-1], "0"} & set(names) if len(names) > 1 else set()
     last = lines.drop_duplicates("series", keep="last").set_index("series")["y"]
-    if len(ends) > 1 and np.diff(np.sort(last[sorted(ends)])).min() < ROOM * limits[1]:
+    if len(ends) > 1 and np.diff(np.sort(last[sorted(ends)])).min() < ROOM * top:
         labels = {"0": "all"}
     else:
         labels = {name: name.replace("-", "\u2212") for name in ends}
@@ -223,42 +194,33 @@ def _over_shift(
     x_limits = (float(lines["x"].min()) - 0.03 * reach, float(lines["x"].max()) + 0.12 * reach)
     return Curves(
         title=title, x_label=x_label, y_label=y_label, frame=lines, looks=looks, labels=labels,
-        x_limits=x_limits, y_limits=limits, high=190.0,
+        x_limits=x_limits, y_limits=(-0.06 * top, top), high=190.0,
     )  # fmt: skip
 
 
 def posterior(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
-    """Intervals of each stiffness by the sampler and by Laplace's approximation."""
+    """Median and 95 % interval of each stiffness by the sampler."""
     title = "Stiffness with landmarks as unknowns too"
     every = tables["posterior"]
-    good = every[(every["status"] == Status.CONVERGED.value) & (every["quantity"] == "stiffness")]
-    good = good[good["median"].notna()]
+    converged = (every["status"] == Status.CONVERGED.value) & every["median"].notna()
+    good = every[converged & (every["quantity"] == "stiffness")]
     if good.empty:
         return saying(title, "The sampler did not converge for any specimen.")
-    looks = {"sampler": MODEL, "Laplace's approximation": BASE}
     panels = []
     for name in _in_order({one for one in COORDINATES if COLUMN[one] in set(good["unknown"])}):
-        rows = []
-        for row in good[good["unknown"] == COLUMN[name]].head(MOST_ROWS).to_dict("records"):
-            place = place_of(row["specimen"], row["joint"], cohort) or "all joints"
-            for series, start in zip(looks, ("", "laplace_"), strict=True):
-                low, high = (
-                    np.nan if row[f"open_{side}"] else FACTOR[name] * row[f"{start}{end}"]
-                    for end, side in (("low", "below"), ("high", "above"))
-                )
-                # by Laplace, the median of the lognormal distribution
-                middle = np.sqrt(low * high) if start else FACTOR[name] * row["median"]
-                middle = middle if np.isfinite(low * high) else np.nan
-                rows.append(
-                    {"row": place, "series": series, "value": middle, "low": low, "high": high}
-                )
-        panels.append(_on_log_axis(AXIS[name], f"stiffness ({UNIT[name]})", rows, looks))
-    keys = [Key(look, name) for name, look in looks.items()]
+        own = good[good["unknown"] == COLUMN[name]].head(MOST_ROWS)
+        below, above = (own[f"open_{side}"].astype(bool) for side in ("below", "above"))
+        frame = FACTOR[name] * own[["median", "low", "high"]].rename(columns={"median": "value"})
+        for column, is_open in (("low", below), ("high", above), ("value", below | above)):
+            frame[column] = frame[column].mask(is_open)
+        places = zip(own["specimen"], own["joint"], strict=True)
+        frame["row"] = [place_of(*place, cohort) or "all joints" for place in places]
+        panels.append(_on_log_axis(AXIS[name], f"stiffness ({UNIT[name]})", frame, {"": MODEL}))
     caption = (
-        "Symbol: median; line: 95 % interval. A line that goes on to the edge has no end "
-        "there that the readings set."
+        "Symbol: median; line: 95 % interval. A line that goes on to the edge has no end there "
+        "that the readings set."
     )
-    return Chart(title, panels, caption, keys)
+    return Chart(title, panels, caption)
 
 
 def bootstrap(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
@@ -271,8 +233,7 @@ def bootstrap(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
         changes = {PALPATION: [one.values / one.at(50.0)[0] for one in own]}
         for one in own:
             for (what, loading), values in other_fits(study, tables["bootstrap"], one).items():
-                told = "start values" if what == "start" else "damping"
-                changes.setdefault(f"{told}, {SHORT[loading]}", []).append(values)
+                changes.setdefault(f"{what}, {READ[loading]}", []).append(values)
         rows = []
         for row, parts in changes.items():
             ends = 100.0 * np.percentile(np.concatenate(parts), PERCENTS, method="nearest") - 100.0
@@ -287,6 +248,6 @@ def bootstrap(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
         return saying(title, "No fit of a stiffness that has a number is retained.")
     caption = (
         "Symbol: median; thick: middle half; thin: middle 95 % of retained fits. Palpation: change "
-        "from its median; others: from the median of other starts at rest."
+        "from its median; others: from that of other start values at rest."
     )
     return Chart(title, panels, caption)

@@ -1,6 +1,5 @@
 """Figures of motion and joint frames: agreement, what errors come from, frames, precision."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from spinepipe.report.forms.rows import Rows
 from spinepipe.report.words import AXIS, POSITIVE, tick, unit
 from spinepipe.statistics import bland_altman
 from spinepipe.status import USABLE, Status
+from spinepipe.studies.joint_pose_sensitivity.charts import MOST_ROWS, Tables
 from spinepipe.studies.joint_pose_sensitivity.conclusions_of_motion import ROUNDING
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.retained import place_of, retained
@@ -23,15 +23,9 @@ from spinepipe.studies.joint_pose_sensitivity.spread import iqr_with_ends
 from spinepipe.studies.joint_pose_sensitivity.variables import readings
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS
 
-Tables = Mapping[str, pd.DataFrame]
-
-MOST_ROWS = 24
-"""Of a panel: where there are more, those with the largest numbers are drawn."""
-
 LONG_NAME = 16
 """Letters of a row's name from which a panel is wider."""
 
-WHERE = ["specimen", "joint"]
 WAYS = dict(zip(ROTATIONS, ("flexion", "bending", "rotation"), strict=True))
 FITTED_TO = {
     "calibrated": "stiffness fitted to each pose",
@@ -40,8 +34,14 @@ FITTED_TO = {
 """Whose stiffness poses are run with."""
 
 
+def _places(rows: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
+    """Rows by specimen and joint, from above."""
+    groups = list(rows.groupby(["specimen", "joint"], sort=False))
+    return {(str(specimen), str(joint)): part for (specimen, joint), part in reversed(groups)}
+
+
 def _panel(title: str, x_label: str, frame: pd.DataFrame, **how: Any) -> Rows:
-    """Rows with the largest numbers, as wide as their names ask."""
+    """Rows with the largest numbers where they are many, as wide as their names ask."""
     sizes = frame["value"].abs().groupby(frame["row"]).max()
     frame = frame[frame["row"].isin(sizes.nlargest(MOST_ROWS).index)]
     wide = 380.0 if frame["row"].str.len().max() > LONG_NAME else 300.0
@@ -58,13 +58,11 @@ def agreement(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
     title = "Agreement of predicted with measured motion"
     runs = tables["simulations"]
     own = runs[(runs["stiffness"] == "calibrated") & runs["status"].isin(USABLE)]
-    places = readings(retained(own, tables["success"]), cohort.zeroed_at_step_0).groupby(
-        WHERE, sort=False
-    )
+    places = _places(readings(retained(own, tables["success"]), cohort.zeroed_at_step_0))
     panels = []
     for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True):
         rows = []
-        for place, part in places:
+        for place, part in places.items():
             pair = part[[f"measured_{column}", f"predicted_{column}"]].dropna().to_numpy(float)
             rounding = np.abs(pair[:, 1] - pair[:, 0]) < ROUNDING
             found = bland_altman(pair[:, 0], np.where(rounding, pair[:, 0], pair[:, 1]))
@@ -80,7 +78,7 @@ def agreement(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
         return saying(title, "No motion was measured of which a retained fit has two readings.")
     caption = (
         "Predicted less measured. Filled: mean (bias); hollow: limits of agreement (± 1.96 SD); "
-        f"lines: 95 % intervals, over the retained fits{_only_largest(places.ngroups)}."
+        f"lines: 95 % intervals, over the retained fits{_only_largest(len(places))}."
     )
     return Chart(title, panels, caption)
 
@@ -97,9 +95,10 @@ def errors_by_source(study: JointPoseSensitivity, cohort: Cohort, tables: Tables
     names = {"signed_share": "value", "signed_share_low": "low", "signed_share_high": "high"}
     panels = []
     for name in (name for name in COORDINATES if name in set(done["coordinate"])):
-        rows = done[done["coordinate"] == name].rename(columns=names)
+        rows = done[done["coordinate"] == name].rename(columns=names)[::-1]
         frame = 100.0 * rows[["value", "low", "high"]]
-        frame["row"] = [place_of(*place, cohort) for place in rows[WHERE].to_numpy()]
+        places = zip(rows["specimen"], rows["joint"], strict=True)
+        frame["row"] = [place_of(*place, cohort) for place in places]
         frame["series"] = rows["factor"].map(series)
         label, wide = "share of variance (%)", (0.0, 100.0)
         panels.append(_panel(AXIS[name], label, frame, looks=looks, x_limits=wide))
@@ -107,7 +106,7 @@ def errors_by_source(study: JointPoseSensitivity, cohort: Cohort, tables: Tables
     caption = (
         f"Symbol: share; line: 95 % interval; {first['n_poses']} joint poses of retained fits, "
         f"each run with {first['n_stiffness']} stiffness sets"
-        f"{_only_largest(done.groupby(WHERE).ngroups)}."
+        f"{_only_largest(len(done[['specimen', 'joint']].drop_duplicates()))}."
     )
     return Chart(title, panels, caption, [Key(look, name) for name, look in looks.items()])
 
@@ -117,20 +116,20 @@ def frames(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart
     title = "How far palpation moves joint frames"
     poses = tables["poses"]
     kept = retained(poses[poses["status"] == Status.CONVERGED.value], tables["success"])
-    places = list(kept.groupby(WHERE, sort=False))[::-1]  # from above
+    places = _places(kept)
     paper = GOULD_2024A.beside(cohort.name)
     looks = {"palpation": MODEL} | ({paper[0]: BASE} if paper else {})
     centre = dict(zip(TRANSLATIONS, ("x_mm", "y_mm", "z_mm"), strict=True))
     axes = {name: f"{name}_deg" for name in ROTATIONS}
     panels = []
-    for kind, symbol, names in (("Joint centre", "mm", centre), ("Joint axes", "°", axes)):
-        printed: Any = (
-            paper[1]["joint_orientation" if symbol == "°" else "joint_origin"] if paper else {}
-        )
+    for kind, symbol, names, printed in (
+        ("Joint centre", "mm", centre, "joint_origin"),
+        ("Joint axes", "°", axes, "joint_orientation"),
+    ):
         rows = []
-        for place, part in places:
+        for place, part in places.items():
             seed = specimen_seed(study.seed, f"frames/{'/'.join(place)}")
-            theirs = printed.get("complete", {}).get(place[1], {}).get("iqr", {})
+            theirs = paper[1][printed]["complete"].get(place[1], {}).get("iqr", {}) if paper else {}
             for name, column in names.items():
                 values = part[column].to_numpy(float)
                 if symbol == "°":  # about the first of them, so that none jumps by a turn
@@ -141,9 +140,9 @@ def frames(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart
                 key = column if symbol == "°" else f"{name}_mm"
                 if paper and key in theirs:
                     rows.append({**row, "series": paper[0], "value": theirs[key]})
-        if len(kept) and not np.isnan(rows[0]["value"]):
-            frame = pd.DataFrame(rows)
-            limits = (0.0, 1.06 * float(frame[["value", "high"]].max(axis=None)))
+        frame = pd.DataFrame(rows, columns=["row", "series", "value", "low", "high"])
+        if frame["value"].notna().any():
+            limits = (0.0, 1.06 * float(np.nanmax(frame[["value", "high"]].to_numpy(float))))
             panels.append(
                 _panel(kind, f"middle half ({symbol})", frame, looks=looks, x_limits=limits)
             )

@@ -5,6 +5,7 @@ further parts of the study conclude stands in `conclusions_of_motion` and `concl
 """
 
 from collections.abc import Iterator, Sequence
+from math import isfinite
 
 import pandas as pd
 
@@ -16,6 +17,7 @@ from spinepipe.report.words import AXIS, listed
 from spinepipe.status import USABLE, Status
 from spinepipe.studies.joint_pose_sensitivity import conclusions_of_motion as of_motion
 from spinepipe.studies.joint_pose_sensitivity import conclusions_of_parts as of_parts
+from spinepipe.studies.joint_pose_sensitivity.checks import has_force
 from spinepipe.studies.joint_pose_sensitivity.retained import (
     COLUMN,
     FACTOR,
@@ -45,7 +47,7 @@ def conclusions(
     main = most_moved(found)
     yield from _palpation(found, main, results)
     yield from _landmarks(study, cohort)
-    if not study.load_point.asked and _has_force(study, cohort):
+    if not study.load_point.asked and has_force(study, cohort):
         yield Conclusion("load_place", "known")
     if main:
         yield from _load_points(main, results)
@@ -86,11 +88,11 @@ def _palpation(
         ]
         yield Conclusion("load", "told", {"value": values["load"]}, {"sds": listed(sds)})
     if len(alike) > 1:
-        rows = Value(len(alike), source="calibrations: stiffnesses of this direction")
-        yield Conclusion("palpation", "several", {**values, "rows": rows}, names)
+        values["rows"] = Value(len(alike), source="calibrations: stiffnesses of this direction")
+        yield Conclusion("palpation", "several", values, names)
     elif load is None:
-        kept = Value(n, source="success: reduced")
-        yield Conclusion("palpation", "alone", {**values, "kept": kept}, names)
+        values["kept"] = Value(n, source="success: reduced")
+        yield Conclusion("palpation", "alone", values, names)
     else:
         verdict = "more" if load > high else "less" if load < low else "alike"
         yield Conclusion("palpation", verdict, values, names)
@@ -136,9 +138,9 @@ def _load_points(main: Stiffness, results: Results) -> Iterator[Conclusion]:
 def _readings(main: Stiffness) -> Iterator[Conclusion]:
     """The region of one fit beside the middle 95 % over palpations."""
     low, high = main.region
-    if low is None or high is None:
-        return
     first, last = map(float, main.at(2.5, 97.5))
+    if low is None or high is None or not isfinite(last - first):
+        return
     how = "calibrations: median and median ends of the 95 % regions of retained fits"
     middle = float(main.at(50.0)[0])
     region = Value(middle, main.unit, low, high, len(main.values), how)
@@ -151,52 +153,31 @@ def _readings(main: Stiffness) -> Iterator[Conclusion]:
 def _identified(found: Sequence[Stiffness]) -> Conclusion:
     """Which stiffnesses have no number, and how many fits do not identify them."""
     unknown = [one for one in found if not one.told]
-    share = _lost_share(unknown or [max(found, key=lambda one: one.lost / len(one.values))])
     worst = max(found, key=lambda one: one.lost / len(one.values))
+    told = unknown or [worst]
+    lost, fits = sum(one.lost for one in told), sum(len(one.values) for one in told)
+    share = Value(100.0 * lost / fits, "%", n=fits, source="calibrations: not identifiable")
     names = {"worst": worst.name}
-    if not unknown:
-        return Conclusion("identified", "all", {"lost": share}, names)
-    if len(unknown) == len(found):
-        return Conclusion("identified", "none", {"lost": share}, names)
+    if not unknown or len(unknown) == len(found):
+        return Conclusion("identified", "none" if unknown else "all", {"lost": share}, names)
     ways = list(dict.fromkeys(AXIS[one.coordinate].lower() for one in unknown))
     alone = named(unknown[0].coordinate, unknown[0].place)
-    several = f"{listed(ways)} stiffness"
+    several = f"{listed(ways, most=6)} stiffness"
     whole = {one.coordinate for one in unknown} & {one.coordinate for one in found if one.told}
     several += f" of {len(unknown)} specimens or joints" if whole else ""
     names["unknown"] = alone if len(unknown) == 1 else several
     return Conclusion("identified", "some", {"lost": share}, names)
 
 
-def _lost_share(chosen: Sequence[Stiffness]) -> Value:
-    lost, fits = sum(one.lost for one in chosen), sum(len(one.values) for one in chosen)
-    return Value(
-        100.0 * lost / max(1, fits), "%", n=fits, source="calibrations: identifiable is false"
-    )
-
-
 def _landmarks(study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Conclusion]:
     """The SD that landmarks were drawn with."""
-    table = cohort.landmarks
-    if table is None:
-        return
-    own = table.loc[table["landmark"].isin(FRAME_LANDMARKS), "sd_mm"].dropna()
-    sds = own if study.landmark_sd_mm is None else pd.Series([study.landmark_sd_mm])
-    least, most = (
-        Value(float(sd), "mm", source="settings or cohort: sd_mm") for sd in (sds.min(), sds.max())
-    )
-    if least == most:
-        yield Conclusion("landmarks", "one", {"sd": least})
-    else:
-        yield Conclusion("landmarks", "several", {"least": least, "most": most})
-
-
-def _has_force(study: JointPoseSensitivity, cohort: Cohort) -> bool:
-    """Whether any test has a force, which has a point."""
-    loads = cohort.loads
-    if loads is None:
-        return False
-    chosen = loads[loads["test"].isin(study.tests or cohort.tests)]
-    return bool(chosen[["fx_n", "fy_n", "fz_n"]].abs().gt(0.0).any(axis=None))
+    assert cohort.landmarks is not None  # the study demands them
+    own = cohort.landmarks.loc[cohort.landmarks["landmark"].isin(FRAME_LANDMARKS), "sd_mm"]
+    sds = own.dropna() if study.landmark_sd_mm is None else pd.Series([study.landmark_sd_mm])
+    source = "settings or cohort: sd_mm"
+    least, most = (Value(float(sd), "mm", source=source) for sd in (sds.min(), sds.max()))
+    verdict = "one" if least == most else "several"
+    yield Conclusion("landmarks", verdict, {"least": least, "most": most})
 
 
 def _fits(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]:
@@ -205,16 +186,12 @@ def _fits(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]
     if counts.empty:
         return
     rows = counts[counts["part"] == "poses"]
-    near = f"near_start_{study.success.failed_when}"
-    names = {
-        "fits": "fits",
-        "solved": "solved",
-        "unmoved": near,
-        "outliers": "outliers",
-        "kept": "reduced",
+    columns = (f"near_start_{study.success.failed_when}", "fits", "outliers", "reduced")
+    sums = {
+        name: int(rows[column].sum())
+        for name, column in zip(("unmoved", "fits", "outliers", "kept"), columns, strict=True)
     }
-    sums = {name: int(rows[column].sum()) for name, column in names.items()}
-    sums["lost"] = sums["fits"] - sums.pop("solved")
+    sums["lost"] = sums["fits"] - int(rows["solved"].sum())
     values = {name: Value(n, source="counts: sum over specimens") for name, n in sums.items()}
     left_out = sums["fits"] - sums["kept"]
     verdict = "stop" if left_out > MOST_LEFT_OUT * sums["fits"] else "check" if left_out else "ok"

@@ -11,7 +11,7 @@ from spinepipe.report.words import AXIS, unit
 from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.retained import place_of
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import TRANSLATIONS
+from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
 
 MISSED = 10.0
 """Percent of the measured motion: a larger error is told as missed."""
@@ -73,28 +73,31 @@ def _grid(shares: pd.DataFrame) -> Iterator[Conclusion]:
 def _agreement(
     study: JointPoseSensitivity, cohort: Cohort, errors: pd.DataFrame
 ) -> Iterator[Conclusion]:
-    """The motion that fitted models miss most, as a share of itself; beside reading error."""
-    rows = errors[errors["median"].notna() & errors["percent_of_measured"].notna()]
-    if rows.empty:
+    """The motion above reading error that fitted models miss most, as a share of itself."""
+    known = errors[errors["median"].notna() & errors["percent_of_measured"].notna()]
+    if known.empty:
         return
-    worst = rows.loc[rows["percent_of_measured"].idxmax()]
-    error, way = float(worst["median"]), worst["coordinate"]
-    n, source = int(worst["n"]), "summary: error of retained fits"
+    sd = cohort.measurement_sd
+    reading = dict.fromkeys(COORDINATES, 0.0)
+    if sd is not None:
+        reading |= dict.fromkeys(TRANSLATIONS, sd.translation_mm or 0.0)
+        reading |= dict.fromkeys(ROTATIONS, sd.rotation_deg or 0.0)
+    above = known[known["median"] > 2.0 * known["coordinate"].map(reading)]
+    if (known["maximum"] < ROUNDING).all() or above.empty:
+        yield Conclusion("agreement", "within" if above.empty else "exact")
+        return
+    worst = max(above.to_dict("records"), key=lambda row: row["percent_of_measured"])
+    percent, way, n = float(worst["percent_of_measured"]), worst["coordinate"], int(worst["n"])
+    source = "summary: error of retained fits"
     values = {
-        "error": Value(error, unit(way), n=n, source=f"{source}, median"),
-        "percent": Value(float(worst["percent_of_measured"]), "%", n=n, source=source),
+        "error": Value(float(worst["median"]), unit(way), n=n, source=f"{source}, median"),
+        "percent": Value(percent, "%", n=n, source=source),
     }
     place = place_of(worst["specimen"], worst["joint"], cohort)
-    names = {"motion": f"{AXIS[way].lower()} motion of {place}"}
-    sd = cohort.measurement_sd
-    reading = None if sd is None else sd.translation_mm if way in TRANSLATIONS else sd.rotation_deg
-    missed = worst["percent_of_measured"] > MISSED and error > 2.0 * (reading or 0.0)
     shared = study.calibration.grouping == "per_specimen" and len(cohort.joint_names) > 1
-    verdict = "misses" if not shared else "misses_shared"
-    exact = (rows["maximum"] < ROUNDING).all()
-    yield Conclusion(
-        "agreement", "exact" if exact else verdict if missed else "follows", values, names
-    )
+    missed = "misses_shared" if shared else "misses"
+    names = {"motion": f"{AXIS[way].lower()} motion of {place}"}
+    yield Conclusion("agreement", missed if percent > MISSED else "follows", values, names)
 
 
 def _frames(rows: pd.DataFrame) -> Iterator[Conclusion]:

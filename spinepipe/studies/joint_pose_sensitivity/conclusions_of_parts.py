@@ -13,6 +13,7 @@ from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.retained import (
     COLUMN,
     FACTOR,
+    READ,
     REST,
     Stiffness,
     other_fits,
@@ -30,13 +31,6 @@ ALIKE = 0.5
 IN_BAND = 0.9
 """Of the readings that lie in a 95 % band: fewer speak against the model."""
 
-READ = {
-    REST: "at rest",
-    "quasi_static": "quasi-statically",
-    "dynamic": "at the end of a load ramp",
-}
-"""When motion is read under each loading."""
-
 
 def conclusions(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]:
     """Of parts that tell no stiffness."""
@@ -45,10 +39,8 @@ def conclusions(study: JointPoseSensitivity, results: Results) -> Iterator[Concl
         rows = counts[counts["part"] != "poses"]
         fits, lost = int(rows["fits"].sum()), int((rows["fits"] - rows["solved"]).sum())
         boots = results.table("bootstrap")
-        at_bound = (
-            boots[boots["status"] == Status.CONVERGED_AT_BOUND.value] if len(boots) else boots
-        )
-        bounded = len(at_bound.drop_duplicates(FIT)) if len(at_bound) else 0
+        each = boots if boots.empty else boots.drop_duplicates(FIT)["status"]
+        bounded = int((each == Status.CONVERGED_AT_BOUND.value).to_numpy().sum())
         values = {"fits": Value(fits), "lost": Value(lost, source="counts: fits less solved")}
         values["bounded"] = Value(bounded, source="bootstrap: status")
         if fits:
@@ -68,22 +60,17 @@ def bootstraps(
     spread = {key: 100.0 * (three[2] - three[0]) / three[1] for key, three in ends.items()}
     moved, names = main.moved[0], {"stiffness": main.name}
     if ("start", REST) in ends:
-        at_rest = ends["start", REST][1]
         yield _moved("starts", spread["start", REST], moved, names)
-        changes = {
-            loading: 100.0 * (three[1] / at_rest - 1.0)
-            for (what, loading), three in ends.items()
-            if what == "start" and loading != REST
-        }
-        if changes:
-            at = max(changes, key=lambda loading: abs(changes[loading]))
-            yield _moved("loading", changes[at], moved, {**names, "loading": READ[at]})
+        medians = {loading: three[1] for (what, loading), three in ends.items() if what == "start"}
+        at = max(medians, key=lambda loading: abs(medians[loading] - medians[REST]))
+        if len(medians) > 1:
+            change = 100.0 * (medians[at] / medians[REST] - 1.0)
+            yield _moved("loading", change, moved, {**names, "loading": READ[at]})
     damped = {loading: share for (what, loading), share in spread.items() if what == "damping"}
     if damped:
         at = max(damped, key=lambda loading: damped[loading])
-        factor = Value(study.damping_bootstrap.factor, source="settings: factor")
-        told = {**names, "loading": READ[at]}
-        yield _moved("damping", damped[at], moved, told, factor=factor)
+        more = {"factor": Value(study.damping_bootstrap.factor, source="settings: factor")}
+        yield _moved("damping", damped[at], moved, {**names, "loading": READ[at]}, **more)
 
 
 def _moved(
@@ -117,9 +104,9 @@ def _precision(study: JointPoseSensitivity, rows: pd.DataFrame) -> Iterator[Conc
         return
     names, source = {"limits": limits[motion]}, "required_precision: "
     share = Value(100.0 * asked.share, "%", source="settings: landmark_precision")
-    worst, n = own.loc[own["nominal_share"].idxmax()], int(own["n"].min())
-    if worst["nominal_share"] >= 1.0:
-        over = Value(float(worst["nominal_share"]), source=f"{source}nominal_share")
+    worst, n = float(own["nominal_share"].max()), int(own["n"].min())
+    if worst >= 1.0:
+        over = Value(worst, source=f"{source}nominal_share")
         yield Conclusion("precision", "model", {"value": over, "share": share}, names)
         return
     if float(proportion_confint(n, n, method="wilson")[0]) < asked.share:
@@ -133,11 +120,11 @@ def _precision(study: JointPoseSensitivity, rows: pd.DataFrame) -> Iterator[Conc
         value = Value(float(sd), "mm", source=f"{source}message")
         verdict = "not_enough" if len(short) else "enough"
     else:
-        row = known.loc[known["sd_mm"].idxmin()]
-        ends = (
-            None if pd.isna(row[end]) else float(row[end]) for end in ("sd_low_mm", "sd_high_mm")
+        row = min(known.to_dict("records"), key=lambda row: row["sd_mm"])
+        low, high = (
+            None if pd.isna(row[f"sd_{end}_mm"]) else row[f"sd_{end}_mm"] for end in ("low", "high")
         )
-        value = Value(float(row["sd_mm"]), "mm", *ends, n, f"{source}sd_mm")
+        value = Value(float(row["sd_mm"]), "mm", low, high, n, f"{source}sd_mm")
         verdict = "known"
     yield Conclusion("precision", verdict, {"value": value, "share": share}, names)
 
@@ -189,7 +176,9 @@ def _sampled(results: Results) -> Iterator[Conclusion]:
     counted = pd.DataFrame({"poses": each.size(), "alike": 1.0 / each.agg(lambda w: (w**2).sum())})
     counted = counted[each.sum() > 0.0]
     if len(counted):
-        least = counted.loc[(counted["alike"] / counted["poses"]).idxmin()]
+        least = (
+            counted.assign(share=counted["alike"] / counted["poses"]).nsmallest(1, "share").iloc[0]
+        )
         source = "pose_weights: one over the sum of squares, least of specimens"
         values = {
             "poses": Value(int(least["poses"]), source="pose_weights: poses"),

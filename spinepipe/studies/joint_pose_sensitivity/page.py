@@ -1,5 +1,7 @@
 """The page of a joint-pose study."""
 
+from typing import Any
+
 import pandas as pd
 
 from spinepipe.cohort import Cohort
@@ -63,7 +65,7 @@ _COORDINATE = Column("coordinate", "text", "coordinate whose stiffness it is")
 _SHAPES = {table.name: table for table in all_declared(__file__)}
 
 _FOLD = ["specimen", "family", "test", "joint", "response", "factor"]
-_OPEN = {"nullable": True, "empty": "none is significant after Holm's correction"}
+_OPEN: dict[str, Any] = {"nullable": True, "empty": "none is significant after Holm's correction"}
 FOLDED = (
     *(Column(name, "text", f"{name} of the tests") for name in _FOLD),
     Column("tests", "integer", "tests folded into this row, one for each pose or stiffness set"),
@@ -113,12 +115,9 @@ def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable
             found.append(sortable(name, title, _SHAPES[name].about, _chosen(rows, name), kept))
     tests = results.table("statistics")
     if len(tests):
-        title = "Tests of significance"
-        about = (
-            f"Significant: p below {study.significance:g} after Holm's correction in its family."
-        )
+        about = f"Significant: p below {study.significance:g} after Holm's correction by family."
         rows = folded(tests, study.significance)
-        found.append(sortable("statistics", title, about, rows, FOLDED))
+        found.append(sortable("statistics", "Tests of significance", about, rows, FOLDED))
     return [table for table in found if table.rows]
 
 
@@ -161,13 +160,12 @@ def _in_field_units(rows: pd.DataFrame) -> pd.DataFrame:
 
 def folded(statistics: pd.DataFrame, alpha: float) -> pd.DataFrame:
     """One row for each test, joint, response and factor, whatever is held fixed in it."""
-    rows = []
-    for key, part in statistics.groupby(_FOLD, sort=False, dropna=False):
-        kept = part.loc[part["p_holm"] < alpha, "effect"]
-        rows.append(
-            dict(zip(_FOLD, key, strict=True))
-            | {"tests": len(part), "significant": len(kept)}
-            | {"effect_name": part["effect_name"].iloc[0]}
-            | {"effect_lowest": kept.min(), "effect_highest": kept.max()}
-        )
-    return pd.DataFrame(rows, columns=[column.name for column in FOLDED])
+    kept = statistics["effect"].where(statistics["p_holm"] < alpha)
+    groups = statistics.assign(kept=kept).groupby(_FOLD, sort=False, dropna=False, as_index=False)
+    return groups.agg(
+        tests=("kept", "size"),
+        significant=("kept", "count"),
+        effect_name=("effect_name", "first"),
+        effect_lowest=("kept", "min"),
+        effect_highest=("kept", "max"),
+    )

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,6 +29,9 @@ from spinepipe.units import (
 MOST_LOST = 0.5
 """Of the fits: a stiffness that more of them do not identify has no number."""
 
+MOST_AT_BOUND = 0.1
+"""Of the fits: where more stand at a bound, quartiles may be made of it."""
+
 FEWEST = 3
 """Retained fits below which quartiles say nothing of a spread."""
 
@@ -40,6 +44,9 @@ MIDDLE_HALF = 2.0 * float(norm.ppf(0.75))
 EVERY_JOINT = "*"
 REST = "equilibrium"
 """Loading under which motion is read at rest, as by the fits of palpations."""
+
+READ = {REST: "at rest", "quasi_static": "quasi-statically", "dynamic": "on a load ramp"}
+"""When motion is read under each loading."""
 
 UNIT = {name: "N/mm" if name in TRANSLATIONS else "N m/deg" for name in COORDINATES}
 FACTOR = {n: 1.0 / (MM_PER_M if n in TRANSLATIONS else DEG_PER_RAD) for n in COORDINATES}
@@ -90,17 +97,17 @@ class Stiffness:
 
     @property
     def told(self) -> bool:
-        """Whether it has a number: most fits identify it, and no quartile stands at a bound."""
-        if len(self.values) < FEWEST or self.lost > MOST_LOST * len(self.values):
-            return False
-        return not any(
-            np.isclose(self.at(25.0, 75.0), bound, AT_BOUND).any() for bound in self.bounds
-        )
+        """Whether it has a number: most fits identify it, and few stand at a bound."""
+        n, at_bound = len(self.values), int(self._at_bound(self.values).sum())
+        return n >= FEWEST and self.lost <= MOST_LOST * n and at_bound <= MOST_AT_BOUND * n
 
     def at(self, *percents: float) -> Array:
-        """Percentiles over the fits."""
+        """Percentiles over the fits; NaN of one that is at a bound."""
         found: Array = np.percentile(self.values, percents)
-        return found
+        return np.where(self._at_bound(found), np.nan, found)
+
+    def _at_bound(self, values: Array) -> Any:
+        return np.any([np.isclose(values, bound, AT_BOUND, 0.0) for bound in self.bounds], axis=0)
 
     @cached_property
     def moved(self) -> tuple[float, float, float]:

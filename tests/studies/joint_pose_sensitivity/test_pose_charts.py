@@ -175,7 +175,7 @@ def test_a_value_at_a_bound_is_drawn_as_open(study: Settings) -> None:
     rows = rows_of(chart("bootstrap", study, {"bootstrap": fits}), "Flexion–extension").set_index(
         "row"
     )
-    damped = rows.loc["damping, load ramp"]
+    damped = rows.loc["damping, on a load ramp"]
     assert np.isnan(damped["low"])
     assert np.isfinite(damped[["inner_low", "value", "high"]].astype(float)).all()
     assert rows.loc["palpation", "inner_high"] == pytest.approx(5.0)

@@ -23,6 +23,7 @@ from page_rules import (
 from study_cases import STUDY, Size, project
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.report.conclusions import Value, sentences_of
 from spinepipe.report.page.study_page import Page, Results
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
@@ -224,9 +225,22 @@ def test_a_rule_comes_to_its_verdict_alone(study: Settings, case: Case) -> None:
 
 def test_every_verdict_has_a_study_that_comes_to_it(study: Settings, tmp_path: Path) -> None:
     reached = set().union(*(verdicts(page_of(study, c.tables, c.asked).conclusions) for c in CASES))
-    several = two_specimens(tmp_path)
-    reached |= verdicts(page_of(several, several_tables()).conclusions)
+    reached |= verdicts(page_of(two_specimens(tmp_path), several_tables()).conclusions)
+    reached |= verdicts(page_of(coarse(study), {"summary": made.summary(40.0)}).conclusions)
     assert reached == all_verdicts(sentences_of(PACKAGE))
+
+
+def coarse(study: Settings) -> Settings:
+    """Readings whose error is half of that of the fitted models, 0.05 degrees."""
+    sd = MeasurementSd(rotation_deg=0.025, translation_mm=0.01)
+    return study[0], replace(study[1], measurement_sd=sd)
+
+
+def test_errors_within_reading_error_are_no_miss(study: Settings) -> None:
+    """40 % of the motion, but 0.05 degrees of readings with an SD of 0.025; 0.06 would be a miss."""
+    for error, verdict in ((0.05, "within"), (0.06, "misses_shared")):
+        found = page_of(coarse(study), {"summary": made.summary(40.0, error)})
+        assert [one.verdict for one in found.told if one.rule == "agreement"] == [verdict]
 
 
 def two_specimens(root: Path) -> Settings:
