@@ -11,11 +11,17 @@ import numpy as np
 import pandas as pd
 import pose_tables
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from page_rules import faults_of_chart
 from study_cases import STUDY, Size, project, results
 from sweeps import sweep
 
 from spinepipe.frames import Pose
+from spinepipe.report.forms.chart import Panel
+from spinepipe.report.forms.chart import saying as saying_chart
+from spinepipe.report.forms.look import look
+from spinepipe.report.forms.rows import Rows
 from spinepipe.report.glyphs import quartiles
 from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from spinepipe.report.page.tables import sortable
@@ -187,3 +193,39 @@ def test_columns_that_say_nothing_are_left_out_and_units_stand_in_the_heading() 
     long = sortable("t", "T", "about", pd.DataFrame({"specimen": list("ab") * 400}), columns)
     assert len(long.rows) == 200
     assert long.note == "The first 200 of 800 rows; all of them are in t.parquet."
+
+
+def drawn(panel: Panel) -> Axes:
+    """A panel of a chart on axes of its own."""
+    with look():
+        axes = Figure().subplots()
+        panel.draw(axes)
+    return axes
+
+
+def test_series_that_a_row_alone_has_stand_in_its_middle() -> None:
+    """Row one has both series, row two the second alone."""
+    rows = [("one", "a", 1.0), ("one", "b", 2.0), ("two", "b", 3.0)]
+    frame = pd.DataFrame(rows, columns=["row", "series", "value"])
+    heights = [line.get_ydata() for line in drawn(Rows(frame=frame)).lines]
+    found = {round(float(y), 3) for of in heights for y in np.atleast_1d(of)}
+    assert found == {-0.155, 0.155, 1.0}
+
+
+@sweep("low, high", [(119.0, 477.0), (1.0, 40.0), (0.2, 0.5), (160.0, 480.0), (30.0, 40.0)])
+def test_numbers_of_a_logarithmic_axis_are_apart_and_plain(low: float, high: float) -> None:
+    frame = pd.DataFrame({"row": ["one"], "value": [low], "low": [low], "high": [high]})
+    axis = drawn(Rows(frame=frame, log=True, x_limits=(low, high))).xaxis
+    shown = [x for x in axis.get_majorticklocs() if low <= x <= high]
+    assert 2 <= len(shown) <= 6
+    steps = np.diff(np.log10(shown)) / np.log10(high / low)
+    assert steps.min() > 0.12
+    assert not any("$" in axis.get_major_formatter()(x, None) for x in shown)
+
+
+def test_a_figure_without_results_says_why_however_long_that_is() -> None:
+    short = saying_chart(
+        "Nothing", "No fit of any specimen that was tried ended with a stiffness; " * 3 + "so."
+    )
+    assert list(faults_of_chart(short)) == []
+    assert short.panels[0].height > saying_chart("Nothing", "No.").panels[0].height

@@ -25,6 +25,7 @@ from spinepipe.studies.joint_pose_sensitivity.retained import (
     effect_on,
     moved_by_load,
     other_fits,
+    percentiles,
     place_of,
     stiffnesses,
 )
@@ -42,9 +43,6 @@ LOOKS = {PALPATION: MODEL, LOAD: THIRD, READINGS: SOFT}
 PERCENTS = (2.5, 25.0, 50.0, 75.0, 97.5)
 SPREAD = ("low", "inner_low", "value", "inner_high", "high")
 """Percentiles, and the columns of a form that show them."""
-
-LEAST = 0.05
-"""Share of a stiffness by which it must change over load points to be drawn."""
 
 ROOM = 0.075
 """Share of a panel's height that a label beside a line takes."""
@@ -128,16 +126,13 @@ def _on_log_axis(title: str, label: str, frame: pd.DataFrame, looks: Mapping[str
 
 
 def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Chart:
-    """Each stiffness over the load's place, where the fit identifies it, and the cost of fits."""
+    """The stiffness that the answer tells over the load's place, and the cost of the fits."""
     title = "Stiffness over where the load acts"
     tried = tables["stiffness_over_load_point"]
     solved = tried[tried["status"].isin(USABLE)]
-    known = {
-        name: values
-        for name in _in_order(study.calibration.free)
-        if len(values := solved.loc[solved[f"{name}_identifiable"].eq(True), COLUMN[name]])
-    }
-    if not known:
+    names = _in_order(study.calibration.free)
+    name = next((one for one in names if solved[f"{one}_identifiable"].eq(True).any()), None)
+    if name is None:
         return saying(title, "At no load point does the fit identify a stiffness.")
     ways = {"superior": "superior_shift_mm", "anterior": "anterior_shift_mm"}
     along = max(ways, key=lambda way: tried[ways[way]].nunique())
@@ -148,17 +143,13 @@ def load_point(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> C
     own = rows[(rows["x"] == 0.0) & (rows["across"] == 0.0)].drop_duplicates("specimen")
     stated = own.set_index("specimen")["cost"].replace(0.0, np.nan)
     label = f"load point moved {along} (mm)"
-    panels = []
-    # those that the place of the load changes, or one that it does not
-    changed = [one for one, of in known.items() if of.max() > (1.0 + LEAST) * of.min()]
-    for name in changed or list(known)[:1]:
-        _, low, high, *_, identifiable = region_columns(name)
-        own = rows[rows[identifiable].eq(True)]
-        lines = _lines(own, FACTOR[name] * own[COLUMN[name]], across, alone)
-        if alone:
-            stated_only = FACTOR[name] * own[[low, high]].where(own["across"] == 0.0)
-            lines[["y_low", "y_high"]] = stated_only.to_numpy(float)
-        panels.append(_over_shift(AXIS[name], label, f"stiffness ({UNIT[name]})", lines, 1.35))
+    _, low, high, *_, identifiable = region_columns(name)
+    own = rows[rows[identifiable].eq(True)]
+    lines = _lines(own, FACTOR[name] * own[COLUMN[name]], across, alone)
+    if alone:
+        stated_only = FACTOR[name] * own[[low, high]].where(own["across"] == 0.0)
+        lines[["y_low", "y_high"]] = stated_only.to_numpy(float)
+    panels = [_over_shift(AXIS[name], label, f"stiffness ({UNIT[name]})", lines, 1.35)]
     each = rows.drop_duplicates(["specimen", "x", "across"])
     cost = _lines(each, each["cost"] / each["specimen"].map(stated), across, alone)
     if cost["y"].notna().any():
@@ -236,9 +227,8 @@ def bootstrap(study: JointPoseSensitivity, cohort: Cohort, tables: Tables) -> Ch
                 changes.setdefault(f"{what}, {READ[loading]}", []).append(values)
         rows = []
         for row, parts in changes.items():
-            ends = 100.0 * np.percentile(np.concatenate(parts), PERCENTS, method="nearest") - 100.0
+            ends = 100.0 * percentiles(np.concatenate(parts), *PERCENTS) - 100.0
             series = PALPATION if row == PALPATION else "other"
-            ends = np.where(np.isfinite(ends), ends, np.nan)
             rows.append({**dict(zip(SPREAD, ends, strict=True)), "row": row, "series": series})
         if len(rows) > 1:
             looks = {PALPATION: MODEL, "other": THIRD}

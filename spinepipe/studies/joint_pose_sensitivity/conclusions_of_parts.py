@@ -17,7 +17,7 @@ from spinepipe.studies.joint_pose_sensitivity.retained import (
     REST,
     Stiffness,
     other_fits,
-    quartiles,
+    percentiles,
 )
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 
@@ -55,13 +55,16 @@ def bootstraps(
     """How far start values, loading and damping move the stiffness that the answer tells."""
     found = other_fits(study, results.table("bootstrap"), main)
     # quartiles of few say nothing, those at a bound have no number
-    ends = {key: quartiles(values) for key, values in found.items() if len(values) >= FEWEST_FITS}
+    enough = {key: values for key, values in found.items() if len(values) >= FEWEST_FITS}
+    ends = {key: percentiles(values, 25.0, 50.0, 75.0) for key, values in enough.items()}
     ends = {key: three for key, three in ends.items() if np.isfinite(three).all()}
-    spread = {key: 100.0 * (three[2] - three[0]) / three[1] for key, three in ends.items()}
+    spread = {key: 100.0 * float((three[2] - three[0]) / three[1]) for key, three in ends.items()}
     moved, names = main.moved[0], {"stiffness": main.name}
     if ("start", REST) in ends:
         yield _moved("starts", spread["start", REST], moved, names)
-        medians = {loading: three[1] for (what, loading), three in ends.items() if what == "start"}
+        medians = {
+            loading: float(three[1]) for (what, loading), three in ends.items() if what == "start"
+        }
         at = max(medians, key=lambda loading: abs(medians[loading] - medians[REST]))
         if len(medians) > 1:
             change = 100.0 * (medians[at] / medians[REST] - 1.0)

@@ -229,10 +229,11 @@ def effect_on(one: Stiffness, effects: pd.DataFrame) -> pd.Series | None:
     return None if rows.empty else rows.iloc[0]
 
 
-def quartiles(values: Array) -> tuple[float, float, float]:
-    """Quartiles as values that there are, some of which may be infinite."""
-    low, middle, high = map(float, np.percentile(values, (25.0, 50.0, 75.0), method="nearest"))
-    return low, middle, high
+def percentiles(values: Array, *percents: float) -> Array:
+    """Percentiles of values of which some may be infinite; NaN of what one of these makes."""
+    with np.errstate(invalid="ignore"):
+        found: Array = np.percentile(values, percents)
+    return np.where(np.isfinite(found), found, np.nan)
 
 
 def other_fits(
