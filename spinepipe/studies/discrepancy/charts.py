@@ -94,8 +94,8 @@ def load_displacement(study: Discrepancy, cohort: Cohort, tables: StudyTables) -
     keys += [Key(_LINES[name], words[name], as_line=True) for name in shown]
     caption = (
         "A model is right where its line stays within the bars; shown is where the "
-        f"{model_name(study)} is farthest off. Lines leave out errors of the set-up, which the misfit "
-        "allows for."
+        f"{model_name(study)} is farthest off. Lines leave out errors of the set-up, which the "
+        "misfit allows for."
     )
     return Chart(title, panels, caption, keys)
 
@@ -308,7 +308,7 @@ def _evidence(verdict: Verdict, candidates: pd.DataFrame) -> Iterator[tuple[str,
             behind = rival.log_evidence_margin
             name = name_at(rival.name, rival.coordinates)
             bars.append((one.log_evidence - behind, name, f"{number(behind, 2)} behind"))
-        yield capital(own) if len(verdict.effects) > 1 else "", bars
+        yield short(capital(own), 26) if len(verdict.effects) > 1 else "", bars
     tried = candidates[candidates["log_evidence"].notna()] if len(candidates) else candidates
     for stage, heading in (("refit 1", "Each alone"), ("screen 1", "Each alone (linear)")):
         rows = tried[tried["stage"] == stage] if len(tried) else tried
@@ -323,7 +323,8 @@ def _evidence(verdict: Verdict, candidates: pd.DataFrame) -> Iterator[tuple[str,
 
 def _bars(heading: str, label: str, bars: Bars, marks: Mapping[float, str] | None = None) -> Rows:
     frame = pd.DataFrame(bars, columns=["value", "row", "note"])
-    how: dict[str, Any] = {"marks": marks or {}, "bars": True, "looks": {"": MODEL}}
+    wide = 400.0 if heading else 300.0
+    how: dict[str, Any] = {"marks": marks or {}, "bars": True, "looks": {"": MODEL}, "width": wide}
     return Rows(title=heading, x_label=label, frame=frame, **how)
 
 

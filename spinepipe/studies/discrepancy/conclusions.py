@@ -92,7 +92,7 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
             if after is not None and after.number > LARGE:
                 told = "large"
             elif told == "part" and (after is None or (after.low or 0.0) <= SMALL):
-                told = "part_left_out"
+                told = "part_open"
         case found.Conclusion.SET:
             every = list(dict.fromkeys(name_at(c.name, c.coordinates) for c in verdict.in_set))
             names["names"] = in_words([every], _MOST_WORDS_OF_SET, "or")
@@ -186,22 +186,16 @@ def _by_test(verdict: Verdict, model: str, where: pd.DataFrame) -> Iterator[Conc
 def _stiffness(numbers: pd.DataFrame, model: str) -> Iterator[Conclusion]:
     """Stiffness at rest and under load, mean of the specimens."""
     rows = stiffness_at_rest_and_loaded(numbers)
-    if rows.empty:
+    means = rows[rows["specimen"] == EVERY[0]].set_index("model") if len(rows) else rows
+    if not {BASE, WITH_EFFECTS} <= set(means.index):
         return
-    means = rows[rows["specimen"] == EVERY[0]].set_index("model")
     row = means.loc[WITH_EFFECTS]
-    unit, factor = UNITS.get(row["unit"], (row["unit"], 1.0))
-    values = {"load": Value(float(row["load"]), LOAD_UNITS[row["coordinate"]])}
-    for name in ("rest", "loaded"):
-        ends = [
-            None if pd.isna(row[f"{name}{end}"]) else factor * row[f"{name}{end}"] for end in _ENDS
-        ]
-        how = f"field_numbers: {row['number']}, mean of specimens"
-        values[name] = Value(factor * float(row[name]), unit, *ends, int(row["specimens"]), how)
-    base = (
-        factor * float(means.loc[BASE, "loaded"]) if BASE in means.index else values["rest"].number
-    )
-    values["base"] = Value(base, unit, source="field_numbers: base, under load")
+    values = {
+        "rest": _slope(row, "rest"),
+        "loaded": _slope(row, "loaded"),
+        "base": _slope(means.loc[BASE], "loaded"),
+        "load": Value(float(row["load"]), LOAD_UNITS[row["coordinate"]], source="field_numbers"),
+    }
     rest, loaded = values["rest"], values["loaded"]
     above = rest.high is not None and loaded.low is not None and loaded.low > rest.high
     below = rest.low is not None and loaded.high is not None and loaded.high < rest.low
@@ -215,7 +209,13 @@ def _stiffness(numbers: pd.DataFrame, model: str) -> Iterator[Conclusion]:
     yield Conclusion("stiffness", told, values, names)
 
 
-_ENDS = ("_low", "_high")
+def _slope(row: pd.Series, at: str) -> Value:
+    """Stiffness ``rest`` or ``loaded`` of a row."""
+    unit, factor = UNITS.get(row["unit"], (row["unit"], 1.0))
+    size, *ends = (row[f"{at}{end}"] for end in ("", "_low", "_high"))
+    known = [None if pd.isna(end) else factor * float(end) for end in ends]
+    how = f"field_numbers: {row['number']}, {at}, mean of specimens"
+    return Value(factor * float(size), unit, *known, int(row["specimens"]), how)
 
 
 def _carries_over(

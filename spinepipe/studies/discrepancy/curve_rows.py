@@ -8,6 +8,9 @@ from spinepipe.studies.discrepancy.verdict import EVERY
 from spinepipe.studies.discrepancy.words import TOWARDS, motion_of
 from spinepipe.units import COORDINATES, DISPLAY_PER_SI
 
+ENDS = {"value": "", "low": "_low", "high": "_high"}
+"""Columns of a number with its interval, and how they end in tables of several."""
+
 PLACE = ["specimen", "test", "joint", "coordinate"]
 
 
@@ -51,15 +54,14 @@ def stiffness_at_rest_and_loaded(numbers: pd.DataFrame) -> pd.DataFrame:
     if numbers.empty:
         return numbers
     keys = ["joint", "coordinate", "model", "specimen"]
-    at_rest = numbers[numbers["number"] == "stiffness_at_zero"].set_index(keys)
+    rest = numbers[numbers["number"] == "stiffness_at_zero"][[*keys, *ENDS]]
+    rest = rest.rename(columns={name: f"rest{end}" for name, end in ENDS.items()})
     found = []
     for number, side in (("stiffness_at_plus", 0), ("stiffness_at_minus", 1)):
-        under_load = numbers[numbers["number"] == number].set_index(keys)
-        both = under_load.join(at_rest, how="inner", rsuffix="_at_rest").reset_index()
-        names = {f"{name}_at_rest": f"rest{end}" for name, end in _ENDS.items()}
-        names |= {name: f"loaded{end}" for name, end in _ENDS.items()}
+        loaded = numbers[numbers["number"] == number]
+        both = loaded.rename(columns={name: f"loaded{end}" for name, end in ENDS.items()})
         sides = [TOWARDS[name][side] for name in both["coordinate"]]
-        found.append(both.rename(columns=names).assign(side=sides))
+        found.append(both.assign(side=sides).merge(rest, on=keys))
     rows = pd.concat(found, ignore_index=True)
     means = rows[(rows["specimen"] == EVERY[0]) & (rows["model"] == MODELS[1])]
     means = means[(means["loaded"] > 0.0) & (means["rest"] > 0.0)]
@@ -76,6 +78,3 @@ def stiffness_at_rest_and_loaded(numbers: pd.DataFrame) -> pd.DataFrame:
     every = len(joints) > 1 and len(joints) == same["joint"].nunique()
     both = {"side": motion_of(best["coordinate"])} if len(sides) > 1 else {}
     return found.assign(every=every, **both)
-
-
-_ENDS = {"value": "", "low": "_low", "high": "_high"}
