@@ -70,7 +70,7 @@ class StudyFiles(ABC):
     """Files other than tables and figures that the report reads."""
 
     subfolder: ClassVar[str] = ""
-    """Where results are, below the folder of the study; ends with a slash."""
+    """Where all results but pages are, below the folder of the study; ends with a slash."""
 
     study: Study
     specimens: tuple[str, ...]
@@ -82,8 +82,12 @@ class StudyFiles(ABC):
 
     @property
     def folder(self) -> str:
-        """Where all results of the study are."""
+        """Where all results of the study but its pages are."""
         return f"results/{self.study.study}/{self.subfolder}".rstrip("/")
+
+    def page(self, name: str = "report") -> str:
+        """The file of a page, in the same place for every kind."""
+        return f"results/{self.study.study}/{name}.html"
 
     @property
     @abstractmethod
@@ -177,8 +181,8 @@ class StudyFiles(ABC):
         files = [*(f"{table}.parquet" for table in self.tables_of(full)), *self.others]
         drawn = self.figures(full)
         files += [f"figures/{figure}.{kind}" for figure in drawn for kind in ("svg", "png")]
-        pages = ["report.html", *(["full.html"] if full and self.adds else [])]
-        return [f"{self.folder}/{file}" for file in [*files, *pages]]
+        pages = ["report", *(["full"] if full and self.adds else [])]
+        return [*(f"{self.folder}/{file}" for file in files), *map(self.page, pages)]
 
     def lost(self, full: bool = False) -> list[str]:
         """Job files that are missing although a table or block holds their rows.

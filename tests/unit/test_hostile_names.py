@@ -22,6 +22,8 @@ from spinepipe.marks import marked
 from spinepipe.report.page import document as page
 from spinepipe.report.page import space
 from spinepipe.report.page.origin import origin
+from spinepipe.report.specimen import view_of
+from spinepipe.report.specimen_page import specimen_page
 from spinepipe.report.style import picture, style
 from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.tracking import in_space as tracking_space
@@ -122,6 +124,18 @@ def _as_settings(study: Any) -> Any:
     return Written()
 
 
+@pytest.mark.filterwarnings("ignore:constrained_layout not applied:UserWarning")
+def test_the_page_of_a_specimen_holds_no_markup_of_names(tmp_path: Path) -> None:
+    """`spinepipe show`: name, title, tests, vertebrae and all numbers as text."""
+    found = made("joint_pose_sensitivity", tmp_path)
+    pages = []
+    for payload in (PAYLOAD, HARMLESS):
+        cohort = renamed(found, payload, tmp_path).cohort
+        pages.append(specimen_page(cohort, view_of(cohort, cohort.specimen_names[0])))
+    assert pages[0].count("&lt;script&gt;alert(1)") > 10, "they do stand in the page"
+    assert_alike(*pages)
+
+
 def test_settings_are_shown_as_text(results: Made) -> None:
     """YAML of settings is written by the safe writer, which names no types to build."""
     assert "!!" not in origin(results.study, {}).settings
@@ -176,9 +190,13 @@ def test_only_the_page_vouches_for_markup() -> None:
         for path in (ROOT / "spinepipe").rglob("*.py")
         if vouching.search(path.read_text(encoding="utf-8"))
     }
-    assert users == {"report/page/document.py"}
-    template = (ROOT / "spinepipe/report/page/page.html").read_text()
-    assert not re.search(r"\|\s*safe|autoescape", template)
+    assert users == {
+        "report/page/document.py",
+        "report/specimen_page.py",
+        "report/viewer/figure.py",
+    }
+    for template in (ROOT / "spinepipe/report").rglob("*.html"):
+        assert not re.search(r"\|\s*safe|autoescape", template.read_text("utf-8")), template.name
     scripts = (ROOT / "spinepipe/report/page/page.js.html").read_text()
     assert not re.search(r"innerHTML|outerHTML|document\.write|insertAdjacentHTML|eval\(", scripts)
 

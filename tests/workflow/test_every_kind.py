@@ -37,6 +37,14 @@ def layout(project: Project, kind: str) -> StudyFiles:
     return files_of(*check(project.folder, kind))
 
 
+def test_the_page_of_all_studies_names_each_below_its_question(eight: Project) -> None:
+    """Pages of most were not asked for."""
+    page = eight.path("results/index.html").read_text()
+    assert set(re.findall(r"<b><(?:a|span)[^>]*>(\w+)<", page)) == set(SMALL)
+    assert "8 studies: 1 up to date, 7 not finished" in page
+    assert {kind_of(kind).question for kind in SMALL} <= set(re.findall(">([^<]+)</h2>", page))
+
+
 @pytest.mark.parametrize("kind", SMALL)
 def test_tables_are_as_declared_and_name_their_makers(eight: Project, kind: str) -> None:
     look_at_tables(eight, kind, full=False)
@@ -82,7 +90,7 @@ def look_at_results(project: Project, kind: str, full: bool) -> None:
     files = layout(project, kind)
     assert {name.removeprefix("results/") for name in files.results(full)} <= set(project.files())
     assert not list(project.path(f"results/{kind}").rglob("*.log"))
-    page = project.path(f"{files.folder}/report.html").read_text()
+    page = project.path(files.page()).read_text()
     look_at_page(page, files, full=False)
     if files.adds:
         assert "`make full` makes them" in page

@@ -21,6 +21,13 @@ def outputs_of(place, kind, job):
     return files if len(files) > 1 else {"output": files[job.writes[0]]}
 
 
+def pages_of(place, kind):
+    """Output of the job of a page: it, and where a kind once had it a page that leads there."""
+    once = kind.files.subfolder
+    former = {"former": update(f"{place}/{once}{{page,report|full}}.html")} if once else {}
+    return {"output": update(f"{place}/{{page,report|full}}.html"), **former}
+
+
 def caption_of_figure(wildcards):
     caption = Path(layout(wildcards.study).caption(wildcards.figure))
     return caption.read_text("utf-8") if caption.is_file() else ""
@@ -121,7 +128,7 @@ for kind in PROJECT.kinds:
             outdated(f"{kind}_report", PROJECT.mark_of_page),
             unpack(PROJECT.inputs_of_page),
         output:
-            output=update(f"{place}/{made.files.subfolder}{{page,report|full}}.html"),
+            **pages_of(place, made),
         log:
             f"{LOGS}/{{page}}.log",
         params:

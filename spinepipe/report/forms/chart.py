@@ -18,10 +18,10 @@ from markupsafe import Markup
 from markupsafe import escape as markup_escape
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 
-from spinepipe.report.forms.look import COLORS, Look, look
+from spinepipe.report.forms.look import COLORS, TEXT, Look, look
 
 SVG = "http://www.w3.org/2000/svg"
 GAP = 16.0
@@ -104,7 +104,8 @@ class Chart:
                 kind = "panel legend" if self.keys and index == 0 else "panel"
                 placed.append(
                     f'<svg class="{kind}" x="{x:.0f}" y="{y:.0f}" width="{wide:.0f}" '
-                    f'height="{high:.0f}" viewBox="0 0 {wide:.0f} {high:.0f}">{part}</svg>'
+                    f'height="{high:.0f}" viewBox="0 0 {wide:.0f} {high:.0f}" '
+                    f'style="max-width: {1.4 * wide:.0f}px">{part}</svg>'
                 )
                 x += wide + GAP
             width = max(width, x - GAP)
@@ -130,12 +131,9 @@ class Chart:
         with look():
             size = ((wide + GAP * across) / 72.0, (sum(highs) + GAP * len(lines) + below) / 72.0)
             figure = Figure(figsize=size, layout="constrained", facecolor="white")
-            grid = figure.subplots(len(lines), across, squeeze=False, height_ratios=highs)
-            for spare in grid.ravel():
-                spare.set_visible(False)
+            grid = figure.subfigures(len(lines), across, squeeze=False, height_ratios=highs)
             for row, line in enumerate(lines):
                 for column, index in enumerate(line):
-                    grid[row][column].set_visible(True)
                     _draw(self.panels[index], grid[row][column])
             if self.keys:
                 handles = [key.handle() for key in self.keys]
@@ -164,8 +162,12 @@ class _Message(Panel):
         axes.text(0.0, 0.5, self.message, transform=axes.transAxes, color=COLORS["soft"], wrap=True)
 
 
-def _draw(panel: Panel, axes: Axes) -> None:
-    axes.set_title(panel.title)
+def _draw(panel: Panel, figure: FigureBase) -> None:
+    """A panel alone on a figure or a part of one; its title begins at the left edge."""
+    axes = figure.subplots()
+    if panel.title:
+        style = {"size": TEXT + 1.0, "weight": "bold", "color": COLORS["ink"]}
+        figure.suptitle(panel.title, x=0.0, ha="left", **style)
     axes.set_xlabel(panel.x_label)
     axes.set_ylabel(panel.y_label)
     panel.draw(axes)
@@ -174,7 +176,7 @@ def _draw(panel: Panel, axes: Axes) -> None:
 def _drawn(panel: Panel) -> tuple[Figure, tuple[float, float]]:
     size = (panel.width, panel.height)
     figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), layout="constrained")
-    _draw(panel, figure.subplots())
+    _draw(panel, figure)
     return figure, size
 
 

@@ -66,6 +66,7 @@ class DiscrepancyFiles(StudyFiles):
 
 
 KIND = Kind(
+    question="What is the model missing?",
     settings=Discrepancy,
     files=DiscrepancyFiles,
     checks=(check_discrepancy,),

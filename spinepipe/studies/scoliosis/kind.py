@@ -141,6 +141,7 @@ def _population(expected: Any, place: Mapping[str, str]) -> list[str]:
 
 
 KIND = Kind(
+    question="Scoliosis films",
     settings=Scoliosis,
     files=ScoliosisFiles,
     checks=(check_scoliosis,),

@@ -188,6 +188,7 @@ _ASKED = tuple(
 
 
 KIND = Kind(
+    question="Motion from skin markers",
     settings=Tracking,
     files=TrackingFiles,
     checks=(check_tracking,),

@@ -149,6 +149,7 @@ def _source_and_design(expected: Any, place: Mapping[str, str]) -> list[str]:
 _NO_TASK_OF_ITS_OWN = ignoring("uncertain", "volunteer", "simplified_tasks")
 
 KIND = Kind(
+    question="Loads in daily tasks",
     settings=TrunkLoads,
     files=TrunkFiles,
     checks=(check_trunk,),
