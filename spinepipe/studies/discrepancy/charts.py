@@ -37,7 +37,7 @@ from spinepipe.studies.discrepancy.misfits import model_name, stands_for
 from spinepipe.studies.discrepancy.quantities import UNITS
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import MODELS
-from spinepipe.studies.discrepancy.verdict import EVERY, Conclusion, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, Conclusion, Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import general, load_axis, motion_of, name_at
 from spinepipe.tables import StudyTables
 from spinepipe.units import LOAD_UNITS
@@ -69,6 +69,7 @@ def load_displacement(study: Discrepancy, cohort: Cohort, tables: StudyTables) -
         return saying(title, "No curve: no pose, or no joint is loaded.")
     verdict = read_verdict(tables.files["verdict"])
     words = {"base": model_name(study), "with_effects": f"with {stands_for(verdict)}"}
+    words["with_table"] = "with an empirical curve"
     shown = models_shown(rows)
     panels = []
     for curve in curves:
@@ -85,12 +86,13 @@ def load_displacement(study: Discrepancy, cohort: Cohort, tables: StudyTables) -
                 frame=frame,
                 looks={"measured": MEASURED, **{name: _LINES[name] for name in shown[::-1]}},
                 points=("measured",),
+                high=256.0,
                 x_limits=_with_zero(frame, "x"),
                 y_limits=_with_zero(frame, "y"),
             )
         )
-    keys = [Key(MEASURED, "measured, ±2 SD of the noise")]
-    words["with_table"] = "with an empirical curve"
+    assumed = "" if verdict.noise.source == REPEATS else "assumed "
+    keys = [Key(MEASURED, f"measured, ±2 SD of the {assumed}noise")]
     keys += [Key(_LINES[name], words[name], as_line=True) for name in shown]
     caption = (
         "A model is right where its line stays within the bars; shown is where the "
@@ -133,11 +135,8 @@ def worst_curves(gap: pd.DataFrame) -> list[pd.DataFrame]:
 def models_shown(gap: pd.DataFrame) -> tuple[str, ...]:
     """The models that differ: the base, that with effects, that with a table besides."""
     added = not gap["base"].fillna(0.0).equals(gap["with_effects"].fillna(0.0))
-    return (
-        "base",
-        *["with_effects"] * added,
-        *["with_table"] * bool(gap["with_table"].notna().any()),
-    )
+    tabulated = bool(gap["with_table"].notna().any())
+    return ("base", *["with_effects"] * added, *["with_table"] * tabulated)
 
 
 def _curve_rows(curve: pd.DataFrame, shown: Sequence[str]) -> Iterator[pd.DataFrame]:
@@ -176,67 +175,67 @@ def misfit(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
     """Misfit of both models, pooled in several ways."""
     title, where = "Misfit of the models", tables["where"]
     rows = where[where["gap"].notna() & where["by"].isin(_BY)] if len(where) else where
-    if rows.empty:
-        return saying(title, "No misfit: no model has a pose.")
-    told = stands_for(read_verdict(tables.files["verdict"]))
     frames = {}
-    for by, (heading, words) in _BY.items():
-        own = rows[rows["by"] == by].assign(row=rows[by].map(words))
-        sides = [own[own["model"] == model].set_index("row") for model in MODELS]
+    for by, (heading, words) in _BY.items() if len(rows) else ():
+        own = rows[rows["by"] == by].assign(row=rows[by].map(words)).set_index("row")
+        sides = [_side(own[own["model"] == model], "gap", name) for model, name in _SIDES.items()]
         if len(sides[0]) > 1 or by == "test":
-            ends = [{end: side[f"gap{end}"] for end in ENDS} for side in sides]
-            frames[heading] = _sides(*ends if told else ends[:1])
-    return Chart(title, _compared(frames), _says(study, told))
-
-
-ENDS = ("", "_low", "_high")
-
-
-def _sides(
-    before: Mapping[str, pd.Series], after: Mapping[str, pd.Series] | None = None
-) -> pd.DataFrame:
-    """The largest of many before, and of the same ones after; columns of a `BeforeAfter`."""
-    columns = {f"before{end}": values for end, values in before.items()}
-    columns |= {f"after{end}": values for end, values in (after or {}).items()}
-    frame = pd.DataFrame(columns).reset_index(names="row")
-    kept = frame["before"].nlargest(MOST_ROWS).index if len(frame) > MOST_ROWS else frame.index
-    return frame[frame.index.isin(kept)]
-
-
-def _compared(frames: Mapping[str, pd.DataFrame]) -> list[Panel]:
-    """Panels on one scale; without a model with effects the base alone."""
-    most = max(float(frame.filter(regex="_high$").max().max()) for frame in frames.values())
-    panels: list[Panel] = []
-    for heading, frame in frames.items():
-        how: dict[str, Any] = {"title": heading, "x_label": MISFIT, "x_limits": (0.0, 1.05 * most)}
-        if "after" in frame:
-            panels.append(BeforeAfter(frame=frame, before=BASE, after=MODEL, **how))
-        else:
-            names = {f"before{end}": f"value{end}".removeprefix("value_") for end in ENDS}
-            panels.append(Rows(frame=frame.rename(columns=names), looks={"": BASE}, **how))
-    return panels
-
-
-def _says(study: Discrepancy, told: str, more: str = "0 is noise alone.") -> str:
-    after = f", ● with {told}" if told else ""
-    return f"■ {model_name(study)}{after}; lines: 95 % intervals. {more}"
+            frames[heading] = pd.concat(sides, axis=1)
+    return _compared(title, frames, study, tables)
 
 
 def left_out(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
     """Misfit of both models on each test and specimen that was left out."""
     title, held_out = "Misfit on readings left out of the fit", tables["held_out"]
     rows = held_out[held_out["gap_base"].notna()] if len(held_out) else held_out
-    if rows.empty:
-        return saying(title, "Nothing left out could be predicted.")
-    told = stands_for(read_verdict(tables.files["verdict"]))
     frames = {}
-    for kind, own in rows.groupby("kind", sort=False):
-        own = own.set_index(own["fold"].map(plain if kind == "test" else str))
-        ends = [{end: own[f"gap_{model}{end}"] for end in ENDS} for model in MODELS]
-        frames[f"Left-out {kind}s".replace("stepss", "steps")] = _sides(*ends if told else ends[:1])
+    for kind, own in rows.groupby("kind", sort=False) if len(rows) else ():
+        own = own.set_index(own["fold"].map(plain if kind == "test" else str).rename("row"))
+        sides = [_side(own, f"gap_{model}", name) for model, name in _SIDES.items()]
+        frames[_KINDS[str(kind)]] = pd.concat(sides, axis=1)
     lost = len(held_out) - len(rows)
     more = f"Not shown: {count(lost, 'test')} that the others do not determine." if lost else ""
-    return Chart(title, _compared(frames), _says(study, told, more).strip())
+    return _compared(title, frames, study, tables, more)
+
+
+_SIDES = dict(zip(MODELS, ("before", "after"), strict=True))
+_KINDS = {"test": "Left-out tests", "specimen": "Left-out specimens", "steps": "Left-out steps"}
+ENDS = ("", "_low", "_high")
+_ALONE = {"before": "value", "before_low": "low", "before_high": "high"}
+
+
+def _side(rows: pd.DataFrame, column: str, name: str) -> pd.DataFrame:
+    """A misfit and its interval, named as a `BeforeAfter` has them."""
+    return rows.rename(columns={f"{column}{end}": f"{name}{end}" for end in ENDS})[
+        [f"{name}{end}" for end in ENDS]
+    ]
+
+
+def _compared(
+    title: str,
+    frames: Mapping[str, pd.DataFrame],
+    study: Discrepancy,
+    tables: StudyTables,
+    more: str = "0 is noise alone.",
+) -> Chart:
+    """Panels on one scale, of many rows the largest before; without effects the base alone."""
+    if not frames:
+        return saying(title, "There is no misfit to show.")
+    told = stands_for(read_verdict(tables.files["verdict"]))
+    most = max(float(frame.filter(regex="_high$").max().max()) for frame in frames.values())
+    panels: list[Panel] = []
+    for heading, frame in frames.items():
+        how: dict[str, Any] = {"title": heading, "x_label": MISFIT, "x_limits": (0.0, 1.05 * most)}
+        kept = frame["before"].nlargest(MOST_ROWS).index
+        own = frame[frame.index.isin(kept)].reset_index()
+        if told:
+            panels.append(BeforeAfter(frame=own, before=BASE, after=MODEL, **how))
+        else:
+            alone = own.rename(columns=_ALONE)
+            panels.append(Rows(frame=alone, looks={"": BASE}, **how))
+    after = f", ● with {told}" if told else ""
+    caption = f"■ {model_name(study)}{after}; lines: 95 % intervals. {more}"
+    return Chart(title, panels, caption.strip())
 
 
 def stiffness(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
@@ -314,10 +313,8 @@ def _evidence(verdict: Verdict, candidates: pd.DataFrame) -> Iterator[tuple[str,
         rows = tried[tried["stage"] == stage] if len(tried) else tried
         if len(rows) and not verdict.effects:
             best = rows.groupby("effect")["log_evidence"].max().sort_values(ascending=False)
-            yield (
-                heading,
-                [(size, general(str(name)), number(size, 2)) for name, size in best.items()],
-            )
+            bars = [(size, general(str(name)), number(size, 2)) for name, size in best.items()]
+            yield heading, bars
             return
 
 

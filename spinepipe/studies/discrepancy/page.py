@@ -1,7 +1,7 @@
 """The page of a search for missing effects."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import pandas as pd
 
@@ -17,6 +17,7 @@ from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
     FIELD_NUMBERS,
+    FOLDER,
     GAP,
     HELD_OUT,
     IMPERFECTIONS,
@@ -25,7 +26,7 @@ from spinepipe.studies.discrepancy.tables import (
     TABULATED,
     WHERE,
 )
-from spinepipe.studies.discrepancy.verdict import EVERY, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict import EVERY, Verdict, read_verdict, share_of_gap
 from spinepipe.studies.discrepancy.verdict_unnamed import FormulaTerm
 from spinepipe.studies.discrepancy.words import SET_UP, general, motion_of, readable, what_of
 
@@ -62,9 +63,8 @@ _SHOWN: Mapping[str, tuple[str, str, str]] = {
     ),
     "candidates": (
         "Effects tried",
-        "Each alone beside the base, in its best form: fitted (refit), or linear (screen). The "
-        "share is of the excess of chi squared, the square of the misfit.",
-        "stage effect variant spread log_evidence threshold gap_share status",
+        "Each alone beside the base, in its best form: fitted (refit), or linear (screen).",
+        "stage effect spread log_evidence threshold gap_share status",
     ),
     "imperfections": (
         "Set-up errors",
@@ -91,7 +91,7 @@ _WORDS = {
     "effect": general,
     "kind": lambda name: SET_UP.get(name, plain(name)),
     "component": lambda name: plain(name.removeprefix("tilt_")),
-    "variant": lambda text: ", ".join(_values(json.loads(text))),
+    "gap_share": share_of_gap,
 }
 """How cells are told, by column."""
 
@@ -178,7 +178,7 @@ def _table(title: str, about: str, names: str, rows: Sequence[object]) -> Iterat
     if rows:
         frame = pd.DataFrame(rows, columns=[column.name for column in columns])
         name = title.lower().replace(" ", "-")
-        yield sortable(name, title, about, frame, columns, "verdict.json")
+        yield sortable(name, title, about, frame, columns, f"{FOLDER}verdict.json")
 
 
 def _place(term: FormulaTerm) -> str:
@@ -190,12 +190,6 @@ def _motions(coordinates: Sequence[str]) -> str:
     return "" if tuple(coordinates) == EVERY else listed(map(motion_of, coordinates))
 
 
-def _values(options: Mapping[str, object]) -> Iterator[str]:
-    for value in options.values():
-        every = value if isinstance(value, list) else [value]
-        yield from (motion_of(str(name)) for name in every)
-
-
 def _of_files(results: Results) -> Iterator[Sortable]:
     """Rows of the result files that a reader compares, in plain words."""
     shapes: Mapping[str, Table] = {shape.name: shape for shape in SHAPES}
@@ -203,23 +197,26 @@ def _of_files(results: Results) -> Iterator[Sortable]:
         rows = _chosen(name, results.table(name))
         if rows.empty:
             continue
-        cells = {at: rows[at].map(told) for at, told in _WORDS.items() if at in rows}
+        words = {at: told for at, told in _WORDS.items() if at in rows}
+        cells = {at: rows[at].map(told, na_action="ignore") for at, told in words.items()}
         columns = [shapes[name].column(column) for column in shown.split()]
-        yield sortable(name, title, about, rows.assign(**cells), columns)
+        names = {one.name: one.name.replace("gap", "misfit") for one in columns}
+        rows = rows.assign(**cells).rename(columns=names)
+        columns = [replace(one, name=names[one.name]) for one in columns]
+        yield sortable(name, title, about, rows, columns, f"{FOLDER}{name}.parquet")
 
 
 def _chosen(name: str, rows: pd.DataFrame) -> pd.DataFrame:
     if rows.empty:
         return rows
     if name == "where":
-        above = (rows["by"] != "joint x coordinate x test") | (rows["gap_low"] > 0.0)
-        return rows[(rows["by"] != "step") & above]
+        return rows[rows["by"] != "step"]
     if name == "field_numbers":
         return rows[rows["specimen"] == EVERY[0]]
     if name == "tabulated":
         return rows[(rows["specimen"] == EVERY[0]) & (rows["motion"] != 0.0)]
     if name == "imperfections":
-        own = rows[rows["model"] == MODELS[1]]
+        own = rows[(rows["model"] == MODELS[1]) & (rows["places"] == 1)]
         return own.loc[own["in_prior_sds"].abs().sort_values(ascending=False).index].head(20)
     if name == "candidates":
         first = rows[rows["log_evidence"].notna() & rows["stage"].isin(("refit 1", "screen 1"))]

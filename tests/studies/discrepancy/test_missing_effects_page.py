@@ -436,7 +436,8 @@ def test_the_key_figure_shows_where_a_load_drives_what_it_should_not(root: Path)
 def test_files_of_tables_are_there(root: Path) -> None:
     for answer in VERDICTS:
         _, _, _, shown = made(root, Case(answer, ""))
-        known = {f"{table.name}.parquet" for table in KIND.tables} | {"verdict.json"}
+        names = [f"{table.name}.parquet" for table in KIND.tables]
+        known = {f"{KIND.files.subfolder}{name}" for name in (*names, "verdict.json")}
         assert {table.file for table in shown.tables} <= known
         assert len({table.name for table in shown.tables}) == len(shown.tables)
 
