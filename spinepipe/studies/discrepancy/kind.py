@@ -7,7 +7,6 @@ from spinepipe.schema import all_declared
 from spinepipe.studies.base_checks import BaseCheck
 from spinepipe.studies.discrepancy.checks import check_discrepancy
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.tables import FOLDER
 from spinepipe.studies.kind import Job, Kind
 from spinepipe.studies.study_files import Figure, StudyFiles
 
@@ -22,7 +21,7 @@ OTHERS = (VERDICT, "design.csv", "model_base.yaml", "model_with_effects.yaml")
 class DiscrepancyFiles(StudyFiles):
     """The result files of one search for missing effects."""
 
-    subfolder = FOLDER
+    subfolder = "discrepancy/"
     told_in_report = (VERDICT,)
     drawings = (
         Figure(

@@ -17,7 +17,6 @@ from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
     FIELD_NUMBERS,
-    FOLDER,
     GAP,
     HELD_OUT,
     IMPERFECTIONS,
@@ -29,6 +28,9 @@ from spinepipe.studies.discrepancy.tables import (
 from spinepipe.studies.discrepancy.verdict import EVERY, Verdict, read_verdict, share_of_gap
 from spinepipe.studies.discrepancy.verdict_unnamed import FormulaTerm
 from spinepipe.studies.discrepancy.words import SET_UP, general, motion_of, readable, what_of
+
+FOLDER = "discrepancy/"
+"""Where the result files are, from the page."""
 
 SHAPES = (
     *(GAP, WHERE, CANDIDATES, HELD_OUT, IMPERFECTIONS),

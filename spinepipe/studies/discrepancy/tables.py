@@ -12,9 +12,6 @@ NEXT_TESTS = declared(__file__, "next_tests")
 FIELD_NUMBERS = declared(__file__, "field_numbers")
 TABULATED = declared(__file__, "tabulated")
 
-FOLDER = "discrepancy/"
-"""Where all results but the page are, below the folder of the study."""
-
 MODELS = WHERE.column("model").allowed
 """The two models that are compared; without a named effect they are the same."""
 
