@@ -125,11 +125,6 @@ class Expected:
             *self._of_results(files.tables, full),
             *map(self.of_figure, drawn),
             *self._of_results(files.told_in_report, full),
-            *(
-                path.read_text("utf-8")
-                for name in drawn
-                if (path := Path(self.root, files.caption(name))).is_file()
-            ),
         ]
         return report_digest(page, self.study, self.cohort, read)
 

@@ -172,7 +172,6 @@ class Project:
         return {
             "tables": files.table_files(files.tables, full),
             "figures": [f"{files.folder}/figures/{figure}.svg" for figure in drawn],
-            "captions": [path for path in map(files.caption, drawn) if Path(path).is_file()],
             **files.other_files(files.told_in_report),
         }
 

@@ -5,8 +5,6 @@ says nothing that the tables and their code do not, so no digest holds it and no
 """
 
 import os
-from collections.abc import Collection
-from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
@@ -20,9 +18,7 @@ from spinepipe.marks import KEY, write_marked
 from spinepipe.report.conclusions import rows_of
 from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.comparison import AGAINST, comparison, paper_of
-from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.page.study_page import Results
-from spinepipe.report.words import listed
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
@@ -44,12 +40,11 @@ def run(
     page: str,
     tables: list[str],
     figures: list[str],
-    captions: list[str],
     output: str,
     former: str = "",
     **others: str,
 ) -> None:
-    """Write a page from the files of all tables, pictures (SVG), captions and ``others``.
+    """Write a page from the files of all tables, figures (SVG) and ``others``.
 
     Parameters
     ----------
@@ -59,19 +54,8 @@ def run(
     settings, cohort = study_of(root, study)
     kind_page = import_module(f"{PACKAGE}.{settings.kind}.page")
     read = [mark_of(path) for path in [*tables, *figures, *others.values()]]
-    read += [_text(path) for path in captions]
     digest = report_digest(page, settings, cohort, read)
-    if hasattr(kind_page, "page"):
-        _write_page(kind_page, settings, cohort, page, tables, figures, output, others, digest)
-    else:
-        titles = {figure.name: figure.title for figure in kind_of(settings.kind).figures}
-        results = results_of(kind_page.READ, titles, tables, figures, captions, others)
-        document = kind_page.document(settings, cohort, results)
-        added = files_of(settings, cohort).adds
-        if page == "report" and added:
-            more = f"{listed(added)} (`make full` makes them and the page full.html)"
-            document = replace(document, left_out=(*document.left_out, more))
-        write_marked(document.html(settings, cohort), output, digest)
+    _write_page(kind_page, settings, cohort, page, tables, figures, output, others, digest)
     if former:
         address = Path(os.path.relpath(output, Path(former).parent)).as_posix()
         write_marked(_LEADING.format(address=address), former, digest)
@@ -109,7 +93,9 @@ def _write_page(
             write_marked(
                 comparison(shape, title, rows, study), folder / f"{shape.name}.html", digest
             )
-    write_marked(made.html(study, cohort, results, papers=papers, date=date), output, digest)
+    subfolder = kind_of(study.kind).files.subfolder
+    html = made.html(study, cohort, results, papers=papers, date=date, folder=subfolder)
+    write_marked(html, output, digest)
     if page == "report":
         metadata = {"study": study.study, "kind": study.kind, KEY: digest}
         told = from_rows(CONCLUSIONS, rows_of(made.told))
@@ -126,27 +112,6 @@ def descriptor_of(study: Study, cohort: Cohort, folder: Path) -> str:
     ]
     title = f"Results of the study {study.study} ({study.kind}) of the cohort {cohort.name}"
     return descriptor(study.study, title, shapes)
-
-
-def results_of(
-    read: Collection[str],
-    titles: dict[str, str],
-    tables: list[str],
-    figures: list[str],
-    captions: list[str],
-    others: dict[str, str],
-) -> ResultTables:
-    """Rows of the tables named in ``read``, where all tables come from, and pictures."""
-    words = {Path(path).stem: _text(path) for path in captions}
-    drawn = {Path(path).stem: _text(path) for path in figures}
-    return ResultTables(
-        tables=StudyTables.read([path for path in tables if Path(path).stem in read], others),
-        metadata={Path(path).stem: read_metadata(path) for path in tables},
-        pictures={
-            name: Picture.of(name, titles[name], svg, " ".join(words[name].split()))
-            for name, svg in drawn.items()
-        },
-    )
 
 
 def _text(path: str) -> str:

@@ -26,7 +26,7 @@ class Figure:
 
     Attributes
     ----------
-    name : of its files; its caption is ``figures/<name>.rst`` in the folder of the kind.
+    name : of its files.
     title : above it on the report's page.
     at : ``file:function`` in the folder of the kind; called with study, cohort and tables.
     reads : the tables it is drawn from; a name with a dot is another result file.
@@ -142,10 +142,6 @@ class StudyFiles(ABC):
     def other_files(self, names: tuple[str, ...]) -> dict[str, str]:
         """Files that are no tables (a name with a dot), by their names without the ending."""
         return {name.partition(".")[0]: f"{self.folder}/{name}" for name in names if "." in name}
-
-    def caption(self, figure: str) -> str:
-        """The file of what is said below a figure."""
-        return f"spinepipe/studies/{self.study.kind}/figures/{figure}.rst"
 
     def read_by_figure(self, name: str) -> list[str]:
         """What a figure is drawn from: of what it names, what the study has."""

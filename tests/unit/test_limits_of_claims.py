@@ -10,13 +10,13 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from spinepipe.report.page.document import judged as told
 from sweeps import sweep
 
 from papers.engine import Claim, Evidence, claims_of, judge
 from papers.ranges import Limit, Range, factor_of_two
 from papers.run import Computed, NotComputed, StudyRun
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import judged as told
 from spinepipe.studies.tracking.tables import AGAINST_WANG_2021
 from tests.validation import comparisons
 

@@ -19,9 +19,9 @@ import pytest
 from made_pages import SVG
 from small_project import Project
 from small_studies import SMALL
+from spinepipe.report.page.document import Picture
 
 from spinepipe.jobs.report import results_of
-from spinepipe.report.page.document import Picture
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study_files import StudyFiles

@@ -28,11 +28,6 @@ def pages_of(place, kind):
     return {"output": update(f"{place}/{{page,report|full}}.html"), **former}
 
 
-def caption_of_figure(wildcards):
-    caption = Path(layout(wildcards.study).caption(wildcards.figure))
-    return caption.read_text("utf-8") if caption.is_file() else ""
-
-
 # One set of rules for each kind of study that has a study file: their patterns name the studies, so
 # that a file is tried against the rules of its own kind alone.
 for kind in PROJECT.kinds:
@@ -117,7 +112,6 @@ for kind in PROJECT.kinds:
                 f"{LOGS}/figure_{{figure}}.log",
             params:
                 digest=PROJECT.mark_of_figure,
-                caption=caption_of_figure,
             run:
                 run_job(DRAW, rule, wildcards, input, output, params, log)
 

@@ -96,13 +96,14 @@ class Page:
         *,
         papers: Mapping[str, str] | None = None,
         date: str = "",
+        folder: str = "",
     ) -> str:
         """The page. It loads nothing from the network, and the same results make the same bytes.
 
         Parameters
         ----------
         papers : pages of comparisons with papers, by file, with the words of the link.
-        date : of the results.
+        date : of the results. folder : of tables and figures as the page reaches it, with a slash.
         """
         findings, lights = self.at("finding"), self.at("light")
         drawings = dict(results.drawings)
@@ -133,6 +134,7 @@ class Page:
             "methods": self.at("methods"),
             "origin": run,
             "date": date,
+            "folder": folder,
             "left_out": self.left_out,
             "source": cohort.source,
             "papers": (papers or {}).items(),
