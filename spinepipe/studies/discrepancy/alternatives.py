@@ -12,6 +12,7 @@ from spinepipe.studies.discrepancy.misfits import (
     WITH_EFFECTS,
     bare,
     change_of_misfit,
+    largest,
     place_of_most,
 )
 from spinepipe.studies.discrepancy.quantities import UNITS
@@ -60,16 +61,16 @@ def alternatives(verdict: Verdict, margin: float, candidates: pd.DataFrame) -> I
         names = {"effect": name_at(first.name, first.scope.coordinates)}
         yield Conclusion("alternatives", "alone", names=names)
     if verdict.verdict is Ended.SET:
-        first, *others = sorted(verdict.in_set, key=lambda one: (one.behind is None, one.behind))
-        second = next((one for one in others if one.name != first.name), first)
+        best, *others = sorted(verdict.in_set, key=lambda one: (one.behind is None, one.behind))
+        other = next((one for one in others if one.name != best.name), best)
         names = {
-            "first": name_at(first.name, first.coordinates),
-            "second": name_at(second.name, second.coordinates),
+            "first": name_at(best.name, best.coordinates),
+            "second": name_at(other.name, other.coordinates),
         }
-        if second.behind is None or first.behind is None:
+        if other.behind is None or best.behind is None:
             yield Conclusion("alternatives", "set_silent", names=names)
         else:
-            lead = Value(second.behind - first.behind, source="verdict: candidates, behind")
+            lead = Value(other.behind - best.behind, source="verdict: candidates, behind")
             yield Conclusion("alternatives", "set", {"margin": lead, "needed": needed}, names)
     if verdict.reason is Reason.NO_KNOWN_EFFECT:
         yield from _nearest(verdict, candidates)
@@ -81,7 +82,7 @@ def _nearest(verdict: Verdict, candidates: pd.DataFrame) -> Iterator[Conclusion]
     tried = candidates[candidates["stage"] == "refit 1"] if len(candidates) else candidates
     if threshold is None or tried.empty or not tried["log_evidence"].max() > threshold:
         return
-    best = tried.loc[tried["log_evidence"].idxmax()]
+    best = largest(tried, tried["log_evidence"])
     values = {
         "evidence": Value(float(best["log_evidence"]), source="candidates: refit 1"),
         "threshold": Value(threshold, source="verdict: threshold"),
@@ -103,7 +104,7 @@ def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterato
         )
         names = {"shape": shape_in_words(shape or "")}
         yield Conclusion("shape", "seen" if shape else "unseen", names=names)
-    formula, table = told and told.formula, verdict.tabulated
+    formula, table = None if told is None else told.formula, verdict.tabulated
     if table is not None:
         values = {"after": Value(table.gap, NOISE, source="verdict: tabulated")}
         laws = readable(table.place).split("; ")

@@ -117,7 +117,8 @@ def worst_curves(gap: pd.DataFrame) -> list[pd.DataFrame]:
     """
     loads = driven_coordinates(gap)
     keys = list(zip(gap["test"], gap["joint"], strict=True))
-    rows = gap.assign(driven=[loads.get(key) for key in keys]).dropna(subset="driven")
+    rows = gap.assign(driven=[loads.get(key, "") for key in keys])
+    rows = rows[rows["driven"] != ""]
     at = ["specimen", "test", "step", "joint"]
     drives = rows[rows["coordinate"] == rows["driven"]].set_index(at)["load"].rename("drive")
     rows = rows.join(drives, on=at).dropna(subset="drive")

@@ -24,6 +24,7 @@ from spinepipe.studies.discrepancy.misfits import (
     SMALL,
     WITH_EFFECTS,
     bare,
+    largest,
     misfit,
     model_name,
     place_of_most,
@@ -159,41 +160,41 @@ def _by_test(verdict: Verdict, model: str, where: pd.DataFrame) -> Iterator[Conc
         return
     names = {"model": model, "effects": stands_for(verdict)}
     if not names["effects"]:
-        most = before.loc[before["gap"].idxmax()]
+        most = largest(before, before["gap"])
         names["test"] = plain(str(most.name))
         told = "base" if (before["gap_low"] > SMALL).any() else "within"
         yield Conclusion("by_test", told, {"before": bare(sized(most))}, names)
         return
-    change = (after["gap"] - before["gap"]).dropna()
-    falls = change.index[after["gap"][change.index] < before["gap_low"][change.index]]
-    rises = change.index[after["gap"][change.index] > before["gap_high"][change.index]]
-    told = "all" if len(falls) == len(change) else "some" if len(falls) else "none"
-    told = "one" if told == "all" and len(change) == 1 else told
-    told = "worse" if len(rises) else "single" if told == "some" and len(falls) == 1 else told
-    most_at = change.idxmax() if len(rises) else change.idxmin()
+    both = before.join(after["gap"].rename("then"), how="inner").dropna(subset="then")
+    falls, rises = both["then"] < both["gap_low"], both["then"] > both["gap_high"]
+    tests, fallen, risen = len(both), int(falls.sum()), int(rises.sum())
+    told = "none" if not fallen else "single" if fallen == 1 else "some"
+    told = "worse" if risen else ("one" if tests == 1 else "all") if fallen == tests else told
+    most = largest(both, both["then"] - both["gap"] if risen else both["gap"] - both["then"])
     how = "where: gap by test"
     values = {
-        "before": bare(sized(before.loc[most_at])),
-        "after": bare(sized(after.loc[most_at])),
-        "fall": Value(abs(float(change[most_at])), NOISE, source=how),
-        "fallen": Value(len(falls), source=how),
-        "risen": Value(len(rises), source=how),
-        "tests": Value(len(change), source=how),
+        "before": Value(float(most["gap"]), NOISE, source=how),
+        "after": Value(float(most["then"]), NOISE, source=how),
+        "fall": Value(float(most["gap"] - most["then"]), NOISE, source=how),
+        "fallen": Value(fallen, source=how),
+        "risen": Value(risen, source=how),
+        "tests": Value(tests, source=how),
     }
-    yield Conclusion("by_test", told, values, {**names, "test": plain(str(most_at))})
+    yield Conclusion("by_test", told, values, {**names, "test": plain(str(most.name))})
 
 
 def _stiffness(numbers: pd.DataFrame, model: str) -> Iterator[Conclusion]:
     """Stiffness at rest and under load, mean of the specimens."""
     rows = stiffness_at_rest_and_loaded(numbers)
-    means = rows[rows["specimen"] == EVERY[0]].set_index("model") if len(rows) else rows
-    if not {BASE, WITH_EFFECTS} <= set(means.index):
+    means = rows[rows["specimen"] == EVERY[0]] if len(rows) else rows
+    models = {str(row["model"]): row for _, row in means.iterrows()}
+    if not {BASE, WITH_EFFECTS} <= models.keys():
         return
-    row = means.loc[WITH_EFFECTS]
+    row = models[WITH_EFFECTS]
     values = {
         "rest": _slope(row, "rest"),
         "loaded": _slope(row, "loaded"),
-        "base": _slope(means.loc[BASE], "loaded"),
+        "base": _slope(models[BASE], "loaded"),
         "load": Value(float(row["load"]), LOAD_UNITS[row["coordinate"]], source="field_numbers"),
     }
     rest, loaded = values["rest"], values["loaded"]
@@ -213,9 +214,9 @@ def _slope(row: pd.Series, at: str) -> Value:
     """Stiffness ``rest`` or ``loaded`` of a row."""
     unit, factor = UNITS.get(row["unit"], (row["unit"], 1.0))
     size, *ends = (row[f"{at}{end}"] for end in ("", "_low", "_high"))
-    known = [None if pd.isna(end) else factor * float(end) for end in ends]
+    low, high = (None if pd.isna(end) else factor * float(end) for end in ends)
     how = f"field_numbers: {row['number']}, {at}, mean of specimens"
-    return Value(factor * float(size), unit, *known, int(row["specimens"]), how)
+    return Value(factor * float(size), unit, low, high, int(row["specimens"]), how)
 
 
 def _carries_over(

@@ -67,14 +67,14 @@ def stiffness_at_rest_and_loaded(numbers: pd.DataFrame) -> pd.DataFrame:
     means = means[(means["loaded"] > 0.0) & (means["rest"] > 0.0)]
     if means.empty:
         return means
-    change = np.log(means["loaded"] / means["rest"]).abs()
-    best = means.loc[change.idxmax()]
+    change = np.abs(np.log((means["loaded"] / means["rest"]).to_numpy(float)))
+    best = means.iloc[int(change.argmax())]
     keys = ["joint", "coordinate", "side"]
     same = means[means["coordinate"] == best["coordinate"]]
     alike = same["loaded"].round(6) == round(best["loaded"], 6)
     joints = same[alike & (same["side"] == best["side"])]
     sides = same[alike & (same["joint"] == best["joint"])]
-    found = rows[(rows[keys] == best[keys]).all(axis=1)]
+    chosen = rows[(rows[keys] == best[keys]).all(axis=1)]
     every = len(joints) > 1 and len(joints) == same["joint"].nunique()
-    both = {"side": motion_of(best["coordinate"])} if len(sides) > 1 else {}
-    return found.assign(every=every, **both)
+    told = motion_of(best["coordinate"]) if len(sides) > 1 else best["side"]
+    return chosen.assign(every=every, side=told)

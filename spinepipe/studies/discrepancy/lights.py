@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.page.study_page import Results
 from spinepipe.report.words import count, level, listed, plain
-from spinepipe.studies.discrepancy.misfits import LARGE, SMALL, WITH_EFFECTS, bare
+from spinepipe.studies.discrepancy.misfits import LARGE, SMALL, WITH_EFFECTS, bare, largest
 from spinepipe.studies.discrepancy.quantities import quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, Verdict
@@ -128,7 +128,7 @@ def _set_up(verdict: Verdict, imperfections: pd.DataFrame) -> Iterator[Conclusio
     common = rows[rows["common"]]
     if len(beyond) or len(common):
         rows = beyond if len(beyond) else common
-        row = rows.loc[rows["in_prior_sds"].abs().idxmax()]
+        row = largest(rows, rows["in_prior_sds"].abs())
         values = _sizes(row) | {"beyond": Value(len(beyond), source="imperfections: in_prior_sds")}
         yield Conclusion("set_up", "stop" if len(beyond) else "check", values, _place(row))
     elif taken.gap_without is None:

@@ -5,6 +5,7 @@ Misfit is the root of chi2 / dof - 1 (the column ``gap`` of results), in SDs of 
 
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 
 from spinepipe.report.conclusions import Value
@@ -47,6 +48,11 @@ def misfit(where: pd.DataFrame, model: str) -> Value | None:
     return None if rows.empty else sized(rows.iloc[0])
 
 
+def largest(rows: pd.DataFrame, sizes: pd.Series) -> pd.Series:
+    """The row with the largest of these sizes."""
+    return rows.iloc[int(np.nanargmax(sizes.to_numpy(float)))]
+
+
 def sized(row: pd.Series) -> Value:
     """That of one row."""
     how = f"where: gap by {row['by']}, {row['model']}"
@@ -82,7 +88,7 @@ def place_of_most(
     single = rows[(rows["by"] == "joint x coordinate x test") & (rows["gap_low"] > 0.0)]
     single = single if len(single) else rows[rows["by"] == "coordinate"]
     single = single if len(single) else rows
-    row = single.loc[single["gap"].idxmax()]
+    row = largest(single, single["gap"])
     motion = motion_of(row["coordinate"]) if row["coordinate"] != EVERY[0] else "all motions"
     driven = driven_coordinates(gap) if len(gap) else {}
     if driven.get((row["test"], row["joint"]), row["coordinate"]) != row["coordinate"]:

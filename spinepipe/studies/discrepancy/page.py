@@ -1,7 +1,8 @@
 """The page of a search for missing effects."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import pandas as pd
 
@@ -86,7 +87,7 @@ _SHOWN: Mapping[str, tuple[str, str, str]] = {
 }
 """Of each table its title, what is said of it, and the columns that a reader compares."""
 
-_WORDS = {
+_WORDS: Mapping[str, Callable[[Any], object]] = {
     **dict.fromkeys(("test", "fold", "model", "number", "stage", "status"), plain),
     **dict.fromkeys(("effect_or_pair", "message", "joint"), readable),
     **dict.fromkeys(("coordinate", "over"), motion_of),
@@ -138,7 +139,7 @@ def _of_verdict(verdict: Verdict) -> Iterator[Sortable]:
         "Effects that these tests cannot distinguish from the likeliest, and those next to what "
         "is named.",
         "effect acts_in log_units_behind*",
-        tied + rivals,
+        [*tied, *rivals],
     )
     yield from _table(
         "What these tests cannot show",

@@ -73,13 +73,14 @@ class _Way:
     falls: bool = False
 
     def told(self, one: Estimate) -> Value | None:
-        ends = [None if end is None else self.of(end) for end in one.ci95]
-        low, high = (end if end is not None and isfinite(end) else None for end in ends)
-        value = self.of(one.value)
-        if not isfinite(value):
-            return None
-        ends = [high, low] if self.falls else [low, high]
-        return Value(value, self.unit, *ends, source="verdict: effects, by profile likelihood")
+        value, told = (
+            self.of(one.value),
+            [None if end is None else self.of(end) for end in one.ci95],
+        )
+        low, high = (end if end is not None and isfinite(end) else None for end in told)
+        low, high = (high, low) if self.falls else (low, high)
+        how = "verdict: effects, by profile likelihood"
+        return Value(value, self.unit, low, high, source=how) if isfinite(value) else None
 
 
 def quantities(effect: Missing) -> list[Quantity]:
