@@ -403,7 +403,7 @@ def _held_out(wide: bool, named: bool) -> Rows:
         }
         rows.append(
             {
-                "fold": f"{kind} {name}",
+                "fold": name,
                 "kind": kind,
                 "readings": 216,
                 **{f"rms_{model}": value for model, value in rms.items()},

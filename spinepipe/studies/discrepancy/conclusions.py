@@ -151,21 +151,26 @@ def _power(verdict: Verdict) -> Iterator[Conclusion]:
     yield Conclusion("power", "easiest", {"value": first}, {**names, "effect": easy})
 
 
+def _compared_tests(where: pd.DataFrame) -> pd.DataFrame:
+    """By test the base's misfit, and in the column ``then`` that with effects."""
+    rows = where[(where["by"] == "test") & where["gap"].notna()]
+    before, after = (rows[rows["model"] == name].set_index("test") for name in MODELS)
+    return before.join(after["gap"].rename("then"), how="inner").dropna(subset="then")
+
+
 def _by_test(verdict: Verdict, model: str, where: pd.DataFrame) -> Iterator[Conclusion]:
     if where.empty:
         return
-    rows = where[(where["by"] == "test") & where["gap"].notna()]
-    before, after = (rows[rows["model"] == name].set_index("test") for name in MODELS)
-    if before.empty:
+    both = _compared_tests(where)
+    if both.empty:
         return
     names = {"model": model, "effects": stands_for(verdict)}
     if not names["effects"]:
-        most = largest(before, before["gap"])
+        most = largest(both, both["gap"])
         names["test"] = plain(str(most.name))
-        told = "base" if (before["gap_low"] > SMALL).any() else "within"
+        told = "base" if (both["gap_low"] > SMALL).any() else "within"
         yield Conclusion("by_test", told, {"before": bare(sized(most))}, names)
         return
-    both = before.join(after["gap"].rename("then"), how="inner").dropna(subset="then")
     falls, rises = both["then"] < both["gap_low"], both["then"] > both["gap_high"]
     tests, fallen, risen = len(both), int(falls.sum()), int(rises.sum())
     told = "none" if not fallen else "single" if fallen == 1 else "some"
@@ -225,7 +230,8 @@ def _carries_over(
     """Whether what the fit gains shows in left-out tests and specimens, or halves of their steps.
 
     It does in a kind of fold where the misfit of all together falls, that of one fold at least
-    below its interval before, and none is worse by more than noise makes.
+    below its interval before, and none is worse by more than noise makes; of tests the one that
+    gains most in the fit must be among those that fall.
     """
     if not stands_for(verdict):
         return
@@ -233,7 +239,6 @@ def _carries_over(
     if scored.empty:
         yield Conclusion("carries", "untold")
         return
-    better = scored["gap_with_effects"] < scored["gap_base_low"]
     tests, every = held_out[held_out["kind"] == "test"], where[where["by"] == "all"]
     values = {
         "folds": Value(len(scored), source="held_out: rows with a score"),
@@ -241,18 +246,20 @@ def _carries_over(
         "scored": Value(int(tests["readings"].sum()), source="held_out: readings of tests"),
         "readings": Value(int(every["readings"].max()), source="where: readings"),
     }
-    good = []
+    better = scored[scored["gap_with_effects"] < scored["gap_base_low"]]
+    gains, good = _compared_tests(where), []
+    most = str(largest(gains, gains["gap"] - gains["then"]).name) if len(gains) else ""
     for one in verdict.left_out:
-        if one.gap_closed is None:
+        falls = better[better["kind"] == one.kind]
+        own = scored[scored["kind"] == one.kind]
+        shown = one.kind != "test" or most in set(falls["fold"])
+        if one.gap_closed is None or falls.empty or own["worse"].any() or not shown:
             continue
-        change = Value(
-            -100.0 * one.gap_closed, "%", n=one.folds, source=f"verdict: left_out, {one.kind}"
-        )
-        values[one.kind] = change
-        yield Conclusion("left_out", one.kind, {"value": change})
-        own = scored["kind"] == one.kind
-        if change.number < 0.0 and better[own].any() and not scored["worse"][own].any():
+        how = f"verdict: left_out, {one.kind}"
+        values[one.kind] = change = Value(-100.0 * one.gap_closed, "%", n=one.folds, source=how)
+        if change.number < 0.0:
             good.append(one.kind)
+            yield Conclusion("left_out", one.kind, {"value": change})
     told = "both" if {"test", "specimen"} <= set(good) else good[0] if good else "nowhere"
     told = "worse" if scored["worse"].any() else told
     yield Conclusion("carries", told, values, {"effects": stands_for(verdict)})
