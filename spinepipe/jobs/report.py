@@ -90,9 +90,8 @@ def _write_page(
         rows = results.table(shape.name)
         if shape.name.startswith(AGAINST) and len(rows):
             papers[f"{shape.name}.html"] = title = f"Beside {paper_of(shape.name)}"
-            write_marked(
-                comparison(shape, title, rows, study), folder / f"{shape.name}.html", digest
-            )
+            beside = comparison(shape, title, rows, study, cohort)
+            write_marked(beside, folder / f"{shape.name}.html", digest)
     subfolder = kind_of(study.kind).files.subfolder
     html = made.html(study, cohort, results, papers=papers, date=date, folder=subfolder)
     write_marked(html, output, digest)

@@ -7,6 +7,7 @@ for papers, all panels stand in a grid.
 
 import io
 import re
+import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -149,17 +150,26 @@ def saying(title: str, message: str) -> Chart:
     return Chart(title, [_Message(message=message)], message)
 
 
+_LETTERS = 40
+"""In a line of a message."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Message(Panel):
     message: str
 
     @property
+    def lines(self) -> list[str]:
+        return textwrap.wrap(self.message, _LETTERS)
+
+    @property
     def height(self) -> float:
-        return 24.0
+        return 8.0 + 16.0 * len(self.lines)
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        axes.text(0.0, 0.5, self.message, transform=axes.transAxes, color=COLORS["soft"], wrap=True)
+        text = axes.text(0.0, 0.5, "\n".join(self.lines), transform=axes.transAxes, va="center")
+        text.set(color=COLORS["soft"], in_layout=False)  # it is wider than the axes
 
 
 def _draw(panel: Panel, figure: FigureBase) -> None:
@@ -254,13 +264,14 @@ class Drawing:
 
     Attributes
     ----------
-    panels : SVG elements.
+    panels : SVG elements. least_px : narrower than this text of a panel is too small.
     """
 
     name: str
     title: str
     caption: str
     panels: tuple[str, ...]
+    least_px: int = 260
 
     @classmethod
     def read(cls, name: str, svg: str) -> "Drawing":
@@ -270,13 +281,15 @@ class Drawing:
         root = ElementTree.fromstring(svg)
         title = root.findtext(f"{{{SVG}}}title", "")
         caption = root.findtext(f"{{{SVG}}}desc", "")
-        panels = []
+        panels, widest = [], 0.0
         for child in root.findall(f"{{{SVG}}}svg"):
             for place in ("x", "y"):
                 child.attrib.pop(place, None)
+            if "legend" not in child.attrib["class"]:
+                widest = max(widest, float(child.attrib["width"]))
             text = ElementTree.tostring(child, encoding="unicode")
             panels.append(_own_ids(_with_variables(text), f"{name}-"))
-        return cls(name, title, caption, tuple(panels))
+        return cls(name, title, caption, tuple(panels), round(0.9 * widest))
 
     def labelled(self, says: str) -> list[Markup]:
         """The panels as elements of a page; a reader who cannot see them is told ``says``."""

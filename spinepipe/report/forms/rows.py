@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from spinepipe.report.forms.axes import log_ticks
 from spinepipe.report.forms.chart import Panel
@@ -55,7 +56,7 @@ class Rows(Panel):
     @property
     def height(self) -> float:
         """By the number of rows, and of series in a row."""
-        row = max(ROW, 7.5 * len(self.series) + 5.0)
+        row = max(ROW, 7.5 * max(map(len, self._series_of_rows().values())) + 5.0)
         return (
             row * len(self.names)
             + ABOVE_AND_BELOW
@@ -73,29 +74,43 @@ class Rows(Panel):
             dict.fromkeys(self.frame["series"])
         )
 
+    def _series_of_rows(self) -> dict[str, list[str]]:
+        """Series that each row has: these alone share its height."""
+        if "series" not in self.frame:
+            return {name: [""] for name in self.names}
+        rows = self.frame.groupby(self.frame["row"].astype(str), sort=False)["series"]
+        return {str(name): [one for one in self.series if one in set(own)] for name, own in rows}
+
     def draw(self, axes: Axes) -> None:
         """Symbols, intervals, notes and marks."""
-        names, series = self.names, self.series
+        names, series, of_rows = self.names, self.series, self._series_of_rows()
         if self.log:
             axes.set_xscale("log")
         if self.x_limits:
             axes.set_xlim(*self.x_limits)
-        for place, words in self.marks.items():
-            axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
-            _small(axes, place, 1.0, words, "bottom", "center")
         for number, one in enumerate(series):
             rows = self.frame if one == "" else self.frame[self.frame["series"] == one]
             look = self.looks.get(one, SEVERAL[number % len(SEVERAL)])
-            shift = _WITHIN * (number + 0.5) / len(series) - 0.5 * _WITHIN
-            y = np.array([names.index(str(name)) for name in rows["row"]]) + shift
+            own = [(names.index(name), of_rows[name]) for name in rows["row"].astype(str)]
+            y = np.array(
+                [
+                    at + _WITHIN * ((in_row.index(one) + 0.5) / len(in_row) - 0.5)
+                    for at, in_row in own
+                ]
+            )
             self._draw_series(axes, rows, y, look)
+        for place, words in self.marks.items():  # alone on a logarithmic axis it has no limits
+            axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
+            _small(axes, place, 1.0, words, "bottom", "center")
         axes.set_ylim(len(names) - 0.45, -0.55)
         axes.set_yticks(range(len(names)), [short(name, self.letters) for name in names])
         axes.tick_params(axis="y", colors=COLORS["ink"])
         axes.grid(axis="y", visible=False)
         axes.spines["left"].set_visible(False)
-        if self.log and not self.x_limits:
+        if self.log:
             log_ticks(axes.xaxis, *axes.get_xlim())
+        else:  # as many ticks whatever the width, which the layout is still to find
+            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         if "note" in self.frame:
             told = self.frame.drop_duplicates("row").set_index("row")["note"]
             for place, name in enumerate(names):

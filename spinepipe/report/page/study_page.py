@@ -124,6 +124,7 @@ class Page:
             "depends": self.at("depends"),
             "key_figure": key_figure,
             "findings": findings[:MOST_FINDINGS],
+            "first": {one.figure: n for n, one in reversed([*enumerate(findings, 1)])},
             "others": findings[MOST_FINDINGS:],
             "drawings": drawings,
             "further": [one for name, one in drawings.items() if name not in used],

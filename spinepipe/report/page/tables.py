@@ -1,7 +1,7 @@
-"""Tables of a page: rows of result files with headings, and a paper's numbers beside ours."""
+"""Tables of a page: rows of result files with headings."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -61,7 +61,6 @@ class Sortable:
     title, about : above the table: its heading, and what its rows are.
     note : how many rows were left out, or nothing. file : beside the page, that has all rows, for a
         link; empty where none has.
-    folded : whether its rows are hidden until a reader asks for them.
     """
 
     name: str
@@ -71,7 +70,6 @@ class Sortable:
     rows: tuple[tuple[Cell, ...], ...]
     note: str
     file: str
-    folded: bool = False
 
 
 def sortable(
@@ -141,8 +139,7 @@ def _cell(value: Any, column: Column) -> Cell:
 def page_tables(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]:
     """A result table as a page has it.
 
-    None without rows; two, see `beside_paper`, of a table ``against_*``, which sets a paper's
-    numbers beside ours; else one.
+    None without rows, else one.
 
     Parameters
     ----------
@@ -150,92 +147,5 @@ def page_tables(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]
     """
     if frame.empty:
         return []
-    if shape.name.startswith("against_"):
-        return beside_paper(shape, title, frame)
     whole = sortable(shape.name, title, shape.about, frame, shape.columns)
     return [whole] if whole.rows else []
-
-
-_PAPER_ORDER = (
-    *("quantity", "unit", "paper", "paper_low", "paper_high", "ours", "ours_low", "ours_high"),
-    *("limit", "verdict", "reason", "where", "evidence"),
-)
-"""Columns of a table ``against_*``: what a reader compares stands first. The key of its rows, a
-short name of each quantity, is left to the file.
-"""
-
-
-def beside_paper(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]:
-    """A paper's numbers beside ours: those that are evidence, then folded those that are none.
-
-    Evidence are those whose column ``evidence`` is ``independent``: the cohort and the study were
-    not made to have them, so that agreement could have failed.
-    """
-    independent = frame["evidence"] == "independent"
-    columns = tuple(map(shape.column, _PAPER_ORDER))
-    rest = sortable(shape.name, f"{title}: no evidence", NO_EVIDENCE, frame[~independent], columns)
-    told = frame[independent].drop(columns="evidence")
-    first = sortable(shape.name, title, shape.about, told, columns)
-    return [table for table in (first, replace(rest, folded=True)) if table.rows]
-
-
-NO_EVIDENCE = (
-    "Numbers of the paper of which agreement shows nothing: the cohort or the study was made to "
-    "have them (circular), they follow from the paper's other numbers (recomputed), these exclude "
-    "them (contradicted), or no run has anything to set beside them."
-)
-
-
-def judged(rows: pd.DataFrame) -> str:
-    """A sentence on rows of a table ``against_*``; nothing without rows.
-
-    It tells how many quantities that are evidence lie inside the paper's range, outside it, or
-    were not computed; how hard it was to lie inside; and, not counted, those that are no evidence.
-    """
-    if rows.empty:
-        return ""
-    counted = rows[rows["evidence"] == "independent"]
-    inside, outside, lacking = (
-        int((counted["verdict"] == name).sum()) for name in ("inside", "outside", "not_computed")
-    )
-    told = (
-        f"Of {len(counted)} published quantities that are evidence ours are inside the paper's "
-        f"range for {inside} and outside for {outside}"
-        + (f"; {lacking} are not computed" if lacking else "")
-    )
-    kinds = rows["evidence"].fillna("")
-    others = [f"{n} {words}" for kind, words in _NO_EVIDENCE if (n := int((kinds == kind).sum()))]
-    rest = f" Not counted: {', '.join(others)}." if others else ""
-    return f"{told}.{_what_it_took(counted[counted['verdict'] == 'inside'])}{rest}"
-
-
-_NO_EVIDENCE = (
-    ("circular", "that cohort or study were made to have"),
-    ("recomputed", "that follow from the paper's own numbers"),
-    ("contradicted", "that other numbers of the paper exclude"),
-    ("", "that nothing of a run can be held against"),
-)
-"""Values of the column ``evidence`` that are none, with the words that follow their number."""
-
-_WORDS_OF_LIMITS = {
-    "two_sided": "lie in a range with two ends whose width the paper gives",
-    "chosen": "in one whose width was chosen here",
-    "wide": "in one so wide (half to twice, or more) that inside is no agreement",
-    "one_sided": "are on the right side of a single limit or of zero",
-    "binary": "are the same yes, no or count",
-}
-"""Kinds of range, as in the column ``limit``, in words: that which is hardest to lie in first."""
-
-
-def _what_it_took(inside: pd.DataFrame) -> str:
-    """How many of the rows, all of them inside, lie in ranges of each kind; nothing without rows.
-
-    The strongest kind is told even where its number is 0.
-    """
-    if inside.empty:
-        return ""
-    counts = {name: int((inside["limit"] == name).sum()) for name in _WORDS_OF_LIMITS}
-    strongest, *weaker = _WORDS_OF_LIMITS
-    told = [f"{counts[strongest]} {_WORDS_OF_LIMITS[strongest]}"]
-    told += [f"{counts[name]} {_WORDS_OF_LIMITS[name]}" for name in weaker if counts[name]]
-    return f" Of the {len(inside)} inside, {', '.join(told)}."

@@ -6,10 +6,10 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from spinepipe.report.page.document import ResultTables
 from study_cases import STUDY, Size, project
 from sweeps import sweep
 
-from spinepipe.report.page.document import ResultTables
 from spinepipe.studies.joint_pose_sensitivity.findings import findings
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import left_out, shown_tables

@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from pydantic import ValidationError
+from spinepipe.report.page.document import ResultTables
 from study_cases import STUDY, TABLES, Size, project
 from sweeps import sweep
 
 from papers.engine import claims_of, judge
 from papers.run import StudyRun
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import ResultTables
 from spinepipe.report.style import style
 from spinepipe.studies.joint_pose_sensitivity.figures.load_point import load_point_figure
 from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import load_point

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
 from spinepipe.report.page.document import ResultTables
+
 from spinepipe.studies.joint_pose_sensitivity import poses, posterior
 from spinepipe.studies.joint_pose_sensitivity.figures.posterior import posterior_figure
 from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import posterior as sentences

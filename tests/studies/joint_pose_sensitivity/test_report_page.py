@@ -11,14 +11,14 @@ from tempfile import mkdtemp
 import numpy as np
 import pandas as pd
 from identification_cases import METADATA, identification, write_table
+from spinepipe.report.page.document import Picture, ResultTables
+from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from study_cases import STUDY, Size, project, results
 from sweeps import sweep
 
 from spinepipe.cohort import Cohort
 from spinepipe.frames import Pose
 from spinepipe.jobs import report
-from spinepipe.report.page.document import Picture, ResultTables
-from spinepipe.report.page.scene import CORNERS, LONE_DISC_MM, MOST_POSES, as_script, scenes, solids
 from spinepipe.report.page.tables import sortable
 from spinepipe.report.specimen import view_of
 from spinepipe.schema import Column

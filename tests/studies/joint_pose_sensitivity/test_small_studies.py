@@ -9,12 +9,12 @@ import pandas as pd
 from identification_cases import identification
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from spinepipe.report.page.document import Picture, ResultTables
+from spinepipe.report.page.scene import scenes
 from study_cases import STUDY, Size, project, results
 from sweeps import sweep
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Picture, ResultTables
-from spinepipe.report.page.scene import scenes
 from spinepipe.report.panels import across_of, log_ticks
 from spinepipe.report.specimen import view_of
 from spinepipe.report.style import TALLEST_MM, style

@@ -8,9 +8,9 @@ from typing import Any
 
 import pandas as pd
 from scoliosis_cases import ERRORS, Size, paired_test, study_of, tables_of
+from spinepipe.report.page.document import Headline, ResultTables
 from sweeps import sweep
 
-from spinepipe.report.page.document import Headline, ResultTables
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.findings import both_ways, findings
 from spinepipe.studies.scoliosis.headline import (

@@ -10,9 +10,9 @@ from functools import cache
 
 import pandas as pd
 from scoliosis_cases import ERRORS, Size, cohort_of, study_of, tables_of
+from spinepipe.report.page.document import Picture, ResultTables
 from sweeps import sweep
 
-from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
 from spinepipe.studies.scoliosis.kind import KIND
 from spinepipe.studies.scoliosis.page import READ, document, left_out, shown_tables
