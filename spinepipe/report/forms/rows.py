@@ -19,7 +19,8 @@ ROW, ABOVE_AND_BELOW = 21.0, 52.0
 _WITHIN = 0.62
 """Share of a row's height over which its series are spread."""
 
-_MOST_LETTERS = 26
+LETTERS = 26
+"""Of a row's name; the middle of a longer one is left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +37,7 @@ class Rows(Panel):
     marks : a dashed vertical line at each value, with its words; zero has a solid one.
     bars : whether a bar from zero stands in the place of a symbol.
     log : whether the axis is logarithmic. x_limits : its ends.
+    letters : most of a row's name, where a wide panel has room for sentences.
     """
 
     frame: pd.DataFrame
@@ -44,6 +46,7 @@ class Rows(Panel):
     bars: bool = False
     log: bool = False
     x_limits: tuple[float, float] | None = None
+    letters: int = LETTERS
 
     @property
     def names(self) -> list[str]:
@@ -100,7 +103,7 @@ class Rows(Panel):
             axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
             _small(axes, place, 1.0, words, "bottom", "center")
         axes.set_ylim(len(names) - 0.45, -0.55)
-        axes.set_yticks(range(len(names)), [short(name, _MOST_LETTERS) for name in names])
+        axes.set_yticks(range(len(names)), [short(name, self.letters) for name in names])
         axes.tick_params(axis="y", colors=COLORS["ink"])
         axes.grid(axis="y", visible=False)
         axes.spines["left"].set_visible(False)

@@ -57,9 +57,10 @@ class Sortable:
 
     Attributes
     ----------
-    name : of the result file, without an ending.
+    name : no other table of the page has it.
     title, about : above the table: its heading, and what its rows are.
-    note : how many rows were left out, or nothing. file : that has all rows, for a link.
+    note : how many rows were left out, or nothing. file : beside the page, that has all rows, for a
+        link; empty where none has.
     """
 
     name: str
@@ -68,11 +69,7 @@ class Sortable:
     heads: tuple[Head, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str
-
-    @property
-    def file(self) -> str:
-        """The result file, beside the page."""
-        return f"{self.name}.parquet"
+    file: str
 
 
 def sortable(
@@ -81,6 +78,7 @@ def sortable(
     about: str,
     frame: pd.DataFrame,
     columns: Sequence[Column],
+    file: str | None = None,
 ) -> Sortable:
     """The first `MOST_ROWS` rows of a frame as a table of the page.
 
@@ -89,17 +87,19 @@ def sortable(
 
     Parameters
     ----------
-    name : of the result file, without an ending; a note on rows left out names it.
+    name : of the table, and of its result file.
     columns : those to be shown, in this order; a frame need not have all of them.
+    file : that has all rows, where it is not ``<name>.parquet``.
     """
+    file = f"{name}.parquet" if file is None else file
     kept = [c for c in columns if c.name in frame and _says_something(frame[c.name])]
     shown = frame.head(MOST_ROWS)
     note = ""
     if len(frame) > len(shown):
-        note = f"The first {len(shown)} of {len(frame)} rows; all of them are in {name}.parquet."
+        note = f"The first {len(shown)} of {len(frame)} rows; all of them are in {file}."
     values = [[_cell(value, c) for value in shown[c.name]] for c in kept]
     heads = tuple(Head(_title(c), _unit(c), _meaning(c), c.type in _NUMERIC) for c in kept)
-    return Sortable(name, title, about, heads, tuple(zip(*values, strict=True)), note)
+    return Sortable(name, title, about, heads, tuple(zip(*values, strict=True)), note, file)
 
 
 def _unit(column: Column) -> str:

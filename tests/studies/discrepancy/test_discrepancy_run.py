@@ -76,9 +76,9 @@ def test_the_verdict_and_all_around_it_are_made(searched: Project) -> None:
     made = {name.removeprefix(f"{STUDY}/discrepancy/") for name in searched.files()}
     tables = {f"{name}.parquet" for name in ("gap", "candidates", "where", "confusions")}
     assert made >= tables | {"verdict.json", "held_out.parquet", "report.html"}
-    assert made >= {"model_base.yaml", "model_with_effects.yaml", "figures/gap_map.png"}
+    assert made >= {"model_base.yaml", "model_with_effects.yaml", "figures/misfit.png"}
     report = searched.path(f"results/{STUDY}/report.html").read_text()
-    assert "The model lacks a neutral zone" in report
+    assert "lacks neutral zone in flexion–extension" in report
 
 
 def test_where_the_page_once_was_stays_a_target_that_leads_to_it(
