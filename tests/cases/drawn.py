@@ -4,6 +4,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
+from spinepipe.report.forms.chart import saying
 from spinepipe.studies.registry import PACKAGE, kind_of
 
 
@@ -14,3 +15,9 @@ def drawings(kind: str) -> dict[str, Callable[..., Any]]:
         module, _, function = figure.at.partition(":")
         found[figure.name] = getattr(import_module(f"{PACKAGE}.{kind}.{module}"), function)
     return found
+
+
+def a_picture(kind: str) -> bytes:
+    """Some figure of ours as the bytes of an ``svg``, ``png`` or ``pdf``."""
+    chart = saying("Nothing", "There is nothing to show.")
+    return chart.svg().encode() if kind == "svg" else chart.picture(kind)
