@@ -166,8 +166,9 @@ class _Message(Panel):
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        how = {"va": "center", "color": COLORS["soft"], "in_layout": False}
-        axes.text(0.0, 0.5, "\n".join(self._lines), transform=axes.transAxes, **how)
+        lines = "\n".join(self._lines)
+        text = axes.text(0.0, 0.5, lines, transform=axes.transAxes, va="center")
+        text.set(color=COLORS["soft"], in_layout=False)
 
 
 def _draw(panel: Panel, axes: Axes) -> None:
