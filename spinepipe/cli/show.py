@@ -1,17 +1,20 @@
-"""`spinepipe show`: one specimen as text and as a picture."""
+"""`spinepipe show`: one specimen as text, and as a page or a picture."""
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from spinepipe.cli.find import specimen_of, study_or_cohort
+from spinepipe.files import appearing
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.report.specimen import draw_specimen, view_of
+from spinepipe.report.specimen import view_of
+from spinepipe.report.specimen_curves import curve_charts, measured_curves
+from spinepipe.report.specimen_page import specimen_page
 from spinepipe.report.specimen_text import describe
-from spinepipe.report.style import save, style
 from spinepipe.studies.study import Study
 
-PICTURES = (".png", ".svg", ".pdf")
+PAGE, PICTURES = ".html", (".png", ".svg", ".pdf")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=Path,
         metavar="FILE",
-        help="picture, .png, .svg or .pdf (default: results/show/<name>.png)",
+        help="page, .html, or picture, .png, .svg or .pdf (default: results/show/<name>.html)",
     )
 
 
@@ -31,23 +34,36 @@ def run(options: argparse.Namespace) -> int:
     """Print and draw."""
     name = Path(options.name).name
     chosen = f"{name}-{options.specimen}" if options.specimen else name
-    output = options.output or options.root / "results" / "show" / f"{chosen}.png"
-    if output.suffix not in PICTURES:
-        allowed = ", ".join(PICTURES)
-        problem = InputProblem(
-            "command line", None, "-o", output.name, allowed, "rename the picture"
-        )
+    output = options.output or options.root / "results" / "show" / f"{chosen}{PAGE}"
+    if output.suffix not in (PAGE, *PICTURES):
+        allowed = ", ".join((PAGE, *PICTURES))
+        problem = InputProblem("command line", None, "-o", output.name, allowed, "rename the file")
         raise InputError([problem])
     study, cohort = study_or_cohort(options.name, options.root)
     specimen = specimen_of(cohort, options.specimen)
     view = view_of(cohort, specimen, *_loading(study))
     print(describe(cohort, view))
+    kind = "page" if output.suffix == PAGE else "picture"
     if not cohort.has_frames:
-        print(f"\nno picture: {cohort.name} has neither landmarks.csv nor joints.csv to draw")
+        print(f"\nno {kind}: {cohort.name} has neither landmarks.csv nor joints.csv to draw")
         return 0
-    with style():
-        save(draw_specimen(cohort, view), output)
-    print(f"\npicture: {output}")
+    if kind == "page":
+        with appearing(output) as temporary:
+            temporary.write_text(specimen_page(cohort, view), encoding="utf-8")
+    else:
+        curves = curve_charts(cohort, list(measured_curves(view)))
+        if not curves:
+            print("\nno picture: no motion was measured; the page, .html, shows the geometry")
+            return 0
+        first = curves[0]
+        panels = [panel for chart in curves for panel in chart.panels]
+        whole = replace(first, panels=panels)
+        picture = (
+            whole.svg().encode() if output.suffix == ".svg" else whole.picture(output.suffix[1:])
+        )
+        with appearing(output) as temporary:
+            temporary.write_bytes(picture)
+    print(f"\n{kind}: {output}")
     return 0
 
 

@@ -14,10 +14,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.form import TableForm
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem
-from spinepipe.report.tables import CONCLUSIONS
 from spinepipe.schema import Table
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles
+from spinepipe.studies.tables import CONCLUSIONS
 
 Check = Callable[[YamlDocument, Any, Cohort], Iterator[InputProblem]]
 """What is asked of a study file, the study and its cohort."""
@@ -122,6 +122,7 @@ class Kind:
     told_by_check : ``file:function`` of what `spinepipe check` says of a sound study besides;
         called with study, cohort and the folder of the Snakefile, it returns words, and what it
         warns of.
+    question : what its studies ask, in a few words: the heading above them on the page of all.
     doubts : ``file:function`` of what most likely is wrong with files that it alone reads; called
         with a cohort that has any of them, it yields doubts.
     """
@@ -142,6 +143,7 @@ class Kind:
     settled: Callable[[Any, Cohort], Any] | None = None
     told_by_check: str | None = None
     doubts: str | None = None
+    question: str = "Other questions"
 
     def job(self, name: str) -> Job:
         """The job of that name."""

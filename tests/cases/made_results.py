@@ -9,9 +9,9 @@ from typing import Any
 import cohort_study_cases
 import discrepancy_cases
 import grid_cases
-import identification_cases
 import numpy as np
 import pandas as pd
+import pose_tables
 import scoliosis_cases
 import study_cases
 import tracking_table_cases
@@ -45,12 +45,9 @@ def made(kind: str, root: Path) -> Made:
     return MAKERS[kind](root)
 
 
-def _from_files(root: Path) -> Made:
-    size = study_cases.Size(poses=6)
-    folder = study_cases.results(study_cases.project(root, size), size)
-    identification_cases.identification(folder, size)
-    study, cohort = check(root, study_cases.STUDY)
-    return Made(study, cohort, StudyTables.read([str(path) for path in folder.glob("*.parquet")]))
+def _poses(root: Path) -> Made:
+    study, cohort = check(study_cases.project(root, study_cases.Size(("a",))), study_cases.STUDY)
+    return Made(study, cohort, StudyTables(pose_tables.frames(pose_tables.whole())))
 
 
 def _of_size(cases: Any, size: Any, own_vertebrae: bool = True) -> Callable[[Path], Made]:
@@ -111,7 +108,7 @@ def _index(specimen: str, test: str, joint: str, index: str, factor: str) -> dic
 
 
 MAKERS: Mapping[str, Callable[[Path], Made]] = {
-    "joint_pose_sensitivity": _from_files,
+    "joint_pose_sensitivity": _poses,
     "cohort_stiffness": _of_size(cohort_study_cases, cohort_study_cases.Size()),
     "discrepancy": _search,
     "global_sensitivity": _indices,

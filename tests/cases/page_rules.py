@@ -124,7 +124,8 @@ def faults_of_page(html: str) -> Iterator[str]:
         yield f"{size:.1f} MB"
     if re.search(r"(?:src|href)=\"(?:https?:)?//", html) or "@import" in html:
         yield "an address elsewhere"
-    before = html[html.index("<main") : html.find('<svg role="img"')]
+    figure = html.find('<svg role="img"')
+    before = html[html.index("<main") : figure if figure > 0 else html.index("<h2")]
     words = len(unescape(re.sub(r"<[^>]+>", " ", before)).split())
     if words > MOST_WORDS_BEFORE_FIGURE:
         yield f"{words} words before the first figure"

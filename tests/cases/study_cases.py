@@ -1,28 +1,28 @@
 """Projects of any size with results as a run would write them: tables made up, not computed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
+import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.frames import FRAME_LANDMARKS
-from spinepipe.jobs import draw
+from spinepipe.report.forms.chart import Chart
 from spinepipe.schema import Table
 from spinepipe.studies.joint_pose_sensitivity.kind import KIND
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import CALIBRATIONS, POSES, SIMULATIONS
 from spinepipe.studies.registry import PACKAGE
-from spinepipe.tables import StudyTables, to_arrow, write
+from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, STIFFNESS_COLUMNS, TRANSLATIONS
 
 STUDY = "probe"
 TABLES = {table.name: table for table in KIND.tables}
-FIGURES = {figure.name: figure.reads for figure in KIND.figures}
+FIGURES = tuple(figure.name for figure in KIND.figures)
 START = (24600.0, 110000.0, 13500.0, 37.0, 64.0, 268.0)
 _POINTS = {
     "superior_endplate_centre": (0.0, 26.0, 0.0),
@@ -111,20 +111,15 @@ def results(root: Path, size: Size) -> Path:
     return folder
 
 
-def drawn(root: Path, name: str) -> Path:
-    """One figure of the results of the project, by the job; returns its SVG."""
-    folder = root / "results" / STUDY
-    svg, png = (folder / "figures" / f"{name}.{kind}" for kind in ("svg", "png"))
-    tables = [str(folder / f"{table}.parquet") for table in FIGURES[name]]
-    draw.run(str(root), STUDY, name, tables, str(svg), str(png))
-    return svg
-
-
-def drawing(name: str) -> Callable[[JointPoseSensitivity, Cohort, StudyTables], Figure]:
+def drawing(
+    name: str,
+) -> Callable[[JointPoseSensitivity, Cohort, Mapping[str, pd.DataFrame]], Chart]:
     """The function that draws a figure, as the kind declares it."""
     module, _, function = KIND.figure(name).at.partition(":")
     found = import_module(f"{PACKAGE}.joint_pose_sensitivity.{module}")
-    draws: Callable[[JointPoseSensitivity, Cohort, StudyTables], Figure] = getattr(found, function)
+    draws: Callable[[JointPoseSensitivity, Cohort, Mapping[str, pd.DataFrame]], Chart] = getattr(
+        found, function
+    )
     return draws
 
 

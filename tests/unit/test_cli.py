@@ -146,7 +146,11 @@ def test_show(tmp_path: Path, run: Run, name: str) -> None:
     assert "specimen   b (2 of 2)" in out
     assert "  V2V3   " in out
     assert "flexion      1     1  V1           0   -20" in out
-    assert (tmp_path / "results" / "show" / f"{Path(name).name}-b.png").stat().st_size > 10_000
+    page = (tmp_path / "results" / "show" / f"{Path(name).name}-b.html").read_text()
+    assert page.index("Measured motion") < page.index("Geometry") < page.index("All numbers")
+    assert page.count("data:image/svg+xml") == 1, "the tests drive one coordinate"
+    assert "specimen   b (2 of 2)" in page
+    assert 'class="view spine3d"' in page
 
 
 def test_show_without_landmarks_bodies_motion(tmp_path: Path, run: Run) -> None:
@@ -176,7 +180,7 @@ def test_show_moments_of_several_tests(tmp_path: Path, run: Run) -> None:
     code, out, _ = run("--root", tmp_path, "show", "small")
     assert code == 0
     assert "left_rotation" in out
-    assert (tmp_path / "results" / "show" / "small.png").exists()
+    assert "No motion was measured" in (tmp_path / "results" / "show" / "small.html").read_text()
 
 
 @pytest.mark.parametrize(
@@ -184,7 +188,7 @@ def test_show_moments_of_several_tests(tmp_path: Path, run: Run) -> None:
     [
         (["straigt"], "did you mean 'straight'?"),
         (["straight", "z"], "unknown specimen 'z'; allowed: one of a, b"),
-        (["straight", "-o", "x.bmp"], "found x.bmp; allowed: .png, .svg, .pdf"),
+        (["straight", "-o", "x.bmp"], "found x.bmp; allowed: .html, .png, .svg, .pdf"),
     ],
 )
 def test_show_of_what_is_not_there(
@@ -490,7 +494,7 @@ def test_a_locale_of_ascii_alone_is_left_behind(tmp_path: Path) -> None:
     ended = subprocess.run(command, env=here, capture_output=True, check=False)
     assert ended.returncode == 0, ended.stderr.decode()
     assert "für Müller" in ended.stdout.decode()
-    assert f"picture: {root}/results/show/straight.png" in ended.stdout.decode()
+    assert f"page: {root}/results/show/straight.html" in ended.stdout.decode()
 
 
 def test_usage(capsys: pytest.CaptureFixture[str]) -> None:

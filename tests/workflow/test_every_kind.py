@@ -19,9 +19,9 @@ import pytest
 from made_pages import SVG
 from small_project import Project
 from small_studies import SMALL
+from spinepipe.report.page.document import Picture
 
 from spinepipe.jobs.report import results_of
-from spinepipe.report.page.document import Picture
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study_files import StudyFiles
@@ -35,6 +35,14 @@ FETCHES = re.compile(r"""<(script|link|img|iframe)[^>]+(src|href)=["'](https?:)?
 
 def layout(project: Project, kind: str) -> StudyFiles:
     return files_of(*check(project.folder, kind))
+
+
+def test_the_page_of_all_studies_names_each_below_its_question(eight: Project) -> None:
+    """Pages of most were not asked for."""
+    page = eight.path("results/index.html").read_text()
+    assert set(re.findall(r"<b><(?:a|span)[^>]*>(\w+)<", page)) == set(SMALL)
+    assert "8 studies: 1 up to date, 7 not finished" in page
+    assert {kind_of(kind).question for kind in SMALL} <= set(re.findall(">([^<]+)</h2>", page))
 
 
 @pytest.mark.parametrize("kind", SMALL)
@@ -82,7 +90,7 @@ def look_at_results(project: Project, kind: str, full: bool) -> None:
     files = layout(project, kind)
     assert {name.removeprefix("results/") for name in files.results(full)} <= set(project.files())
     assert not list(project.path(f"results/{kind}").rglob("*.log"))
-    page = project.path(f"{files.folder}/report.html").read_text()
+    page = project.path(files.page()).read_text()
     look_at_page(page, files, full=False)
     if files.adds:
         assert "`make full` makes them" in page

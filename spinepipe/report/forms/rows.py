@@ -19,7 +19,8 @@ ROW, ABOVE_AND_BELOW = 21.0, 52.0
 _WITHIN = 0.62
 """Share of a row's height over which its series are spread."""
 
-_MOST_LETTERS = 26
+LETTERS = 26
+"""Of a row's name; the middle of a longer one is left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,9 +34,10 @@ class Rows(Panel):
         ``hollow`` (not to be trusted), ``inner_low`` and ``inner_high`` (a thicker line, such as
         the middle half) where they are told.
     looks : of each series, in the order from the top of a row down.
-    marks : a dashed vertical line at each value, with its words.
+    marks : a dashed vertical line at each value, with its words; zero has a solid one.
     bars : whether a bar from zero stands in the place of a symbol.
     log : whether the axis is logarithmic. x_limits : its ends.
+    letters : most of a row's name, where a wide panel has room for sentences.
     """
 
     frame: pd.DataFrame
@@ -44,6 +46,7 @@ class Rows(Panel):
     bars: bool = False
     log: bool = False
     x_limits: tuple[float, float] | None = None
+    letters: int = LETTERS
 
     @property
     def names(self) -> list[str]:
@@ -53,7 +56,7 @@ class Rows(Panel):
     @property
     def height(self) -> float:
         """By the number of rows, and of series in a row."""
-        row = max(ROW, 7.5 * len(self.series) + 5.0)
+        row = max(ROW, 7.5 * max(map(len, self._series_of_rows().values())) + 5.0)
         return (
             row * len(self.names)
             + ABOVE_AND_BELOW
@@ -71,24 +74,36 @@ class Rows(Panel):
             dict.fromkeys(self.frame["series"])
         )
 
+    def _series_of_rows(self) -> dict[str, list[str]]:
+        """Series that each row has: these alone share its height."""
+        if "series" not in self.frame:
+            return {name: [""] for name in self.names}
+        rows = self.frame.groupby(self.frame["row"].astype(str), sort=False)["series"]
+        return {str(name): [one for one in self.series if one in set(own)] for name, own in rows}
+
     def draw(self, axes: Axes) -> None:
         """Symbols, intervals, notes and marks."""
-        names, series = self.names, self.series
+        names, series, of_rows = self.names, self.series, self._series_of_rows()
         if self.log:
             axes.set_xscale("log")
         if self.x_limits:
             axes.set_xlim(*self.x_limits)
-        for place, words in self.marks.items():
-            axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
-            _small(axes, place, 1.0, words, "bottom", "center")
         for number, one in enumerate(series):
             rows = self.frame if one == "" else self.frame[self.frame["series"] == one]
             look = self.looks.get(one, SEVERAL[number % len(SEVERAL)])
-            shift = _WITHIN * (number + 0.5) / len(series) - 0.5 * _WITHIN
-            y = np.array([names.index(str(name)) for name in rows["row"]]) + shift
+            own = [(names.index(name), of_rows[name]) for name in rows["row"].astype(str)]
+            y = np.array(
+                [
+                    at + _WITHIN * ((in_row.index(one) + 0.5) / len(in_row) - 0.5)
+                    for at, in_row in own
+                ]
+            )
             self._draw_series(axes, rows, y, look)
+        for place, words in self.marks.items():  # alone on a logarithmic axis it has no limits
+            axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
+            _small(axes, place, 1.0, words, "bottom", "center")
         axes.set_ylim(len(names) - 0.45, -0.55)
-        axes.set_yticks(range(len(names)), [short(name, _MOST_LETTERS) for name in names])
+        axes.set_yticks(range(len(names)), [short(name, self.letters) for name in names])
         axes.tick_params(axis="y", colors=COLORS["ink"])
         axes.grid(axis="y", visible=False)
         axes.spines["left"].set_visible(False)
@@ -96,6 +111,9 @@ class Rows(Panel):
             log_ticks(axes.xaxis, *axes.get_xlim())
         else:  # as many ticks whatever the width, which the layout is still to find
             axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        low, high = axes.get_xlim()
+        if not self.log and low < 0.0 < high:
+            axes.axvline(0.0, color=COLORS["soft"], lw=0.8, zorder=1)
         if "note" in self.frame:
             told = self.frame.drop_duplicates("row").set_index("row")["note"]
             for place, name in enumerate(names):

@@ -6,7 +6,7 @@ from functools import cached_property
 from importlib.resources import files
 
 import pandas as pd
-from jinja2 import Environment, FunctionLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import spinepipe
@@ -15,9 +15,14 @@ from spinepipe.report.conclusions import Conclusion, Sentence, Told, told
 from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.origin import origin
 from spinepipe.report.page.tables import Sortable
+from spinepipe.report.viewer.figure import viewer_html, viewer_script, viewer_style
+from spinepipe.report.viewer.scene import Scene
+from spinepipe.report.viewer.specimens import specimen_scenes
 from spinepipe.report.words import count, listed
 from spinepipe.studies.study import Study
 from spinepipe.tables import StudyTables
+
+_HERE = "spinepipe.report.page"
 
 MOST_FINDINGS = 5
 """Of those that have something to say the first; all others stand folded."""
@@ -62,7 +67,8 @@ class Page:
     key_figure : beside the answer, by name; nothing where there is none to show it.
     tables : folded below; those of a paper's comparison are not among them.
     left_out : parts that the settings leave out, in words.
-    viewer : the 3-D view as HTML, see `spinepipe.report.viewer`; nothing without one.
+    scenes : of the 3-D view; None for the specimens of the cohort with its loads.
+    chooser : what a scene is one of.
     """
 
     conclusions: Sequence[Conclusion]
@@ -70,7 +76,8 @@ class Page:
     key_figure: str
     tables: Sequence[Sortable]
     left_out: Sequence[str] = ()
-    viewer: str = ""
+    scenes: Sequence[Scene] | None = None
+    chooser: str = "Specimen"
 
     @cached_property
     def told(self) -> list[Told]:
@@ -89,13 +96,14 @@ class Page:
         *,
         papers: Mapping[str, str] | None = None,
         date: str = "",
+        folder: str = "",
     ) -> str:
         """The page. It loads nothing from the network, and the same results make the same bytes.
 
         Parameters
         ----------
         papers : pages of comparisons with papers, by file, with the words of the link.
-        date : of the results.
+        date : of the results. folder : of tables and figures as the page reaches it, with a slash.
         """
         findings, lights = self.at("finding"), self.at("light")
         drawings = dict(results.drawings)
@@ -105,6 +113,7 @@ class Page:
             (level, words, sum(one.level == level for one in lights))
             for level, words in LEVELS.items()
         ]
+        scenes = specimen_scenes(cohort) if self.scenes is None else self.scenes
         run = origin(study, results.metadata)
         shown = {
             "tag": tag(cohort),
@@ -121,11 +130,12 @@ class Page:
             "further": [one for name, one in drawings.items() if name not in used],
             "lights": sorted(lights, key=lambda one: list(LEVELS).index(one.level)),
             "counts": [one for one in counts if one[2]],
-            "viewer": Markup(self.viewer),
+            "viewer": viewer_html(scenes, self.chooser),
             "tables": self.tables,
             "methods": self.at("methods"),
             "origin": run,
             "date": date,
+            "folder": folder,
             "left_out": self.left_out,
             "source": cohort.source,
             "papers": (papers or {}).items(),
@@ -140,22 +150,30 @@ class Page:
         return rendered("study_page.html", page=shown, title=title, index="../index.html")
 
 
-def rendered(template: str, **values: object) -> str:
-    """A template of this folder with the style sheet and script that all pages share."""
+def rendered(
+    template: str, packages: Sequence[str] = (), more_style: str = "", **values: object
+) -> str:
+    """A template of this folder, or of further packages, in the frame that all pages share.
+
+    Parameters
+    ----------
+    more_style : rules of a style sheet behind those of all pages.
+    """
     environment = Environment(
-        loader=FunctionLoader(part),
+        loader=ChoiceLoader([PackageLoader(name, "") for name in (_HERE, *packages)]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    style, script = (Markup(part(f"study_page.{end}")) for end in ("css", "js"))
-    return environment.get_template(template).render(style=style, script=script, **values)
-
-
-def part(name: str) -> str:
-    """Text of a file that lies beside this one."""
-    return files("spinepipe.report.page").joinpath(name).read_text(encoding="utf-8")
+    style, script = (
+        files(_HERE).joinpath(f"study_page.{end}").read_text("utf-8") for end in ("css", "js")
+    )
+    return environment.get_template(template).render(
+        style=Markup(style) + viewer_style() + Markup(more_style),
+        script=Markup(script) + viewer_script(),
+        **values,
+    )
 
 
 def tag(cohort: Cohort) -> str:

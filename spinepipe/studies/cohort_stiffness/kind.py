@@ -243,6 +243,7 @@ _FITTING = ("seed", "steps", "cost", "measurement_sd", "bound_factor", "starts")
 """Settings by what they decide: what is held out and compared, and how stiffness is fitted."""
 
 KIND = Kind(
+    question="How stiff are the joints?",
     settings=CohortStiffness,
     files=CohortLayout,
     checks=(check_cohort_stiffness,),

@@ -44,20 +44,20 @@ class SensitivityFiles(StudyFiles):
     drawings = (
         Figure(
             "factor_indices",
-            "What each output hangs on",
-            "figures.indices:indices_figure",
+            "What each output depends on",
+            "charts:indices",
             ("indices",),
         ),
         Figure(
             "index_convergence",
             "Indices against the number of runs",
-            "figures.convergence:convergence_figure",
+            "charts:convergence",
             ("convergence", "indices"),
         ),
         Figure(
             "top_factors",
-            "Outputs over the leading factors",
-            "figures.scatter:scatter_figure",
+            "Outputs over the leading inputs",
+            "charts:runs",
             ("responses", "design", "indices"),
         ),
     )
@@ -138,6 +138,7 @@ _ANALYSING = ("bootstraps", "confidence", "indices", "most_failed", "outputs")
 """Settings by what they decide: what the samples are done with, what is made of them."""
 
 KIND = Kind(
+    question="Which inputs matter?",
     settings=GlobalSensitivity,
     files=SensitivityFiles,
     checks=(check_global_sensitivity,),

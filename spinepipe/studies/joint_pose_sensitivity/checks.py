@@ -90,17 +90,22 @@ def _load_point(
     document: YamlDocument, study: JointPoseSensitivity, cohort: Cohort
 ) -> Iterator[InputProblem]:
     """Only forces have a point: another one changes nothing under pure moments."""
-    if not study.load_point.asked or cohort.loads is None:
-        return
-    forces = ["fx_n", "fy_n", "fz_n"]
-    loads = cohort.loads[cohort.loads["test"].isin(study.tests or cohort.tests)]
-    acting = [table for table in (loads, cohort.preload) if table is not None]
-    if any(table[forces].abs().gt(0.0).any(axis=None) for table in acting):
+    if not study.load_point.asked or cohort.loads is None or has_force(study, cohort):
         return
     found = "other load points, but no force in any chosen test"
     place = at(document, "load_point")
     allowed = "tests with a force: a pure moment has no point"
     yield InputProblem(*place, found, allowed, "choose tests with forces, or leave load_point out")
+
+
+def has_force(study: JointPoseSensitivity, cohort: Cohort) -> bool:
+    """Whether any load of the chosen tests is a force."""
+    forces = ["fx_n", "fy_n", "fz_n"]
+    loads = cohort.loads
+    if loads is not None:
+        loads = loads[loads["test"].isin(study.tests or cohort.tests)]
+    acting = [table for table in (loads, cohort.preload) if table is not None]
+    return any(bool(table[forces].abs().gt(0.0).any(axis=None)) for table in acting)
 
 
 def _tests(

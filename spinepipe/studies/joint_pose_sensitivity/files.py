@@ -43,12 +43,6 @@ BY_SPECIMEN = {
 _FILES_PER_BLOCK = 100
 
 
-def _figure(name: str, title: str, reads: tuple[str, ...], file: str = "") -> Figure:
-    """A figure, drawn by the function of its file's name."""
-    file = file or name
-    return Figure(name, title, f"figures.{file}:{file}_figure", reads)
-
-
 @dataclass(frozen=True)
 class JointPoseFiles(StudyFiles):
     """The result files of one study.
@@ -65,36 +59,42 @@ class JointPoseFiles(StudyFiles):
         *("required_precision", "spread_over_landmark_sd", *POSTERIOR, "against_gould_2024a"),
     )
     drawings = (
-        _figure("stiffness", "Calibrated stiffness", ("calibrations",)),
-        _figure("errors", "Errors of predicted motion", ("simulations",)),
-        _figure(
-            "agreement",
-            "Agreement with measured motion",
-            ("agreement", "simulations", "success"),
+        Figure(
+            *("stiffness", "Stiffness, and what it depends on", "charts:stiffness"),
+            ("calibrations", "success"),
+            also=("load_point_effect",),
         ),
-        _figure("joint_pose", "Joint frames from uncertain landmarks", ("poses",)),
-        _figure(
-            "pose_against_stiffness",
-            "Joint pose against stiffness",
-            ("variance_shares", "importance"),
+        Figure(
+            *("load_point", "Stiffness over where the load acts", "charts:load_point"),
+            ("stiffness_over_load_point",),
         ),
-        _figure("posterior", "What the data make likely", POSTERIOR),
-        _figure(
-            "landmark_precision",
-            "Landmark precision needed",
-            ("landmark_precision", "required_precision"),
+        Figure(
+            *(
+                "pose_against_stiffness",
+                "What errors come from",
+                "charts_of_motion:errors_by_source",
+            ),
+            ("variance_shares",),
         ),
-        _figure("bootstrap", "Start values, damping and loading", ("bootstrap",)),
-        _figure(
-            "success_by_method",
-            "Success by method",
-            ("success_by_method", "method_fits"),
-            file="success",
+        Figure(
+            *("agreement", "Agreement with measured motion", "charts_of_motion:agreement"),
+            ("simulations", "success"),
         ),
-        _figure(
-            "load_point",
-            "Where the load acts",
-            ("stiffness_over_load_point", "load_point_effect"),
+        Figure(
+            *("joint_pose", "How far palpation moves joint frames", "charts_of_motion:frames"),
+            ("poses", "success"),
+        ),
+        Figure(
+            *("bootstrap", "Other starts, damping and loading", "charts:bootstrap"),
+            ("bootstrap", "calibrations", "success"),
+        ),
+        Figure(
+            *("posterior", "With landmarks as unknowns too", "charts:posterior"),
+            ("posterior",),
+        ),
+        Figure(
+            *("landmark_precision", "How precise landmarks must be", "charts_of_motion:precision"),
+            ("landmark_precision",),
         ),
     )
 

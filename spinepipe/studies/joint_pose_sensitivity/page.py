@@ -1,118 +1,92 @@
-"""The report of a joint-pose study: what it asks, its captions for this study, and its tables."""
+"""The page of a joint-pose study."""
 
-import re
-from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import Document, Picture, ResultTables
-from spinepipe.report.page.tables import Sortable, page_tables, sortable
+from spinepipe.report.conclusions import sentences_of
+from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.tables import Sortable, sortable
 from spinepipe.schema import Column, all_declared
-from spinepipe.studies.joint_pose_sensitivity.figures.agreement import in_rows
-from spinepipe.studies.joint_pose_sensitivity.figures.pose_against_stiffness import (
-    TREE,
-    importance_by_factor,
-)
-from spinepipe.studies.joint_pose_sensitivity.findings import findings, settling
+from spinepipe.studies.joint_pose_sensitivity.conclusions import conclusions
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
+from spinepipe.studies.joint_pose_sensitivity.retained import FACTOR, MOST_LOST, UNIT
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.studies.joint_pose_sensitivity.tables import (
-    IMPORTANCE,
-    STATISTICS,
-)
 
-QUESTION = (
-    "How stiff are the intervertebral joints of this cohort, and how much of the answer hangs on "
-    "where its landmarks were palpated?"
-)
-
+_IQR = "median low_quartile high_quartile"
 SHOWN = {
-    "counts": "Fits and filters",
-    "summary": "Medians and spreads",
-    "against_gould_2024a": "Beside Gould et al. 2024",
-    "posterior": "Posterior of stiffness and landmarks",
-    "posterior_motion": "Motion that the posterior predicts",
-    "success_by_method": "Success by method",
-    "variance_shares": "Variance shares of joint pose and stiffness",
-    "importance": "Importance in the regression tree, by factor",
-    "required_precision": "Landmark precision needed",
-    "load_point_effect": "Where the load acts",
-    "spread_over_landmark_sd": "Spread of joint frames by landmark SD",
-    "agreement": "Agreement of predicted and measured motion",
-    "statistics": "Tests of significance",
+    "summary": (
+        "Stiffness and errors over the retained fits",
+        f"quantity joint coordinate unit n {_IQR} percent_of_measured open_share lower_end_median",
+    ),
+    "counts": (
+        "Fits and what filters keep of them",
+        "part loading fits solved near_start_any near_start_all outliers reduced",
+    ),
+    "load_point_effect": (
+        "Where the load acts",
+        "joint coordinate unit stated stated_low stated_high per_mm_anterior per_mm_superior "
+        "uncertain_low uncertain_median uncertain_high message",
+    ),
+    "posterior": (
+        "Stiffness with landmarks as unknowns too",
+        "joint coordinate unit median low high laplace_low laplace_high r_hat ess_bulk message",
+    ),
+    "required_precision": (
+        "Landmark precision needed",
+        "stiffness motion n sd_mm sd_low_mm sd_high_mm message",
+    ),
+    "variance_shares": (
+        "Shares of joint pose and stiffness in errors",
+        "joint coordinate factor signed_share signed_share_low signed_share_high message",
+    ),
+    "agreement": (
+        "Agreement of predicted and measured motion",
+        "joint coordinate unit n bias bias_low bias_high lower_limit upper_limit message",
+    ),
+    "success_by_method": (
+        "Ways of fitting",
+        "method fits successful success_low success_high arrived evaluations_median",
+    ),
 }
-"""Tables of the page in their order, with their titles."""
+"""Tables of the page in their order: a title, and what a reader compares beside the specimen."""
 
-READ = ("poses", "calibrations", "success", "method_fits", "pose_weights", *SHOWN)
+READ = (
+    *("calibrations", "success", "simulations", "bootstrap", "stiffness_over_load_point"),
+    *("posterior_motion", "pose_weights", "statistics", "against_gould_2024a", *SHOWN),
+)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
-_SIMULATED = ("errors", "agreement")
-"""Figures of simulated motion."""
-
-_SENTENCE_END = re.compile(r"(?<=[.])(?<!et al[.])\s+(?=[A-Z])")
-
-_BY_FACTOR = tuple(
-    column
-    for column in IMPORTANCE.columns
-    if column.name in ("specimen", "joint", "coordinate", "factor", "leaves", "r2", "n")
-)
-
-_IMPORTANCE = (
-    *_BY_FACTOR[:4],
-    Column("importance", "number", "share of all predictors of this factor among all splits"),
-    Column("predictors", "integer", "predictors of this factor"),
-    *_BY_FACTOR[4:],
-    Column("message", "text", "why there is no tree"),
-)
-
-_FOLD = ["specimen", "family", "test", "joint", "response", "factor"]
-_OPEN: dict[str, Any] = {
-    "nullable": True,
-    "empty": "no test is significant after Bonferroni's correction",
-}
-FOLDED = (
-    Column("specimen", "text", "name of the specimen"),
-    Column("test", "text", "name of the test"),
-    Column("joint", "text", "joint, or * for all joints together"),
-    Column("response", "text", "what is tested"),
-    Column("factor", "text", "what it is tested against"),
-    Column("family_size", "integer", "tests that are corrected together and have a p-value"),
-    Column("tests", "integer", "tests folded into this row, one per stratum"),
-    Column("with_result", "integer", "of these: tests that could be done"),
-    Column("significant", "integer", "significant without correction"),
-    Column("bonferroni", "integer", "significant after Bonferroni's correction"),
-    Column("holm", "integer", "significant after Holm's correction"),
-    Column("effect_name", "text", "what the effect size is called"),
-    Column("effect_lowest", "number", "smallest effect significant after Bonferroni", **_OPEN),
-    Column("effect_highest", "number", "largest effect significant after Bonferroni", **_OPEN),
-)
-
-
+_STIFFNESS = ("N/m", "N m/rad")
+_NO_STIFFNESS = ("percent_of_measured", "open_share", "r_hat", "ess_bulk")
+_COORDINATE = Column("coordinate", "text", "coordinate whose stiffness it is")
 _SHAPES = {table.name: table for table in all_declared(__file__)}
 
+_FOLD = ["specimen", "family", "test", "joint", "response", "factor"]
+_OPEN: dict[str, Any] = {"nullable": True, "empty": "none is significant after Holm's correction"}
+FOLDED = (
+    *(Column(name, "text", f"{name} of the tests") for name in _FOLD),
+    Column("tests", "integer", "tests folded into this row, one for each pose or stiffness set"),
+    Column("significant", "integer", "of these: significant after Holm's correction"),
+    Column("effect_name", "text", "what the effect size is called"),
+    Column("effect_lowest", "number", "smallest significant effect", **_OPEN),
+    Column("effect_highest", "number", "largest significant effect", **_OPEN),
+)
 
-def document(study: JointPoseSensitivity, cohort: Cohort, results: ResultTables) -> Document:
-    """What the report says and shows."""
-    return Document(
-        question=QUESTION,
-        findings=findings(study, results),
-        pictures=[
-            replace(picture, caption=caption(picture, study, cohort, results))
-            for picture in results.pictures.values()
-        ],
+
+def page(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Page:
+    """What the page says and shows, of the tables that there are by then."""
+    return Page(
+        conclusions=list(conclusions(study, cohort, results)),
+        sentences=sentences_of(__package__),
+        key_figure="stiffness",
         tables=shown_tables(study, results),
-        metadata=results.metadata,
         left_out=(
             *left_out(study),
             *papers.left_out(GOULD_2024A.cited, GOULD_2024A.stands_for(cohort.name)),
         ),
-        poses=results.table("poses"),
-        tests=study.tests,
-        load_shift_mm=study.load_point_shift_mm.in_order(),
     )
 
 
@@ -130,93 +104,68 @@ def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
     return told if study.load_point.asked else (*told, point)
 
 
-def caption(
-    picture: Picture, study: JointPoseSensitivity, cohort: Cohort, results: ResultTables
-) -> str:
-    """A figure's caption for this study and cohort."""
-    false = tuple(_false(cohort, results))
-    sentences = _SENTENCE_END.split(picture.caption)
-    kept = [sentence for sentence in sentences if not sentence.startswith(false)]
-    if picture.name in _SIMULATED and settling(study):
-        kept.append(settling(study))
-    return " ".join(kept)
-
-
-def _false(cohort: Cohort, results: ResultTables) -> Iterator[str]:
-    """How the sentences begin that speak of something else than this study shows."""
-    if not GOULD_2024A.stands_for(cohort.name):
-        yield "For the cohort rebuilt from"
-    several = len(cohort.specimen_names) > 1
-    yield "With one specimen," if several else "With several specimens,"
-    agreement = results.table("agreement")
-    if not agreement.empty:
-        rows = in_rows(agreement, cohort)
-        yield "With few joints and directions," if rows else "With many joints and directions,"
-
-
-def shown_tables(study: JointPoseSensitivity, results: ResultTables) -> list[Sortable]:
-    """Tables that the study has, as the page shows them; those without rows are left out."""
-    found = [
-        table
-        for name, title in SHOWN.items()
-        if len(results.table(name))
-        for table in _of(name, title, results.table(name), study)
-    ]
+def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:
+    """Tables that the study has, of retained fits where there are others too."""
+    found = []
+    for name, (title, columns) in SHOWN.items():
+        rows = results.table(name)
+        if len(rows):
+            known = {one.name: one for one in (_COORDINATE, *_SHAPES[name].columns)}
+            kept = [known[one] for one in ("specimen", *columns.split())]
+            found.append(sortable(name, title, _SHAPES[name].about, _chosen(rows, name), kept))
+    tests = results.table("statistics")
+    if len(tests):
+        about = f"Significant: p below {study.significance:g} after Holm's correction by family."
+        rows = folded(tests, study.significance)
+        found.append(sortable("statistics", "Tests of significance", about, rows, FOLDED))
     return [table for table in found if table.rows]
 
 
-def _of(
-    name: str, title: str, frame: pd.DataFrame, study: JointPoseSensitivity
-) -> Iterator[Sortable]:
-    about = _SHAPES[name].about
-    if name == "statistics":
-        yield sortable(name, title, about, in_full(frame), STATISTICS.columns)
-        about = (
-            "Tests done again and again with a stiffness set or a pose held fixed: how many are "
-            f"significant at {study.significance:g}, and how large the effects of these are. One "
-            "row per test, joint, response and factor; every single test is in statistics.parquet."
-        )
-        title = "Tests of significance, two factors"
-        yield sortable(name, title, about, folded(frame, study.significance), FOLDED)
-    elif name == "importance":
-        # by factor, and one row with its message for each tree that could not be grown
-        none = frame[frame["status"] != "done"].drop_duplicates(TREE)[[*TREE, "n", "message"]]
-        trees = pd.concat([importance_by_factor(frame), none], ignore_index=True)
-        yield sortable(name, title, about, trees, _IMPORTANCE)
-    else:
-        yield from page_tables(_SHAPES[name], title, frame)
+def _chosen(rows: pd.DataFrame, name: str) -> pd.DataFrame:
+    """Rows of retained fits, stiffness in the field's units and only where it is identifiable."""
+    if name == "summary":
+        rows = rows[(rows["part"] == "poses") & (rows["dataset"] == "reduced")]
+        rows = rows[rows["quantity"].isin(["stiffness", "error"])]
+        unknown = rows["open_share"].astype(float) > MOST_LOST
+        return _in_field_units(_without(rows, ("median", "low_quartile", "high_quartile"), unknown))
+    if name == "agreement":
+        return rows[rows["dataset"] == "reduced"]
+    if name == "load_point_effect":
+        unknown = rows[["stated_low", "stated_high"]].isna().any(axis=1)
+        numbers = ("stated", "per_mm_anterior", "per_mm_superior", "uncertain_median")
+        return _in_field_units(_without(rows, numbers, unknown))
+    if name == "posterior":
+        own = rows[rows["quantity"] == "stiffness"]
+        names = own["unknown"].str.replace(r"_(n_per_m|nm_per_rad)$", "", regex=True)
+        own = own.assign(coordinate=names)
+        for end, flag in (("low", "open_below"), ("high", "open_above")):
+            own = _without(own, (end, f"laplace_{end}", "median"), own[flag].eq(True))
+        return _in_field_units(own)
+    return rows
 
 
-def in_full(statistics: pd.DataFrame) -> pd.DataFrame:
-    """The tests of families without repeats."""
-    return statistics[~_repeated(statistics)]
+def _without(rows: pd.DataFrame, columns: tuple[str, ...], where: pd.Series) -> pd.DataFrame:
+    """Rows with these columns empty there."""
+    return rows.assign(**{name: rows[name].astype(float).mask(where) for name in columns})
+
+
+def _in_field_units(rows: pd.DataFrame) -> pd.DataFrame:
+    """Numbers of stiffness in N/mm and N m/deg."""
+    stiff = rows["unit"].isin(_STIFFNESS)
+    factor = rows["coordinate"].map(FACTOR).where(stiff, 1.0)
+    numbers = rows.select_dtypes("number").columns.difference(["n", *_NO_STIFFNESS])
+    changed = {name: rows[name].astype(float) * factor for name in numbers}
+    return rows.assign(**changed, unit=rows["coordinate"].map(UNIT).where(stiff, rows["unit"]))
 
 
 def folded(statistics: pd.DataFrame, alpha: float) -> pd.DataFrame:
-    """One row per test, joint, response and factor of the other families, as in `FOLDED`."""
-    repeated = statistics[_repeated(statistics)]
-    rows = []
-    for key, part in repeated.groupby(_FOLD, sort=False, dropna=False):
-        kept = part.loc[part["p_bonferroni"] < alpha, "effect"]
-        rows.append(
-            dict(zip(_FOLD, key, strict=True))
-            | {
-                "family_size": part["family_size"].max(),
-                "tests": len(part),
-                "with_result": int(part["p"].notna().sum()),
-                "significant": int((part["p"] < alpha).sum()),
-                "bonferroni": len(kept),
-                "holm": int((part["p_holm"] < alpha).sum()),
-                "effect_name": part["effect_name"].iloc[0],
-                "effect_lowest": kept.min(),
-                "effect_highest": kept.max(),
-            }
-        )
-    return pd.DataFrame(rows, columns=[column.name for column in FOLDED])
-
-
-def _repeated(statistics: pd.DataFrame) -> pd.Series:
-    """Whether a row's family does a test again and again, with something else held fixed."""
-    again = statistics.duplicated(_FOLD, keep=False)
-    families = [statistics["specimen"], statistics["family"]]
-    return again.groupby(families).transform("any")
+    """One row for each test, joint, response and factor, whatever is held fixed in it."""
+    kept = statistics["effect"].where(statistics["p_holm"] < alpha)
+    groups = statistics.assign(kept=kept).groupby(_FOLD, sort=False, dropna=False, as_index=False)
+    return groups.agg(
+        tests=("kept", "size"),
+        significant=("kept", "count"),
+        effect_name=("effect_name", "first"),
+        effect_lowest=("kept", "min"),
+        effect_highest=("kept", "max"),
+    )

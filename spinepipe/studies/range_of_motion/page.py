@@ -4,6 +4,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import sentences_of
 from spinepipe.report.page.study_page import Page, Results
 from spinepipe.report.page.tables import page_tables
+from spinepipe.report.viewer.specimens import specimen_scenes
 from spinepipe.studies.range_of_motion.conclusions import conclusions, whole
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import ROM_SUMMARY, ROM_VARIANCE, STIFFNESS_SETS
@@ -24,4 +25,5 @@ def page(study: RangeOfMotion, cohort: Cohort, results: Results) -> Page:
             *page_tables(ROM_VARIANCE, "Shares of variance", variance),
             *page_tables(STIFFNESS_SETS, "Stiffness sets", results.table("stiffness_sets")),
         ],
+        scenes=specimen_scenes(cohort, with_loads=study.virtual_tests is None),
     )

@@ -16,8 +16,6 @@ from spinepipe.studies.global_sensitivity.failed_runs import (
     of_runs,
     rows_of,
 )
-from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
-from spinepipe.studies.global_sensitivity.soundness import cautions
 from spinepipe.studies.global_sensitivity.tables import FAILED_RUNS, RESPONSES
 from spinepipe.tables import from_rows, write
 
@@ -121,33 +119,3 @@ def test_a_run_counts_once_however_many_steps_and_joints_it_has(tmp_path: Path) 
     design = draw("latin_hypercube", FACTORS, 3, 1)
     rows_ = failed_rows(design, design.unit, UNITS, [path], [])
     assert [(row["test"], row["failed"]) for row in rows_] == [("push", 0)] * 3 + [("pull", 1)] * 3
-
-
-def test_the_sentence_has_the_numbers_of_the_table() -> None:
-    design = drawn("sobol")
-    failed = (design.unit[:, 0] < 0.3) & (design.unit[:, 1] > 0.6)
-    how = ended(failed)
-    how[np.flatnonzero(failed)[:2]] = WAYS.index(Status.NOT_CONVERGED)
-    table = rows(design, how).reset_index()
-    n = int(failed.sum())
-    (words,) = said(table)
-    assert words.startswith(f"{n} of {design.n} runs of push failed (")
-    assert f"{n - 2} tipped over and 2 did not converge" in words
-    assert f"{n} of {n} in the lowest third of soft" in words
-    high = int(table.set_index("factor").loc["tall", "high_third"])
-    assert f"{high} of {n} in the highest third of tall, whose effect may then be" in words
-    assert "The indices of push speak only of inputs at which the spine stands." in words
-    none = rows(design, ended(np.zeros(design.n, dtype=bool))).reset_index()
-    assert said(none) == []
-    one = np.zeros(design.n, dtype=bool)
-    one[5] = True
-    (words,) = said(rows(design, ended(one)).reset_index())
-    assert "at no end of a factor more often than by chance" in words
-
-
-def said(table: pd.DataFrame) -> list[str]:
-    factors = [{"of": "load_size", "times": {"sd": 0.1}}, {"of": "damping", "times": {"sd": 0.1}}]
-    head = {"study": "probe", "kind": "global_sensitivity", "cohort": "any", "factors": factors}
-    nothing = pd.DataFrame()
-    told = cautions(GlobalSensitivity.model_validate(head), nothing, nothing, table)
-    return [words.replace("\u00a0", " ").replace("\u2009", "") for words in told]

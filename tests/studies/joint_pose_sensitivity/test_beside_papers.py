@@ -7,20 +7,18 @@ figures of another cohort.
 from dataclasses import replace
 from pathlib import Path
 
+import pose_tables
 import pytest
-from identification_cases import identification
-from study_cases import FIGURES, STUDY, Size, drawing, project, results
+from study_cases import FIGURES, STUDY, Size, drawing, project
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.comparison import papers
-from spinepipe.report.style import picture, style
 from spinepipe.studies.cohort_stiffness.settings import GOULD_2024B
 from spinepipe.studies.joint_pose_sensitivity.gould_2024a import GOULD_2024A
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.study import Study
-from spinepipe.tables import StudyTables
 
 COHORTS = Path(__file__).resolve().parents[3] / "config" / "cohorts"
 
@@ -86,16 +84,12 @@ def test_numbers_of_a_paper_are_for_its_own_cohort_only() -> None:
 @pytest.mark.full
 @sweep("name", FIGURES)
 def test_joint_pose_figures_of_a_cohort_of_the_other_paper(name: str, tmp_path: Path) -> None:
-    size = Size(("a",), 2, 12)
-    folder = results(project(tmp_path, size), size)
-    identification(folder, size)
-    study, cohort = study_and_cohort(str(tmp_path), STUDY)
-    tables = StudyTables.read([folder / f"{table}.parquet" for table in FIGURES[name]])
-    with style():
-        alone, other = (
-            picture(drawing(name)(study, one, tables), "svg")
-            for one in (cohort, replace(cohort, name=GOULD_2024B.cohort))
-        )
+    study, cohort = study_and_cohort(str(project(tmp_path, Size(("a",)))), STUDY)
+    tables = pose_tables.frames(pose_tables.whole())
+    alone, other = (
+        drawing(name)(study, one, tables).svg()
+        for one in (cohort, replace(cohort, name=GOULD_2024B.cohort))
+    )
     assert other == alone
 
 

@@ -1,4 +1,4 @@
-"""Load points: what the readings exclude, slopes, ranges with the point uncertain, and the words.
+"""Load points: what the readings exclude, slopes, and ranges with the point uncertain.
 
 Expected values are closed forms of normal distributions, tables of F, or worked by hand.
 """
@@ -12,22 +12,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from pydantic import ValidationError
-from study_cases import STUDY, TABLES, Size, project
+from study_cases import STUDY, Size, project
 from sweeps import sweep
 
 from papers.engine import claims_of, judge
 from papers.run import StudyRun
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import ResultTables
-from spinepipe.report.style import style
-from spinepipe.studies.joint_pose_sensitivity.figures.load_point import load_point_figure
-from spinepipe.studies.joint_pose_sensitivity.findings_of_stiffness import load_point
-from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.load_point_effect import effect
 from spinepipe.studies.joint_pose_sensitivity.over_load_point import allowed
 from spinepipe.studies.joint_pose_sensitivity.settings import LoadPoint
 from spinepipe.studies.read import check
-from spinepipe.tables import StudyTables
 
 NAN = float("nan")
 FINE = tuple(float(x) for x in np.arange(-4.0, 4.01, 0.25))
@@ -199,74 +193,7 @@ def test_pure_moments_have_no_load_point(tmp_path: Path) -> None:
         check(root, STUDY)
 
 
-# --- words, figure and comparison ----------------------------------------------------------------
-
-
-def row(**more: Any) -> dict[str, Any]:
-    """An effect of one specimen."""
-    names = [column.name for column in TABLES["load_point_effect"].columns]
-    numbers = {"stated": 20.0, "stated_low": 18.0, "stated_high": NAN, "lowest": 10.0}
-    numbers |= {"highest": 30.0, "per_mm_anterior": 2.0, "per_mm_superior": 0.1}
-    numbers |= {"cost_lowest": 0.9, "cost_highest": 1.5, "points": 9, "fitted": 9, "allowed": 9}
-    numbers |= {"anterior_sd_mm": 1.0, "superior_sd_mm": 0.0, "uncertain_low": 14.0}
-    key = {"specimen": "a", "joint": "*", "coordinate": "extension", "unit": "N m/rad"}
-    return {**dict.fromkeys(names, NAN), **key, **numbers, "message": "", **more}
-
-
-def told(*rows: dict[str, Any]) -> str:
-    frame = pd.DataFrame(list(rows))
-    return load_point(ResultTables(StudyTables({"load_point_effect": frame}), {}, {}))
-
-
-def test_finding_says_what_a_mm_is_worth_and_that_motion_does_not_tell() -> None:
-    assert told(row(), row(coordinate="superior", unit="N/m", lowest=19.5, highest=20.5)) == (
-        "Over 9 load points, flexion–extension stiffness is 10.0 to 30.0 N m/rad (20.0 where the "
-        "study puts the load; 2.00 per mm anterior and 0.10 per mm superior); the others differ by "
-        "less than 10 %. The readings exclude none (cost 0.90 to 1.50 times that of the study's "
-        "point): motion does not tell where the load acted. With the load known to 1 mm anterior "
-        "(SD), flexion–extension stiffness lies in 14.0 to an open upper end N m/rad (95 %), not "
-        "in 18.0 to an open upper end."
-    )
-
-
-def test_finding_says_so_where_motion_tells_or_nothing_hangs_on_the_point() -> None:
-    assert "The readings exclude 6 of 9 load points with a fit" in told(row(allowed=3))
-    assert "cannot be said: too few readings" in told(row(allowed=NAN))
-    still = told(row(lowest=19.5, highest=20.5))
-    assert still.startswith("No fitted stiffness differs by more than 10 % over 9 load points.")
-    assert "known to" not in still
-    assert told(row(stated=NAN)) == ""
-
-
-def test_finding_names_the_worst_of_several_specimens() -> None:
-    words = told(row(), row(specimen="b", highest=50.0), row(specimen="c", lowest=20, highest=20))
-    assert "stiffness (in 2 of 3, most in b) is 10.0 to 50.0 N m/rad" in words
-    assert "stiffness in b lies in" in words
-
-
-@sweep("specimens", [("a",), ("a", "b", "c")])
-def test_figure_has_a_panel_for_each_stiffness_and_one_for_the_cost(
-    tmp_path: Path, specimens: tuple[str, ...]
-) -> None:
-    study, cohort = study_and_cohort(str(project(tmp_path, Size(specimens))), STUDY)
-    points = (-1.0, 0.0, 1.0), (-20.0, 0.0, 20.0, 40.0)
-    one = tried(*points, lambda a, s: 20.0 + a + 0.1 * s)
-    fits = pd.concat([one.assign(specimen=name) for name in specimens])
-    effects = pd.DataFrame([row(specimen=name) for name in specimens])
-    tables = {"stiffness_over_load_point": fits, "load_point_effect": effects}
-    with style():
-        figure = load_point_figure(study, cohort, StudyTables(tables))
-        figure.canvas.draw()
-        shown = [axis for axis in figure.axes if axis.get_visible()]
-        assert [axis.get_title("left")[-4:] for axis in shown] == ["sion", "Cost"]
-        lines = [line for line in shown[0].lines if len(line.get_xdata()) == 4]
-        assert len(lines) == 3  # of each other shift, or of each specimen
-        nothing = load_point_figure(
-            study,
-            cohort,
-            StudyTables({**tables, "stiffness_over_load_point": fits.assign(status="unstable")}),
-        )
-    assert "No stiffness was found" in nothing.texts[0].get_text()
+# --- comparison -----------------------------------------------------------------------------------
 
 
 def claim(name: str, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
