@@ -269,16 +269,16 @@ CASES: dict[str, tuple[Case, str]] = {
     "alike": (Case(tables=claims(**of_all(BOTH, "no", "no"))), "specimens alike, levels alike"),
     "nothing decided": (
         Case(tables=claims(**of_all(BOTH, "no", "undecided"), **dict.fromkeys(ALL_KINDS, UNTOLD))),
-        "specimens not_shown, levels not_shown, descriptions none_shown, stiffening not_shown, "
+        "specimens not_shown, levels not_shown, descriptions none_shown, laws not_shown, "
         "centres not_shown, published neither_shown, load_cases not_shown",
     ),
     "all pay": (
         Case(tables=claims(**dict.fromkeys(ALL_KINDS, "yes"))),
-        "descriptions best, stiffening better, centres better, published better, load_cases yes",
+        "descriptions best, laws better, centres better, published better, load_cases yes",
     ),
     "none pays": (
         Case(tables=claims(**dict.fromkeys(ALL_KINDS, ("no", -0.5)))),
-        "descriptions best, stiffening worse, centres worse, published worse, load_cases small",
+        "descriptions best, laws worse, centres worse, published worse, load_cases small",
     ),
     "one of two about published stiffness": (
         Case(tables=claims(**{PUBLISHED[0]: UNTOLD, PUBLISHED[1]: "yes"})),

@@ -15,12 +15,19 @@ from spinepipe.report.words import AXIS, SIGNS, case, level
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import loaded_ratios
 from spinepipe.studies.cohort_stiffness.conclusions import one_joint_errors
 from spinepipe.studies.cohort_stiffness.conclusions_of_stiffness import FIELD, joint_values
-from spinepipe.studies.cohort_stiffness.fit_rows import LEVEL
 from spinepipe.studies.cohort_stiffness.loop_rows import paired_curves
-from spinepipe.studies.cohort_stiffness.representations import IN_WORDS, PUBLISHED
+from spinepipe.studies.cohort_stiffness.representations import (
+    IN_WORDS,
+    OF_JOINTS,
+    PUBLISHED,
+    SHARED,
+)
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
 Tables = Mapping[str, pd.DataFrame]
+
+LEVEL = 0.975
+"""Probability below the upper end of an interval: 95 % lie between the ends."""
 
 MOST_TIMES = 12.0
 """Largest over least value from which on an axis is logarithmic."""
@@ -85,8 +92,16 @@ def _panel(
     looks = {each: SOFT if shared else MODEL, "median": MODEL}
     frame = frame[::-1] if by == "joint" else frame  # cranial at the top
     width = 300.0 + 5.0 * max(0, min(26, singles["row"].str.len().max()) - 12)
-    how = {"looks": looks, "marks": marks, "log": log, "x_limits": ends, "width": width}
-    return Rows(title=title, x_label=label, frame=frame, **how)
+    return Rows(
+        title=title,
+        x_label=label,
+        frame=frame,
+        looks=looks,
+        marks=marks,
+        log=log,
+        x_limits=ends,
+        width=width,
+    )
 
 
 STAGES = {
@@ -106,7 +121,7 @@ def held_out_error(study: CohortStiffness, cohort: Cohort, tables: Tables) -> Ch
     if rows.empty:
         return saying(title, "No fit has an error: there is nothing to compare.")
     same = one_joint_errors(rows, len(cohort.joint_names))  # equal results once
-    alike = {"per_joint": "per_specimen"} if len(cohort.joint_names) == 1 else {}
+    alike = {OF_JOINTS[0]: SHARED[0]} if len(cohort.joint_names) == 1 else {}
     names = rows["representation"].replace(alike).map(IN_WORDS)
     rows = rows.assign(row=names.where(~rows.index.isin(same.index), "all linear descriptions"))
     published = rows["representation"].isin(PUBLISHED)

@@ -18,12 +18,12 @@ from spinepipe.studies.cohort_stiffness.conclusions_of_stiffness import (
     direction,
     directions,
 )
-from spinepipe.studies.cohort_stiffness.representations import NUISANCE, STIFFENING, named
+from spinepipe.studies.cohort_stiffness.representations import NUISANCE, SHARED, STIFFENING, named
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stages import LEFT_OUT_CASE, LEFT_OUT_SPECIMEN
 from spinepipe.units import COORDINATES
 
-Row = dict[str, Any]
+Row = dict[Any, Any]
 Claims = dict[str, Row]
 
 UNSEEN = {LEFT_OUT_SPECIMEN: "a left-out specimen", LEFT_OUT_CASE: "a left-out load case"}
@@ -64,7 +64,7 @@ def claim_conclusions(
     plain = [pair for pair in CONTESTS if not special & {*pair}]
     yield from _descriptions(_contests(claims, plain))
     laws = [pair for pair in CONTESTS if pair[0] in STIFFENING and pair[1] not in STIFFENING]
-    yield from _worth("stiffening", _contests(claims, laws))
+    yield from _worth("laws", _contests(claims, laws))
     yield from _worth("centres", _contests(claims, [p for p in CONTESTS if p[0] in NUISANCE]))
     yield from _published(claims)
 
@@ -77,7 +77,7 @@ def _contests(claims: Claims, pairs: Sequence[tuple[str, str]]) -> list[Row]:
     Rows of the table with ``order``, which is the better and which the worse one where they are
     decided, and ``names``, the words of a sentence about them.
     """
-    found = []
+    found: list[Row] = []
     for pair, (stage, what) in ((pair, one) for pair in pairs for one in UNSEEN.items()):
         row = claims.get("{}_beats_{}_{}".format(*pair, stage))
         if row and row["holds"] in (*DECIDED, UNDECIDED) and pd.notna(row["value"]):
@@ -98,7 +98,7 @@ def _size(row: Row) -> Value:
     sign = -1.0 if row["holds"] == "no" and value < 0.0 else 1.0
     low, high = (None if pd.isna(end) else sign * end for end in ends[:: int(sign)])
     n = None if pd.isna(row["specimens"]) else int(row["specimens"])
-    unit = SIGNS.get(row["unit"], row["unit"])
+    unit = str(SIGNS.get(row["unit"], row["unit"]))
     return Value(sign * value, unit, low, high, n, f"findings: {row['finding']}")
 
 
@@ -122,7 +122,7 @@ def _descriptions(rows: Sequence[Row]) -> Iterator[Conclusion]:
     best = beaten == compared - {first} and first not in {order[1] for order in orders}
     wins = [row for row in decided if row["order"][0] == first]
     # of the best the closest rival is told, else whether one value for all joints is enough
-    told = min(wins, key=lambda row: row["order"][1] != "per_specimen")
+    told = min(wins, key=lambda row: row["order"][1] != SHARED[0])
     told = min(wins, key=lambda row: abs(row["value"])) if best else told
     verdict = "best" if best else "some"
     yield Conclusion("descriptions", verdict, {"less": _size(told), **_counts(rows)}, told["names"])
@@ -159,8 +159,8 @@ def _differ(claims: Claims, values: pd.DataFrame, what: str, by: str) -> Iterato
     """Whether specimens or levels differ, by the claims of all directions."""
     times = differences(values, by)
     begins = f"stiffness_differs_between_{what}_"
-    rows = {name: claims.get(begins + name) for name in COORDINATES if name in times}
-    holds = {name: row["holds"] for name, row in rows.items() if row and pd.notna(row["value"])}
+    rows = {name: claims.get(begins + name, {}) for name in COORDINATES if name in times}
+    holds = {name: row["holds"] for name, row in rows.items() if pd.notna(row.get("value"))}
     if not holds:
         return
     differ = [name for name, verdict in holds.items() if verdict in ("yes", CIRCULAR)]

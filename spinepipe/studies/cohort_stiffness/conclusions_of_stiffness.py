@@ -8,7 +8,7 @@ import pandas as pd
 
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.words import AXIS, level, listed, short
-from spinepipe.studies.cohort_stiffness.representations import FITTED, SHARED, named
+from spinepipe.studies.cohort_stiffness.representations import FITTED, OF_JOINTS, SHARED, named
 from spinepipe.studies.cohort_stiffness.stages import own_fits
 from spinepipe.studies.cohort_stiffness.tables import STIFFNESS
 from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
@@ -44,7 +44,7 @@ def joint_values(stiffness: pd.DataFrame) -> pd.DataFrame:
 def _order(name: str) -> tuple[bool, bool, bool]:
     """Each joint its own first, before these all by itself and with centres as stated."""
     one = named(name)
-    return one.pooled or bool(one.without_nuisances), one.grouping != "per_joint", one.stiffens
+    return one.pooled or bool(one.without_nuisances), name not in OF_JOINTS, one.stiffens
 
 
 def _rows(own: pd.DataFrame) -> pd.DataFrame:

@@ -45,7 +45,7 @@ from page_rules import (
 from spinepipe.report.conclusions import sentences_of
 
 PACKAGE = "spinepipe.studies.cohort_stiffness"
-UNSEEN = {"descriptions", "stiffening", "centres", "published"}
+UNSEEN = {"descriptions", "laws", "centres", "published"}
 """Rules about motion that no fit has seen."""
 
 COMPARING = {*UNSEEN, "specimens", "levels", "load_cases"}

@@ -122,7 +122,7 @@ def test_two_covariates_need_six_specimens(n: int, refused: bool) -> None:
     if refused:
         assert set(found["message"]) == {"5 specimens, and 2 covariates together need 6"}
         (told,) = covariate_conclusions(found.reset_index())
-        assert (told.rule, told.names["covariates"]) == ("asked", "age, sex")
+        assert (told.rule, told.names["covariates"]) == ("asked", "age and sex")
 
 
 def test_what_says_nothing_is_refused_by_itself() -> None:

@@ -143,7 +143,7 @@ def test_stiffening_wins_where_joints_stiffen_and_only_there(
     assert best == ("stiffening" if wins else "per_specimen")
     told = claim_conclusions(study, joint_values(frames["stiffness"]), frames["findings"])
     verdicts = {one.rule: one.verdict for one in told}
-    assert verdicts["stiffening"] == ("better" if wins else "not_shown")
+    assert verdicts["laws"] == ("better" if wins else "not_shown")
 
 
 @pytest.mark.parametrize("label", ["left_lateral_bending", "all_but_flexion"])
