@@ -321,8 +321,7 @@ def _evidence(verdict: Verdict, candidates: pd.DataFrame) -> Iterator[tuple[str,
 
 def _bars(heading: str, label: str, bars: Bars, marks: Mapping[float, str] | None = None) -> Rows:
     frame = pd.DataFrame(bars, columns=["value", "row", "note"])
-    wide = 400.0 if heading else 300.0
-    how: dict[str, Any] = {"marks": marks or {}, "bars": True, "looks": {"": MODEL}, "width": wide}
+    how: dict[str, Any] = {"marks": marks or {}, "bars": True, "looks": {"": MODEL}, "width": 400.0}
     return Rows(title=heading, x_label=label, frame=frame, **how)
 
 
