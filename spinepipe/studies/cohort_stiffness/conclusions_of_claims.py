@@ -97,7 +97,7 @@ def _size(row: Row) -> Value:
     value, *ends = (float(row[name]) for name in ("value", "low", "high"))
     sign = -1.0 if row["holds"] == "no" and value < 0.0 else 1.0
     low, high = (None if pd.isna(end) else sign * end for end in ends[:: int(sign)])
-    n = None if pd.isna(row["specimens"]) else int(row["specimens"])
+    n: int | None = None if pd.isna(row["specimens"]) else int(row["specimens"])
     unit = str(SIGNS.get(row["unit"], row["unit"]))
     return Value(sign * value, unit, low, high, n, f"findings: {row['finding']}")
 
