@@ -1,6 +1,7 @@
 """Figures of a study of stiffness: how stiff joints are, and how well that predicts motion."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,9 +26,6 @@ from spinepipe.studies.cohort_stiffness.representations import (
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 
 Tables = Mapping[str, pd.DataFrame]
-
-LEVEL = 0.975
-"""Probability below the upper end of an interval: 95 % lie between the ends."""
 
 MOST_TIMES = 12.0
 """Largest over least value from which on an axis is logarithmic."""
@@ -92,16 +90,8 @@ def _panel(
     looks = {each: SOFT if shared else MODEL, "median": MODEL}
     frame = frame[::-1] if by == "joint" else frame  # cranial at the top
     width = 300.0 + 5.0 * max(0, min(26, singles["row"].str.len().max()) - 12)
-    return Rows(
-        title=title,
-        x_label=label,
-        frame=frame,
-        looks=looks,
-        marks=marks,
-        log=log,
-        x_limits=ends,
-        width=width,
-    )
+    how: dict[str, Any] = {"looks": looks, "marks": marks, "log": log, "x_limits": ends}
+    return Rows(title=title, x_label=label, frame=frame, width=width, **how)
 
 
 STAGES = {
@@ -128,7 +118,7 @@ def held_out_error(study: CohortStiffness, cohort: Cohort, tables: Tables) -> Ch
     rows = rows.assign(series=rows["criterion"].where(~published, "published"))
     rows = rows.drop_duplicates(["row", "series"])
     value, n = rows["value"].astype(float), rows["specimens"].astype(float)
-    reach = rows["standard_error"].astype(float) * stats.t.ppf(LEVEL, (n - 1.0).clip(lower=1.0))
+    reach = rows["standard_error"].astype(float) * stats.t.ppf(0.975, (n - 1.0).clip(lower=1.0))
     rows = rows.assign(low=(value - reach).clip(lower=0.0), high=value + reach)
     unit = SIGNS[rows["unit"].iloc[0]]
     panel = Rows(
@@ -160,7 +150,7 @@ def load_case_stiffness(study: CohortStiffness, cohort: Cohort, tables: Tables) 
     if found.empty:
         return saying(title, "No load case bounds a stiffness by itself.")
     found = found.drop_duplicates("ratio")  # joints that share a value have one
-    reach = stats.norm.ppf(LEVEL) * found["error"]
+    reach = stats.norm.ppf(0.975) * found["error"]
     logs = {"value": found["ratio"], "low": found["ratio"] - reach, "high": found["ratio"] + reach}
     found = found.assign(**{name: np.exp(log) for name, log in logs.items()})
     found = found.assign(place=found["value"], test=[case(str(name)) for name in found["test"]])

@@ -1,6 +1,6 @@
 """What a study of stiffness concludes; the sentences stand in conclusions.csv."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,7 @@ from spinepipe.studies.cohort_stiffness.conclusions_of_claims import (
     covariate_conclusions,
 )
 from spinepipe.studies.cohort_stiffness.conclusions_of_stiffness import (
+    counted,
     directions,
     joint_values,
     stiffness_conclusions,
@@ -65,7 +66,7 @@ def conclusions(study: CohortStiffness, cohort: Cohort, results: Results) -> Ite
     scatter = _scatter(fits, values)
     yield from stiffness_conclusions(values)
     yield from _trust(study, signs, values, scatter)
-    needed = _counts({"n": specimens, "needed": FEWEST}, "cohort: specimens")
+    needed = counted({"n": specimens, "needed": FEWEST}, "cohort: specimens")
     words = {"specimens": count(specimens, "specimen")}
     yield Conclusion("sample", "few" if specimens < FEWEST else "ok", needed, words)
     same = one_joint_errors(table("ranking"), len(cohort.joint_names))
@@ -90,10 +91,6 @@ def conclusions(study: CohortStiffness, cohort: Cohort, results: Results) -> Ite
     yield from _methods(study, stiffness, specimens)
 
 
-def _counts(numbers: Mapping[str, int], source: str) -> dict[str, Value]:
-    return {name: Value(int(n), source=source) for name, n in numbers.items()}
-
-
 def _scatter(fits: pd.DataFrame, values: pd.DataFrame) -> Value | None:
     """Residuals of the fits whose stiffness is told, in SDs of a reading: median of specimens."""
     if fits.empty or values.empty:
@@ -114,7 +111,7 @@ def _trust(
     if rows:
         counts = {name: len(part) for name, part in rows.items()} | {"n": len(signs)}
         counts["moved"] += counts["wrong"]
-        numbers = _counts(counts, "sign_checks: verdict")
+        numbers = counted(counts, "sign_checks: verdict")
         places = [
             f"{short(row['specimen'])} {level(row['joint'])} in {plain(row['test'])}"
             for row in rows["flipped"].to_dict("records")
@@ -163,7 +160,7 @@ def _quality(
         lost = fits.loc[~fits["status"].isin(USABLE), "status"]
         several = int((fits["n_optima"] > 1).sum())
         counts = {"n": len(fits), "lost": len(lost), "several": several}
-        numbers = _counts(counts, "fits: status, n_optima")
+        numbers = counted(counts, "fits: status, n_optima")
         verdict = "ok" if lost.empty else "check" if len(lost) <= MANY * len(fits) else "stop"
         why = [f"{n} {plain(str(name))}" for name, n in lost.value_counts().items()]
         yield Conclusion("fits", verdict, numbers, {"why": listed(why)})
@@ -171,7 +168,7 @@ def _quality(
     if len(values):
         lost_values = int(values["value"].isna().sum())
         counts = {"n": len(values), "lost": lost_values}
-        numbers = _counts(counts, "stiffness: identifiable, at_bound")
+        numbers = counted(counts, "stiffness: identifiable, at_bound")
         yield Conclusion("bounded", "check" if lost_values else "ok", numbers)
     if study.cost == "published":
         yield Conclusion("noise", "check_none")
@@ -212,7 +209,7 @@ def _checks(
     ]
     known = pd.concat([own[:0], *parts])["identifiable"].eq(True)
     if len(known) and not known.all():
-        numbers = _counts({"n": len(known), "lost": int((~known).sum())}, "stiffness: identifiable")
+        numbers = counted({"n": len(known), "lost": int((~known).sum())}, "stiffness: identifiable")
         yield Conclusion("left_out_stiffness", "check", numbers)
 
 
@@ -223,7 +220,7 @@ def _priors(rows: pd.DataFrame) -> Iterator[Conclusion]:
         far = int((whole["pull"].abs() > FAR).sum())
         bounded = whole["standard_error"].astype(float) < 0.5 * whole["prior_sd"].astype(float)
         numbers = {"n": len(whole), "far": far, "bounded": int(bounded.sum())}
-        values = _counts(numbers, "nuisances: pull, standard_error")
+        values = counted(numbers, "nuisances: pull, standard_error")
         yield Conclusion("priors", "check" if far else "ok", values)
 
 
@@ -234,7 +231,7 @@ def _experiments(curves: pd.DataFrame, axes: pd.DataFrame) -> Iterator[Conclusio
         yield from _zones(curves)
         loops = paired_curves(curves, "hysteresis_area", "j").dropna(subset=["measured"])
         sure = int((loops["measured"] - loops["measured_way"] > 0.0).sum())
-        values = _counts({"n": len(loops), "sure": sure}, "load_displacement: hysteresis area")
+        values = counted({"n": len(loops), "sure": sure}, "load_displacement: hysteresis area")
         if len(loops):
             work = float(loops["measured"].median())
             values["work"] = Value(work, "J", n=len(loops), source="load_displacement: median")
@@ -243,7 +240,7 @@ def _experiments(curves: pd.DataFrame, axes: pd.DataFrame) -> Iterator[Conclusio
     measured = axes[axes["source"] == MEASURED] if len(axes) else axes
     if len(measured):
         placed = measured[measured["status"] == WHOLE]
-        values = _counts({"n": len(measured), "placed": len(placed)}, "helical_axes: status")
+        values = counted({"n": len(measured), "placed": len(placed)}, "helical_axes: status")
         sds = placed[["centre_anterior_sd_mm", "centre_superior_sd_mm"]].astype(float).dropna()
         if len(sds):
             sd = float(np.median(np.hypot(*sds.to_numpy().T)))
@@ -270,7 +267,7 @@ def ranges(pairs: pd.DataFrame) -> Iterator[Conclusion]:
     counts = {"n": len(off), "known": n, "outside": outside, "inside": n - outside}
     values = {"middle": Value(float(off.median()), "°", n=len(off), source=source)}
     verdict = "no_noise" if not n else "differ" if outside > MANY * n else "agree"
-    yield Conclusion("ranges", verdict, values | _counts(counts, source))
+    yield Conclusion("ranges", verdict, values | counted(counts, source))
 
 
 def _zones(rows: pd.DataFrame) -> Iterator[Conclusion]:
@@ -280,7 +277,7 @@ def _zones(rows: pd.DataFrame) -> Iterator[Conclusion]:
     asked = measured[measured["neutral_zone"].isin([*bent, Zone.NOT_MEANINGFUL.value])]
     soft, of_model = (part[part["neutral_zone"].isin(bent)] for part in (asked, model))
     counts = {"n": len(asked), "soft": len(soft), "model": len(of_model)}
-    values = _counts(counts, "load_displacement: neutral_zone")
+    values = counted(counts, "load_displacement: neutral_zone")
     zone = soft["neutral_zone_deg"].dropna().astype(float)
     if len(zone):
         middle = float(zone.median())
@@ -293,7 +290,7 @@ def _methods(study: CohortStiffness, stiffness: pd.DataFrame, n: int) -> Iterato
     tests = load_cases(stiffness["fitted_to"]) if len(stiffness) else ()
     words = {"directions": directions(study.free), "tests": count(len(tests), "load case")}
     verdict = "published" if study.cost == "published" else "noise"
-    yield Conclusion("methods", verdict, _counts({"n": n}, "cohort: specimens"), words)
+    yield Conclusion("methods", verdict, counted({"n": n}, "cohort: specimens"), words)
     if set(study.representations) & set(POOLED):
         yield Conclusion("methods_more", "pooled")
     if n >= FEWEST:

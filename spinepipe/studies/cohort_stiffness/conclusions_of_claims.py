@@ -14,6 +14,7 @@ from spinepipe.studies.cohort_stiffness.claims import CIRCULAR, DECIDED, UNDECID
 from spinepipe.studies.cohort_stiffness.claims_of_errors import CONTESTS
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import SPECIFIC
 from spinepipe.studies.cohort_stiffness.conclusions_of_stiffness import (
+    counted,
     differences,
     direction,
     directions,
@@ -103,8 +104,7 @@ def _size(row: Row) -> Value:
 
 
 def _counts(rows: Sequence[Row]) -> dict[str, Value]:
-    counts = {"compared": len(rows), "decided": len(_decided(rows))}
-    return {name: Value(n, source="findings: comparisons") for name, n in counts.items()}
+    return counted({"compared": len(rows), "decided": len(_decided(rows))}, "findings")
 
 
 def _descriptions(rows: Sequence[Row]) -> Iterator[Conclusion]:
@@ -183,8 +183,7 @@ def _load_cases(claims: Claims) -> Iterator[Conclusion]:
         row = claims.get(claim.finding)
         if row and row["holds"] in verdicts and pd.notna(row["value"]):
             n, source = int(row["specimens"]), f"findings: {claim.finding}"
-            counts = {"below": round(row["value"] * n), "n": n}
-            numbers = {name: Value(number, source=source) for name, number in counts.items()}
+            numbers = counted({"below": round(row["value"] * n), "n": n}, source)
             words = {"described": named(representation).sentence}
             yield Conclusion("load_cases", verdicts[row["holds"]], numbers, words)
             break
@@ -198,8 +197,8 @@ def covariate_conclusions(rows: pd.DataFrame) -> Iterator[Conclusion]:
     for row in held.to_dict("records"):
         factor, low, high = (float(row[name]) for name in ("factor", "low", "high"))
         n = int(row["specimens"])
-        numbers = {"factor": Value(factor, "", low, high, n, "covariates: factor")}
-        numbers["n"] = Value(n, source="covariates: specimens")
+        numbers = counted({"n": n}, "covariates: specimens")
+        numbers["factor"] = Value(factor, "", low, high, n, "covariates: factor")
         words = {"direction": direction(row["coordinate"]), "covariate": row["name"]}
         yield Conclusion("covariates", "yes", numbers, {**words, "step": str(row["step"])})
     parts = {"covariates": rows[rows["holds"] == UNDECIDED]}

@@ -1,6 +1,6 @@
 """How stiff the joints are, in units of the field; the sentences stand in conclusions.csv."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite, pi
 
 import numpy as np
@@ -94,6 +94,11 @@ def kind_of(rows: pd.DataFrame) -> str:
     return "joints" if len(known) > 1 else "single"
 
 
+def counted(numbers: Mapping[str, int], source: str) -> dict[str, Value]:
+    """Counts as values."""
+    return {name: Value(int(n), source=source) for name, n in numbers.items()}
+
+
 def direction(coordinate: str) -> str:
     """A coordinate as a direction of motion in a sentence."""
     words = AXIS[coordinate].lower()
@@ -117,7 +122,7 @@ def stiffness_conclusions(values: pd.DataFrame) -> Iterator[Conclusion]:
     for name, value in told.items():
         rows = values[values["coordinate"] == name]
         more = {**names, "direction": direction(name)}
-        n = {"n": Value(value.n or 0, source=value.source)}
+        n = counted({"n": value.n or 0}, value.source)
         yield Conclusion("direction", kind_of(rows), {"value": value, **n}, more)
     yield from _open(values, [name for name in found if name not in told])
 
