@@ -1,89 +1,70 @@
 """Figure: growth of time and memory with joints, unknowns and targets, beside OpenSim."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+import pandas as pd
 
-from spinepipe.report.panels import log_ticks
-from spinepipe.report.style import BLACK, BLUE, GREEN, GREY, SMALL_PT, VERMILLION, blank
+from spinepipe.report.forms.chart import Chart, Key, Panel
+from spinepipe.report.forms.curves import Curves
+from spinepipe.report.forms.look import BASE, FOURTH, MEASURED, MODEL, SOFT, THIRD, Look
 
 Data = dict[str, Any]
 
-_HEIGHT_MM = 130.0
+_LOOKS: Mapping[str, Look] = {
+    "spinepipe, among many": MODEL,
+    "spinepipe, model loaded": THIRD,
+    "OpenSim, static root-find": BASE,
+    "OpenSim, CPodes, 1.5 s run": MEASURED,
+    "OpenSim, default integrator (extrapolated)": SOFT,
+    "cold": MODEL,
+    "1 % lost": THIRD,
+    "nothing to do": FOURTH,
+}
 
 
-def speed_figure(parts: dict[str, Data]) -> Figure:
+def speed_chart(parts: dict[str, Data]) -> Chart:
     """Four panels from the parts' results."""
-    figure = blank(_HEIGHT_MM)
-    (joints, unknowns), (targets, memory) = figure.subplots(2, 2)
-    _joints(joints, parts["many_spines"]["growth"])
-    _unknowns(unknowns, parts["foundation"]["engine"])
-    _targets(targets, parts["sensitivity"]["targets"])
-    _memory(memory, parts["sensitivity"]["targets"], parts["memory"]["processes"])
-    return figure
-
-
-def _joints(axis: Axes, rows: Sequence[Data]) -> None:
-    looks = (
-        ("together_s", "spinepipe, among many", BLUE, "o", "-"),
-        ("engine_s", "spinepipe, engine of record, model loaded", GREEN, "s", "-"),
-        ("static_s", "OpenSim, static root-find", VERMILLION, "^", "-"),
-        ("cpodes_s", "OpenSim, CPodes, 1.5 s run", BLACK, "v", "-"),
-        ("default_s", "OpenSim, default integrator (extrapolated)", GREY, "D", "--"),
+    growth = parts["many_spines"]["growth"]
+    fits = [row for row in parts["foundation"]["engine"] if row["what"].startswith("calibration")]
+    unknowns = [{**row, "unknowns": int(row["what"].split()[2])} for row in fits]
+    targets = [
+        {
+            "targets": row["targets"],
+            **{key: row[key]["wall_s"] for key in ("cold", "lost", "again")},
+            "peak_mib": row["cold"]["peak_mib"],
+        }
+        for row in parts["sensitivity"]["targets"]
+    ]
+    one, five, time = "spinepipe, among many", "OpenSim, static root-find", "CPU time (s)"
+    names = dict(
+        zip(("together_s", "engine_s", "static_s", "cpodes_s", "default_s"), _LOOKS, strict=False)
     )
-    at = [row["joints"] for row in rows]
-    for key, label, color, marker, line in looks:
-        values = [row[key] for row in rows]
-        face = "white" if line == "--" else color
-        axis.plot(at, values, color=color, marker=marker, ls=line, ms=3.2, mfc=face, label=label)
-    _finish(axis, "a  One equilibrium", "joints", "CPU time (s)", at)
-    axis.set_ylim(top=axis.get_ylim()[1] * 3e3)
+    kept = {"cold": "cold", "lost": "1 % lost", "again": "nothing to do"}
+    panels = [
+        _panel("One equilibrium", growth, "joints", names, time),
+        _panel(
+            "One calibration, T12–S1", unknowns, "unknowns", {"ours_s": one, "peer_s": five}, time
+        ),
+        _panel("A study of single targets, 2 cores", targets, "targets", kept, "wall time (s)"),
+        _panel("Memory of it, cold", targets, "targets", {"peak_mib": "cold"}, "memory (MiB)"),
+    ]
+    keys = [Key(look, name) for name, look in _LOOKS.items()]
+    return Chart("Speed beside OpenSim", panels, "Time and memory over size of task.", keys)
 
 
-def _unknowns(axis: Axes, rows: Sequence[Data]) -> None:
-    fits = [row for row in rows if row["what"].startswith("calibration")]
-    at = [int(row["what"].split()[2]) for row in fits]
-    ours, theirs = ([row[key] for row in fits] for key in ("ours_s", "peer_s"))
-    axis.plot(at, ours, color=BLUE, marker="o", ms=3.2, label="spinepipe, exact derivatives")
-    label = "OpenSim static root-find, differences"
-    axis.plot(at, theirs, color=VERMILLION, marker="^", ms=3.2, label=label)
-    _finish(axis, "b  One calibration, T12-S1", "stiffnesses that are fitted", "CPU time (s)", at)
-    axis.set_ylim(top=axis.get_ylim()[1] * 4)
-
-
-def _targets(axis: Axes, rows: Sequence[Data]) -> None:
-    looks = (
-        ("cold", "cold", BLUE, "o"),
-        ("lost", "1 % lost", GREEN, "s"),
-        ("again", "nothing to do", GREY, "D"),
+def _panel(title: str, rows: Sequence[Data], x: str, names: Mapping[str, str], label: str) -> Panel:
+    cells = [(row[x], row[key], name) for key, name in names.items() for row in rows]
+    frame = pd.DataFrame(cells, columns=["x", "y", "series"])
+    return Curves(
+        title=title,
+        x_label=x,
+        y_label=label,
+        frame=frame,
+        looks=_LOOKS,
+        points=tuple(names.values()),
+        x_log=True,
+        y_log="memory" not in label,
+        zeros=False,
+        width=420.0,
     )
-    at = [row["targets"] for row in rows]
-    for key, label, color, marker in looks:
-        values = [row[key]["wall_s"] for row in rows]
-        axis.plot(at, values, color=color, marker=marker, ms=3.2, label=label)
-    _finish(axis, "c  A study of single targets, 2 cores", "targets", "wall time (s)", at)
-
-
-def _memory(axis: Axes, rows: Sequence[Data], processes: Sequence[Data]) -> None:
-    at = [row["targets"] for row in rows]
-    cold = [row["cold"]["peak_mib"] for row in rows]
-    axis.plot(at, cold, color=BLUE, marker="o", ms=3.2, label="all processes of the study, cold")
-    for one, color, line in zip(processes, (GREEN, VERMILLION), (":", "--"), strict=True):
-        label = f"{one['what'].partition(':')[0]}: one process that solves T12-S1"
-        axis.axhline(one["peak_mib"], color=color, ls=line, label=label)
-    _finish(axis, "d  Memory of it", "targets", "largest memory (MiB)", at)
-    axis.set_yscale("linear")
-    axis.set_ylim(0.0, 1.5 * max(cold))
-
-
-def _finish(axis: Axes, title: str, across: str, up: str, at: Sequence[float]) -> None:
-    axis.set_xscale("log")
-    axis.set_yscale("log")
-    log_ticks(axis.xaxis, min(at), max(at), 5)
-    axis.set_xlabel(across)
-    axis.set_ylabel(up)
-    axis.set_title(title)
-    axis.tick_params(axis="y", length=2.5)
-    axis.legend(loc="upper left", fontsize=SMALL_PT, labelspacing=0.3, borderaxespad=0.2)

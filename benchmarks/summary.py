@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from benchmarks.figure import speed_figure
-from spinepipe.report.style import save, style
+from benchmarks.figure import speed_chart
 
 Data = dict[str, Any]
 
@@ -52,10 +51,9 @@ def write(folder: Path) -> None:
     ]
     text = _TEXT.format(cores=CORES, table="\n".join(lines), machines="\n".join(machines))
     (folder / "README.md").write_text(text, encoding="utf-8")
-    with style():
-        figure = speed_figure(parts)
-        for kind in ("png", "svg"):
-            save(figure, folder / f"speed.{kind}")
+    chart = speed_chart(parts)
+    (folder / "speed.svg").write_text(chart.svg(), encoding="utf-8")
+    (folder / "speed.png").write_bytes(chart.picture("png"))
     print(text)
 
 

@@ -12,12 +12,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from math import inf
 from pathlib import Path
 from typing import Any, NoReturn
 
 import pandas as pd
 
-from papers.ranges import RULES, Range
+from papers.ranges import RULES, Limit, Range
 from papers.run import Computed, NotComputed, StudyRun
 from papers.selectors import selectors_of
 
@@ -173,17 +174,35 @@ def judge(claim: Claim, run: StudyRun) -> dict[str, Any]:
 
 
 def _verdict(claim: Claim, ours: Computed | None) -> str:
-    """Inside or outside, or why neither means anything."""
+    """Inside or outside, undecided between them, or why none of these means anything."""
     printed = (claim.range, *claim.also) if claim.also else ()
     disagrees = ours is not None and printed and not any(r.holds(ours.value) for r in printed)
     if claim.contradicted and not disagrees:
         return Evidence.CONTRADICTED.value
     if ours is None:
         return "not_computed"
-    if not claim.range.holds(ours.value):
-        return "outside"
-    independent = claim.evidence in (None, Evidence.INDEPENDENT)
-    return "inside" if independent else str(claim.evidence)
+    held = claim.range.holds(ours.value)
+    if held and claim.evidence not in (None, Evidence.INDEPENDENT):
+        return str(claim.evidence)
+    if _straddles(claim.range, ours):
+        return "undecided"
+    return "inside" if held else "outside"
+
+
+def _straddles(printed: Range, ours: Computed) -> bool:
+    """Whether a single limit, of order or sign, lies within our own range.
+
+    A range with one end is open at the other. The largest or the least of several that is outside
+    is outside wherever the others are: there our value is an end of our range.
+    """
+    held, ends = printed.holds(ours.value), (ours.low, ours.high)
+    if printed.limit is not Limit.ONE_SIDED or ends == (None, None):
+        return False
+    if not held and ours.value in ends:
+        return False
+    return any(
+        printed.holds(o if e is None else e) != held for e, o in zip(ends, (-inf, inf), strict=True)
+    )
 
 
 def _reason(claim: Claim, verdict: str, ours: Computed | None, missing: str) -> str:
@@ -194,6 +213,7 @@ def _reason(claim: Claim, verdict: str, ours: Computed | None, missing: str) -> 
             claim.contradicted and f"outside of all that the paper prints ({claim.contradicted})",
             claim.outside,
         ],
+        "undecided": ["the limit lies within our own range"],
         "contradicted": [f"not compared: {claim.contradicted}", missing],
         "not_computed": [missing],
     }.get(verdict, [])

@@ -133,7 +133,9 @@ def pressure_error(
 
 
 def agreement(run: StudyRun, column: str, tier: str) -> Computed:
-    """Correlation, or root mean square error, of computed and measured pressures."""
+    """Correlation, or root mean square error, of pressures, where all tasks are held."""
+    if loose := run.number("agreement", "n_not_held", tier=tier):
+        raise NotComputed(f"{loose:g} of its tasks are not held by the muscles")
     value = run.number("agreement", column, tier=tier)
     note = f"ours: over {run.number('agreement', 'n_tasks', tier=tier):g} tasks"
     if column != "r":

@@ -24,6 +24,7 @@ class Limit(StrEnum):
 
     TWO_SIDED = "two_sided"
     CHOSEN = "chosen"
+    BORROWED = "borrowed"
     WIDE = "wide"
     ONE_SIDED = "one_sided"
     BINARY = "binary"
@@ -40,12 +41,15 @@ class Range:
     Attributes
     ----------
     chosen : whether the width was chosen here, not taken from what the paper prints.
+    borrowed : whether the width is printed of something else, such as an error of all tasks
+        together for a single task.
     """
 
     low: float | None
     high: float | None
     what: str
     chosen: bool = False
+    borrowed: bool = False
 
     @property
     def limit(self) -> Limit:
@@ -57,6 +61,8 @@ class Range:
         near, far = sorted((abs(self.low), abs(self.high)))
         if self.low * self.high >= 0.0 and far >= WIDE_FROM * near:
             return Limit.WIDE
+        if self.borrowed:
+            return Limit.BORROWED
         return Limit.CHOSEN if self.chosen else Limit.TWO_SIDED
 
     def holds(self, value: float) -> bool:
@@ -134,6 +140,11 @@ def plus_minus(value: float, reach: float, what: str) -> Range:
     return Range(value - reach, value + reach, what)
 
 
+def borrowed(value: float, reach: float, what: str) -> Range:
+    """A value less and plus a tolerance that the paper prints of something else."""
+    return Range(value - reach, value + reach, f"borrowed: {what}", borrowed=True)
+
+
 def near(value: float, to: float, why: str) -> Range:
     """A value and how far ours may be from it."""
     return Range(value - to, value + to, f"the paper's value to {to:g}{why and ': '}{why}")
@@ -205,8 +216,8 @@ RULES: dict[str, Callable[..., Range]] = {
     rule.__name__: rule
     for rule in (
         *(between, chosen, nothing, exactly, at_most, at_least, no_larger, factor_of_two, window),
-        *(window_of_percent, within_width, plus_minus, near, rounded, of_sign, half_width),
-        *(binomial, normal_iqr, spearman_interval, insignificant),
+        *(window_of_percent, within_width, plus_minus, borrowed, near, rounded, of_sign),
+        *(half_width, binomial, normal_iqr, spearman_interval, insignificant),
     )
 }
 """By the name that a row has in its column `rule`."""

@@ -12,18 +12,15 @@ from spinepipe.api.study import Say, model_path, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.progress import Progress, silent
+from spinepipe.report.conclusions import sentences_of, told
+from spinepipe.studies.discrepancy.conclusions import answer
 from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
+from spinepipe.studies.discrepancy.misfits import model_name
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.tables import CANDIDATES, GAP, HELD_OUT, NEXT_TESTS
+from spinepipe.studies.discrepancy.tables import CANDIDATES, GAP, HELD_OUT, NEXT_TESTS, WHERE
 
-SENTENCES = {
-    "NAMED": "{names} is missing from the model.",
-    "PART": "{names} is missing from the model, and something without a name besides.",
-    "SET": "One of these is missing; the data do not tell which: {names}.",
-    "NULL": "Nothing is missing that these data could show.",
-    "UNKNOWN": "Something is missing, or wrong in the data, that no effect explains.",
-}
+PACKAGE = "spinepipe.studies.discrepancy"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +30,14 @@ class MissingEffects(Result):
     Attributes
     ----------
     table : the effects that are missing for certain: ``name``, ``log_evidence``, coordinates.
-    quality : what the verdict hangs on: noise, threshold, and the misfit with and without.
+    headline : the answer as the page of a study has it.
+    quality : what the verdict depends on: noise, threshold, and residuals with and without.
     verdict : ``NAMED``, ``PART``, ``SET``, ``NULL`` or ``UNKNOWN``; ``why`` in a sentence.
     alternatives : effects that the data cannot exclude. not_testable : effects that these tests
         cannot show, and the test that would. next_tests : tests that would tell more.
     misfit : measured and predicted motion, with and without the effects.
-    left_out : errors on tests and specimens that the fits did not see.
+    left_out : misfit on each left-out test, predicted from the others, and on each left-out
+        specimen, predicted from the others and half of its own load steps.
     model : the base with its effects; it can be the ``base`` of `spinepipe.calibration`.
     """
 
@@ -95,14 +94,15 @@ def find_missing_effects(
         }
         study = study_of(Discrepancy, cohort, asked)
         file = None if path is None else read_model(path)
-    return _result(searched(study, cohort, file, at_once, Progress(say)))
+    return _result(searched(study, cohort, file, at_once, Progress(say)), model_name(study))
 
 
-def _result(found: DiscrepancyResults) -> MissingEffects:
+def _result(found: DiscrepancyResults, model: str) -> MissingEffects:
+    """The same in frames; ``model`` : what the base is called."""
     verdict = found.verdict
     tables = {
         one.name: frame(one, found.rows.get(one.name, ()))
-        for one in (CANDIDATES, GAP, HELD_OUT, NEXT_TESTS)
+        for one in (CANDIDATES, GAP, HELD_OUT, NEXT_TESTS, WHERE)
     }
     named = [
         {"name": one.name, "log_evidence": one.log_evidence, "spread": one.spread, **one.variant}
@@ -112,18 +112,16 @@ def _result(found: DiscrepancyResults) -> MissingEffects:
     quality = [
         ("noise of a rotation", noise.rotation_sd_deg, "deg"),
         ("noise of a translation", noise.translation_sd_mm, "mm"),
-        ("log evidence needed", verdict.threshold.log_evidence, ""),
-        ("misfit without the effects", rms.base, rms.unit),
-        ("misfit with them", rms.with_effects, rms.unit),
-        ("held out, without", rms.held_out_base, rms.unit),
-        ("held out, with", rms.held_out_with_effects, rms.unit),
+        ("log evidence required", verdict.threshold.log_evidence, ""),
+        ("residual (RMS) without the effects", rms.base, rms.unit),
+        ("residual (RMS) with them", rms.with_effects, rms.unit),
+        ("residual (RMS) of left-out readings, without", rms.held_out_base, rms.unit),
+        ("residual (RMS) of left-out readings, with", rms.held_out_with_effects, rms.unit),
     ]
-    # the verdict in a sentence, with the effects that are named or between which nothing decides
-    names = verdict.named or tuple(dict.fromkeys(one.name for one in verdict.in_set))
-    words = ", ".join(name.replace("_", " ") for name in names)
-    sentence = SENTENCES[verdict.verdict.value].format(names=words)
+    ended = answer(verdict, model, tables[WHERE.name], tables[GAP.name])
+    (said,) = told([ended], sentences_of(PACKAGE))
     return MissingEffects(
-        headline=sentence[:1].upper() + sentence[1:],
+        headline=said.text,
         table=pd.DataFrame(named, columns=None if named else ["name", "log_evidence", "spread"]),
         quality=pd.DataFrame(quality, columns=["quantity", "value", "unit"]),
         verdict=verdict.verdict.value,

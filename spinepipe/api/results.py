@@ -1,6 +1,6 @@
 """Results of a study that a run wrote: its tables as data frames, and how two runs differ."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import pandas as pd
 from spinepipe.api.result import with_units
 from spinepipe.jobs.expected import Expected
 from spinepipe.marks import mark_in
+from spinepipe.report.overview.stored import CONCLUSIONS
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import kind_of
@@ -21,29 +22,38 @@ class Results(Mapping[str, pd.DataFrame]):
 
     Attributes
     ----------
-    path : folder of the results.
+    path : folder of the results. files : of each table.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._files = {one.stem: one for one in sorted(self.path.glob("*.parquet"))}
-        if not self._files:
-            self._files = {one.stem: one for one in sorted(self.path.glob("*/*.parquet"))}
-        if not self._files:
+        # conclusions lie beside the page, tables of some kinds in a folder below
+        places = (self.path, *sorted(one for one in self.path.glob("*") if one.is_dir()))
+        for place in places:
+            found = sorted(one for one in place.glob("*.parquet") if one.stem != CONCLUSIONS)
+            if found:
+                break
+        else:
             raise FileNotFoundError(f"{path}: no tables; has the study run?")
+        self.files = {one.stem: one for one in found}
         self._read: dict[str, pd.DataFrame] = {}
 
     def __getitem__(self, name: str) -> pd.DataFrame:
         """Rows of a table; units in ``attrs["units"]``."""
         if name not in self._read:
-            self._read[name] = with_units(self.kind.table(name), read_frame(self._files[name]))
+            rows = read_frame(self.files[name])
+            self._read[name] = with_units(self.kind.table(name), rows)
         return self._read[name]
 
+    def __contains__(self, name: object) -> bool:
+        """Whether there is such a table, which is not read for that."""
+        return name in self.files
+
     def __iter__(self) -> Iterator[str]:
-        return iter(self._files)
+        return iter(self.files)
 
     def __len__(self) -> int:
-        return len(self._files)
+        return len(self.files)
 
     @cached_property
     def kind(self) -> Kind:
@@ -53,7 +63,7 @@ class Results(Mapping[str, pd.DataFrame]):
     @cached_property
     def provenance(self) -> Mapping[str, str]:
         """Where the tables come from: study, kind, seed, digests, versions."""
-        return read_metadata(next(iter(self._files.values())))
+        return read_metadata(next(iter(self.files.values())))
 
     @property
     def tables(self) -> pd.DataFrame:
@@ -72,7 +82,7 @@ class Results(Mapping[str, pd.DataFrame]):
         """
         root, name = self.path.absolute().parents[1], self.provenance["study"]
         expected = Expected(str(root), *check(root, name, starting=False))
-        return [n for n in self if mark_in(self._files[n]) != expected.of_result(n)]
+        return [n for n in self if mark_in(self.files[n]) != expected.of_result(n)]
 
     def _repr_html_(self) -> str:
         return str(self.tables.to_html(index=False))
@@ -93,11 +103,15 @@ def open_results(path: str | Path) -> Results:
     return Results(path)
 
 
-def compare(a: Results, b: Results) -> pd.DataFrame:
+def compare(a: Results, b: Results, tables: Collection[str] | None = None) -> pd.DataFrame:
     """What differs between two results of the same kind, cell by cell.
 
     Rows are held together by the keys of their tables. A row that only one side has is told once,
     with ``column`` empty.
+
+    Parameters
+    ----------
+    tables : those that are compared, which two kinds may have alike; None for all.
 
     Returns
     -------
@@ -105,9 +119,10 @@ def compare(a: Results, b: Results) -> pd.DataFrame:
         ``table``, ``key`` (``name=value, ...``), ``column``, ``a``, ``b``, ``difference`` (of
         numbers, b less a); no rows where nothing differs.
     """
-    told = [row for name in a if name in b for row in _differences(name, a, b)]
-    told += [(name, "", "", "only in a", "", np.nan) for name in a if name not in b]
-    told += [(name, "", "", "", "only in b", np.nan) for name in b if name not in a]
+    left, right = ([n for n in one if tables is None or n in tables] for one in (a, b))
+    told = [row for name in left if name in right for row in _differences(name, a, b)]
+    told += [(name, "", "", "only in a", "", np.nan) for name in left if name not in right]
+    told += [(name, "", "", "", "only in b", np.nan) for name in right if name not in left]
     return pd.DataFrame(told, columns=["table", "key", "column", "a", "b", "difference"])
 
 
@@ -122,10 +137,11 @@ def _differences(name: str, a: Results, b: Results) -> Iterator[tuple[object, ..
     for label in map(str, left.columns.intersection(right.columns)):
         here, there = left.loc[both, label], right.loc[both, label]
         differs = ~((here == there) | (here.isna() & there.isna()))
-        numeric = pd.api.types.is_numeric_dtype(here) and not pd.api.types.is_bool_dtype(here)
-        for place in both[differs]:
-            change = there[place] - here[place] if numeric else np.nan
-            yield name, _words(key, place), label, here[place], there[place], change
+        is_number, is_flag = pd.api.types.is_numeric_dtype, pd.api.types.is_bool_dtype
+        numeric = all(is_number(one) and not is_flag(one) for one in (here, there))
+        for place, one, other in zip(both[differs], here[differs], there[differs], strict=True):
+            change = other - one if numeric else np.nan
+            yield name, _words(key, place), label, one, other, change
 
 
 def _words(key: list[str], place: object) -> str:

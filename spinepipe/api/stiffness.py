@@ -220,7 +220,7 @@ def _model(
 
 
 def _headline(own: pd.DataFrame) -> str:
-    """How many stiffnesses the data hold, and of how many specimens."""
-    held, every = int(own["identifiable"].fillna(False).astype(bool).sum()), len(own)
+    """How many stiffnesses are identifiable, and of how many specimens."""
+    known, every = int(own["identifiable"].fillna(False).astype(bool).sum()), len(own)
     specimens = own["specimen"].nunique()
-    return f"The data hold {held} of {every} stiffnesses of {specimens} specimens."
+    return f"{known} of {every} stiffnesses of {specimens} specimens are identifiable."

@@ -11,7 +11,7 @@ FOLDER = Path("docs") / "figures"
 
 PICTURES: Mapping[str, str] = {
     "stiffness.png": "results/l1l4_joint_pose/figures/stiffness.png",
-    "missing_effect.png": "results/stiffening_spines/discrepancy/figures/gap_by_step.png",
+    "missing_effect.png": "results/stiffening_spines/discrepancy/figures/misfit.png",
     "factor_indices.png": "results/l1l4_factors/figures/factor_indices.png",
 }
 """Pictures of README and tutorial in `docs/figures`: the figure of a plain run that each copies."""

@@ -23,6 +23,8 @@ COMMANDS = {
     "show": "print a specimen and write a page of it: curves, geometry",
     "doctor": "test whether this computer can run the studies",
     "export": "write a specimen's model as an OpenSim file",
+    "index": "write the page of all studies, results/index.html, and say which are up to date",
+    "compare": "set two studies side by side: what changed",
     "archive": "pack a computed study as a zip, for the supplement of a paper",
     "docs": "write the generated parts of the documentation",
 }

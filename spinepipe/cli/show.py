@@ -2,15 +2,16 @@
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from spinepipe.cli.find import specimen_of, study_or_cohort
 from spinepipe.files import appearing
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.report.specimen import draw_specimen, view_of
+from spinepipe.report.specimen import view_of
+from spinepipe.report.specimen_curves import curve_charts, measured_curves
 from spinepipe.report.specimen_page import specimen_page
 from spinepipe.report.specimen_text import describe
-from spinepipe.report.style import save, style
 from spinepipe.studies.study import Study
 
 PAGE, PICTURES = ".html", (".png", ".svg", ".pdf")
@@ -50,8 +51,18 @@ def run(options: argparse.Namespace) -> int:
         with appearing(output) as temporary:
             temporary.write_text(specimen_page(cohort, view), encoding="utf-8")
     else:
-        with style():
-            save(draw_specimen(cohort, view), output)
+        curves = curve_charts(cohort, list(measured_curves(view)))
+        if not curves:
+            print("\nno picture: no motion was measured; the page, .html, shows the geometry")
+            return 0
+        first = curves[0]
+        panels = [panel for chart in curves for panel in chart.panels]
+        whole = replace(first, panels=panels)
+        picture = (
+            whole.svg().encode() if output.suffix == ".svg" else whole.picture(output.suffix[1:])
+        )
+        with appearing(output) as temporary:
+            temporary.write_bytes(picture)
     print(f"\n{kind}: {output}")
     return 0
 

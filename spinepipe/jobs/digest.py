@@ -27,7 +27,7 @@ def value_digest(*values: Any) -> str:
 
 _LIBRARIES = (
     *("numpy", "scipy", "numba", "pandas", "pyarrow", "pybullet", "SALib", "scikit-learn"),
-    *("statsmodels", "matplotlib", "plotly", "Jinja2", "spinepipe"),
+    *("statsmodels", "matplotlib", "Jinja2", "spinepipe"),
 )
 
 
@@ -138,7 +138,7 @@ def report_digest(page: str, study: Study, cohort: Cohort, read: Sequence[str]) 
 
     Parameters
     ----------
-    read : marks of the tables, figures and other results that it shows, then its captions.
+    read : marks of the tables, figures and other results that it shows.
     """
     module = f"{PACKAGE}.{study.kind}.page"
     titles = [figure.title for figure in kind_of(study.kind).figures]

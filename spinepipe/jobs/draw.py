@@ -5,7 +5,6 @@ from importlib import import_module
 from spinepipe.jobs.digest import figure_digest, mark_of
 from spinepipe.jobs.inputs import study_of
 from spinepipe.marks import write_marked
-from spinepipe.report.style import save, style
 from spinepipe.studies.registry import PACKAGE, kind_of
 from spinepipe.tables import StudyTables
 
@@ -28,12 +27,6 @@ def run(
         figure, settings, cohort, [mark_of(path) for path in [*tables, *others.values()]]
     )
     read = StudyTables.read(tables, others)
-    if module.startswith("figures."):  # kinds whose figures are not made of forms
-        with style():
-            drawn = draw(settings, cohort, read)
-            for path in (svg, pdf, png):
-                save(drawn, path, digest)
-        return
     chart = draw(settings, cohort, read)
     write_marked(chart.svg(), svg, digest)
     for kind, path in (("pdf", pdf), ("png", png)):

@@ -13,6 +13,7 @@ from typing import Any
 from spinepipe.cohort import Cohort
 from spinepipe.jobs.collect import joined_digest
 from spinepipe.jobs.digest import base_marks, digest_of, figure_digest, report_digest
+from spinepipe.marks import mark_in
 from spinepipe.studies.base_model import made_by
 from spinepipe.studies.kind import Job
 from spinepipe.studies.read import check
@@ -97,6 +98,15 @@ class Expected:
             return self.of_report(Path(name).stem)
         return self.of_result(name.removesuffix(".parquet"))
 
+    @property
+    def is_up_to_date(self) -> bool:
+        """Whether settings, data and code of now make the report that is there, so all it shows.
+
+        Its mark covers the marks of all tables and figures; that these are whole is not asked.
+        """
+        there = all(Path(self.root, path).exists() for path in self.files.results())
+        return there and mark_in(Path(self.root, self.files.page())) == self.of_report("report")
+
     def _of_results(self, names: Sequence[str], full: bool) -> list[str]:
         return [self.of_result(name) for name in self.files.has(names, full)]
 
@@ -115,11 +125,6 @@ class Expected:
             *self._of_results(files.tables, full),
             *map(self.of_figure, drawn),
             *self._of_results(files.told_in_report, full),
-            *(
-                path.read_text("utf-8")
-                for name in drawn
-                if (path := Path(self.root, files.caption(name))).is_file()
-            ),
         ]
         return report_digest(page, self.study, self.cohort, read)
 

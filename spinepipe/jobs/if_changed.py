@@ -76,7 +76,7 @@ def main() -> None:
     target, *command = sys.argv[1:]
     record = Path(".snakemake") / f"spinepipe-{target}.json"
     if is_up_to_date(record):
-        print(f"{target}: nothing to do. The reports: results/<study>/report.html")
+        print(f"{target}: nothing to do. All studies: results/index.html")
         return
     begun = inputs()
     status = subprocess.run(command, check=False).returncode

@@ -172,7 +172,6 @@ class Project:
         return {
             "tables": files.table_files(files.tables, full),
             "figures": [f"{files.folder}/figures/{figure}.svg" for figure in drawn],
-            "captions": [path for path in map(files.caption, drawn) if Path(path).is_file()],
             **files.other_files(files.told_in_report),
         }
 
@@ -239,7 +238,7 @@ class Project:
         threading.Thread(target=_stop_timers).start()
 
     def end(self) -> None:
-        """Remove the empty logs that Snakemake leaves for every job that went well.
+        """Write the page of all studies; first remove empty logs, of jobs that went well.
 
         A folder of logs that is a link is somebody's own.
         """
@@ -251,6 +250,20 @@ class Project:
                         os.unlink(path)
                 if not os.listdir(folder):
                     os.rmdir(folder)
+        self._write_index()
+
+    def _write_index(self) -> None:
+        """The page of all studies; of those of this run the marks are known, and state is told."""
+        # here: a look at what is to be done needs no templates
+        from spinepipe.report.overview.index import INDEX, write_index
+
+        try:
+            of_run = {name: self.expected(name).is_up_to_date for name in self.at_work}
+            page = write_index(Path(self.root), of_run)
+        except (OSError, InputError) as trouble:  # of a disk, or a study changed meanwhile
+            warn(f"{INDEX} is not written: {trouble}")
+        else:
+            print(f"all studies: {page.as_uri()}", file=sys.stderr)
 
 
 def _drop_damaged(record: Path) -> None:

@@ -4,8 +4,7 @@ Beside it is written what the tables are that the study has by then, for other p
 says nothing that the tables and their code do not, so no digest holds it and nothing reads it here.
 """
 
-from collections.abc import Collection
-from dataclasses import replace
+import os
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
@@ -19,14 +18,20 @@ from spinepipe.marks import KEY, write_marked
 from spinepipe.report.conclusions import rows_of
 from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.comparison import AGAINST, comparison, paper_of
-from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.report.page.study_page import Results
-from spinepipe.report.words import listed
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
 from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import StudyTables, from_rows, read_metadata, write
+
+_LEADING = """\
+<!DOCTYPE html>
+<html lang="en"><meta charset="utf-8"><title>This page has moved</title>
+<meta http-equiv="refresh" content="0; url={address}">
+<p>This page has moved to <a href="{address}">{address}</a>.</p></html>
+"""
+"""What stands where a page once was; its address is made of names of ours."""
 
 
 def run(
@@ -35,36 +40,28 @@ def run(
     page: str,
     tables: list[str],
     figures: list[str],
-    captions: list[str],
     output: str,
+    former: str = "",
     **others: str,
 ) -> None:
-    """Write a page from the files of all tables, pictures (SVG), captions and ``others``."""
+    """Write a page from the files of all tables, figures (SVG) and ``others``.
+
+    Parameters
+    ----------
+    former : where the page once was, if elsewhere: what is written there leads to it. A copy could
+        be the older of two; so could a page that an earlier version left there.
+    """
     settings, cohort = study_of(root, study)
     kind_page = import_module(f"{PACKAGE}.{settings.kind}.page")
     read = [mark_of(path) for path in [*tables, *figures, *others.values()]]
-    folder = Path(output).parent
-    if hasattr(kind_page, "page"):
-        _write_page(kind_page, settings, cohort, page, tables, figures, output, others, read)
-        _describe(settings, cohort, folder)
-        return
-    titles = {figure.name: figure.title for figure in kind_of(settings.kind).figures}
-    results = results_of(kind_page.READ, titles, tables, figures, captions, others)
-    document = kind_page.document(settings, cohort, results)
-    added = files_of(settings, cohort).adds
-    if page == "report" and added:
-        more = f"{listed(added)} (`make full` makes them and the page full.html, which shows them)"
-        document = replace(document, left_out=(*document.left_out, more))
-    read += [_text(path) for path in captions]
     digest = report_digest(page, settings, cohort, read)
-    write_marked(document.html(settings, cohort), output, digest)
-    _describe(settings, cohort, folder)
-
-
-def _describe(study: Study, cohort: Cohort, folder: Path) -> None:
-    """Write what the tables are that the study has by now."""
+    _write_page(kind_page, settings, cohort, page, tables, figures, output, others, digest)
+    if former:
+        address = Path(os.path.relpath(output, Path(former).parent)).as_posix()
+        write_marked(_LEADING.format(address=address), former, digest)
+    folder = Path(output).parent / kind_of(settings.kind).files.subfolder
     with appearing(folder / FILE) as temporary:
-        temporary.write_text(descriptor_of(study, cohort, folder), "utf-8")
+        temporary.write_text(descriptor_of(settings, cohort, folder), "utf-8")
 
 
 def _write_page(
@@ -76,7 +73,7 @@ def _write_page(
     figures: list[str],
     output: str,
     others: dict[str, str],
-    read: list[str],
+    digest: str,
 ) -> None:
     """Write the page, beside it its conclusions as a table, and pages of comparisons."""
     results = Results(
@@ -85,7 +82,6 @@ def _write_page(
         {Path(path).stem: Drawing.read(Path(path).stem, _text(path)) for path in figures},
     )
     made = kind_page.page(study, cohort, results)
-    digest = report_digest(page, study, cohort, read)
     newest = max((Path(path).stat().st_mtime for path in tables), default=0.0)
     date = datetime.fromtimestamp(newest, UTC).date().isoformat()
     folder = Path(output).parent
@@ -94,10 +90,11 @@ def _write_page(
         rows = results.table(shape.name)
         if shape.name.startswith(AGAINST) and len(rows):
             papers[f"{shape.name}.html"] = title = f"Beside {paper_of(shape.name)}"
-            write_marked(
-                comparison(shape, title, rows, study), folder / f"{shape.name}.html", digest
-            )
-    write_marked(made.html(study, cohort, results, papers=papers, date=date), output, digest)
+            beside = comparison(shape, title, rows, study, cohort)
+            write_marked(beside, folder / f"{shape.name}.html", digest)
+    subfolder = kind_of(study.kind).files.subfolder
+    html = made.html(study, cohort, results, papers=papers, date=date, folder=subfolder)
+    write_marked(html, output, digest)
     if page == "report":
         metadata = {"study": study.study, "kind": study.kind, KEY: digest}
         told = from_rows(CONCLUSIONS, rows_of(made.told))
@@ -114,27 +111,6 @@ def descriptor_of(study: Study, cohort: Cohort, folder: Path) -> str:
     ]
     title = f"Results of the study {study.study} ({study.kind}) of the cohort {cohort.name}"
     return descriptor(study.study, title, shapes)
-
-
-def results_of(
-    read: Collection[str],
-    titles: dict[str, str],
-    tables: list[str],
-    figures: list[str],
-    captions: list[str],
-    others: dict[str, str],
-) -> ResultTables:
-    """Rows of the tables named in ``read``, where all tables come from, and pictures."""
-    words = {Path(path).stem: _text(path) for path in captions}
-    drawn = {Path(path).stem: _text(path) for path in figures}
-    return ResultTables(
-        tables=StudyTables.read([path for path in tables if Path(path).stem in read], others),
-        metadata={Path(path).stem: read_metadata(path) for path in tables},
-        pictures={
-            name: Picture.of(name, titles[name], svg, " ".join(words[name].split()))
-            for name, svg in drawn.items()
-        },
-    )
 
 
 def _text(path: str) -> str:

@@ -21,7 +21,7 @@ from spinepipe.studies.registry import place_of as function_of
 BLOCK = "spinepipe.jobs.block:run"
 """The job that makes the files of a block."""
 
-_OF_RULES = ("digest", "job", "caption")
+_OF_RULES = ("digest", "job")
 """Params that tell Snakemake something, and no job."""
 
 _FORCE = ("-f", "-F", "-R", "--force", "--forceall", "--forcerun")

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError, InputProblem
 
+WITHOUT_SUBJECT = "names of markers without what stands before the colon"
+
 M_PER = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Units in which motion is written."""
 
@@ -62,6 +64,8 @@ def unit_of(file: str, row: int | None, column: str, text: str) -> float:
 def without_subjects(names: tuple[str, ...], file: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names without their subject (`Anna:T1`) where that leaves each once, and what was done.
 
+    What was done stands on pages, so it does not name the subject: people write names of persons.
+
     Raises
     ------
     InputError
@@ -78,7 +82,4 @@ def without_subjects(names: tuple[str, ...], file: str) -> tuple[tuple[str, ...]
     chosen = tuple(
         cut if cut and counts[cut] == 1 else name for name, cut in zip(names, short, strict=True)
     )
-    subjects = sorted(
-        {name.rpartition(":")[0] for name, cut in zip(names, chosen, strict=True) if name != cut}
-    )
-    return chosen, tuple(f"names of markers without '{subject}:'" for subject in subjects)
+    return chosen, (WITHOUT_SUBJECT,) if chosen != names else ()

@@ -71,21 +71,34 @@ def measured_pressures() -> tuple[MeasuredPressure, ...]:
 
 def pair_with_tasks(tasks: Mapping[str, Task]) -> tuple[PairedPressure, ...]:
     """Measured pressures of those tasks that have one."""
+    return paired(
+        {
+            name: (task.number, DEG_PER_RAD * float(task.turned[-1, 1]))
+            for name, task in tasks.items()
+        }
+    )
+
+
+def paired(asked: Mapping[str, tuple[int | None, float]]) -> tuple[PairedPressure, ...]:
+    """The same by the tasks' numbers in Table 1 and rotations of the trunk to the right, deg."""
     found = []
-    for name, task in tasks.items():
-        if task.number is None or task.number == 7:  # a course of angles, not one posture
+    for name, (number, bent_deg) in asked.items():
+        if number is None or number == 7:  # a course of angles, not one posture
             continue
-        rows = [row for row in measured_pressures() if row.task == task.number and row.value]
-        if task.number == 9:  # lateral bending was measured at several angles
-            bent = DEG_PER_RAD * abs(float(task.turned[-1, 1]))
+        rows = [row for row in measured_pressures() if row.task == number and row.value]
+        if number == 9:  # lateral bending was measured at several angles
             of_each = [(row, row.condition.removesuffix(" deg")) for row in rows]
-            rows = [r for r, deg in of_each if deg.isdigit() and abs(float(deg) - bent) < SAME_DEG]
+            rows = [
+                row
+                for row, deg in of_each
+                if deg.isdigit() and abs(float(deg) - abs(bent_deg)) < SAME_DEG
+            ]
         # confirmed series alone, where there are any
         rows = [row for row in rows if row.status == "confirmed"] or rows
         if rows:
             status = rows[0].status
             source = "; ".join(dict.fromkeys(row.source for row in rows))
             mean = float(np.mean([row.value for row in rows if row.value is not None]))
-            counted = task.number in COUNTED and status == "confirmed"
+            counted = number in COUNTED and status == "confirmed"
             found.append(PairedPressure(name, mean, status, source, counted))
     return tuple(found)

@@ -64,7 +64,8 @@ class Value:
             (True, True): f"{low} to {high}",
         }[self.low is not None, self.high is not None]
         between = "" if self.unit == "°" else "\u00a0"
-        unit = f"{between}{self.unit}" if self.unit else ""
+        words = self.unit.replace(" ", "\u00a0")  # no line breaks inside a unit
+        unit = f"{between}{words}" if words else ""
         interval = f" ({ends})" if ends else ""
         return parts[spec].format(value=value, interval=interval, ends=ends, unit=unit)
 

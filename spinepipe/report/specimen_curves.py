@@ -5,17 +5,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.load_response import LoadedCycle, joint_loads
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.effects.contract import Array
-from spinepipe.report.panels import explain_marks, side_by_side
+from spinepipe.report.forms.chart import Chart, Key
+from spinepipe.report.forms.curves import Curves
+from spinepipe.report.forms.look import SEVERAL
 from spinepipe.report.specimen import SpecimenView
-from spinepipe.report.style import BLUE, GREEN, GREY, PURPLE, SKY, VERMILLION, blank
 from spinepipe.report.words import AXIS, POSITIVE, SIGNS, case, short
 from spinepipe.units import (
     COORDINATE_UNITS,
@@ -25,10 +24,6 @@ from spinepipe.units import (
     TRANSLATIONS,
     from_si,
 )
-
-_COLORS = (BLUE, VERMILLION, GREEN, PURPLE, SKY, GREY)
-_MARKERS = ("o", "s", "^", "D", "v", "P")
-_ACROSS, _ROW_MM, _AROUND_MM = 4, 38.0, 22.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,54 +77,49 @@ def measured_curves(view: SpecimenView) -> Iterator[MeasuredCurve]:
                 )
 
 
-def curve_figures(cohort: Cohort, curves: Sequence[MeasuredCurve]) -> Iterator[tuple[str, Figure]]:
-    """Of each coordinate its name in words and a figure with a panel of each joint, from above."""
-    for coordinate in COORDINATES:
-        own = [curve for curve in curves if curve.coordinate == coordinate]
-        if own:
-            yield AXIS[coordinate], _figure(cohort, coordinate, own)
+def curve_charts(cohort: Cohort, curves: Sequence[MeasuredCurve]) -> list[Chart]:
+    """Of each coordinate a figure with a panel of each joint, from above."""
+    own = [[one for one in curves if one.coordinate == name] for name in COORDINATES]
+    return [_chart(cohort, name, part) for name, part in zip(COORDINATES, own, strict=True) if part]
 
 
-def _figure(cohort: Cohort, coordinate: str, curves: Sequence[MeasuredCurve]) -> Figure:
-    joints = sorted({curve.joint for curve in curves}, reverse=True)
+def _chart(cohort: Cohort, coordinate: str, curves: Sequence[MeasuredCurve]) -> Chart:
     tests = list(dict.fromkeys(curve.test for curve in curves))
-    last = {test: max(c.cycle for c in curves if c.test == test) for test in tests}
-    rows = -(-len(joints) // _ACROSS)
-    figure = blank(rows * _ROW_MM + _AROUND_MM)
-    panels = side_by_side(figure, len(joints), _ACROSS, sharex=True, sharey=True)
-    sides = list(pairwise(cohort.vertebrae))
-    for panel, joint in zip(panels, joints, strict=True):
-        lower, upper = sides[joint]
-        _zero_lines(panel)
-        panel.set_title(f"{upper}–{lower}")
-        for curve in (c for c in curves if c.joint == joint):
-            k = tests.index(curve.test)
-            there = np.isfinite(curve.motion)
-            panel.plot(
-                curve.motion[there],
-                curve.load[there],
-                color=_COLORS[k % len(_COLORS)],
-                marker=_MARKERS[k % len(_MARKERS)],
-                ms=2.2,
-                mew=0.0,
-                alpha=1.0 if curve.cycle == last[curve.test] else 0.4,
-            )
-    for panel in panels[::_ACROSS]:
-        panel.set_ylabel(f"load ({LOAD_UNITS[coordinate]})")
-    for panel in panels[-_ACROSS:]:
-        panel.tick_params(labelbottom=True)
-        panel.set_xlabel(f"{POSITIVE[coordinate]} ({SIGNS[COORDINATE_UNITS[coordinate]]})")
-    handles = [
-        Line2D(
-            [], [], color=_COLORS[k % 6], marker=_MARKERS[k % 6], ms=3.0, label=short(case(test))
-        )
-        for k, test in enumerate(tests)
+    looks = {test: SEVERAL[number % len(SEVERAL)] for number, test in enumerate(tests)}
+    frames = []
+    for curve in curves:
+        there = np.isfinite(curve.motion)
+        frame = pd.DataFrame({"x": curve.motion[there], "y": curve.load[there]})
+        frames.append(frame.assign(joint=curve.joint, series=curve.test, part=curve.cycle))
+    every = pd.concat(frames)
+    ends = [
+        (float(every[axis].min()), float(every[axis].max()))
+        if every[axis].min() < every[axis].max()
+        else None
+        for axis in ("x", "y")
     ]
-    cycles = "Faint: cycles before the last." if any(n > 1 for n in last.values()) else ""
-    explain_marks(figure, handles, cycles, _ACROSS)
-    return figure
+    x, y = (None if end is None else _with_room(*end) for end in ends)
+    unit = SIGNS[COORDINATE_UNITS[coordinate]]
+    names = [f"{upper}–{lower}" for lower, upper in pairwise(cohort.vertebrae)]
+    panels = [
+        Curves(
+            title=names[joint],
+            x_label=f"{POSITIVE[coordinate]} ({unit})",
+            y_label=f"load ({LOAD_UNITS[coordinate]})",
+            frame=every[every["joint"] == joint],
+            looks=looks,
+            x_limits=x,
+            y_limits=y,
+            width=226.0,
+            high=180.0,
+        )
+        for joint in sorted(set(every["joint"]), reverse=True)
+    ]
+    keys = [Key(look, short(case(test)), as_line=True) for test, look in looks.items()]
+    caption = "Load that a joint carries in the neutral pose over its measured motion, all cycles."
+    return Chart(f"Measured {AXIS[coordinate].lower()}", panels, caption, keys)
 
 
-def _zero_lines(panel: Axes) -> None:
-    panel.axhline(0.0, color=GREY, lw=0.4)
-    panel.axvline(0.0, color=GREY, lw=0.4)
+def _with_room(low: float, high: float) -> tuple[float, float]:
+    room = 0.05 * (high - low)
+    return low - room, high + room

@@ -1,16 +1,12 @@
 """The page of one specimen: measured curves, then the geometry in 3-D, then all numbers."""
 
-import base64
-from importlib.resources import files
-
-from jinja2 import Environment, StrictUndefined
-
 from spinepipe.cohort import Cohort
+from spinepipe.report.forms.chart import Drawing
+from spinepipe.report.page.study_page import rendered, tag
 from spinepipe.report.specimen import SpecimenView
-from spinepipe.report.specimen_curves import curve_figures, measured_curves
+from spinepipe.report.specimen_curves import curve_charts, measured_curves
 from spinepipe.report.specimen_text import describe
-from spinepipe.report.style import picture, style
-from spinepipe.report.viewer.figure import viewer_html, viewer_script, viewer_style
+from spinepipe.report.viewer.figure import viewer_html
 from spinepipe.report.viewer.specimens import specimen_scene
 
 
@@ -21,21 +17,15 @@ def specimen_page(cohort: Cohort, view: SpecimenView) -> str:
     ----------
     cohort : one that tells where joints are.
     """
-    with style():
-        drawn = [
-            (name, base64.b64encode(picture(figure, "svg")).decode())
-            for name, figure in curve_figures(cohort, list(measured_curves(view)))
-        ]
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    page = files("spinepipe.report").joinpath("specimen_page.html").read_text(encoding="utf-8")
-    return environment.from_string(page).render(
+    charts = curve_charts(cohort, list(measured_curves(view)))
+    return rendered(
+        "specimen_page.html",
+        ("spinepipe.report",),
+        title=f"{cohort.name}, {view.specimen}",
+        tag=tag(cohort),
         cohort=cohort,
         specimen=view.specimen,
-        curves=drawn,
+        curves=[Drawing.read(f"curves-{n}", chart.svg()) for n, chart in enumerate(charts)],
         viewer=viewer_html([specimen_scene(cohort, view)]),
-        viewer_style=viewer_style(),
-        viewer_script=viewer_script(),
         text=describe(cohort, view),
     )

@@ -26,7 +26,7 @@ class Figure:
 
     Attributes
     ----------
-    name : of its files; its caption is ``figures/<name>.rst`` in the folder of the kind.
+    name : of its files.
     title : above it on the report's page.
     at : ``file:function`` in the folder of the kind; called with study, cohort and tables.
     reads : the tables it is drawn from; a name with a dot is another result file.
@@ -70,7 +70,7 @@ class StudyFiles(ABC):
     """Files other than tables and figures that the report reads."""
 
     subfolder: ClassVar[str] = ""
-    """Where results are, below the folder of the study; ends with a slash."""
+    """Where all results but pages are, below the folder of the study; ends with a slash."""
 
     study: Study
     specimens: tuple[str, ...]
@@ -82,8 +82,12 @@ class StudyFiles(ABC):
 
     @property
     def folder(self) -> str:
-        """Where all results of the study are."""
+        """Where all results of the study but its pages are."""
         return f"results/{self.study.study}/{self.subfolder}".rstrip("/")
+
+    def page(self, name: str = "report") -> str:
+        """The file of a page, in the same place for every kind."""
+        return f"results/{self.study.study}/{name}.html"
 
     @property
     @abstractmethod
@@ -139,10 +143,6 @@ class StudyFiles(ABC):
         """Files that are no tables (a name with a dot), by their names without the ending."""
         return {name.partition(".")[0]: f"{self.folder}/{name}" for name in names if "." in name}
 
-    def caption(self, figure: str) -> str:
-        """The file of what is said below a figure."""
-        return f"spinepipe/studies/{self.study.kind}/figures/{figure}.rst"
-
     def read_by_figure(self, name: str) -> list[str]:
         """What a figure is drawn from: of what it names, what the study has."""
         figure = self.figure(name)
@@ -177,8 +177,8 @@ class StudyFiles(ABC):
         files = [*(f"{table}.parquet" for table in self.tables_of(full)), *self.others]
         drawn = self.figures(full)
         files += [f"figures/{figure}.{kind}" for figure in drawn for kind in ("svg", "png")]
-        pages = ["report.html", *(["full.html"] if full and self.adds else [])]
-        return [f"{self.folder}/{file}" for file in [*files, *pages]]
+        pages = ["report", *(["full"] if full and self.adds else [])]
+        return [*(f"{self.folder}/{file}" for file in files), *map(self.page, pages)]
 
     def lost(self, full: bool = False) -> list[str]:
         """Job files that are missing although a table or block holds their rows.

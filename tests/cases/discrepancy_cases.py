@@ -291,6 +291,8 @@ def _where(wide: bool, named: bool, part: bool) -> Rows:
     places = [("all", {})]
     places += [("joint", {"joint": joint}) for joint in JOINTS]
     places += [("step", {"step": str(step)}) for step in range(STEPS)]
+    places += [("test", {"test": test}) for test in TESTS]
+    places += [("coordinate", {"coordinate": name}) for name in ROTATIONS]
     places += [
         ("joint x coordinate x test", {"joint": joint, "coordinate": coordinate, "test": test})
         for joint, coordinate, test in product(JOINTS, ROTATIONS, TESTS)
@@ -302,6 +304,8 @@ def _where(wide: bool, named: bool, part: bool) -> Rows:
         worst &= place.get("coordinate", "extension") == "extension"
         left = wide and not (named and model == "with_effects")
         gap = 9.3 if worst and left else 1.1 if by in ("all", "step") and left else 0.0
+        if place in ({"test": "flexion"}, {"coordinate": "extension"}) and left:
+            gap = 1.9
         stays = place == {"joint": "L3L4", "coordinate": "left_rotation", "test": TESTS[2]}
         gap = 2.4 if part and stays else gap
         rows.append(
@@ -399,7 +403,7 @@ def _held_out(wide: bool, named: bool) -> Rows:
         }
         rows.append(
             {
-                "fold": f"{kind} {name}",
+                "fold": name,
                 "kind": kind,
                 "readings": 216,
                 **{f"rms_{model}": value for model, value in rms.items()},
@@ -489,9 +493,10 @@ def _field_numbers() -> Rows:
     told |= {f"stiffness_at_{side}": (1.0, "N m/deg") for side in ("minus", "plus")}
     told |= {"break_minus": (-1.5, "deg"), "break_plus": (1.5, "deg")}
     told["loop_area"] = (4.0, "N m deg")
+    slopes = {name: (0.6, unit) for name, (_, unit) in told.items() if "stiffness" in name}
     return [
         {
-            "model": "with_effects",
+            "model": model,
             "specimen": specimen,
             "joint": "L4L5",
             "coordinate": "extension",
@@ -505,7 +510,8 @@ def _field_numbers() -> Rows:
             "specimens": 3 if specimen == "*" else 1,
         }
         for specimen in (*SPECIMENS, "*")
-        for number, (value, unit) in told.items()
+        for model, numbers in (("base", slopes), ("with_effects", told))
+        for number, (value, unit) in numbers.items()
     ]
 
 

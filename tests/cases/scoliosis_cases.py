@@ -244,14 +244,3 @@ def variation(size: Size) -> list[dict[str, Any]]:
             moved = 0.25 * abs(float(np.log10(factor)))
             rows.append(known | kind | {"rotation_rmse_deg": 0.5, "moved_deg": moved})
     return rows
-
-
-def paired_test(films: str, measure: str, pair: tuple[str, str], p: float | None) -> dict[str, Any]:
-    """A row of the table statistics: a paired test of two models over patients."""
-    return {
-        "family": f"{films}/{measure}",
-        "response": pair[0],
-        "factor": pair[1],
-        "p_holm": p,
-        "status": "too_few" if p is None else "done",
-    }

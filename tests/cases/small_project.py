@@ -186,8 +186,9 @@ class Project:
         return [(int(pid), float(start)) for pid, start in map(str.split, lines)]
 
     def files(self) -> dict[str, str]:
-        """Result files, each with number on the disk and checksum, then date; logs left out.
+        """Result files, each with number on the disk and checksum, then date.
 
+        Logs are left out, and the page of all studies, which is no result: each run writes it anew.
         The disk may give a new file the number of one that it replaced.
         """
         results = self.path("results")
@@ -197,7 +198,7 @@ class Project:
                 f"{state.st_ino}-{crc32(path.read_bytes())} {state.st_mtime_ns}"
             )
             for path, state in found.items()
-            if "logs" not in path.parts
+            if "logs" not in path.parts and path != results / "index.html"
         }
 
     def contents(self) -> dict[str, bytes]:

@@ -71,9 +71,11 @@ COSTS = {
     "one_sided": np.array([0.5, 0.0, 6.0, 12.0, 18.0]),
     "not_told": np.array([1.0, 0.5, 0.0, 0.5, 1.0]),
     "falls": np.array([0.0, 6.0, 12.0, 18.0, 24.0]),
+    "falls slowly": np.array([0.0, 2.0, 12.0, 18.0, 24.0]),
+    "gap": np.array([1.0, 0.0, 9.0, 2.0, 3.0]),
     "lost": np.full(5, np.inf),
 }
-"""What ratios cost, by the verdict that follows; `falls`, to the softest, tells nothing."""
+"""What ratios cost; `told`, `one_sided` and `not_told` are verdicts, all others are `not_told`."""
 
 
 @dataclass(frozen=True)

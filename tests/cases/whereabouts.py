@@ -18,8 +18,6 @@ import pyarrow.parquet as pq
 
 _EMBEDDED = re.compile(rb"base64,([A-Za-z0-9+/=]+)")
 _PNG = b"\x89PNG\r\n\x1a\n"
-LIBRARIES = re.compile(rb"<script>[^<]{0,200}plotly\.js.*?</script>", re.DOTALL)
-"""A library that pages carry along."""
 
 
 def needles(project: Path) -> list[bytes]:
@@ -62,7 +60,6 @@ def parts_of(content: bytes) -> Iterator[bytes]:
                 yield name.encode()
                 yield from parts_of(file.read(name))
     else:
-        content = LIBRARIES.sub(b"", content)
         yield content
         for found in _EMBEDDED.findall(content):
             yield from parts_of(base64.b64decode(found))

@@ -401,7 +401,9 @@ def ghezelbash_2016() -> Frames:
             computed_mpa=measured + pressures["error"],
             status="converged",
         ),
-        "agreement": agreement.assign(n_tasks=6, r_low=agreement["r"] - 0.1, r_high=0.999),
+        "agreement": agreement.assign(
+            n_tasks=6, n_not_held=0, r_low=agreement["r"] - 0.1, r_high=0.999
+        ),
     }
 
 

@@ -9,18 +9,26 @@ from sweeps import sweep
 from papers.engine import Claim, Evidence, arguments, judge
 from papers.ranges import Range
 from papers.run import Computed, NotComputed, StudyRun
+from spinepipe.studies.tracking.tables import AGAINST_WANG_2021 as TABLE
 
 
 def missing(run: StudyRun) -> Computed:
     raise NotComputed("this run made no table x")
 
 
-def judged(value: float | None, low: float | None, high: float | None, wrong: str = "") -> Any:
+def judged(
+    value: float | None,
+    low: float | None,
+    high: float | None,
+    wrong: str = "",
+    ends: tuple[float | None, float | None] = (None, None),
+    evidence: Evidence = Evidence.INDEPENDENT,
+) -> Any:
     claim = Claim(
         *("a", "Table 1", "something", "mm", 2.0),
         range=Range(low, high, "the paper's IQR"),
-        ours=missing if value is None else lambda run: Computed(value),
-        evidence=Evidence.CONTRADICTED if wrong else Evidence.INDEPENDENT,
+        ours=missing if value is None else lambda run: Computed(value, *ends),
+        evidence=Evidence.CONTRADICTED if wrong else evidence,
         contradicted=wrong,
         outside="for a reason",
         note="a note",
@@ -43,6 +51,41 @@ def judged(value: float | None, low: float | None, high: float | None, wrong: st
 )
 def test_verdict(value: float | None, low: float | None, high: float | None, verdict: str) -> None:
     assert judged(value, low, high)["verdict"] == verdict
+
+
+@sweep(
+    "low, high, ends, verdict",
+    [
+        (1.0, None, (1.5, 2.5), "inside"),
+        (1.0, None, (1.0, 2.5), "inside"),  # touches
+        (1.0, None, (0.9, 2.5), "undecided"),
+        (1.0, None, (0.9, 2.0), "undecided"),  # largest of several, one of them below
+        (1.0, None, (None, 2.5), "undecided"),  # open below
+        (1.0, None, (1.5, None), "inside"),
+        (None, 3.0, (1.5, 3.0), "inside"),
+        (None, 3.0, (1.5, 3.1), "undecided"),
+        (None, 3.0, (1.5, None), "undecided"),
+        (None, 1.0, (1.5, 2.5), "outside"),
+        (None, 1.0, (0.5, 2.5), "undecided"),
+        (None, 1.0, (0.5, 2.0), "outside"),  # the largest is above, wherever the least is
+        (1.0, 3.0, (0.5, 9.0), "inside"),  # two ends: as it was
+        (2.0, 2.0, (0.5, 9.0), "inside"),
+    ],
+)
+def test_a_single_limit_within_our_own_range_is_undecided(
+    low: float | None, high: float | None, ends: tuple[float | None, float | None], verdict: str
+) -> None:
+    row = judged(2.0, low, high, ends=ends)
+    assert row["verdict"] == verdict
+    assert ("within our own range" in row["reason"]) == (verdict == "undecided")
+    assert row["verdict"] in TABLE.column("verdict").allowed
+
+
+def test_what_was_put_in_stays_circular_whatever_its_interval() -> None:
+    found = [
+        judged(2.0, 1.0, None, ends=(0.5, high), evidence=Evidence.CIRCULAR) for high in (3, 9)
+    ]
+    assert [row["verdict"] for row in found] == ["circular", "circular"]
 
 
 @sweep(

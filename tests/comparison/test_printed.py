@@ -5,7 +5,6 @@ the print alone: what rounds to it, its SD, half to twice of it.
 """
 
 import csv
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from sweeps import sweep
 from papers.engine import claims_of, judged, rows_of
 from papers.run import StudyRun
 from spinepipe.comparison.papers import papers
-from tests.comparison.made_up import ROOT
 from tests.generators import ais_films
 
 with Path(__file__).with_name("printed.csv").open(encoding="utf-8", newline="") as file:
@@ -49,14 +47,6 @@ def test_shipped_films_have_the_patients_of_table_1() -> None:
     for number, (sex, _, lenke, _) in enumerate(ais_films.TABLE_1, start=1):
         assert quantities[f"table_1.p{number:02d}.sex"].endswith(f" is {sex}")
         assert quantities[f"table_1.p{number:02d}.lenke_class"].endswith(f" is {lenke}")
-
-
-def test_the_figure_shows_the_rotations_of_the_rows() -> None:
-    figures = ROOT / "spinepipe" / "studies" / "trunk_loads" / "figures"
-    table = tomllib.loads((figures / "ghezelbash_2016.toml").read_text(encoding="utf-8"))
-    printed = {claim.id: claim.printed for claim in claims_of("ghezelbash_2016")}
-    for column, turned in zip("ABCD", table["upright_deg"].values(), strict=True):
-        assert [printed[f"table_2.{column}.{body}"] for body in table["bodies"]] == turned
 
 
 @pytest.mark.parametrize("paper", papers())

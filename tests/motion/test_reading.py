@@ -232,7 +232,7 @@ def test_subjects_are_cut_off_names_where_each_stays_one(tmp_path: Path) -> None
     full = ("Anna:LPSI", "Anna:RPSI", "T1")
     found = read_motion(write_c3d(tmp_path / "m.c3d", places_mm(), full))
     assert found.names == NAMES
-    assert found.repaired == ("names of markers without 'Anna:'",)
+    assert found.repaired == ("names of markers without what stands before the colon",)
     two = ("Anna:T1", "Ben:T1", "Ben:LPSI")
     found = read_motion(write_c3d(tmp_path / "n.c3d", places_mm(), two))
     assert found.names == ("Anna:T1", "Ben:T1", "LPSI")

@@ -115,7 +115,7 @@ def test_only_the_last_part_of_a_name_is_the_marker_s(tmp_path: Path) -> None:
     ]
     found = read_motion(csv(tmp_path, "0" + ",1" * 9, header=",".join(["time_s", *columns])))
     assert found.names == ("T1", "T2", "Ben:")
-    assert found.repaired == ("names of markers without 'Lab:Anna:'",)
+    assert found.repaired == ("names of markers without what stands before the colon",)
 
 
 def test_suffixes_may_be_written_large(tmp_path: Path) -> None:

@@ -5,47 +5,27 @@ Catches a name that becomes markup in a page or a figure.
 
 import json
 import re
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from drawn import caption, drawings
+from drawn import drawings
 from hostile import HARMLESS, PAYLOAD, Structure, mapped, renamed
-from made_pages import SVG, document_of, page_of
+from made_pages import made_page, page_of, results_of
 from made_results import MAKERS, Made, made
 from sweeps import sweep
 
 from spinepipe.documents.names import folder_fault, name_fault
 from spinepipe.marks import marked
-from spinepipe.report.forms.chart import Chart
-from spinepipe.report.page import document as page
-from spinepipe.report.page import space
 from spinepipe.report.page.origin import origin
 from spinepipe.report.specimen import view_of
 from spinepipe.report.specimen_page import specimen_page
-from spinepipe.report.style import picture, style
 from spinepipe.studies.registry import kind_names, kind_of
-from spinepipe.studies.tracking import in_space as tracking_space
-from spinepipe.studies.trunk_loads import in_space as trunk_space
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = "<script>&\"'-->]]></svg>"
-
-
-@pytest.fixture(autouse=True)
-def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the library, five megabytes that are the same in every page, and without stills."""
-    monkeypatch.setattr(page, "get_plotlyjs", lambda: "/* drawing library */")
-    for module in (space, tracking_space, trunk_space):
-        monkeypatch.setattr(module, "picture", lambda figure, kind: SVG.encode())
-
-
-def scenes_of(text: str) -> Any:
-    """What the script of a page is given to draw; nothing of a page without a view in space."""
-    read = re.findall(r'<script type="application/json" id="scenes">(.*?)</script>', text)
-    return json.loads(read[0]) if read else {}
 
 
 def assert_alike(hostile: str, harmless: str) -> None:
@@ -53,9 +33,8 @@ def assert_alike(hostile: str, harmless: str) -> None:
     found, expected = Structure(hostile), Structure(harmless)
     assert found.elements == expected.elements
     assert not [one for one in found.elements if re.search(r" on\w+( |$)", one)]
-    beside = re.compile(r"#|data:image/svg\+xml;base64,|(\.\./)?[a-z0-9_]+\.(html|parquet)$")
     for address in found.addresses:
-        assert beside.match(address), address
+        assert address.startswith(("#", "data:image/svg+xml;base64,")), address
     own = [script for script in found.scripts if not script.startswith("{")]
     assert own == [script for script in expected.scripts if not script.startswith("{")]
     assert all("<" not in script for script in found.scripts if script.startswith("{"))
@@ -78,38 +57,30 @@ def test_names_of_people_never_become_markup(results: Made, tmp_path: Path) -> N
     for payload in (PAYLOAD, HARMLESS):
         found = renamed(results, payload, tmp_path)
         pages.append(page_of(found))
-    assert pages[0].count("&lt;script&gt;alert(1)") > 10, "they do stand in the page"
+    # films are of persons, whom that page does not name row by row
+    least = 3 if results.study.kind == "scoliosis" else 10
+    assert pages[0].count("&lt;script&gt;alert(1)") > least, "they do stand in the page"
     assert_alike(*pages)
-    hostile, harmless = map(scenes_of, pages)
-    assert len(hostile) == len(harmless)
-    shown = [words for scene in hostile.values() for words in _texts_of(scene)]
-    assert not [words for words in shown if re.search(r"<[a-z/]", words)]
 
 
-def _texts_of(scene: Any) -> Iterator[str]:
-    for trace in scene["data"]:
-        for words in (trace.get("name", ""), trace.get("text", "")):
-            yield from [words] if isinstance(words, str) else words
-
-
-@sweep("kind", ["discrepancy"])
+@sweep("kind", ["joint_pose_sensitivity", "discrepancy"])
 def test_no_text_of_a_page_becomes_markup(kind: str, tmp_path: Path) -> None:
-    """Each text of document, settings and cohort ends with the payload, with and without a verdict.
+    """Each text of page, settings and cohort ends with the payload; names of ours stay.
 
     All kinds have one template.
     """
     results = made(kind, tmp_path)
-    whole = document_of(results)
+    whole = replace(made_page(results), scenes=[])
     pages = []
     for payload in (PAYLOAD, HARMLESS):
 
         def change(text: str, payload: str = payload) -> str:
-            return text if text in ("data", "frames", "name", "text") else text + payload
+            return text if re.fullmatch(r"[a-z_0-9]*", text) else text + payload
 
         study, told = mapped(results.study, change), mapped(whole, change)
         words = {"title": change("t"), "source": change("s")}
         cohort = type(results.cohort)(**{**vars(results.cohort), **words})
-        pages.append(told.html(_as_settings(study), cohort))
+        pages.append(told.html(_as_settings(study), cohort, results_of(results)))
     assert_alike(*pages)
 
 
@@ -134,7 +105,9 @@ def test_the_page_of_a_specimen_holds_no_markup_of_names(tmp_path: Path) -> None
     for payload in (PAYLOAD, HARMLESS):
         cohort = renamed(found, payload, tmp_path).cohort
         pages.append(specimen_page(cohort, view_of(cohort, cohort.specimen_names[0])))
-    assert pages[0].count("&lt;script&gt;alert(1)") > 10, "they do stand in the page"
+    # films are of persons, whom that page does not name row by row
+    least = 3 if results.study.kind == "scoliosis" else 10
+    assert pages[0].count("&lt;script&gt;alert(1)") > least, "they do stand in the page"
     assert_alike(*pages)
 
 
@@ -152,19 +125,17 @@ def test_settings_are_shown_as_text(results: Made) -> None:
     ],
 )
 def test_no_name_becomes_an_element_of_a_figure(kind: str, tmp_path: Path) -> None:
-    """Text is drawn as outlines, by one style for all kinds; what is left is a comment."""
+    """Names are text of the drawing."""
     found = renamed(made(kind, tmp_path / "made"), SHORT, tmp_path)
     figures = [f for f in kind_of(kind).figures if set(f.tables) <= set(found.tables)]
     figure = next((f for f in figures if set(f.reads) <= {*found.tables, "verdict.json"}), None)
     assert figure is not None
-    with style():
-        drawing = drawings(kind)[figure.name](found.study, found.cohort, found.tables)
-        svg = drawing.svg().encode() if isinstance(drawing, Chart) else picture(drawing, "svg")
-    assert_is_a_drawing(marked(svg, ".svg", "0" * 64))
+    chart = drawings(kind)[figure.name](found.study, found.cohort, found.tables)
+    assert_is_a_drawing(marked(chart.svg(), ".svg", "0" * 64))
 
 
 DRAWN = {"svg", "g", "path", "defs", "use", "clipPath", "rect", "style", "image", "text", "pattern"}
-DRAWN |= {"metadata", "RDF", "Work", "type", "format", "creator", "Agent", "title", "desc"}
+DRAWN |= {"title", "desc"}
 
 
 def assert_is_a_drawing(svg: bytes) -> None:
@@ -194,22 +165,11 @@ def test_only_the_page_vouches_for_markup() -> None:
     }
     assert users == {
         "report/forms/chart.py",
-        "report/page/document.py",
         "report/page/study_page.py",
-        "report/specimen_page.py",
         "report/viewer/figure.py",
     }
     for template in (ROOT / "spinepipe/report").rglob("*.html"):
         assert not re.search(r"\|\s*safe|autoescape", template.read_text("utf-8")), template.name
-    scripts = (ROOT / "spinepipe/report/page/page.js.html").read_text()
-    assert not re.search(r"innerHTML|outerHTML|document\.write|insertAdjacentHTML|eval\(", scripts)
-
-
-@sweep("kind", kind_names())
-def test_captions_hold_no_names_and_no_directives(kind: str) -> None:
-    """They come with the kind, so in `snakemake --report` nobody's name meets reStructuredText."""
-    for figure in kind_of(kind).figures:
-        if not figure.at.startswith("figures."):  # captions of charts stand in their files
-            continue
-        text = caption(kind, figure.name).read_text(encoding="utf-8")
-        assert not re.search(r"^\s*\.\. |\{\{|\{%|::\s*$|`_", text, re.MULTILINE), figure.name
+    for script in (ROOT / "spinepipe/report").rglob("*.js"):
+        unsafe = r"innerHTML|outerHTML|document\.write|insertAdjacentHTML|eval\("
+        assert not re.search(unsafe, script.read_text("utf-8")), script.name

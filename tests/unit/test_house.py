@@ -332,7 +332,7 @@ def test_what_a_kind_declares_is_there(kind: str) -> None:
         module, _, function = figure.at.partition(":")
         assert callable(getattr(import_module(f"{PACKAGE}.studies.{kind}.{module}"), function))
     page = import_module(f"{PACKAGE}.studies.{kind}.page")
-    assert callable(page.page if hasattr(page, "page") else page.document)
+    assert callable(page.page)
     assert set(page.READ) <= {table.name for table in declared.tables} | {"poses"}
 
 

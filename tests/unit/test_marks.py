@@ -9,14 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
+from drawn import a_picture
 from matplotlib.image import imread
 from sweeps import sweep
 
 from spinepipe.marks import KEY, marked, read_mark, with_mark, without_mark, write_marked
 from spinepipe.model.file import EffectEntry, ModelFile, read_model, write_model
 from spinepipe.motion.export import mot
-from spinepipe.report.style import picture
 from spinepipe.studies.joint_pose_sensitivity.tables import AGREEMENT
 from spinepipe.tables import from_rows, write
 
@@ -25,7 +24,6 @@ DIGEST, OTHER = "0123456789abcdef" * 4, "f" * 64
 
 def save(suffix: str, path: Path, digest: str) -> None:
     """A file of that kind, as the jobs write it."""
-    figure = Figure(figsize=(1, 1))
     if suffix == ".parquet":
         write(from_rows(AGREEMENT, []), path, {KEY: digest} if digest else {})
     elif suffix == ".json":
@@ -33,8 +31,8 @@ def save(suffix: str, path: Path, digest: str) -> None:
         path.write_text(json.dumps(with_mark(data, digest) if digest else data, indent=1) + "\n")
     elif suffix == ".yaml":
         write_model(MODEL, path, digest)
-    elif suffix in (".svg", ".png"):
-        write_marked(picture(figure, suffix[1:]), path, digest)
+    elif suffix in (".svg", ".png", ".pdf"):
+        write_marked(a_picture(suffix[1:]), path, digest)
     elif suffix == ".mot":
         write_marked(mot("m", np.zeros(3), np.zeros((3, 18, 6))), path, digest)
     else:
@@ -42,7 +40,7 @@ def save(suffix: str, path: Path, digest: str) -> None:
 
 
 MODEL = ModelFile(model="m", cohort="c", effects=(EffectEntry(effect="linear_bushing"),))
-KINDS = (".parquet", ".json", ".yaml", ".svg", ".png", ".html", ".osim", ".mot")
+KINDS = (".parquet", ".json", ".yaml", ".svg", ".png", ".pdf", ".html", ".osim", ".mot")
 
 
 @sweep("suffix", KINDS)
@@ -76,7 +74,7 @@ def test_half_a_file_or_none_of_its_kind_has_no_mark(suffix: str, tmp_path: Path
 def test_files_with_a_mark_read_as_without(tmp_path: Path) -> None:
     write_model(MODEL, tmp_path / "model.yaml", DIGEST)
     assert read_model(tmp_path / "model.yaml") == MODEL
-    plain = picture(Figure(figsize=(1, 1)), "png")
+    plain = a_picture("png")
     assert (imread(io.BytesIO(marked(plain, ".png", DIGEST))) == imread(io.BytesIO(plain))).all()
     assert without_mark(with_mark({"s01": 1}, DIGEST)) == {"s01": 1}
 

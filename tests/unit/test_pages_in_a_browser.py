@@ -13,9 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import stored_studies
 from hostile import PAYLOAD, renamed
 from made_pages import page_of
 from made_results import MAKERS, made
+
+from spinepipe.report.overview.index import write_index
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 QUIET = (
@@ -87,3 +90,26 @@ def test_names_do_not_run_and_the_page_needs_no_network(kind: str, tmp_path: Pat
     assert not told.ran
     assert told.asked_for == ()
     assert [line for line in told.said if "Error" in line or "Uncaught" in line] == []
+
+
+def test_the_page_of_all_studies_is_searched_and_asks_for_nothing(tmp_path: Path) -> None:
+    """What a reader looks for stays, groups without any of it go; no script fails."""
+    root = stored_studies.project(tmp_path / "project")
+    for name in (stored_studies.FIRST, stored_studies.SECOND):
+        told = stored_studies.conclusion("answer", "r", "v", f"Only {name} says this. {RUNS}")
+        stored_studies.store(root, name, [told])
+    page = write_index(root, {}).read_text("utf-8")
+    typed = (
+        'const box = document.querySelector(".seek"); box.value = "%s"; box.oninput({target: box});'
+    )
+    for words, shown in (("only SECOND", ["second"]), ("nowhere", []), ("", ["second", "first"])):
+        found = seen(page.replace("</body>", f"<script>{typed % words}</script></body>"), tmp_path)
+        assert not found.said
+        assert not found.asked_for
+        assert not found.ran
+        articles = re.findall(
+            r'<article class="study"([^>]*)>.*?<b><a[^>]*>(\w+)<', found.elements, re.S
+        )
+        assert [name for hidden, name in articles if "hidden" not in hidden] == shown
+        groups = re.findall(r'<section class="group"([^>]*)>', found.elements)
+        assert all(("hidden" in one) == (not shown) for one in groups)

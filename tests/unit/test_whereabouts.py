@@ -16,12 +16,12 @@ from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+from drawn import a_picture
 from matplotlib.figure import Figure
 from sweeps import sweep
 from whereabouts import needles, told_of_the_machine
 
 from spinepipe.jobs.digest import versions
-from spinepipe.report.style import picture, style
 
 ROOT = Path(__file__).resolve().parents[2]
 ASKING = re.compile(
@@ -90,8 +90,7 @@ def test_only_temporary_files_and_notes_of_runs_are_called_by_the_machine() -> N
 
 @sweep("kind", ["svg", "png", "pdf"])
 def test_pictures_say_what_drew_them_and_no_more(kind: str, tmp_path: Path) -> None:
-    with style():
-        content = picture(Figure(figsize=(1, 1)), kind)
+    content = a_picture(kind)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / f"a.{kind}").write_bytes(content)
     assert told_of_the_machine(tmp_path) == []

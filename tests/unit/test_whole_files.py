@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
-from matplotlib.figure import Figure
+from drawn import a_picture
 
 from spinepipe.files import appearing, sweep
 from spinepipe.marks import (
@@ -27,7 +27,6 @@ from spinepipe.marks import (
     write_marked,
 )
 from spinepipe.motion.export import mot
-from spinepipe.report.style import picture
 from spinepipe.schema import Column, Table
 from spinepipe.tables import opened, read, read_metadata, to_arrow, write
 
@@ -127,10 +126,9 @@ def test_no_table_is_an_error_of_its_own(tmp_path: Path) -> None:
 
 
 def test_one_changed_word_of_any_other_file_is_seen(tmp_path: Path) -> None:
-    figure = Figure(figsize=(1, 1))
     contents = {
-        "a.svg": picture(figure, "svg"),
-        "a.png": picture(figure, "png"),
+        "a.svg": a_picture("svg"),
+        "a.png": a_picture("png"),
         "a.html": "<html><body>12.3 N/m</body></html>",
         "a.yaml": "stiffness: 12.3\n",
         "a.csv": "x\n12.3\n",

@@ -73,8 +73,10 @@ def _comparisons() -> None:
     head = (
         "Published numbers beside ours, study by study, as `against_<paper>.parquet` has them. "
         "Inside a range counts for little unless it has two ends whose width the paper gives "
-        "(`inside_two_sided`): `wide` ranges, half to twice or more, exclude hardly anything, "
-        "`one_sided` ones are an order or a sign, `binary` ones a yes, a no or a count."
+        "(`inside_two_sided`): `chosen` ones have a width that we chose, `borrowed` ones one "
+        "that the paper gives of something else; `wide` ranges, half to twice or more, exclude "
+        "hardly anything, `one_sided` ones are an order or a sign, `binary` ones a yes, a no or a "
+        "count."
     )
     _write("comparisons", head, found)
 

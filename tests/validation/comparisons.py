@@ -5,8 +5,8 @@ from pathlib import Path
 import pandas as pd
 
 ROOT = Path(__file__).resolve().parents[2]
-LIMITS = ("two_sided", "chosen", "wide", "one_sided", "binary")
-OTHERS = ("outside", "circular", "recomputed", "contradicted", "not_computed")
+LIMITS = ("two_sided", "chosen", "borrowed", "wide", "one_sided", "binary")
+OTHERS = ("outside", "undecided", "circular", "recomputed", "contradicted", "not_computed")
 """Verdicts beside inside."""
 
 

@@ -9,7 +9,6 @@ is asked when the project is built (`small_project.Shared`).
 
 import json
 import re
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -17,15 +16,16 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from made_pages import SVG
+from page_rules import faults_of_page, faults_of_told
 from small_project import Project
 from small_studies import SMALL
 
-from spinepipe.jobs.report import results_of
-from spinepipe.report.page.document import Picture
+from spinepipe.report.forms.chart import Drawing
+from spinepipe.report.page.study_page import Results
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study_files import StudyFiles
-from spinepipe.tables import arrow_schema
+from spinepipe.tables import StudyTables, arrow_schema
 
 pytestmark = pytest.mark.slow
 
@@ -35,6 +35,14 @@ FETCHES = re.compile(r"""<(script|link|img|iframe)[^>]+(src|href)=["'](https?:)?
 
 def layout(project: Project, kind: str) -> StudyFiles:
     return files_of(*check(project.folder, kind))
+
+
+def test_the_page_of_all_studies_names_each_below_its_question(eight: Project) -> None:
+    """Pages of most were not asked for."""
+    page = eight.path("results/index.html").read_text()
+    assert set(re.findall(r"<b><(?:a|span)[^>]*>(\w+)<", page)) == set(SMALL)
+    assert "8 studies: 1 up to date, 7 not finished" in page
+    assert {kind_of(kind).question for kind in SMALL} <= set(re.findall(">([^<]+)</h2>", page))
 
 
 @pytest.mark.parametrize("kind", SMALL)
@@ -59,21 +67,25 @@ def test_a_page_is_written_from_the_tables_of_all(eight: Project, kind: str) -> 
     """All that it reads is there without those of `full`; its figures are left empty."""
     files, (study, cohort) = layout(eight, kind), check(eight.folder, kind)
     module = import_module(f"{PACKAGE}.{kind}.page")
-    titles = {one.name: one.title for one in kind_of(kind).figures}
     tables = [str(eight.path(name)) for name in files.table_files(files.tables, full=False)]
     others = files.other_files(files.told_in_report)
     others = {name: str(eight.path(path)) for name, path in others.items()}
-    results = results_of(module.READ, titles, tables, [], [], others)
-    drawn = files.figures(full=False)
-    pictures = {name: Picture.of(name, titles[name], SVG, "Words.") for name in drawn}
-    document = module.document(study, cohort, replace(results, pictures=pictures))
-    look_at_page(document.html(study, cohort), files, full=False)
-    assert document.findings
+    read = [path for path in tables if Path(path).stem in module.READ]
+    drawings = {
+        one.name: Drawing(one.name, one.title, "Words.", (SVG,))
+        for one in kind_of(kind).figures
+        if one.name in files.figures(full=False)
+    }
+    results = Results(StudyTables.read(read, others), {}, drawings)
+    page = module.page(study, cohort, results)
+    assert list(faults_of_told(page.told)) == []
+    html = page.html(study, cohort, results)
+    assert list(faults_of_page(html)) == []
+    look_at_page(html, files, full=False)
 
 
 def look_at_page(page: str, files: StudyFiles, full: bool) -> None:
-    for name in files.figures(full):
-        assert f'id="figure-{name}"' in page, name
+    assert "<figcaption>" in page
     assert "default-src 'none'" in page
     assert not FETCHES.search(page)
 
@@ -82,7 +94,7 @@ def look_at_results(project: Project, kind: str, full: bool) -> None:
     files = layout(project, kind)
     assert {name.removeprefix("results/") for name in files.results(full)} <= set(project.files())
     assert not list(project.path(f"results/{kind}").rglob("*.log"))
-    page = project.path(f"{files.folder}/report.html").read_text()
+    page = project.path(files.page()).read_text()
     look_at_page(page, files, full=False)
     if files.adds:
         assert "`make full` makes them" in page

@@ -67,6 +67,11 @@ def test_failing_jobs_are_named_the_others_kept_and_a_killed_run_goes_on(
         assert words in toy_copy.path(log).read_text()
     kept = {job_file(one) for one in SPECIMENS if one not in ACCIDENTS}
     assert set(toy_copy.files()) == kept
+    index = toy_copy.path("results/index.html").read_text()
+    assert "1 study: 1 failed" in index
+    assert "job count_joints study=counted specimen=a: " in index
+    assert ACCIDENTS["a"][1] in index
+    assert "(and 3 jobs more)" in index
 
     snakefile.write_text(whole)
     toy_copy.edit("config/studies/counted.yaml", "times: 2", "times: 3")
@@ -80,6 +85,7 @@ def test_failing_jobs_are_named_the_others_kept_and_a_killed_run_goes_on(
 
     toy_copy.run()
     assert toy_copy.contents() == content
+    assert "1 study, all up to date" in toy_copy.path("results/index.html").read_text()
     after = toy_copy.files()
     cut_off = {path.name for path in toy_copy.path(".snakemake/incomplete").rglob("*")}
     assert not cut_off

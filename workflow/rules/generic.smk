@@ -21,9 +21,11 @@ def outputs_of(place, kind, job):
     return files if len(files) > 1 else {"output": files[job.writes[0]]}
 
 
-def caption_of_figure(wildcards):
-    caption = Path(layout(wildcards.study).caption(wildcards.figure))
-    return caption.read_text("utf-8") if caption.is_file() else ""
+def pages_of(place, kind):
+    """Output of the job of a page: it, and where a kind once had it a page that leads there."""
+    once = kind.files.subfolder
+    former = {"former": update(f"{place}/{once}{{page,report|full}}.html")} if once else {}
+    return {"output": update(f"{place}/{{page,report|full}}.html"), **former}
 
 
 # One set of rules for each kind of study that has a study file: their patterns name the studies, so
@@ -110,7 +112,6 @@ for kind in PROJECT.kinds:
                 f"{LOGS}/figure_{{figure}}.log",
             params:
                 digest=PROJECT.mark_of_figure,
-                caption=caption_of_figure,
             run:
                 run_job(DRAW, rule, wildcards, input, output, params, log)
 
@@ -121,7 +122,7 @@ for kind in PROJECT.kinds:
             outdated(f"{kind}_report", PROJECT.mark_of_page),
             unpack(PROJECT.inputs_of_page),
         output:
-            output=update(f"{place}/{made.files.subfolder}{{page,report|full}}.html"),
+            **pages_of(place, made),
         log:
             f"{LOGS}/{{page}}.log",
         params:

@@ -7,11 +7,11 @@ for papers, all panels stand in a grid.
 
 import io
 import re
+import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
-from textwrap import wrap
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
@@ -105,7 +105,8 @@ class Chart:
                 kind = "panel legend" if self.keys and index == 0 else "panel"
                 placed.append(
                     f'<svg class="{kind}" x="{x:.0f}" y="{y:.0f}" width="{wide:.0f}" '
-                    f'height="{high:.0f}" viewBox="0 0 {wide:.0f} {high:.0f}">{part}</svg>'
+                    f'height="{high:.0f}" viewBox="0 0 {wide:.0f} {high:.0f}" '
+                    f'style="max-width: {1.4 * wide:.0f}px">{part}</svg>'
                 )
                 x += wide + GAP
             width = max(width, x - GAP)
@@ -144,9 +145,17 @@ class Chart:
         return content.getvalue()
 
 
+_LETTERS = 40
+"""Of a line of a message."""
+
+
 def saying(title: str, message: str) -> Chart:
     """A figure that has nothing to show and says why."""
     return Chart(title, [_Message(message=message)], message)
+
+
+_LETTERS = 40
+"""In a line of a message."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,25 +163,17 @@ class _Message(Panel):
     message: str
 
     @property
-    def _lines(self) -> list[str]:
-        return wrap(self.message, int(self.width / 7.2))
+    def lines(self) -> list[str]:
+        return textwrap.wrap(self.message, _LETTERS)
 
     @property
     def height(self) -> float:
-        return 8.0 + 16.0 * len(self._lines)
+        return 8.0 + 16.0 * len(self.lines)
 
     def draw(self, axes: Axes) -> None:
         axes.set_axis_off()
-        told = "\n".join(self._lines)
-        axes.text(
-            0.0,
-            0.5,
-            told,
-            transform=axes.transAxes,
-            color=COLORS["soft"],
-            va="center",
-            in_layout=False,
-        )
+        text = axes.text(0.0, 0.5, "\n".join(self.lines), transform=axes.transAxes, va="center")
+        text.set(color=COLORS["soft"], in_layout=False)  # it is wider than the axes
 
 
 def _draw(panel: Panel, figure: FigureBase) -> None:
@@ -267,13 +268,14 @@ class Drawing:
 
     Attributes
     ----------
-    panels : SVG elements.
+    panels : SVG elements. least_px : narrower than this text of a panel is too small.
     """
 
     name: str
     title: str
     caption: str
     panels: tuple[str, ...]
+    least_px: int = 260
 
     @classmethod
     def read(cls, name: str, svg: str) -> "Drawing":
@@ -283,13 +285,15 @@ class Drawing:
         root = ElementTree.fromstring(svg)
         title = root.findtext(f"{{{SVG}}}title", "")
         caption = root.findtext(f"{{{SVG}}}desc", "")
-        panels = []
+        panels, widest = [], 0.0
         for child in root.findall(f"{{{SVG}}}svg"):
             for place in ("x", "y"):
                 child.attrib.pop(place, None)
+            if "legend" not in child.attrib["class"]:
+                widest = max(widest, float(child.attrib["width"]))
             text = ElementTree.tostring(child, encoding="unicode")
             panels.append(_own_ids(_with_variables(text), f"{name}-"))
-        return cls(name, title, caption, tuple(panels))
+        return cls(name, title, caption, tuple(panels), round(0.9 * widest))
 
     def labelled(self, says: str) -> list[Markup]:
         """The panels as elements of a page; a reader who cannot see them is told ``says``."""

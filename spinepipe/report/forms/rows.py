@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from spinepipe.report.forms.axes import log_ticks
 from spinepipe.report.forms.chart import Panel
@@ -18,7 +19,8 @@ ROW, ABOVE_AND_BELOW = 21.0, 52.0
 _WITHIN = 0.62
 """Share of a row's height over which its series are spread."""
 
-_MOST_LETTERS = 26
+LETTERS = 26
+"""Of a row's name; the middle of a longer one is left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,9 +34,10 @@ class Rows(Panel):
         ``hollow`` (not to be trusted), ``inner_low`` and ``inner_high`` (a thicker line, such as
         the middle half) where they are told.
     looks : of each series, in the order from the top of a row down.
-    marks : a dashed vertical line at each value, with its words.
+    marks : a dashed vertical line at each value, with its words; zero has a solid one.
     bars : whether a bar from zero stands in the place of a symbol.
     log : whether the axis is logarithmic. x_limits : its ends.
+    letters : most of a row's name, where a wide panel has room for sentences.
     """
 
     frame: pd.DataFrame
@@ -43,6 +46,7 @@ class Rows(Panel):
     bars: bool = False
     log: bool = False
     x_limits: tuple[float, float] | None = None
+    letters: int = LETTERS
 
     @property
     def names(self) -> list[str]:
@@ -84,9 +88,6 @@ class Rows(Panel):
             axes.set_xscale("log")
         if self.x_limits:
             axes.set_xlim(*self.x_limits)
-        for place, words in self.marks.items():
-            axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
-            _small(axes, place, 1.0, words, "bottom", "center")
         for number, one in enumerate(series):
             rows = self.frame if one == "" else self.frame[self.frame["series"] == one]
             look = self.looks.get(one, SEVERAL[number % len(SEVERAL)])
@@ -98,13 +99,21 @@ class Rows(Panel):
                 ]
             )
             self._draw_series(axes, rows, y, look)
+        for place, words in self.marks.items():  # alone on a logarithmic axis it has no limits
+            axes.axvline(place, color=COLORS["soft"], lw=1.0, ls=(0, (3.0, 2.0)), zorder=1)
+            _small(axes, place, 1.0, words, "bottom", "center")
         axes.set_ylim(len(names) - 0.45, -0.55)
-        axes.set_yticks(range(len(names)), [short(name, _MOST_LETTERS) for name in names])
+        axes.set_yticks(range(len(names)), [short(name, self.letters) for name in names])
         axes.tick_params(axis="y", colors=COLORS["ink"])
         axes.grid(axis="y", visible=False)
         axes.spines["left"].set_visible(False)
         if self.log:
             log_ticks(axes.xaxis, *axes.get_xlim())
+        else:  # as many ticks whatever the width, which the layout is still to find
+            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        low, high = axes.get_xlim()
+        if not self.log and low < 0.0 < high:
+            axes.axvline(0.0, color=COLORS["soft"], lw=0.8, zorder=1)
         if "note" in self.frame:
             told = self.frame.drop_duplicates("row").set_index("row")["note"]
             for place, name in enumerate(names):

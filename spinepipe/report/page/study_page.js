@@ -49,6 +49,9 @@ document.querySelectorAll('[data-copy]').forEach(button => button.onclick = asyn
 
 // The index: studies with all the words that are looked for.
 const seek = document.querySelector('.seek');
-if (seek) seek.oninput = () => document.querySelectorAll('.study').forEach(study => {
-  study.hidden = !study.textContent.toLowerCase().includes(seek.value.toLowerCase());
-});
+if (seek) seek.oninput = () => {
+  const words = seek.value.toLowerCase().split(/\s+/);
+  const found = study => words.every(word => study.textContent.toLowerCase().includes(word));
+  document.querySelectorAll('.study').forEach(study => { study.hidden = !found(study); });
+  document.querySelectorAll('.group').forEach(group => { group.hidden = !group.querySelector('.study:not([hidden])'); });
+};

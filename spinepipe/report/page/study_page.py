@@ -6,7 +6,7 @@ from functools import cached_property
 from importlib.resources import files
 
 import pandas as pd
-from jinja2 import Environment, FunctionLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import spinepipe
@@ -21,6 +21,8 @@ from spinepipe.report.viewer.specimens import specimen_scenes
 from spinepipe.report.words import count, listed
 from spinepipe.studies.study import Study
 from spinepipe.tables import StudyTables
+
+_HERE = "spinepipe.report.page"
 
 MOST_FINDINGS = 5
 """Of those that have something to say the first; all others stand folded."""
@@ -94,13 +96,14 @@ class Page:
         *,
         papers: Mapping[str, str] | None = None,
         date: str = "",
+        folder: str = "",
     ) -> str:
         """The page. It loads nothing from the network, and the same results make the same bytes.
 
         Parameters
         ----------
         papers : pages of comparisons with papers, by file, with the words of the link.
-        date : of the results.
+        date : of the results. folder : of tables and figures as the page reaches it, with a slash.
         """
         findings, lights = self.at("finding"), self.at("light")
         drawings = dict(results.drawings)
@@ -121,6 +124,7 @@ class Page:
             "depends": self.at("depends"),
             "key_figure": key_figure,
             "findings": findings[:MOST_FINDINGS],
+            "first": {one.figure: n for n, one in reversed([*enumerate(findings, 1)])},
             "others": findings[MOST_FINDINGS:],
             "drawings": drawings,
             "further": [one for name, one in drawings.items() if name not in used],
@@ -131,6 +135,7 @@ class Page:
             "methods": self.at("methods"),
             "origin": run,
             "date": date,
+            "folder": folder,
             "left_out": self.left_out,
             "source": cohort.source,
             "papers": (papers or {}).items(),
@@ -145,23 +150,30 @@ class Page:
         return rendered("study_page.html", page=shown, title=title, index="../index.html")
 
 
-def rendered(template: str, **values: object) -> str:
-    """A template of this folder with the style sheet and script that all pages share."""
+def rendered(
+    template: str, packages: Sequence[str] = (), more_style: str = "", **values: object
+) -> str:
+    """A template of this folder, or of further packages, in the frame that all pages share.
+
+    Parameters
+    ----------
+    more_style : rules of a style sheet behind those of all pages.
+    """
     environment = Environment(
-        loader=FunctionLoader(part),
+        loader=ChoiceLoader([PackageLoader(name, "") for name in (_HERE, *packages)]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    style = Markup(part("study_page.css")) + viewer_style()
-    script = Markup(part("study_page.js")) + viewer_script()
-    return environment.get_template(template).render(style=style, script=script, **values)
-
-
-def part(name: str) -> str:
-    """Text of a file that lies beside this one."""
-    return files("spinepipe.report.page").joinpath(name).read_text(encoding="utf-8")
+    style, script = (
+        files(_HERE).joinpath(f"study_page.{end}").read_text("utf-8") for end in ("css", "js")
+    )
+    return environment.get_template(template).render(
+        style=Markup(style) + viewer_style() + Markup(more_style),
+        script=Markup(script) + viewer_script(),
+        **values,
+    )
 
 
 def tag(cohort: Cohort) -> str:

@@ -21,6 +21,9 @@ HOLDS = (*DECIDED, UNDECIDED, NOT_ASKED, CIRCULAR)
 BY_CONSTRUCTION = "by_construction"
 """Marks a row whose claim is no test: fitted to the readings it is judged by."""
 
+BY_SIZE = "by_size"
+"""Marks a row whose no is by the size of a share alone: no test decided it, whatever its p."""
+
 
 FEWEST = 3
 """Specimens that a verdict needs; the scatter of two is that of one difference."""

@@ -11,6 +11,7 @@ from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
 from spinepipe.status import Status, joined
 from spinepipe.studies.cohort_stiffness.claims import (
+    BY_SIZE,
     NO_SUCH_FITS,
     CohortClaim,
     Row,
@@ -103,7 +104,8 @@ def load_case_claim(
     lost = f"no test of {len(tests) - n} specimens" if len(tests) > n else ""
     untested = NO_BY_SIZE if holds == "no" else ""
     interval = float(ends.low), float(ends.high)
-    return claim.row(holds, joined(found, untested, lost, note), below / n, interval, p, n)
+    row = claim.row(holds, joined(found, untested, lost, note), below / n, interval, p, n)
+    return row | {BY_SIZE: holds == "no"}
 
 
 def adjusted_share(tests: pd.DataFrame) -> float:

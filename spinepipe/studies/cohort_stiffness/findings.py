@@ -21,6 +21,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.status import joined
 from spinepipe.studies.cohort_stiffness.claims import (
     BY_CONSTRUCTION,
+    BY_SIZE,
     CIRCULAR,
     DECIDED,
     FEWEST,
@@ -98,7 +99,7 @@ def decide_together(rows: Sequence[Row], specimens: int, significance: float) ->
 
 
 def _corrected(rows: Sequence[Row]) -> list[float | None]:
-    """The deciding p of each row, corrected for all claims; None for rows without one.
+    """The deciding p of each row, corrected for all claims; None where no test decided.
 
     A claim may have two tests, and so two null hypotheses: no effect, and one that matters. At most
     one of the two is true, so a claim counts once. From the smallest p on, each is multiplied by
@@ -122,7 +123,10 @@ def _corrected(rows: Sequence[Row]) -> list[float | None]:
         found[place, name] = reached
         open_tests[place] -= 1
         open_tests += Counter()  # drops what has none left
-    return [found.get((place, _deciding(row))) for place, row in enumerate(rows)]
+    return [
+        None if row.get(BY_SIZE) else found.get((place, _deciding(row)))
+        for place, row in enumerate(rows)
+    ]
 
 
 _TESTS = ("p", "p_no")

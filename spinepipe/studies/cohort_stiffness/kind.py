@@ -76,33 +76,33 @@ class CohortLayout(StudyFiles):
     joined = OF_JOBS
     drawings = (
         Figure(
-            "stiffness_by_level",
-            "Fitted stiffness of every specimen, level by level",
-            "figures.stiffness_by_level:stiffness_by_level_figure",
+            "stiffness_by_specimen",
+            "Stiffness of every specimen",
+            "charts:stiffness_by_specimen",
             ("stiffness",),
         ),
         Figure(
-            "error_map",
-            "Errors by specimen and level",
-            "figures.error_map:error_map_figure",
-            ("errors", "sign_checks"),
+            "stiffness_by_level",
+            "Stiffness level by level",
+            "charts:stiffness_by_level",
+            ("stiffness",),
         ),
         Figure(
             "held_out_error",
-            "Errors of fitted and of held-out motion",
-            "figures.held_out_error:held_out_error_figure",
-            ("errors",),
+            "Errors of fitted motion and of motion left out",
+            "charts:held_out_error",
+            ("ranking",),
         ),
         Figure(
             "load_case_stiffness",
             "Stiffness fitted to one load case",
-            "figures.load_case_stiffness:load_case_stiffness_figure",
-            ("stiffness", "errors", "statistics"),
+            "charts:load_case_stiffness",
+            ("stiffness", "sign_checks"),
         ),
         Figure(
             "range_of_motion",
-            "Range of motion, measured and simulated",
-            "figures.range_of_motion:range_of_motion_figure",
+            "Range of motion, measured and modelled",
+            "charts:range_of_motion",
             ("load_displacement",),
         ),
     )
@@ -243,6 +243,7 @@ _FITTING = ("seed", "steps", "cost", "measurement_sd", "bound_factor", "starts")
 """Settings by what they decide: what is held out and compared, and how stiffness is fitted."""
 
 KIND = Kind(
+    question="How stiff are the joints?",
     settings=CohortStiffness,
     files=CohortLayout,
     checks=(check_cohort_stiffness,),

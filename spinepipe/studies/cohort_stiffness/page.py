@@ -1,171 +1,108 @@
-"""The report of a cohort study: its tables, and what is said of parts that it leaves out."""
+"""The page of a study of stiffness."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 
 import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import Document, ResultTables
-from spinepipe.report.page.tables import Sortable, beside_paper, sortable
-from spinepipe.schema import Column, Table, all_declared
-from spinepipe.studies.cohort_stiffness.page_findings import findings
+from spinepipe.report.conclusions import Value, sentences_of
+from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.tables import Sortable, sortable
+from spinepipe.report.words import AXIS, level
+from spinepipe.schema import Column, Table
+from spinepipe.studies.cohort_stiffness.claims import FEWEST
+from spinepipe.studies.cohort_stiffness.conclusions import conclusions
+from spinepipe.studies.cohort_stiffness.conclusions_of_claims import ABOUT_UNSEEN
+from spinepipe.studies.cohort_stiffness.conclusions_of_stiffness import joint_values
 from spinepipe.studies.cohort_stiffness.representations import IN_WORDS
-from spinepipe.studies.cohort_stiffness.settings import (
-    ALL_BUT,
-    GOULD_2024B,
-    NOBODY,
-    CohortStiffness,
-    representations_of,
-)
-from spinepipe.studies.cohort_stiffness.stages import own_fits
+from spinepipe.studies.cohort_stiffness.settings import GOULD_2024B, CohortStiffness
+from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.studies.cohort_stiffness.tables import (
-    AGAINST_GOULD_2024B,
+    COVARIATES_TABLE,
     FINDINGS,
-    HELICAL_AXES,
-    LOAD_DISPLACEMENT,
+    FITS,
+    RANKING,
+    SIGN_CHECKS,
 )
 
-QUESTION = (
-    "Does stiffness differ between specimens, levels and load cases, how should it be described, "
-    "and does it carry over to what it was not fitted to?"
+_STIFFNESS = (
+    Column("specimen", "text", "specimen"),
+    Column("joint", "text", "joint; one row for all where they share a value"),
+    Column("direction", "text", "direction of motion"),
+    Column("stiffness", "number", "fitted to all load cases", empty="not bounded"),
+    Column("interval", "text", "95 %; one end where readings set no other"),
+    Column("unit", "text", "of both"),
 )
+"""The table of each specimen's stiffness, in the units of the field."""
 
-SHOWN = {
-    "findings": "Claims about the cohort, checked",
-    "ranking": "Representations in order",
-    "mae": "Mean absolute errors in the loaded direction",
-    "pooling": "How stiffness is spread over the cohort",
-    "covariates": "What of the specimens stiffness goes with",
-    "against_gould_2024b": "Beside Gould et al. 2024b",
-    "sign_checks": "Does each joint move with the load?",
-    "load_displacement": "Range of motion, neutral zone, stiffness and lost work of each curve",
-    "helical_axes": "Helical axes and centres of rotation",
-    "fits": "Fits",
-    "stiffness": "Stiffness fitted to all load cases",
-    "nuisances": "Errors of joint centres and axes fitted beside",
-    "statistics": "Tests of significance",
+_SHOWN: Mapping[Table, tuple[str, str]] = {
+    FINDINGS: ("Claims, decided together", "statement holds value unit low high p_holm"),
+    RANKING: ("Errors by description", "criterion representation value unit standard_error"),
+    COVARIATES_TABLE: (
+        "What stiffness goes with",
+        "coordinate covariate step factor low high p_holm holds",
+    ),
+    SIGN_CHECKS: (
+        "Does each joint move with the load?",
+        "specimen test joint measured_over_expected verdict",
+    ),
+    FITS: ("Fits to all load cases", "specimen representation readings scatter status message"),
 }
-"""Tables of the page in their order, with their titles."""
+"""Tables of the page with their titles and the columns that a reader compares."""
 
-READ = SHOWN
+READ = (
+    *("stiffness", "nuisances", "load_displacement", "helical_axes", "against_gould_2024b"),
+    *(shape.name for shape in _SHOWN),
+)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
-_CLAIM_ORDER = (
-    *("statement", "holds", "value", "unit", "low", "high"),
-    *("p", "p_holm", "quantity", "message"),
-)
 
-_NOT_SHOWN = ("representation", "readings", "least_load_nm", "largest_load_nm", "from_nm", "to_nm")
-"""Columns of curves and axes that are left to the files, beside ends of zones and SDs of axes."""
-
-
-def _shown(table: Table) -> tuple[Column, ...]:
-    """Columns of a table of an experiment that fit on a page."""
-    inner = ("neutral_zone_from", "neutral_zone_to", "neutral_zone_stiffness_", "direction_")
-    return tuple(
-        column
-        for column in table.columns
-        if column.name not in _NOT_SHOWN
-        and not (column.name.startswith(inner) and column.name.endswith(("_sd", "rad", "_nm")))
+def page(study: CohortStiffness, cohort: Cohort, results: Results) -> Page:
+    """What the page says and shows."""
+    return Page(
+        conclusions=list(conclusions(study, cohort, results)),
+        sentences=sentences_of(__package__),
+        key_figure="stiffness_by_specimen",
+        tables=[
+            *_stiffness(results.table("stiffness")),
+            *(
+                sortable(shape.name, title, shape.about, rows, [*map(shape.column, names.split())])
+                for shape, (title, names) in _SHOWN.items()
+                if len(rows := _rows(study, cohort, results, shape.name))
+            ),
+        ],
+        left_out=papers.left_out(GOULD_2024B.cited, GOULD_2024B.stands_for(cohort.name)),
     )
 
 
-_COLUMNS = {
-    FINDINGS.name: tuple(map(FINDINGS.column, _CLAIM_ORDER)),
-    **{table.name: _shown(table) for table in (LOAD_DISPLACEMENT, HELICAL_AXES)},
-}
-"""What a reader compares stands first; short names are left to the files."""
-
-_SHAPES = {table.name: table for table in all_declared(__file__)}
-
-NO_LEVELS = (
-    "no stiffness of single levels is published for these joints and the coordinates that are free"
-)
-
-HELD_OUT_ERROR = "held_out_error"
-"""The figure of errors of held-out motion."""
-
-NOT_HELD_OUT = (
-    "Besides the bushings, effects of the model file {file} act in all models. Their values are "
-    "the file's in every bar: those for all specimens where it has such, else those for the "
-    "specimen itself. Readings that they were found on count as held out here for stiffness only."
-)
+def _stiffness(stiffness: pd.DataFrame) -> list[Sortable]:
+    """Each specimen's stiffness; a value that readings do not bound stays empty."""
+    values = joint_values(stiffness)
+    if values.empty:
+        return []
+    ends = values[["low", "high"]].astype(object).where(values[["low", "high"]].notna(), None)
+    rows = values.assign(
+        joint=values["joint"].map(level),
+        direction=values["coordinate"].map(AXIS),
+        stiffness=values["value"],
+        interval=[f"{Value(0.0, '', *both):interval}" for both in ends.to_numpy()],
+    ).sort_values("specimen", kind="stable")
+    described = IN_WORDS[values["representation"].iloc[0]]
+    about = f"Fits to all load cases, {described}. Other descriptions and fits are in the file."
+    return [sortable("stiffness", "Stiffness of each specimen", about, rows, _STIFFNESS)]
 
 
-def document(study: CohortStiffness, cohort: Cohort, results: ResultTables) -> Document:
-    """What the report says and shows."""
-    pictures = list(results.pictures.values())
-    if study.base is not None:  # beneath held-out errors, what of its model was not held out
-        note = NOT_HELD_OUT.format(file=study.base.model)
-        pictures = [
-            replace(one, caption=f"{one.caption} {note}") if one.name == HELD_OUT_ERROR else one
-            for one in pictures
-        ]
-    return Document(
-        question=QUESTION,
-        findings=findings(study, results),
-        pictures=pictures,
-        tables=shown_tables(results),
-        metadata=results.metadata,
-        left_out=(
-            *left_out(study, len(cohort.specimen_names), cohort.joint_names),
-            *papers.left_out(GOULD_2024B.cited, GOULD_2024B.stands_for(cohort.name)),
-        ),
-        poses=results.table("poses"),
-    )
-
-
-def left_out(study: CohortStiffness, specimens: int, joints: Sequence[str] = ()) -> tuple[str, ...]:
-    """Parts that the settings or the cohort leave out, each with the reason."""
-    held = study.cross_validation
-    kept = representations_of(study, joints)
-    lost = [IN_WORDS[name] for name in study.representations if name not in kept]
-    parts = (
-        ("prediction of left-out specimens", "cross_validation: specimens: false", held.specimens),
-        (
-            "prediction of left-out specimens",
-            "the cohort has one specimen",
-            not held.specimens or specimens > 1,
-        ),
-        (
-            "prediction of left-out load cases",
-            "cross_validation: load_cases: false",
-            held.load_cases,
-        ),
-        (" and ".join(lost), NO_LEVELS, not lost),
-    )
-    return tuple(f"{part} ({why})" for part, why, done in parts if not done)
-
-
-def shown_tables(results: ResultTables) -> list[Sortable]:
-    """Tables that the study has, as the page shows them; those without rows are left out."""
-    found = []
-    for name, title in SHOWN.items():
-        frame = results.table(name)
-        if not len(frame):
-            continue
-        rows, told = _rows(name, frame)
-        shape = _SHAPES[name]
-        if shape is AGAINST_GOULD_2024B:
-            found += beside_paper(shape, title, rows)
-            continue
-        columns = _COLUMNS.get(shape.name, shape.columns)
-        found.append(sortable(name, title, f"{shape.about} {told}".strip(), rows, columns))
-    return [table for table in found if table.rows]
-
-
-def _rows(name: str, frame: pd.DataFrame) -> tuple[pd.DataFrame, str]:
-    """Rows that the page shows, and what is said of those that it does not."""
-    chosen, told = frame, ""
-    if name == "stiffness":
-        chosen, told = own_fits(frame), "own fits to all load cases"
-    elif name == "pooling":
-        chosen, told = frame[frame["without"] == NOBODY], "fits of all specimens"
-    elif name in ("fits", "mae", "nuisances"):
-        left_out = frame["fitted_to"].astype(str).str.startswith(ALL_BUT)
-        chosen, told = frame[~left_out], "fits that leave no load case out"
-    if len(chosen) == len(frame):
-        return frame, ""
-    return chosen, f"Here: {told}; the others are in {name}.parquet."
+def _rows(study: CohortStiffness, cohort: Cohort, results: Results, name: str) -> pd.DataFrame:
+    """Rows that the page shows: no claim that could not be decided or is none of unseen motion."""
+    rows = results.table(name)
+    if name == FINDINGS.name and len(rows):
+        few = len(cohort.specimen_names) < FEWEST
+        rows = rows[~few & (rows["holds"] != "not_asked")]
+        unseen = rows["finding"].str.endswith(ABOUT_UNSEEN)
+        return rows[~unseen] if study.base is not None else rows
+    if name == FITS.name and len(rows):
+        rows = rows[rows["fitted_to"] == joint_label_of(rows)]
+    if "representation" in rows:
+        rows = rows.assign(representation=rows["representation"].map(lambda x: IN_WORDS.get(x, x)))
+    return rows

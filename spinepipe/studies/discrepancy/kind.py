@@ -26,46 +26,25 @@ class DiscrepancyFiles(StudyFiles):
     drawings = (
         Figure(
             "load_displacement",
-            "Load over displacement, measured and modelled",
-            "figures.load_displacement:load_displacement_figure",
-            ("gap",),
+            "Load over motion, measured and modelled",
+            "charts:load_displacement",
+            ("gap", VERDICT),
+        ),
+        Figure("misfit", "Misfit of the models", "charts:misfit", ("where", VERDICT)),
+        Figure(
+            "stiffness",
+            "Stiffness at rest and under load",
+            "charts:stiffness",
+            ("field_numbers",),
         ),
         Figure(
-            "gap_map",
-            "Where the model is off, before and after",
-            "figures.gap_map:gap_map_figure",
-            ("where",),
+            "left_out",
+            "Misfit on readings left out of the fit",
+            "charts:left_out",
+            ("held_out", VERDICT),
         ),
-        Figure(
-            "gap_by_step",
-            "The gap along the load",
-            "figures.load_displacement:gap_by_step_figure",
-            ("gap",),
-        ),
-        Figure(
-            "held_out_by_test",
-            "Proof on motion held out",
-            "figures.held_out_by_test:held_out_by_test_figure",
-            ("held_out",),
-        ),
-        Figure(
-            "evidence_by_round",
-            "Evidence for each effect, round by round",
-            "figures.evidence_by_round:evidence_by_round_figure",
-            ("candidates", VERDICT),
-        ),
-        Figure(
-            "effect_confusions",
-            "What these tests could tell apart, and see",
-            "figures.effect_confusions:effect_confusions_figure",
-            ("confusions", "candidates", VERDICT),
-        ),
-        Figure(
-            "imperfections",
-            "What small imperfections took up",
-            "figures.imperfections:imperfections_figure",
-            ("imperfections", VERDICT),
-        ),
+        Figure("evidence", "Evidence for each effect", "charts:evidence", ("candidates", VERDICT)),
+        Figure("next_tests", "What to measure next", "charts:next_tests", ("next_tests", VERDICT)),
     )
 
     study: Discrepancy
@@ -87,6 +66,7 @@ class DiscrepancyFiles(StudyFiles):
 
 
 KIND = Kind(
+    question="What is the model missing?",
     settings=Discrepancy,
     files=DiscrepancyFiles,
     checks=(check_discrepancy,),

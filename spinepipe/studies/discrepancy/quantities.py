@@ -4,22 +4,25 @@ Results keep the parameters of the laws. What 17.7 1/rad² means nobody sees; th
 doubled at 10.7° everybody does.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import inf, isfinite, log, nan, pi, sqrt
+from math import inf, isfinite, log, pi, sqrt
 from typing import Any
 
-from spinepipe.report.words import number, plain
+from spinepipe.report.conclusions import Value
+from spinepipe.report.words import plain
 from spinepipe.studies.discrepancy.verdict import Estimate, Missing
 from spinepipe.studies.discrepancy.words import ASYMMETRY, TOWARDS
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 STIFFENING, PRELOAD = "nonlinear_stiffening", "preload_stiffening"
 
-_UNITS: Mapping[str, tuple[str, float]] = {
+UNITS: Mapping[str, tuple[str, float]] = {
     "1": ("", 1.0),
     "deg": ("°", 1.0),
     "mm/deg": ("mm/°", 1.0),
+    "N m/deg": ("N m/°", 1.0),
     "N/m": ("N/mm", 1.0 / MM_PER_M),
     "N m/rad": ("N m/°", 1.0 / DEG_PER_RAD),
     "N/rad": ("N/°", 1.0 / DEG_PER_RAD),
@@ -39,58 +42,25 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number to be read, with its 95 % interval.
+    """A parameter to be read.
 
     Attributes
     ----------
-    place : joint, specimen or test it is of.
-    low, high : infinite where that end is open; there the readings do not tell the value.
+    place : joint, specimen or test it is of; empty where it is of all.
+    value : with its 95 % interval, an end that is open left out; None where it has no number.
     at_bound : whether the fit ended at a bound, so that it says no more than that.
     """
 
     name: str
     place: str
-    value: float
-    unit: str
-    low: float
-    high: float
+    value: Value | None
     at_bound: bool = False
 
     @property
-    def words(self) -> str:
-        """``half width 3.1° (95 % interval 2.8 to 3.4)``, ``half width: at least 2.8° (95 %, no
-        upper end)``, ``half width: not told by these tests``.
-        """
-        told = f"{self.name} ({self.place})" if self.place else self.name
-        if isfinite(self.low) and isfinite(self.high):
-            between = f"(95 % interval {number(self.low)} to {number(self.high)})"
-            return f"{told} {self._sized(self.value)}" + (
-                _BOUND if self.at_bound else f" {between}"
-            )
-        if isfinite(self.low):
-            return f"{told}: at least {self._sized(self.low)} (95 %, no upper end)"
-        if isfinite(self.high):
-            return f"{told}: at most {self._sized(self.high)} (95 %, no lower end)"
-        return f"{told}: {_UNTOLD}"
-
-    @property
-    def in_brackets(self) -> str:
-        """``3.1 [2.8, 3.4]``, ``at least 2.8, no upper end``."""
-        if isfinite(self.low) and isfinite(self.high):
-            between = f" [{number(self.low)}, {number(self.high)}]"
-            return number(self.value) + (_BOUND if self.at_bound else between)
-        if isfinite(self.low):
-            return f"at least {number(self.low)}, no upper end"
-        if isfinite(self.high):
-            return f"at most {number(self.high)}, no lower end"
-        return _UNTOLD
-
-    def _sized(self, value: float) -> str:
-        """With its unit: ``3.1°``, ``14 N/mm``."""
-        return number(value) + (self.unit if self.unit == "°" else f" {self.unit}".rstrip())
-
-
-_BOUND, _UNTOLD = ", at its bound", "not told by these tests"
+    def identifiable(self) -> bool:
+        """Whether the data bound it on both sides."""
+        ends = self.value is not None and None not in (self.value.low, self.value.high)
+        return ends and not self.at_bound
 
 
 @dataclass(frozen=True)
@@ -102,42 +72,39 @@ class _Way:
     of: Callable[[float], float]
     falls: bool = False
 
-    def ends(self, low: float | None, high: float | None) -> tuple[float, float]:
-        """Lower and upper end as they are told, infinite where one is open."""
-        below, above = (None if end is None else self.of(end) for end in (low, high))
-        if self.falls:
-            below, above = above, below
-        return -inf if below is None else below, inf if above is None else above
+    def told(self, one: Estimate) -> Value | None:
+        value, told = (
+            self.of(one.value),
+            [None if end is None else self.of(end) for end in one.ci95],
+        )
+        low, high = (end if end is not None and isfinite(end) else None for end in told)
+        low, high = (high, low) if self.falls else (low, high)
+        how = "verdict: effects, by profile likelihood"
+        return Value(value, self.unit, low, high, source=how) if isfinite(value) else None
 
 
-def quantities(effect: Missing) -> tuple[Quantity, ...]:
-    """The parameters of an effect as they are read."""
-    return tuple(quantity(effect.name, effect.variant, one) for one in effect.parameters)
+def quantities(effect: Missing) -> list[Quantity]:
+    """The parameters of an effect as they are read; results write ``width@L4L5@s01``."""
+    found = []
+    for one in effect.parameters:
+        name, *place = one.name.split("@")
+        way = _way(effect.name, effect.variant, name, one.unit)
+        where = ", ".join(map(plain, place))
+        found.append(Quantity(way.name, where, way.told(one), one.at_bound))
+    return found
 
 
-def quantity(effect: str, variant: Mapping[str, Any], parameter: Estimate) -> Quantity:
-    """One parameter of an effect as it is read; results write ``width@L4L5@s01``."""
-    name, *place = parameter.name.split("@")
-    way = _way(effect, variant, name, parameter.unit)
-    low, high = way.ends(*parameter.ci95)
-    where = ", ".join(map(plain, place))
-    return Quantity(
-        way.name, where, way.of(parameter.value), way.unit, low, high, parameter.at_bound
-    )
+_RAD = re.compile(r"rad(?:\^(\d))?")
 
 
-def estimate(effect: str, variant: Mapping[str, Any], value: float, unit: str) -> tuple[float, str]:
-    """An effect's strength as it is read, and its unit with what it is; NaN stays.
-
-    Parameters
-    ----------
-    value, unit : as the table candidates has them.
-    """
-    names = {STIFFENING: "growth", ASYMMETRY: "asymmetry", PRELOAD: "rise"}
-    way = _way(effect, variant, names.get(effect, ""), unit)
-    told = way.of(value) if isfinite(value) else value
-    named = way.name if effect in names and way.name != names[effect] else ""
-    return (told if isfinite(told) else nan), f"{way.unit} ({named})".strip() if named else way.unit
+def per_degree(value: float, unit: str) -> tuple[float, str]:
+    """A coefficient by radians as one by degrees, and its unit as it is printed."""
+    below = unit.partition("/")[2]
+    powers = sum(int(found[1] or 1) for found in _RAD.finditer(below))
+    told = _RAD.sub(lambda at: "°" + (f"^{at[1]}" if at[1] else ""), unit)
+    for typed, shown in (("^2", "²"), ("^3", "³")):
+        told = told.replace(typed, shown)
+    return value / DEG_PER_RAD**powers, told
 
 
 def _way(effect: str, variant: Mapping[str, Any], name: str, unit: str) -> _Way:
@@ -151,7 +118,7 @@ def _way(effect: str, variant: Mapping[str, Any], name: str, unit: str) -> _Way:
         return _Way("stiffness beyond the break over that within", "", lambda gain: 1.0 + gain)
     if effect == PRELOAD and unit == "1/N":
         return _Way("stiffness gained by compression", "% per 100 N", lambda rise: 1e4 * rise)
-    printed, factor = _UNITS.get(unit, (unit, 1.0))
+    printed, factor = UNITS.get(unit, (unit, 1.0))
     return _Way(_NAMES.get((effect, name), plain(name)), printed, lambda value: factor * value)
 
 
@@ -180,4 +147,4 @@ def _doubling(shape: Any, unit: str) -> _Way | None:
     def reached(rise: float) -> float:
         return factor * at(rise) if rise > 0.0 else inf
 
-    return _Way("stiffness doubles at", length, reached, falls=True)
+    return _Way("motion that doubles the stiffness", length, reached, falls=True)

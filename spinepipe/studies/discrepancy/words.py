@@ -1,9 +1,9 @@
 """Effects, places and misfits in plain words, named as the field does in each coordinate."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 
-from spinepipe.report.words import AXIS, listed, plain
+from spinepipe.report.words import AXIS, level, listed, plain
 from spinepipe.studies.discrepancy.verdict import EVERY, Missing
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
@@ -40,22 +40,53 @@ TOWARDS = {
 _SIDES = ("positive", "negative")
 _USUAL_PAIR = {"right_bending", "left_rotation"}
 
-_UNCOUNTED = (
-    *("asymmetry", "contact", "coupling", "creep", "dependence", "hysteresis", "laxity"),
-    *("migration", "stiffening", "tilt", "weight", "drift"),
-)
+SET_UP = {
+    "joint_centre": "joint centre",
+    "posture": "posture",
+    "law_axes": "axes of the joint",
+    "registration": "registration of frames",
+    "load_axis": "direction of the load",
+    "load_gain": "size of the load",
+    "off_diagonal": "stiffness that couples two motions",
+    "rotation_order": "order of rotations",
+}
+"""Errors of the set-up or of its description that a study allows for."""
+
 _KEYS = ("per_joint", "per_specimen")
 _NAME = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
 _SPOKEN = "|".join(sorted((plain(name) for name in COORDINATES), key=len, reverse=True))
 _PLACED = re.compile(rf"(?P<before>^|\b(?:in|own|of|over) |, )(?P<name>{_SPOKEN})(?P<after>,|\b)")
 
+_SPREADS = {
+    ", each joint of each specimen": ", differing by joint and specimen",
+    ", by joint": ", differing by joint",
+    ", shared": ", alike everywhere",
+}
+"""How a shape differs between places, in the words of results and of the page."""
+
 
 def readable(sentence: str) -> str:
     """A sentence with its names in plain words; keys of a study file stay as they are typed."""
-    words = _NAME.sub(lambda found: found[0] if found[0] in _KEYS else general(found[0]), sentence)
+    words = _NAME.sub(
+        lambda found: found[0] if found[0] in _KEYS else SET_UP.get(found[0], general(found[0])),
+        sentence,
+    )
     return _PLACED.sub(
         lambda at: at["before"] + motion_of(at["name"].replace(" ", "_")) + at["after"], words
     )
+
+
+def shape_in_words(shape: str) -> str:
+    """What generic terms see of a misfit: ``load in lateral bending over ..., alike in all ...``.
+
+    Parameters
+    ----------
+    shape : as the verdict has it.
+    """
+    words = readable(shape).rstrip(".")
+    for spread, told in _SPREADS.items():
+        words = words.removesuffix(spread) + told if words.endswith(spread) else words
+    return words
 
 
 def general(name: str) -> str:
@@ -76,20 +107,13 @@ def name_at(name: str, coordinates: Sequence[str]) -> str:
     return general(name)
 
 
-def with_article(words: str) -> str:
-    """``a neutral zone``, ``an offset``; ``creep`` and the like are not counted."""
-    if words.endswith(_UNCOUNTED) or words.startswith(("coupling", "contact")):
-        return words
-    return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"
-
-
 def axis(coordinate: str) -> str:
-    """A coordinate as a direction: ``flexion-extension``; * is all of them."""
+    """A coordinate as a direction: ``flexion–extension``."""
     return AXIS[coordinate].lower() if coordinate in AXIS else plain(coordinate)
 
 
 def motion_of(coordinate: str) -> str:
-    """A coordinate as a motion: ``flexion-extension``, ``anterior-posterior translation``."""
+    """A coordinate as a motion: ``flexion–extension``, ``anterior–posterior translation``."""
     return f"{axis(coordinate)} translation" if coordinate in TRANSLATIONS else axis(coordinate)
 
 
@@ -100,56 +124,35 @@ def load_axis(coordinate: str) -> str:
     return f"{axis(coordinate)} moment (N m)"
 
 
-def where_of(effect: Missing) -> str:
-    """``at L4L5, in flexion-extension, in specimens a and b``; what is everywhere is left out."""
-    scope = effect.scope
-    parts = [
-        _chosen(scope.joints, "at", str) or "at all joints",
-        _direction(effect),
-        _chosen(scope.specimens, f"in specimen{'s' * (len(scope.specimens) > 1)}", str),
-    ]
-    return ", ".join(part for part in parts if part)
-
-
-def _direction(effect: Missing) -> str:
-    """The coordinate or the side of it, where the name does not say it."""
+def direction_of(effect: Missing) -> str:
+    """``flexion–extension``, ``extension``: what it acts in; empty where its name says so."""
     at, side = effect.scope.coordinates, effect.variant.get("side")
-    if effect.name == COUPLING or (effect.name == ASYMMETRY and at[0] in _SAID_BY_NAME):
+    if at == EVERY or effect.name == COUPLING:
+        return ""
+    if effect.name == ASYMMETRY and at[0] in _SAID_BY_NAME:
         return ""
     if side in _SIDES and len(at) == 1 and at[0] in TOWARDS:
-        return f"in {TOWARDS[at[0]][_SIDES.index(side)]}"
-    return _chosen(at, "in", motion_of)
-
-
-def _chosen(names: tuple[str, ...], word: str, say: Callable[[str], str]) -> str:
-    return "" if names == EVERY else f"{word} {listed([say(name) for name in names])}"
+        return TOWARDS[at[0]][_SIDES.index(side)]
+    return listed(map(motion_of, at))
 
 
 def what_of(effect: Missing) -> str:
-    """``a neutral zone at L4L5, in flexion-extension``."""
-    return f"{with_article(name_at(effect.name, effect.scope.coordinates))} {where_of(effect)}"
+    """``neutral zone in flexion–extension at L4–L5 of s01``; what is everywhere is left out."""
+    scope, told = effect.scope, name_at(effect.name, effect.scope.coordinates)
+    parts = [(" in ", direction_of(effect))]
+    parts += [(" at ", listed(map(level, scope.joints)) if scope.joints != EVERY else "")]
+    parts += [(" of ", listed(scope.specimens) if scope.specimens != EVERY else "")]
+    return told + "".join(f"{word}{at}" for word, at in parts if at)
 
 
-def label_of(effect: Missing) -> str:
-    """``nonlinear stiffening (tangent)``: its name and the variant of it."""
-    options = [plain(str(value)) for key, value in effect.variant.items() if key not in _IN_SCOPE]
-    name = name_at(effect.name, effect.scope.coordinates)
-    return name + (f" ({', '.join(options)})" if options else "")
+def effects_in_words(effects: Sequence[Missing], most_words: int) -> str:
+    """Names of effects, as fully as they fit: with their places, by name, or how many."""
+    full = list(dict.fromkeys(map(what_of, effects)))
+    short = list(dict.fromkeys(name_at(one.name, one.scope.coordinates) for one in effects))
+    return in_words([full, short], most_words) or f"{len(effects)} effects"
 
 
-_IN_SCOPE = ("coordinate", "pair", "side")
-"""Options that name or scope say as well."""
-
-
-def spread_words(effect: Missing) -> str:
-    """How its values may differ from place to place; empty where there is one place or no word."""
-    return _DIFFERING.get(effect.spread, "")
-
-
-_DIFFERING = {
-    "shared": "the same in all specimens and joints",
-    "by joint": "each joint its own",
-    "by specimen": "each specimen its own",
-    "each joint of each specimen": "each joint of each specimen its own",
-    "by test": "each test its own",
-}
+def in_words(ways: Iterable[Sequence[str]], most_words: int, last: str = "and") -> str:
+    """The first of several lists of names that has so many words at most; empty where none has."""
+    lists = (listed(names, len(names), last) for names in ways)
+    return next((told for told in lists if len(told.split()) <= most_words), "")

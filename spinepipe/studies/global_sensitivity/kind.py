@@ -138,6 +138,7 @@ _ANALYSING = ("bootstraps", "confidence", "indices", "most_failed", "outputs")
 """Settings by what they decide: what the samples are done with, what is made of them."""
 
 KIND = Kind(
+    question="Which inputs matter?",
     settings=GlobalSensitivity,
     files=SensitivityFiles,
     checks=(check_global_sensitivity,),

@@ -185,6 +185,7 @@ _ANALYSES = (
 )
 
 KIND = Kind(
+    question="How stiff are the joints?",
     settings=JointPoseSensitivity,
     files=JointPoseFiles,
     checks=(check_joint_pose_sensitivity,),

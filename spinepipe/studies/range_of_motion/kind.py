@@ -90,6 +90,7 @@ _FRAMES = ("poses", "pose_sd")
 """Settings by what they decide: the tests, the stiffness sets, the joint frames."""
 
 KIND = Kind(
+    question="How far do the joints move?",
     settings=RangeOfMotion,
     files=RangeOfMotionFiles,
     checks=(check_range_of_motion,),

@@ -32,6 +32,9 @@ _ANALYSES = (
 )
 """What is computed from tables."""
 
+COMPARED = ("accuracy", "statistics", "positions", "displacements", "curves")
+"""Tables from which laws are compared."""
+
 _BLOCK = "000"
 
 POOLED = "tangent_fitted"
@@ -53,36 +56,24 @@ class ScoliosisFiles(StudyFiles):
     joined = (*OF_JOBS, "variants")
     full = ("variants", "variation", "against_jalalian_2017")
     drawings = (
-        Figure(
-            "fitted_and_held_out",
-            "Errors of fitted and of held-out films",
-            "figures.fitted_and_held_out:fitted_and_held_out_figure",
-            ("accuracy", "positions", "displacements", "curves"),
-        ),
+        Figure("fitted_and_held_out", "Rotation errors", "charts:fitted_and_held_out", COMPARED),
+        Figure("differences", "Differences between laws", "charts:differences", COMPARED),
+        Figure("other_errors", "Other errors", "charts:other_errors", COMPARED),
+        Figure("identifiable_ratios", "Bounded ratios", "charts:identifiable_ratios", ("laws",)),
         Figure(
             "film_overlay",
-            "Films, and the models held in them",
-            "figures.film_overlay:film_overlay_figure",
+            "Vertebrae off their places",
+            "charts_of_films:film_overlay",
             ("positions", "displacements"),
         ),
         Figure(
-            "errors_by_range",
-            "Errors by size of the rotation",
-            "figures.errors_by_range:errors_by_range_figure",
-            ("displacements", "accuracy"),
-        ),
-        Figure(
             "load_displacement",
-            "Laws of the segments of one patient",
-            "figures.load_displacement:load_displacement_figure",
+            "Laws of segments",
+            "charts_of_films:load_displacement",
             ("laws", "displacements", "positions"),
         ),
-        Figure(
-            "enlargement",
-            "Enlargement of the ends, and the scale that films do not tell",
-            "figures.enlargement:enlargement_figure",
-            ("variation",),
-        ),
+        Figure("enlargement", "Enlargement of the ends", "charts:enlargement", ("variants",)),
+        Figure("scale", "Size of stiffness", "charts:scale", ("variants", *COMPARED)),
     )
 
     study: Scoliosis
@@ -141,6 +132,7 @@ def _population(expected: Any, place: Mapping[str, str]) -> list[str]:
 
 
 KIND = Kind(
+    question="Scoliosis films",
     settings=Scoliosis,
     files=ScoliosisFiles,
     checks=(check_scoliosis,),

@@ -1,12 +1,14 @@
-"""The report of a study of scoliotic spines: its answer, figures and tables."""
+"""The page of a study of scoliotic spines."""
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import Document, Headline, ResultTables
-from spinepipe.report.page.tables import Sortable, page_tables
+from spinepipe.report.conclusions import sentences_of
+from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.tables import Sortable, sortable
+from spinepipe.report.words import plain
+from spinepipe.studies.scoliosis.charts import SHORT
+from spinepipe.studies.scoliosis.conclusions import PUBLISHED, conclusions
 from spinepipe.studies.scoliosis.films import HELD_OUT
-from spinepipe.studies.scoliosis.findings import findings
-from spinepipe.studies.scoliosis.headline import headline
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import (
     ACCURACY,
@@ -19,69 +21,77 @@ from spinepipe.studies.scoliosis.tables import (
     POPULATION,
     POSITIONS,
     STATISTICS,
+    VARIANTS,
     VARIATION,
 )
 
-QUESTION = (
-    "Which model of a scoliotic spine, personalised on two bending films, reproduces positions "
-    "that it has not seen, by how much, and what do the films not tell?"
-)
-
-_TITLES = {
-    ACCURACY: "Errors of every model",
-    STATISTICS: "Do models differ over patients?",
-    BY_RANGE: "Errors by size of the rotation",
-    VARIATION: "Enlargement and scale",
-    AGAINST_JALALIAN_2017: "Beside Jalalian et al. 2017",
-    LAWS: "Stiffness of every segment",
-    POPULATION: "What patients have in common",
-    POSITIONS: "Every patient on every film",
-    CURVES: "Cobb and Ferguson angles",
+_SHOWN = {
+    ACCURACY: (
+        "Errors of every law",
+        "films measure model n_patients mean_of_patients sd_of_patients reading_noise unit "
+        "free_parameters decided_parameters",
+    ),
+    STATISTICS: ("Corrected tests of pairs of laws", "family response factor n effect p_holm"),
+    BY_RANGE: ("Errors by size of the rotation", "films opposite range model n rmse_deg"),
+    VARIATION: (
+        "Enlargement and size of stiffness",
+        "varied value films n_patients rotation_rmse_deg place_rmse_mm moved_deg",
+    ),
+    POPULATION: ("What spines have in common", "quantity joint unit mean low high"),
 }
-"""Tables of the page in their order, with their titles."""
+"""Tables of the page with their titles and the columns that a reader compares.
 
-READ = (*(table.name for table in _TITLES), DISPLACEMENTS.name)
+None has a row for a person: those of single spines are in files.
+"""
+
+_READ = (*_SHOWN, LAWS, POSITIONS, DISPLACEMENTS, CURVES, VARIANTS, AGAINST_JALALIAN_2017)
+READ = tuple(table.name for table in _READ)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
+_WORDS = {**SHORT, "held_out": "left-out", "beyond": "beyond the end"}
 
-def document(study: Scoliosis, cohort: Cohort, results: ResultTables) -> Document:
-    """What the report says and shows."""
-    found = headline(results)
-    return Document(
-        question=QUESTION,
-        findings=findings(study, results),
-        pictures=list(results.pictures.values()),
+
+def page(study: Scoliosis, cohort: Cohort, results: Results) -> Page:
+    """What the page says and shows."""
+    return Page(
+        conclusions=list(conclusions(study, cohort, results)),
+        sentences=sentences_of(__package__),
+        key_figure="fitted_and_held_out",
         tables=shown_tables(results),
-        metadata=results.metadata,
         left_out=(
-            *left_out(study, cohort),
+            *left_out(study, cohort, results),
             *papers.left_out("Jalalian et al. 2017", cohort.name in JALALIAN_2017_COHORTS),
         ),
-        headline=Headline(_joined(found.words), _joined(found.how_sure), found.warnings),
     )
 
 
-def _joined(words: str) -> str:
-    """No line ends between a number and its percent sign."""
-    return words.replace(" %", "\u00a0%")
+def shown_tables(results: Results) -> list[Sortable]:
+    """Tables that the study has, with names of laws and films in words."""
+    found = []
+    for shape, (title, names) in _SHOWN.items():
+        rows = results.table(shape.name)
+        if len(rows):
+            columns = [shape.column(name) for name in names.split()]
+            told = rows.apply(lambda cells: cells.map(_in_words))
+            found.append(sortable(shape.name, title, shape.about, told, columns))
+    return found
 
 
-def shown_tables(results: ResultTables) -> list[Sortable]:
-    """Tables that the study has; those without rows are left out."""
-    return [
-        table
-        for shape, title in _TITLES.items()
-        for table in page_tables(shape, title, results.table(shape.name))
-    ]
+def _in_words(cell: object) -> object:
+    if not isinstance(cell, str):
+        return cell
+    return " ".join(plain(_WORDS.get(part, part)) for part in cell.split("/"))
 
 
-def left_out(study: Scoliosis, cohort: Cohort) -> tuple[str, ...]:
+def left_out(study: Scoliosis, cohort: Cohort, results: Results) -> tuple[str, ...]:
     """Parts that the settings or the films leave out, each with the reason."""
     films = cohort.further["films"]
-    parts = [f"{name} (models)" for name in MODELS if name not in study.models]
+    parts = [f"{SHORT[name]} (models)" for name in MODELS if name not in study.models]
     for position in HELD_OUT:
         have = films.loc[films["position"] == position, "specimen"].nunique()
         if have < len(cohort.specimen_names):
             who = "nobody has" if not have else f"{have} of {len(cohort.specimen_names)} have"
             parts.append(f"position {position} ({who} a film of it)")
+    if PUBLISHED in study.models and results.table(VARIANTS.name).empty:
+        parts.append("other enlargements and sizes of stiffness (make full)")
     return tuple(parts)

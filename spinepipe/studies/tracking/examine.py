@@ -86,7 +86,8 @@ def repairs_of(cohort: Cohort, specimen: str) -> Iterator[Remark]:
         read = read_recording(row, cohort.name, cohort.folder)
         trial = str(row["trial"])
         yield from ((trial, text) for text in read.repaired)
-        spare = [name for name in read.names if name not in names]
+        # without the subject, who may be called by name: this stands on the page
+        spare = [name.rpartition(":")[2] for name in read.names if name not in names]
         if spare:
             yield trial, f"not in the set and ignored: {', '.join(spare)}"
 

@@ -44,13 +44,6 @@ FULL = ("weights",)
 """Motions anew with loads counting more and less."""
 
 
-def _figure(
-    name: str, title: str, *reads: str, file: str = "", also: tuple[str, ...] = ()
-) -> Figure:
-    """A figure whose function has its name, in the file of its name or another."""
-    return Figure(name, title, f"figures.{file or name}:{name}_figure", reads, also)
-
-
 @dataclass(frozen=True)
 class TrackingFiles(StudyFiles):
     """The result files of one study of tracked motions.
@@ -63,20 +56,34 @@ class TrackingFiles(StudyFiles):
     full = FULL
     joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, *_OF_RECORDINGS, "weights")
     drawings = (
-        _figure("error_by_level", "How far vertebrae are from the truth", "errors"),
-        _figure("kinematics", "How lumbar joints turn", "tracked"),
-        _figure("motion_sharing", "How lumbar joints share a motion", "sharing"),
-        _figure(
-            *("stiffness_profiles", "Whether markers tell stiffness"),
-            *("profile_points", "profiles"),
-            file="stiffness",
+        Figure("approach_errors", "Errors of approaches", "charts:approach_errors", ("errors",)),
+        Figure("error_by_level", "Errors by level", "charts:error_by_level", ("errors",)),
+        Figure(
+            "motion_sharing",
+            "How lumbar joints share a motion",
+            "charts:motion_sharing",
+            ("sharing",),
+            ("errors",),
         ),
-        _figure(
-            *("stiffness_by_level", "What calibration makes of stiffness", "stiffness"),
-            file="stiffness",
-            also=("profiles",),
+        Figure(
+            "kinematics",
+            "How lumbar joints turn",
+            "charts:kinematics",
+            ("tracked",),
+            ("errors", "similarity"),
         ),
-        _figure("trade_off", "Markers against loads", "weights"),
+        Figure(
+            "stiffness_profiles",
+            "Whether markers tell stiffness",
+            "charts_of_stiffness:stiffness_profiles",
+            ("profile_points", "profiles"),
+        ),
+        Figure(
+            "stiffness_by_level",
+            "Calibrated stiffness beside the prior",
+            "charts_of_stiffness:stiffness_by_level",
+            ("stiffness",),
+        ),
     )
 
     study: Tracking
@@ -188,6 +195,7 @@ _ASKED = tuple(
 
 
 KIND = Kind(
+    question="Motion from skin markers",
     settings=Tracking,
     files=TrackingFiles,
     checks=(check_tracking,),

@@ -130,16 +130,18 @@ def verdict(ratios: Array, costs: Array, message: str = "") -> Row:
     if not settled.any():
         return _verdict_row(None, None, None, message or "no fit settled")
     # costs are sums of squares over variance: twice the fall of the log likelihood
-    at, over = np.log(ratios[settled]), costs[settled] - costs[settled].min()
+    tried, over = ratios[settled], costs[settled] - costs[settled].min()
     best = int(np.argmin(over))
+    least = float(tried[best])  # as it was asked for: a reader may look for it among the points
+    open_ends = bool(over[0] <= LIMIT), bool(over[-1] <= LIMIT)
     lost = int((~settled).sum())
     text = f"{lost} of {len(ratios)} fits did not settle" if lost else ""
-    if best in (0, len(at) - 1):
+    if best in (0, len(tried) - 1):
         edge = "softest" if best == 0 else "stiffest"
         falls = f"the cost falls to the end of what was tried, the {edge}"
-        return _verdict_row(float(np.exp(at[best])), None, None, f"{falls}; {text}".strip("; "))
-    low, high = _crossing(at, over, -1), _crossing(at, over, 1)
-    return _verdict_row(float(np.exp(at[best])), low, high, text)
+        return _verdict_row(least, None, None, f"{falls}; {text}".strip("; "), open_ends)
+    low, high = (_crossing(np.log(tried), over, way) for way in (-1, 1))
+    return _verdict_row(least, low, high, text, open_ends)
 
 
 def _crossing(at: Array, over: Array, way: int) -> float | None:
@@ -153,14 +155,21 @@ def _crossing(at: Array, over: Array, way: int) -> float | None:
     return float(np.exp(at[edge] + share * (at[beyond] - at[edge])))
 
 
-def _verdict_row(best: float | None, low: float | None, high: float | None, message: str) -> Row:
+def _verdict_row(
+    best: float | None,
+    low: float | None,
+    high: float | None,
+    message: str,
+    open_ends: tuple[bool, bool] = (True, True),
+) -> Row:
     closed = (low is not None) + (high is not None)
+    open_below, open_above = open_ends
     return {
         "best_ratio": best,
         "low": low,
         "high": high,
-        "open_below": low is None,
-        "open_above": high is None,
+        "open_below": open_below,
+        "open_above": open_above,
         "verdict": ("not_told", "one_sided", "told")[closed],
         "message": message,
     }

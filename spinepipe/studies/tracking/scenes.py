@@ -14,7 +14,7 @@ from spinepipe.report.words import count, fixed, plain
 from spinepipe.studies.tracking.words import short_of
 from spinepipe.units import ROTATIONS
 
-MOST_SCENES, MOST_FRAMES = 18, 320
+MOST_SCENES, MOST_FRAMES = 18, 270
 """Scenes, and frames of all scenes together: a frame takes about 2 kB of the page."""
 
 MOST_FRAMES_EACH = 25

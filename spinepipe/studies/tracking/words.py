@@ -1,50 +1,44 @@
-"""Approaches, measures, regions and verdicts in plain words, for figures and findings."""
+"""Approaches in words, for figures and sentences."""
 
 from collections.abc import Iterable
 
-from spinepipe.report.words import capital, number, plain
+from spinepipe.report.words import capital, plain
 from spinepipe.studies.tracking.settings import APPROACHES, CONSTRAINED
-from spinepipe.studies.tracking.tables import MEASURES
-
-SHORT = {
-    "ik": "inverse kinematics",
-    "ik_smooth": "smooth, no dynamics",
-    "ik_springs": "springs, frame by frame",
-    "optk_zero": "dynamics, no passive elements",
-    "optk_generic": "dynamics, generic",
-    "optk_generic_lower": "dynamics, generic lower",
-    "optk_generic_upper": "dynamics, generic upper",
-    "optk_calibrated": "dynamics, calibrated",
-    "optk_from_flexion": "dynamics, from flexion",
-    "optk_from_bending": "dynamics, from bending",
-    "optk_from_both": "dynamics, from both",
-}
-"""Approaches, short enough to stand beside an axis."""
 
 PHRASES = {
     "ik": "inverse kinematics",
-    "ik_smooth": "smooth curves without dynamics",
-    "ik_springs": "inverse kinematics with springs",
-    "optk_zero": "dynamics without passive elements",
-    "optk_generic": "dynamics with generic passive elements",
-    "optk_generic_lower": "dynamics with passive elements at the lower end of the generic range",
-    "optk_generic_upper": "dynamics with passive elements at the upper end of the generic range",
-    "optk_calibrated": "dynamics with passive elements calibrated on the motion itself",
-    "optk_from_flexion": "dynamics with passive elements taken from flexion",
-    "optk_from_bending": "dynamics with passive elements taken from bending",
-    "optk_from_both": "dynamics with passive elements taken from flexion and bending together",
+    "ik_smooth": "smoothed inverse kinematics",
+    "ik_springs": "inverse kinematics with stiffness",
+    "optk_zero": "dynamics without stiffness",
+    "optk_generic": "dynamics with generic stiffness",
+    "optk_generic_lower": "dynamics with low generic stiffness",
+    "optk_generic_upper": "dynamics with high generic stiffness",
+    "optk_calibrated": "dynamics calibrated on similar motions",
+    "optk_from_flexion": "dynamics calibrated on flexion",
+    "optk_from_bending": "dynamics calibrated on bending",
+    "optk_from_both": "dynamics calibrated on flexion and bending",
 }
-"""The same inside a sentence."""
+"""Approaches inside a sentence, in six words at most; stiffness is that of joints.
 
-VERDICTS = {
-    "told": "markers tell it",
-    "one_sided": "markers tell one end",
-    "not_told": "markers do not tell it",
+Similar motions are those of the same kind as the motion that is tracked, and that motion itself.
+"""
+
+SHORT = {
+    **PHRASES,
+    "ik_smooth": "smoothed kinematics",
+    "ik_springs": "kinematics with stiffness",
+    "optk_zero": "dynamics, no stiffness",
+    "optk_generic": "dynamics, generic",
+    "optk_generic_lower": "dynamics, low generic",
+    "optk_generic_upper": "dynamics, high generic",
+    "optk_calibrated": "calibrated, own motions",
+    "optk_from_flexion": "calibrated on flexion",
+    "optk_from_bending": "calibrated on bending",
+    "optk_from_both": "calibrated on both",
 }
-"""What a profile says of a stiffness."""
+"""The same beside an axis."""
 
-
-_AUTHORS = {"white_panjabi": "White and Panjabi"}
+_AUTHORS = {"white_panjabi": "White–Panjabi"}
 """Names that are more than a name with a capital."""
 
 
@@ -57,14 +51,14 @@ def _ratios(approach: str) -> str:
 def short_of(approach: str) -> str:
     """An approach beside an axis."""
     if approach.startswith(CONSTRAINED):
-        return f"ratios of {_ratios(approach)}"
+        return f"{_ratios(approach)} ratios"
     return SHORT.get(approach, plain(approach))
 
 
 def phrase(approach: str) -> str:
     """An approach inside a sentence."""
     if approach.startswith(CONSTRAINED):
-        return f"inverse kinematics with the ratios of {_ratios(approach)}"
+        return f"fixed ratios ({_ratios(approach)})"
     return PHRASES.get(approach, plain(approach))
 
 
@@ -75,9 +69,3 @@ def sort_approaches(approaches: Iterable[str]) -> list[str]:
     return sorted(
         set(approaches), key=lambda name: (place.get(name, last), name not in place, name)
     )
-
-
-def error_text(value: float, measure: str) -> str:
-    """An error with its unit."""
-    unit = MEASURES[measure][0]
-    return f"{number(value)}{'°' if unit == 'deg' else ' mm'}"

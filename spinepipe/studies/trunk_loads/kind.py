@@ -51,46 +51,46 @@ class TrunkFiles(StudyFiles):
     drawings = (
         Figure(
             "pressure_against_measured",
-            "Computed against measured pressure of the disc",
-            "figures.pressure_against_measured:pressure_against_measured_figure",
-            ("pressures", "agreement"),
+            "Pressure in and compression of L4–L5",
+            "charts:pressures",
+            ("tasks",),
+            ("intervals",),
+        ),
+        Figure(
+            "tuned_pressures", "Pressures before and after fitting", "charts:tuned", ("pressures",)
+        ),
+        Figure("strength", "Strength that the model needs", "charts_of_trust:strength", ("tasks",)),
+        Figure(
+            "drivers",
+            "Where the spread of the loads comes from",
+            "charts_of_trust:drivers",
+            ("intervals", "drivers", "design", "responses"),
+        ),
+        Figure(
+            "extensors",
+            "Long back muscles while bending forwards",
+            "charts:extensors",
+            ("tasks", "muscles"),
+        ),
+        Figure(
+            "load_over_flexion",
+            "Load while bending forwards",
+            "charts:over_flexion",
+            ("tasks",),
             ("intervals",),
         ),
         Figure(
             "load_by_level",
             "Load on every joint",
-            "figures.load_by_level:load_by_level_figure",
+            "charts:by_level",
             ("tasks", "levels"),
-        ),
-        Figure(
-            "load_over_flexion",
-            "Load and muscle forces while bending forwards",
-            "figures.load_over_flexion:load_over_flexion_figure",
-            ("tasks", "muscles"),
-        ),
-        Figure(
-            "muscle_force_bars",
-            "Forces of the muscles",
-            "figures.muscle_force_bars:muscle_force_bars_figure",
-            ("tasks", "muscles"),
-        ),
-        Figure(
-            "drivers",
-            "How far answers can be trusted, and what drives them",
-            "figures.drivers:drivers_figure",
-            ("intervals", "drivers"),
+            ("intervals",),
         ),
         Figure(
             "cost_of_simplifications",
-            "What four wrong simplifications cost",
-            "figures.cost_of_simplifications:cost_of_simplifications_figure",
+            "What simplifications change",
+            "charts_of_trust:simplifications",
             ("simplified",),
-        ),
-        Figure(
-            "upright",
-            "How persons stand upright",
-            "figures.upright:upright_figure",
-            ("upright",),
         ),
     )
 
@@ -149,6 +149,7 @@ def _source_and_design(expected: Any, place: Mapping[str, str]) -> list[str]:
 _NO_TASK_OF_ITS_OWN = ignoring("uncertain", "volunteer", "simplified_tasks")
 
 KIND = Kind(
+    question="Loads in daily tasks",
     settings=TrunkLoads,
     files=TrunkFiles,
     checks=(check_trunk,),

@@ -1,92 +1,106 @@
-"""The report of a study of trunk loads: its answer, figures, the trunk in 3-D, and tables."""
+"""The page of a study of trunk loads."""
+
+from collections.abc import Mapping
 
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
-from spinepipe.report.page.document import Document, Headline, ResultTables
-from spinepipe.report.page.tables import Sortable, page_tables
-from spinepipe.studies.trunk_loads.findings import findings
-from spinepipe.studies.trunk_loads.headline import headline
-from spinepipe.studies.trunk_loads.in_space import trunk_in_space
+from spinepipe.report.conclusions import sentences_of
+from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.tables import Sortable, sortable
+from spinepipe.schema import Table
+from spinepipe.studies.trunk_loads.conclusions import conclusions
+from spinepipe.studies.trunk_loads.scenes import trunk_scenes
+from spinepipe.studies.trunk_loads.selection import of_person, shown_person, sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads, reproduces
 from spinepipe.studies.trunk_loads.tables import (
-    AGAINST_GHEZELBASH_2016,
-    AGREEMENT,
     DRIVERS,
     INTERVALS,
     LEVELS_TABLE,
-    MASSES,
-    MUSCLES,
-    PATHS,
     PRESSURES,
     REMARKS,
-    SCALING,
     SIMPLIFIED,
     TASKS,
     TUNING,
-    UPRIGHT,
-)
-from spinepipe.studies.trunk_loads.words import unbroken
-
-QUESTION = (
-    "What do tasks ask of a person's trunk: which forces of muscles, which compression and shear "
-    "from T11T12 to L5S1, which pressure in the disc L4L5, how sure is that, and what does it hang "
-    "on?"
 )
 
-_TITLES = {
-    TASKS: "Every task of every person",
-    AGREEMENT: "Agreement with measured pressures",
-    PRESSURES: "Computed and measured pressures",
-    TUNING: "What was fitted to measured pressures",
-    INTERVALS: "How far answers can be trusted",
-    DRIVERS: "What answers hang on",
-    LEVELS_TABLE: "Load on every joint",
-    SIMPLIFIED: "What simplifications cost",
-    AGAINST_GHEZELBASH_2016: "Beside Ghezelbash et al. 2016",
-    UPRIGHT: "Upright posture",
-    MASSES: "Where every kilogram goes",
-    SCALING: "What makes persons differ",
-    MUSCLES: "Force of every fascicle",
-    REMARKS: "What was put right, added or assumed in the geometry",
+SHOWN: Mapping[Table, tuple[str, str]] = {
+    TASKS: (
+        "Loads by body and task",
+        "specimen task l4l5_compression_n l4l5_pressure_mpa l4l5_shear_n l5s1_compression_n "
+        "l5s1_shear_n strength_used inside_eq_6 stable status message",
+    ),
+    PRESSURES: (
+        "Computed and measured pressures",
+        "tier task measured_mpa measured_status computed_mpa counted status",
+    ),
+    TUNING: (
+        "What was fitted to measured pressures",
+        "tier left_out parameter value default low high identifiable",
+    ),
+    INTERVALS: (
+        "Intervals of loads",
+        "specimen task quantity nominal low median high n_samples n_failed",
+    ),
+    DRIVERS: (
+        "Shares of the spread by input",
+        "task quantity factor total total_low total_high message",
+    ),
+    LEVELS_TABLE: (
+        "Load on every joint",
+        "task level compression_n shear_anterior_n shear_right_n status",
+    ),
+    SIMPLIFIED: (
+        "What simplifications change",
+        "specimen task simplification l4l5_compression_n imbalance_nm status",
+    ),
+    REMARKS: ("What was put right, added or assumed in the geometry", "remark"),
 }
-"""Tables of the page in their order, with their titles."""
+"""Tables of the page with their titles and the columns that a reader compares."""
 
-READ = (*(table.name for table in _TITLES), PATHS.name)
+READ = (
+    *(table.name for table in SHOWN),
+    *("muscles", "upright", "design", "responses", "paths", "against_ghezelbash_2016"),
+)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def document(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Document:
-    """What the report says and shows."""
-    found = headline(study, cohort, results)
-    return Document(
-        question=QUESTION,
-        findings=findings(study, cohort, results),
-        pictures=list(results.pictures.values()),
-        tables=shown_tables(results),
-        metadata=results.metadata,
+def page(study: TrunkLoads, cohort: Cohort, results: Results) -> Page:
+    """What the page says and shows."""
+    return Page(
+        conclusions=list(conclusions(study, cohort, results)),
+        sentences=sentences_of(__package__),
+        key_figure="pressure_against_measured",
+        tables=list(_tables(study, results)),
         left_out=(
             *left_out(study),
             *papers.left_out("Ghezelbash et al. 2016", reproduces(cohort.name)),
         ),
-        headline=Headline(unbroken(found.words), unbroken(found.how_sure), found.warnings),
-        space=trunk_in_space(cohort, results.table(PATHS.name), results.table("levels")),
+        scenes=trunk_scenes(cohort, results.table("paths"), results.table("levels")),
     )
 
 
-def shown_tables(results: ResultTables) -> list[Sortable]:
-    """Tables that the study has; those without rows are left out."""
-    return [
-        table
-        for shape, title in _TITLES.items()
-        for table in page_tables(shape, title, results.table(shape.name))
-    ]
+def _tables(study: TrunkLoads, results: Results) -> list[Sortable]:
+    """Tables that have rows; of levels those of one body, of remarks each once."""
+    tasks = results.table("tasks")
+    body = shown_person(study, tasks[sound(tasks)]) if len(tasks) else None
+    found = []
+    for shape, (title, names) in SHOWN.items():
+        rows = results.table(shape.name)
+        if shape is LEVELS_TABLE:
+            rows = of_person(rows, body)
+        elif shape is REMARKS and len(rows):
+            rows = rows.drop_duplicates("remark")
+        columns = tuple(map(shape.column, names.split()))
+        table = sortable(shape.name, title, shape.about, rows, columns)
+        found += [table] if table.rows else []
+    return found
 
 
 def left_out(study: TrunkLoads) -> tuple[str, ...]:
     """Parts that the settings leave out, each with the reason."""
     parts = []
     if not study.uncertain.tasks:
-        parts.append("intervals and what answers hang on (no task is to be sampled)")
+        parts.append("intervals, and which inputs make them (no task is to be sampled)")
     if study.volunteer is None:
         parts.append("agreement with measured pressures (nobody stands for the volunteer)")
     if not study.solving.strength:

@@ -1,8 +1,9 @@
-"""Which persons and tasks stand for the others in figures and sentences, by rule."""
+"""Which bodies and tasks stand for the others in figures and sentences, by rule."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
@@ -11,8 +12,9 @@ from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.forms import PUSH_N, PUSH_NM
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
-MOST_TASKS = 6
-"""So many tasks can be told apart by colour."""
+COMPRESSION, PRESSURE = "l4l5_compression_n", "l4l5_pressure_mpa"
+
+Row = dict[str, Any]
 
 RELAXED = 1
 """Number of relaxed standing in Ghezelbash 2016 Table 1."""
@@ -44,19 +46,61 @@ def of_person(rows: pd.DataFrame, person: str | None) -> pd.DataFrame:
     return rows if rows.empty else rows[rows["specimen"] == person]
 
 
-def some_tasks(study: TrunkLoads, tasks: pd.DataFrame, most: int = MOST_TASKS) -> list[str]:
-    """Tasks of one person that have forces: those that are drawn, then by load from all others.
+def of_task(rows: pd.DataFrame, task: Row) -> pd.DataFrame:
+    """Rows of the body and the task of a row; none of a table that is absent."""
+    if rows.empty:
+        return rows
+    return rows[(rows["specimen"] == task["specimen"]) & (rows["task"] == task["task"])]
 
-    The others are spread evenly from the least to the most loaded disc L4L5, sound ones only.
+
+@dataclass(frozen=True, eq=False)
+class AnsweredTask:
+    """The task that the answer is of.
+
+    Attributes
+    ----------
+    task : its row. standing : row of relaxed standing of the same body; None where there is none
+        or the task is that one itself.
     """
-    loaded = tasks.dropna(subset=["l4l5_compression_n"])
-    drawn = [name for name in study.drawn_tasks if name in set(loaded["task"])][:most]
-    others = loaded[sound(loaded) & ~loaded["task"].isin(drawn)]
-    ranked = others.sort_values("l4l5_compression_n", kind="stable")["task"].tolist()
-    room = min(most - len(drawn), len(ranked))
-    at = np.unique(np.linspace(0, len(ranked) - 1, room).round().astype(int)) if room else ()
-    chosen = {*drawn, *(ranked[k] for k in at)}
-    return [name for name in tasks["task"] if name in chosen]
+
+    task: Row
+    standing: Row | None
+
+
+def answer_of(
+    study: TrunkLoads, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
+) -> AnsweredTask | None:
+    """The task that stands for the others, None where no task is held.
+
+    One with an interval if any has, else with a load in the hands if there is one, and of these
+    the one that loads L4L5 most.
+    """
+    tasks = tables.get("tasks", pd.DataFrame())
+    if tasks.empty:
+        return None
+    person = shown_person(study, tasks[sound(tasks)])
+    own = of_person(tasks, person)
+    good = own[sound(own)]
+    if good.empty:
+        return None
+    intervals = of_person(tables.get("intervals", pd.DataFrame()), person)
+    known = intervals.dropna(subset=["low", "high"])["task"] if len(intervals) else ()
+    rank = pd.DataFrame(
+        {
+            "sampled": good["task"].isin(list(known)),
+            "loaded": good["hand_load_kg"] > 0.0,
+            "n": good[COMPRESSION].astype(float),
+        }
+    )
+    rows = named(good.loc[rank.sort_values(["sampled", "loaded", "n"], kind="stable").index[-1:]])
+    still = relaxed_standing(own, cohort)
+    others = named(own[(own["task"] == still) & (own["task"] != rows[0]["task"])])
+    return AnsweredTask(rows[0], others[0] if others else None)
+
+
+def named(rows: pd.DataFrame) -> list[Row]:
+    """Rows by the names of their columns."""
+    return [{str(name): cell for name, cell in row.items()} for row in rows.to_dict("records")]
 
 
 def relaxed_standing(tasks: pd.DataFrame, cohort: Cohort) -> str | None:
@@ -68,9 +112,14 @@ def relaxed_standing(tasks: pd.DataFrame, cohort: Cohort) -> str | None:
     numbered = good[good["number"] == RELAXED]
     if len(numbered):
         return str(numbered["task"].iloc[0])
-    free = _free_handed(good, cohort)
-    still = free[(free[list(_TURNS)].abs() < _UPRIGHT_DEG).all(axis=1)]
+    free = free_handed(good, cohort)
+    still = free[upright(free)]
     return str(still["task"].iloc[0]) if len(still) else None
+
+
+def upright(tasks: pd.DataFrame) -> "pd.Series[bool]":
+    """Tasks in which trunk and pelvis are as when standing."""
+    return (tasks[list(_TURNS)].abs() < _UPRIGHT_DEG).all(axis=1)
 
 
 def forward_bends(tasks: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
@@ -78,7 +127,7 @@ def forward_bends(tasks: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
 
     Of two with the same angle the first; none where angles are fewer than `FEWEST_ANGLES`.
     """
-    free = _free_handed(tasks[sound(tasks)], cohort)
+    free = free_handed(tasks[sound(tasks)], cohort)
     straight = free[free["trunk_right_bending_deg"].abs() < _UPRIGHT_DEG]
     forward = straight.assign(flexion_deg=0.0 - straight["trunk_extension_deg"].astype(float))
     forward = forward[forward["flexion_deg"] > -_UPRIGHT_DEG]
@@ -107,17 +156,16 @@ def extensor_forces(muscles: pd.DataFrame, course: pd.DataFrame) -> pd.DataFrame
     )
 
 
-def _free_handed(tasks: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
+def free_handed(tasks: pd.DataFrame, cohort: Cohort) -> pd.DataFrame:
     """Tasks without load in the hands, push from outside, or asked-for co-activation."""
     empty = (tasks["hand_load_kg"] == 0.0) & (tasks["tone"] == "none")
+    return tasks[empty & ~tasks["task"].isin(pushed(cohort))]
+
+
+def pushed(cohort: Cohort) -> set[str]:
+    """Tasks in which the trunk is pushed from outside: exertions against it."""
     asked = cohort.further.get("tasks")
     if asked is None:
-        return tasks[empty]
+        return set()
     there = [name for name in (*PUSH_N, *PUSH_NM) if name in asked]
-    pushed = asked.loc[asked[there].fillna(0.0).ne(0.0).any(axis=1), "task"]
-    return tasks[empty & ~tasks["task"].isin(set(pushed))]
-
-
-def grouped(rows: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
-    """Columns `names` of fascicles summed by group and side, in the order of the rows."""
-    return rows.groupby(["group", "side"], sort=False)[list(names)].sum(min_count=1).reset_index()
+    return set(asked.loc[asked[there].fillna(0.0).ne(0.0).any(axis=1), "task"])

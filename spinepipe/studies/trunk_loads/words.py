@@ -1,65 +1,66 @@
-"""Tasks, inputs, simplifications and endings in plain words, for figures and findings."""
+"""Tasks, uncertain inputs and simplifications in plain words, for figures and sentences."""
 
-from spinepipe.report.words import fixed, number, plain
+from spinepipe.report.words import number, plain, short
 from spinepipe.status import Balanced
+from spinepipe.studies.trunk_loads.settings import FACTOR_UNITS, Uncertain
 
 ENDED = {
-    Balanced.BEYOND_STRENGTH.value: "beyond the strength of the muscles",
-    Balanced.NOT_CONVERGED.value: "unsettled",
+    Balanced.BEYOND_STRENGTH.value: "beyond the strength of the model's muscles",
+    Balanced.NOT_CONVERGED.value: "not converged",
     Balanced.CYCLING.value: "going to and fro between answers",
     Balanced.TWO_ANSWERS.value: "with two answers, by where the search begins",
-    Balanced.OUT_OF_REACH.value: "out of reach, without a posture",
+    Balanced.OUT_OF_REACH.value: "without a posture: the arms are too short",
 }
-"""How tasks ended that did not converge."""
+"""How tasks ended that the model does not hold."""
 
-FACTORS = {
+INPUTS = {
     "height_cm": "body height",
     "bmi": "body mass index",
     "age_years": "age",
-    "hand_anterior_mm": "how far ahead the hands are",
-    "pelvis_extension_deg": "turn of the pelvis",
-    "trunk_extension_deg": "how far the trunk leans",
-    "disc_area": "area of the disc",
-    "pcsa": "cross-section of muscles",
-    "passive_rotation": "stiffness of joints",
-    "passive_muscle": "stiffness of stretched muscles",
-    "trunk_mass_ahead": "how far ahead the trunk's mass is",
-    "pressure_kpa": "pressure in the belly",
-    "largest_stress_mpa": "largest stress of muscles",
+    "hand_anterior_mm": "hand position",
+    "pelvis_extension_deg": "pelvis tilt",
+    "trunk_extension_deg": "trunk lean",
+    "disc_area": "disc area",
+    "pcsa": "muscle area",
+    "passive_rotation": "joint stiffness",
+    "passive_muscle": "passive muscle force",
+    "trunk_mass_ahead": "trunk mass position",
+    "pressure_kpa": "abdominal pressure",
+    "largest_stress_mpa": "muscle strength",
 }
-"""Uncertain inputs."""
+"""Uncertain inputs, three words at most."""
 
 SIMPLIFIED = {
-    "no_feedback": "forces do not move the spine",
-    "rigid_translations": "joints only turn",
-    "only_l5s1": "balance at L5S1 alone",
-    "no_wrapping": "muscles run straight",
+    "no_feedback": "leaving the spine undeformed",
+    "rigid_translations": "joints that only turn",
+    "only_l5s1": "balance at L5–S1 alone",
+    "no_wrapping": "straight muscles",
 }
 """Simplifications."""
 
-TIERS = {
-    "untuned": "nothing fitted",
-    "tuned": "fitted to the counted tasks",
-    "left_out": "fitted to the other counted tasks",
-}
-"""What was fitted before pressures were compared."""
+NO_BREAK = "\u00a0"
+
+_UNITS = {"deg": "°", "kg/m2": f"{NO_BREAK}kg/m²"}
 
 
-def factor(name: str) -> str:
+def assumed(uncertain: Uncertain, name: str) -> str:
+    """The SD that the study assumed of an input: ``±10 %``, ``±2°``."""
+    sd, unit = uncertain.factors[name].sd, FACTOR_UNITS[name]  # type: ignore[index]
+    if not unit:
+        return f"±{100.0 * sd:g}{NO_BREAK}%"
+    return f"±{sd:g}{_UNITS.get(unit, NO_BREAK + unit)}"
+
+
+def task_words(name: str) -> str:
+    """A task or a body in a sentence."""
+    return short(plain(name), 30)
+
+
+def input_words(name: str) -> str:
     """An uncertain input."""
-    return FACTORS.get(name, plain(name))
+    return INPUTS.get(name, plain(name))
 
 
 def newton(value: float) -> str:
     """A force to what such a model can tell: 3 digits."""
     return f"{number(value)} N"
-
-
-def mpa(value: float) -> str:
-    """A pressure."""
-    return f"{fixed(value)} MPa"
-
-
-def unbroken(sentence: str) -> str:
-    """A sentence in which no line ends between a number and its percent sign."""
-    return sentence.replace(" %", "\u00a0%")

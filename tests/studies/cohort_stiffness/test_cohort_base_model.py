@@ -24,12 +24,9 @@ from spinepipe.effects import register, registry
 from spinepipe.jobs.digest import base_marks
 from spinepipe.marks import write_marked
 from spinepipe.problems import InputError
-from spinepipe.report.page.document import Picture, ResultTables
 from spinepipe.studies import read as studies
-from spinepipe.studies.cohort_stiffness.page import HELD_OUT_ERROR, NOT_HELD_OUT, document
 from spinepipe.studies.cohort_stiffness.problem import SEEN
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
-from spinepipe.tables import StudyTables
 
 RISE = 2000.0
 TESTS = ("flexion", "gentle_flexion")
@@ -270,19 +267,3 @@ def test_a_file_of_bushings_alone_changes_nothing(tmp_path: Path) -> None:
     plain = stiffening(tmp_path / "plain", None).fit("a", "per_joint")["stiffness"]
     bushings = stiffening(tmp_path / "bushings", HEAD).fit("a", "per_joint")["stiffness"]
     pd.testing.assert_frame_equal(plain, bushings)
-
-
-def test_the_report_says_what_was_not_held_out(tmp_path: Path) -> None:
-    def captions(**more: object) -> dict[str, str]:
-        study, cohort = studies.check(tmp_path, STUDY)
-        found = document(
-            study.model_copy(update=more), cohort, ResultTables(StudyTables({}), {}, pictures)
-        )
-        return {picture.name: picture.caption for picture in found.pictures}
-
-    stiffening(tmp_path, FOR_ALL)
-    told = {HELD_OUT_ERROR: "Errors.", "error_map": "Map."}
-    pictures = {name: Picture(name, "title", "address", words) for name, words in told.items()}
-    beside = NOT_HELD_OUT.format(file="model.yaml")
-    assert captions() == told | {HELD_OUT_ERROR: f"Errors. {beside}"}
-    assert captions(base=None) == told

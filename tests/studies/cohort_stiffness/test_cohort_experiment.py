@@ -7,15 +7,16 @@ import pandas as pd
 import pytest
 from chain_cases import JOINTS, MILLIMETRES, MOMENT_OF, Chains, Tables
 from cohort_edge_cases import A
-from cohort_study_cases import Size, frame, study_of, tables_of
+from cohort_study_cases import Size, tables_of
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from spinepipe.cohort import read
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.experiment.loop import Loop
+from spinepipe.studies.cohort_stiffness.conclusions import ranges
 from spinepipe.studies.cohort_stiffness.experiment import loading_loops
-from spinepipe.studies.cohort_stiffness.page_experiments import axes, hysteresis, ranges, zones
+from spinepipe.studies.cohort_stiffness.loop_rows import paired_curves
 from spinepipe.units import COORDINATES
 
 KEY = ["joint", "test", "cycle", "source"]
@@ -219,30 +220,10 @@ def test_published_discs_have_the_range_and_stiffness_of_their_points() -> None:
     assert {"right_bending", "left_rotation"} < sides, "one side of each was tested"
 
 
-def told(**changed: pd.DataFrame) -> list[str]:
-    """Sentences of made-up results."""
-    size = Size(("a", "b"))
-    tables = tables_of(size, **changed)
-    curves, motions = tables["load_displacement"], tables["helical_axes"]
-    makers = ((ranges, curves), (zones, curves), (hysteresis, curves), (axes, motions))
-    return [one for make, rows in makers if len(rows) for one in make(study_of(size), rows)]
-
-
-def test_sentences_follow_from_the_rows() -> None:
-    range_told, zone_told, work_told, axis_told = told()
-    assert "over 24 curves" in range_told
-    assert "no prediction" in range_told
-    rows = tables_of(Size(("a", "b")))["load_displacement"]
-    assert "24 of 24 curves" in zone_told
-    assert "of the model 0 are" in zone_told
-    assert "median 4.0°" in zone_told
-    assert "24 of 24 lose work for sure" in work_told
-    assert "sure to 1.0 mm" in axis_told
-    one_side = rows.assign(neutral_zone="one_side", neutral_zone_deg=np.nan)
-    assert "one side only 24" in told(load_displacement=one_side)[1]
-    bent = rows.assign(neutral_zone="not_described", neutral_zone_deg=np.nan)
-    assert "24 bend in another way" in told(load_displacement=bent)[1]
-    assert told(load_displacement=frame("load_displacement", [])) == [axis_told]
+def within(rows: pd.DataFrame) -> tuple[str, float, float]:
+    """Verdict on range of motion, curves within noise, and curves of which a limit is known."""
+    (found,) = ranges(paired_curves(rows, "range_of_motion", "deg"))
+    return found.verdict, found.values["inside"].number, found.values["known"].number
 
 
 RANGE = [f"range_of_motion_{part}deg" for part in ("", "low_", "high_")]
@@ -255,11 +236,11 @@ def test_ranges_agree_within_the_noise_that_a_fit_leaves() -> None:
     middle = rows.loc[~model, RANGE[0]].to_numpy()
     rows.loc[~model, RANGE] = middle[:, None] + np.array([0.0, -0.5, 0.5])
     rows.loc[model, RANGE] = middle[:, None] + 0.39 + np.array([0.0, -0.3, 0.3])
-    assert "24 of 24 are within" in told(load_displacement=rows)[0]
+    assert within(rows) == ("agree", 24, 24)
     rows.loc[model, RANGE] += 0.02
-    assert "0 of 24 are within" in told(load_displacement=rows)[0]
+    assert within(rows) == ("differ", 0, 24)
     rows.loc[model, RANGE] = middle[:, None] + np.array([0.0, -0.5, 0.5])
-    assert "are within" not in told(load_displacement=rows)[0]
+    assert within(rows) == ("no_noise", 0, 0)
 
 
 def test_of_springs_fitted_to_their_readings_95_in_100_are_within_the_limit() -> None:
@@ -281,6 +262,6 @@ def test_of_springs_fitted_to_their_readings_95_in_100_are_within_the_limit() ->
             )
         ]
     )
-    (sentence,) = ranges(study_of(Size(("a", "b"))), rows)
-    agree = int(sentence.split(" of 2000 are within")[0].split()[-1])
+    _, agree, known = within(rows)
+    assert known == 2000
     assert agree / 2000 == pytest.approx(0.95, abs=4.0 * np.sqrt(0.05 * 0.95 / 2000))

@@ -1,259 +1,229 @@
-"""The report of a cohort study: doubts first, true to its tables, fetching nothing.
+"""The page of a study of stiffness: what it says follows from its tables, of any outcome.
 
-Seen here: a number or word that the tables do not say, a doubt told late, a page that fetches.
+Seen here: a stiffness that readings do not bound told as a number, a claim of few specimens, by
+an uncorrected p or of motion that was not unseen, equal descriptions compared, silent verdicts.
 """
 
 import re
-from pathlib import Path
+from math import nan
+from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
-from cohort_study_cases import Size, cohort_of, frame, study_of, tables_of
-from drawn import caption
-from study_cases import STUDY, project
-from study_cases import Size as OtherSize
+from cohort_page_cases import (
+    ALIKE,
+    ALL,
+    ALL_KINDS,
+    BASE,
+    BOTH,
+    CASE,
+    CASES,
+    EDGES,
+    ONE,
+    ONE_JOINT,
+    OPEN,
+    PUBLISHED,
+    SPECIMEN,
+    THREE,
+    UNIT,
+    Case,
+    claims,
+    errors,
+    of_all,
+    own,
+)  # fmt: skip
+from cohort_study_cases import Size, tables_of
+from page_rules import (
+    all_verdicts,
+    faults_of_chart,
+    faults_of_page,
+    faults_of_sentences,
+    faults_of_told,
+)
 
-from spinepipe.jobs import draw, report
-from spinepipe.report.page.document import Picture, ResultTables
-from spinepipe.studies.cohort_stiffness.kind import KIND
-from spinepipe.studies.cohort_stiffness.page import document, left_out, shown_tables
-from spinepipe.studies.cohort_stiffness.page_findings import findings
-from spinepipe.studies.cohort_stiffness.settings import CrossValidation
-from spinepipe.tables import to_arrow, write
+from spinepipe.report.conclusions import sentences_of
 
-PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
-SIZES = {
-    "three specimens": Size(),
-    "one specimen": Size(("a",)),
-    "one joint": Size(vertebrae=("L5", "L4")),
-    "one of all": Size(("a",), ("L5", "L4"), ("flexion",), ("per_joint",)),
-    "none pooled": Size(representations=("per_specimen", "level_ratio")),
-    "nothing solved": Size(solved=False),
-}
+PACKAGE = "spinepipe.studies.cohort_stiffness"
+UNSEEN = {"descriptions", "laws", "centres", "published"}
+"""Rules about motion that no fit has seen."""
 
-
-def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
-    """Made-up results with a picture."""
-    tables = tables_of(size, **changed)
-    metadata = {name: {"seed": "7", "code_digest": name} for name in tables}
-    title = KIND.figure("error_map").title
-    picture = Picture.of("error_map", title, PICTURE, "What it shows.")
-    return ResultTables(tables, metadata, {"error_map": picture})
-
-
-def page_of(size: Size) -> str:
-    """The page of made-up results."""
-    study, cohort = study_of(size), cohort_of(size)
-    return document(study, cohort, results(size)).html(study, cohort)
-
-
-def told(size: Size, **changed: pd.DataFrame) -> list[str]:
-    """The findings, plain spaces before percent signs."""
-    found = findings(study_of(size), results(size, **changed))
-    return [sentence.replace("\u00a0", " ") for sentence in found]
+COMPARING = {*UNSEEN, "specimens", "levels", "load_cases"}
+"""Rules that say something over specimens."""
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
-def test_page_of_any_cohort_fetches_nothing(size: Size) -> None:
-    page = page_of(size)
-    before_scripts = page.split("<script")[0]
-    for address in re.findall(r' (?:src|href)="([^"]*)"', before_scripts):
-        assert address.startswith(("#", "data:image/svg+xml;base64,")), address
-    (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
-    assert policy.startswith("default-src 'none'")
-    assert "Figure 1. Errors by specimen and level." in page
-    assert "What it shows." in page
-    assert "sampled joint frames" not in before_scripts, "nothing was sampled"
-    assert "nan" not in " ".join(told(size)).lower().split()
+@pytest.mark.parametrize(("case", "expected"), CASES.values(), ids=CASES.keys())
+def test_each_outcome_has_its_verdict(case: Case, expected: str) -> None:
+    wanted = {tuple(one.split()) for one in expected.split(", ")}
+    assert wanted <= case.verdicts, wanted - case.verdicts
 
 
-def test_page_has_the_same_bytes_twice() -> None:
-    pages = {page_of(Size()) for _ in range(2)}
-    assert len(pages) == 1
+def test_every_verdict_that_has_a_sentence_is_reached() -> None:
+    reached = set().union(*(case.verdicts for case in ALL.values()))
+    assert reached == all_verdicts(sentences_of(PACKAGE))
+    assert not list(faults_of_sentences(PACKAGE))
+    faults = {name: list(faults_of_told(case.page.told)) for name, case in ALL.items()}
+    assert not {name: found for name, found in faults.items() if found}
 
 
-def test_a_flipped_sign_is_told_before_all_else() -> None:
-    signs = tables_of(Size())["sign_checks"]
-    assert told(Size())[0] == "18 of 18 measured joint motions go with the load."
-    place = (signs["specimen"] == "b") & (signs["joint"] == "L3L4") & (signs["test"] == "flexion")
-    signs.loc[place, ["measured_over_expected", "verdict"]] = [-0.93, "flipped"]
-    signs.loc[place, "message"] = "moves against the load in cycle 2"
-    first, *others = told(Size(), sign_checks=signs)
-    assert first.startswith("Look at this first: in 1 place the measured motion goes against")
-    assert "b L3L4 in flexion (flexion–extension: moves against the load in cycle 2)" in first
-    assert not any("go with the load" in sentence for sentence in others)
-    signs.loc[signs["specimen"] == "a", "verdict"] = "undecided"
-    assert "11 of 18 measured joint motions go with the load; 6 cannot be told." in told(
-        Size(), sign_checks=signs
+@pytest.mark.parametrize("name", [*EDGES, "whole", "nothing solved", "open above", "one joint"])
+def test_pages_and_figures_keep_the_rules(name: str) -> None:
+    """And nothing is fetched, nothing is NaN."""
+    faults = [fault for chart in ALL[name].charts.values() for fault in faults_of_chart(chart)]
+    html = ALL[name].html
+    assert not [*faults, *faults_of_page(html)]
+    assert "nan" not in re.sub(r"<svg.*?</svg>|<script.*?</script>", "", html, flags=re.S).split()
+
+
+def of_rule(case: Case, rule: str) -> dict[str, Any]:
+    """Numbers of a rule's only conclusion."""
+    (one,) = (one for one in case.page.conclusions if one.rule == rule)
+    return {name: (v.number, v.low, v.high, v.n) for name, v in one.values.items()}
+
+
+def test_the_first_line_is_the_median_over_specimens_with_their_range() -> None:
+    """Specimens count by the median of their joints: 2, 4, 6."""
+    case = Case(tables=own(THREE))
+    told = {name: pytest.approx(values) for name, values in {"a": (4.0, 2.0, 6.0, 3)}.items()}
+    assert of_rule(case, "typical") == told
+    (answer,) = case.page.at("answer")
+    assert (
+        answer.text.replace("\u00a0", " ")
+        == "A typical joint resists with 4.0 N m/deg in flexion–extension."
     )
 
 
-def test_fits_that_failed_or_stand_at_a_bound_are_told() -> None:
+def test_a_single_value_has_its_own_interval_and_one_specimen_the_range_of_its_joints() -> None:
+    single, joints = Case(ONE, own({"a": 2.0}, 1)), Case(ONE, own({"a": (2.0, 5.0)}))
+    assert of_rule(single, "typical")["a"] == pytest.approx((2.0, 1.8, 2.4, 1))
+    assert of_rule(joints, "typical")["a"] == pytest.approx((3.5, 2.0, 5.0, 2))
+
+
+def test_the_finest_description_that_readings_bound_is_told() -> None:
+    fine, rough = (
+        own(THREE, **OPEN),
+        own({"a": 7.0, "b": 8.0, "c": 9.0}, representation="per_specimen"),
+    )
+    both = {"stiffness": pd.concat([fine["stiffness"], rough["stiffness"]], ignore_index=True)}
+    assert of_rule(Case(tables=both), "typical")["a"] == pytest.approx((8.0, 7.0, 9.0, 3))
+
+
+@pytest.mark.parametrize("column", ["identifiable", "at_bound", "never fitted"])
+def test_what_readings_do_not_bound_is_never_a_number(column: str) -> None:
+    """Of a softest, a middle and a stiffest specimen the last one is 333.3 and not bounded."""
+    found = own({"a": 2.0, "b": 4.0, "c": 333.3})
+    rows = found["stiffness"]
+    last = rows["specimen"] == "c"
+    if column == "never fitted":  # a start value that no reading moved, beside published stiffness
+        rows.loc[last, ["low", "high"]] = nan
+        rows.loc[last, "identifiable"] = False
+        published = rows[last].assign(representation="literature", fitted_to="nothing")
+        rows = pd.concat([rows, published.assign(source="literature")], ignore_index=True)
+    else:
+        rows.loc[last, column] = False if column == "identifiable" else "upper"
+        rows.loc[last, "high"] = nan
+    case = Case(tables={"stiffness": rows})
+    shown = re.sub(r"<svg.*?</svg>", "", case.html, flags=re.DOTALL)
+    assert "333" not in shown
+    assert "(333" not in " ".join(one.text for one in case.page.told)
+    value = of_rule(case, "typical")["a"]
+    if column == "never fitted":
+        assert value == pytest.approx((3.0, 2.0, 4.0, 2))
+    else:  # it is stiffer than the others, so the middle one is the median, and the end is open
+        assert value == (pytest.approx(4.0), pytest.approx(2.0), None, 3)
+        assert "above 300" in shown.replace("\u2009", "")
+
+
+def test_an_open_direction_is_told_by_its_lower_end() -> None:
+    """Lower ends are nine tenths of 2, 4 and 6."""
+    least = of_rule(Case(tables=own(THREE, **OPEN)), "open")["least"]
+    assert least == pytest.approx((3.6, 3.6, None, 6), nan_ok=True)
+
+
+DECIDED = claims(**of_all(BOTH, "yes", "yes"), **dict.fromkeys(ALL_KINDS, "yes"))
+
+
+def test_below_three_specimens_nothing_is_claimed_and_that_is_said_once() -> None:
+    three, two = Case(tables=DECIDED), Case(Size(("a", "b")), DECIDED)
+    assert {rule for rule, _ in three.verdicts} >= COMPARING
+    assert not {rule for rule, _ in two.verdicts} & COMPARING
+    assert sum("at least 3 are needed" in one.text for one in two.page.told) == 1
+    assert "Claim per_joint" not in two.html
+
+
+def test_with_a_base_model_no_motion_counts_as_unseen() -> None:
+    beneath = Case(tables=DECIDED, settings=BASE)
+    rules = {rule for rule, _ in beneath.verdicts}
+    assert not rules & UNSEEN
+    assert rules >= {"left_out", "specimens", "levels", "load_cases"}
+    html, without = beneath.html, Case(tables=DECIDED).html
+    for name in (f"Claim per_joint_beats_per_specimen_{CASE}.", f"Claim {PUBLISHED[1]}."):
+        assert name in without
+        assert name not in html
+    assert "base model&#39;s effects are left out nowhere" in html
+
+
+def test_a_small_p_that_the_others_take_back_decides_nothing() -> None:
+    name = f"per_joint_beats_per_specimen_{CASE}"
+    rows = claims(**{name: "undecided"})["findings"].assign(p=1e-9, p_holm=0.3)
+    assert ("descriptions", "none_shown") in Case(tables={"findings": rows}).verdicts
+
+
+def test_of_one_joint_equal_descriptions_are_one_row_and_others_are_not() -> None:
+    alike = Case(ONE_JOINT, ALIKE)
+    assert of_rule(alike, "descriptions")["error"] == (0.6, None, None, 3)
+    (panel,) = alike.charts["held_out_error"].panels
+    rows = panel.frame.groupby("series")["row"].agg(list)
+    assert rows["fitted"] == rows[SPECIMEN] == ["all linear descriptions"]
+    assert rows[CASE] == ["one value per specimen", "partially pooled"]
+    differ = errors(fitted=(0.5, 0.6, 0.5), left_out_specimen=(0.6, 0.6, 0.6))
+    assert ("descriptions", "same") not in Case(ONE_JOINT, differ).verdicts
+    assert ("descriptions", "same") not in Case(tables=ALIKE).verdicts, "two joints"
+
+
+def test_a_difference_is_told_from_the_side_that_wins() -> None:
+    """The claim's error was 0.5 (0.3 to 0.7) larger: the other side's is smaller by that."""
+    rows = claims(**{PUBLISHED[0]: ("no", -0.5)})
+    assert of_rule(Case(tables=rows), "published")["less"] == pytest.approx((0.5, 0.3, 0.7, 3))
+
+
+def test_specimens_and_levels_differ_by_their_medians() -> None:
+    """Specimens 2, 4 and 6; levels 4 (of 1, 4, 6) and 4 (of 3, 4, 6)."""
+    holds = of_all(BOTH, "yes")
+    case = Case(tables={**own(THREE), **claims(**holds)})
+    assert of_rule(case, "specimens")["times"][0] == pytest.approx(3.0)
+    assert of_rule(case, "levels")["times"][0] == pytest.approx(1.0)
+
+
+def test_residuals_are_those_of_the_description_that_is_told() -> None:
     fits = tables_of(Size())["fits"]
-    assert "All 84 fits ended with a stiffness." in told(Size())
-    fits.loc[0, ["status", "message"]] = ["unstable", "it tips over"]
-    at = fits.index[(fits["fitted_to"] == "all") & (fits["specimen"] == "b")][0]
-    fits.loc[at, ["status", "message"]] = ["converged_at_bound", "k at its upper bound"]
-    fits.loc[1, ["status", "message"]] = ["converged_at_bound", "other"]
-    fits.loc[2, "n_optima"] = 3
-    found = told(Size(), fits=fits)
-    assert found[1] == (
-        "1 of 84 fits have no stiffness: a, one value per specimen, fitted to flexion: "
-        "it tips over."
+    told = (fits["representation"] == "per_joint") & (fits["fitted_to"] == "all")
+    fits["scatter"] = [1.1 if one else 9.0 for one in told]
+    assert of_rule(Case(tables={"fits": fits}), "noise")["scatter"][0] == pytest.approx(1.1)
+
+
+def test_a_load_case_beside_the_others_is_a_ratio_with_an_interval() -> None:
+    """Flexion alone says 6, the others 4; SDs of logarithms are 0.1 each, so 0.14 together."""
+    error = 0.1 * UNIT
+    alone, others, every = (
+        own({"a": value}, 1, fitted_to=label, standard_error=error * value)["stiffness"]
+        for label, value in (("flexion", 6.0), ("all_but_flexion", 4.0), ("all", 5.0))
     )
-    assert found[2] == (
-        "2 fits of 84 ended with a stiffness at a bound, where the data only say that it is "
-        "beyond: 1 to all load cases: b, one value per specimen, fitted to all (k at its upper "
-        "bound); 1 to fewer load cases, which say too little about it."
-    )
-    assert found[3].startswith("1 fit has several optima")
+    tables = {"stiffness": pd.concat([alone, others, every], ignore_index=True)}
+    (panel,) = Case(ONE, tables).charts["load_case_stiffness"].panels
+    (row,) = panel.frame[["row", "value", "low", "high"]].to_dict("records")
+    assert row["row"] == "Flexion"
+    assert row["value"] == pytest.approx(1.5)
+    assert row["high"] / row["value"] == pytest.approx(np.exp(1.96 * 0.1 * 2**0.5), rel=1e-3)
 
 
-def test_where_nothing_was_solved_no_number_is_told() -> None:
-    found = told(Size(solved=False))
-    assert any(s.startswith("84 of 84 fits have no stiffness") for s in found)
-    assert any("and 78 more" in s for s in found)
-    assert not any("least to largest" in s or "largest load" in s for s in found)
-
-
-def test_stiffness_that_is_not_identifiable_is_counted() -> None:
-    size = Size(("a", "b"), representations=("per_joint",))
-    assert "From all load cases together every fitted stiffness is identifiable." in told(size)
-    rows = tables_of(size)["stiffness"]
-    own = rows.index[(rows["source"] == "own") & (rows["fitted_to"] == "all")]
-    rows.loc[own[:3], "identifiable"] = False
-    expected = "each joint its own 3 of 12 values (25 %)"
-    assert f"Not identifiable from all load cases together: {expected}." in told(
-        size, stiffness=rows
-    )
-
-
-def test_representations_in_order_with_what_cannot_be_told_apart() -> None:
-    size = Size(representations=("per_joint", "per_specimen", "level_ratio"))
-    assert (
-        "Motion of a left-out specimen, from least to largest error (mean ± SE): each joint its "
-        "own 0.500 ± 0.050°; one value per specimen 0.600 ± 0.050° (not told apart from the "
-        "first, p 0.30); published ratio of levels 0.700 ± 0.050°. The first was chosen after "
-        "looking, by these errors: p are too small, and one that tells another from it proves "
-        "little."
-    ) in told(size)
-
-
-def test_errors_and_spreads_have_their_numbers() -> None:
-    found = told(Size(representations=("partially_pooled",)))
-    assert (
-        "Flexion, error in the loaded direction at the largest load (median over specimens, "
-        "share of the largest motion): partially pooled 2.0° (25 %)."
-    ) in found
-    # exp(0.25) = 1.2840, exp(0.1) = 1.1052, exp(0.15) = 1.1618
-    spread = "between specimens 1.28, between levels 1.11, of joints beyond that 1.16"
-    assert any(f"flexion–extension 51.0 N m/rad ({spread})" in sentence for sentence in found)
-    one = told(Size(("a",), representations=("partially_pooled",)))
-    assert any("flexion–extension 51.0 N m/rad (of joints beyond that 1.16)" in s for s in one)
-
-
-def test_motion_of_a_wrong_unit_is_told_before_all_else() -> None:
-    signs = tables_of(Size())["sign_checks"]
-    signs["verdict"], signs["message"] = "implausible", "0.0175 times the motion, as radians give"
-    signs["measured_over_expected"] = 0.0175
-    sentence = told(Size(), sign_checks=signs)[0]
-    assert sentence.startswith(f"Look at units too: in {len(signs)} places")
-    assert sentence.endswith(": 0.0175 times the motion, as radians give.")
-
-
-def claim(name: str, holds: str, **numbers: object) -> dict[str, object]:
-    """A row of the table of findings."""
-    return {
-        "finding": name,
-        "statement": f"Claim {name}.",
-        "quantity": "difference",
-        "unit": "deg",
-        "holds": holds,
-        "message": "no fit",
-        **numbers,
-    }
-
-
-def test_claims_are_counted_and_told_with_their_numbers() -> None:
-    rows = [
-        claim("a", "yes", value=0.5, low=0.25, high=0.75, p=0.011, p_holm=0.022),
-        claim("b", "no"),
-        *(claim(f"c{n}", "undecided", value=0.1) for n in range(8)),
-    ]
-    found = told(Size(), findings=frame("findings", rows))
-    assert any(
-        s.startswith("Of 10 claims about this cohort: hold 1, do not hold 1, cannot be decided 8;")
-        for s in found
-    )
-    assert (
-        "Holds here: claim a (0.500 deg, 95 % interval 0.250 to 0.750, p 0.011, "
-        "0.022 beside the other claims)."
-    ) in found
-    assert "Does not hold here: claim b (no fit)." in found
-    assert any(s.endswith("claim c5 (0.100 deg); and 2 more.") for s in found)
-
-
-def test_shown_rows_are_chosen_and_the_choice_is_told() -> None:
-    shown = {table.name: table for table in shown_tables(results(Size()))}
-    of_fits = {"ranking", "mae", "pooling", "sign_checks", "fits", "stiffness"}
-    assert set(shown) == of_fits | {"load_displacement", "helical_axes"}
-    assert len(shown["stiffness"].rows) == 3 * 4 * 2 * 3
-    assert "own fits to all load cases; the others are in stiffness.parquet" in (
-        shown["stiffness"].about
-    )
-    assert len(shown["fits"].rows) == 3 * 4 * 4, "without those that leave a load case out"
-    assert "Here:" not in shown["ranking"].about
-
-
-def test_parts_that_are_left_out_are_named() -> None:
-    none = CrossValidation(specimens=False, load_cases=False)
-    assert left_out(study_of(Size()), 3) == ()
-    assert left_out(study_of(Size()), 1) == (
-        "prediction of left-out specimens (the cohort has one specimen)",
-    )
-    assert left_out(study_of(Size(), cross_validation=none), 3) == (
-        "prediction of left-out specimens (cross_validation: specimens: false)",
-        "prediction of left-out load cases (cross_validation: load_cases: false)",
-    )
-
-
-@pytest.fixture
-def made(tmp_path: Path) -> Path:
-    """A project with a cohort study and files of all its tables."""
-    joint_pose = OtherSize()
-    size = Size(joint_pose.specimens, joint_pose.vertebrae, ("flexion",), ("per_joint",))
-    project(tmp_path, joint_pose)
-    (tmp_path / "config" / "studies" / f"{STUDY}.yaml").write_text(
-        f"study: {STUDY}\nkind: cohort_stiffness\ncohort: straight\ncost: published\n"
-        "free: [extension]\nrepresentations: [per_joint]\n"
-    )
-    folder = tmp_path / "results" / STUDY
-    folder.mkdir(parents=True)
-    for name, found in tables_of(size).items():
-        columns = {column: found[column].tolist() for column in found}
-        clean = {
-            column: [None if pd.isna(v) else v for v in values]
-            for column, values in columns.items()
-        }
-        write(to_arrow(KIND.table(name), clean), str(folder / f"{name}.parquet"), {"seed": "7"})
-    return tmp_path
-
-
-def test_jobs_draw_all_figures_and_write_the_page(made: Path) -> None:
-    folder = made / "results" / STUDY
-    pictures = [str(folder / f"{figure.name}.svg") for figure in KIND.figures]
-    for figure, path in zip(KIND.figures, pictures, strict=True):
-        tables = [str(folder / f"{table}.parquet") for table in figure.tables]
-        draw.run(str(made), STUDY, figure.name, tables, path, path.replace(".svg", ".png"))
-    files = sorted(str(path) for path in folder.glob("*.parquet"))
-    captions = [str(caption("cohort_stiffness", figure.name)) for figure in KIND.figures]
-    output = str(folder / "report.html")
-    report.run(str(made), STUDY, "report", files, pictures, captions, output)
-    page = (folder / "report.html").read_text(encoding="utf-8")
-    for number, figure in enumerate(KIND.figures, start=1):
-        assert f"Figure {number}. {figure.title}." in page
-    assert "<td>errors</td>" in page, "tables that are not shown are among the digests"
-    assert "the cohort&#39;s own joint frames" in page
-    assert "4 of 4 measured joint motions go with the load." in page
-    digests = page.split("Digests of code")[1]
-    assert all(f"<td>{Path(path).stem}</td>" in digests for path in files)
+def test_the_figure_of_specimens_has_each_value_its_median_and_the_published_one() -> None:
+    tables = own(THREE)
+    first = tables["stiffness"].iloc[:1]
+    published = first.assign(representation="literature", fitted_to="nothing", source="literature")
+    rows = pd.concat([tables["stiffness"], published.assign(stiffness=2.5 * UNIT)])
+    (panel,) = Case(tables={"stiffness": rows}).charts["stiffness_by_specimen"].panels
+    values = panel.frame.groupby(["row", "series"])["value"].agg(list)
+    assert values["a", "each joint"] == pytest.approx([1.0, 3.0])
+    assert values["a", "median"] == pytest.approx([2.0])
+    assert list(panel.marks) == pytest.approx([2.5])

@@ -11,13 +11,13 @@ from scipy import stats
 from statsmodels.regression.mixed_linear_model import MixedLM
 
 from spinepipe.problems import InputError
+from spinepipe.studies.cohort_stiffness.conclusions_of_claims import covariate_conclusions
 from spinepipe.studies.cohort_stiffness.covariates import (
     BESIDE,
     covariate_rows,
     specimen_effects,
 )
-from spinepipe.studies.cohort_stiffness.page_optional import covariates
-from spinepipe.studies.cohort_stiffness.settings import COVARIATES, CohortStiffness
+from spinepipe.studies.cohort_stiffness.settings import COVARIATES
 from spinepipe.studies.cohort_stiffness.tables import COVARIATES_TABLE
 from spinepipe.studies.read import check
 from spinepipe.tables import from_rows
@@ -105,11 +105,10 @@ def test_an_effect_is_found_and_told() -> None:
     found = table(rows)
     assert found["holds"].to_dict() == {"age_years": "yes", "sex": "undecided"}
     assert found.loc["age_years", "low"] < np.exp(-0.25) < found.loc["age_years", "high"]
-    study = CohortStiffness(study="probe", kind="cohort_stiffness", cohort="c", covariates=ASKED)
-    first, second = covariates(study, found.reset_index())
-    assert first.startswith("Flexion–extension stiffness goes with age: times 0.")
-    assert "12 specimens" in first
-    assert "not told apart from no effect" in second.lower()
+    first, second = covariate_conclusions(found.reset_index())
+    assert (first.verdict, first.names["covariate"]) == ("yes", "age")
+    assert first.values["n"].number == 12
+    assert (second.verdict, second.names["covariates"]) == ("others_not_shown", "sex")
 
 
 @pytest.mark.parametrize(("n", "refused"), [(5, True), (6, False)])
@@ -122,9 +121,8 @@ def test_two_covariates_need_six_specimens(n: int, refused: bool) -> None:
     assert found["p"].isna().all() == refused
     if refused:
         assert set(found["message"]) == {"5 specimens, and 2 covariates together need 6"}
-        study = CohortStiffness(study="probe", kind="cohort_stiffness", cohort="c")
-        (sentence,) = covariates(study, found.reset_index())
-        assert "was not asked" in sentence
+        (told,) = covariate_conclusions(found.reset_index())
+        assert (told.rule, told.names["covariates"]) == ("asked", "age and sex")
 
 
 def test_what_says_nothing_is_refused_by_itself() -> None:

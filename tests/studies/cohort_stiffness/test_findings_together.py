@@ -1,10 +1,12 @@
 """Claims beside each other: few specimens, many claims, and what is no test."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import norm
 
 from spinepipe.studies.cohort_stiffness.claims import BY_CONSTRUCTION, CohortClaim, Row
+from spinepipe.studies.cohort_stiffness.claims_of_stiffness import SPECIFIC, load_case_claim
 from spinepipe.studies.cohort_stiffness.findings import decide_together, mark_circular
 
 SIGNIFICANCE = 0.05
@@ -91,8 +93,14 @@ def test_a_claim_of_two_tests_stays_among_the_others_when_one_is_settled() -> No
 
 
 def test_a_no_by_size_alone_has_no_p_to_correct() -> None:
-    found, _ = judged(row("no", 0.6), row("yes", 1e-4))
-    assert found["holds"] == "no"
+    """Its p is that there is no effect, which did not decide; it counts beside the others' p."""
+    one = {"effect": 0.01, "statistic": 1.1, "message": ""}
+    tests = pd.DataFrame([{"p": 0.3, "p_holm": 1.0, **one}] * 3)
+    small = load_case_claim(SPECIFIC["per_joint"], tests, SIGNIFICANCE)
+    assert (small["holds"], small["p"] > 0.05) == ("no", True)
+    found, other = judged(small, row("yes", 1e-4))
+    assert (found["holds"], found["p_holm"]) == ("no", None)
+    assert other["p_holm"] == pytest.approx(2e-4)
 
 
 def test_what_is_not_asked_stays_so_with_few_specimens() -> None:

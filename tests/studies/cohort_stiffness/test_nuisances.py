@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 from chain_cases import JOINTS, ROTATIONS, Tables, Written, by_joint
 from cohort_edge_cases import A as K
-from cohort_study_cases import frame
 from displaced_cases import (
     CENTRES,
     MOMENTS,
@@ -27,7 +26,6 @@ from displaced_cases import (
 from scipy import stats
 
 from spinepipe.problems import InputError
-from spinepipe.studies.cohort_stiffness.page_optional import order_with_nuisances, orders
 from spinepipe.studies.cohort_stiffness.representations import FITTED, NUISANCE, finest
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.read import check
@@ -223,40 +221,6 @@ def test_regions_cover_the_truth_as_often_as_they_say() -> None:
     assert found[BESIDE].covered.mean() > 0.88
     assert found[PLAIN].of("extension") < 0.75 < 0.88 < found[BESIDE].of("extension")
     assert 0.9 < found[BESIDE].scatter < 1.1
-
-
-def ranked(values: dict[str, float], specimens: int = 5) -> pd.DataFrame:
-    """Table ``ranking`` of one criterion."""
-    same = {"criterion": "left_out_specimen", "source": "own", "unit": "deg", "message": ""}
-    order = sorted(values, key=values.__getitem__)
-    rows = [
-        {**same, "representation": name, "rank": rank, "value": values[name]}
-        for rank, name in enumerate(order, start=1)
-    ]
-    return frame("ranking", [{**row, "specimens": specimens} for row in rows])
-
-
-def sentence(values: dict[str, float], specimens: int = 5) -> str:
-    settings = CohortStiffness(study="s", kind="cohort_stiffness", cohort="c")
-    return " ".join(order_with_nuisances(settings, ranked(values, specimens)))
-
-
-def test_the_order_changes_where_values_with_nuisances_stand_otherwise() -> None:
-    values = {"per_specimen": 1.0, "per_joint": 1.2, "per_joint_nuisance": 0.9}
-    assert orders(pd.Series(values)) == (
-        ["per_specimen", "per_joint"],
-        ["per_joint", "per_specimen"],
-    )
-    told = sentence(values)
-    assert "1.20° without, 0.900° with" in told
-    assert "order of representations changes" in told
-    assert "With them it is each joint its own; one value per specimen." in told
-    same = sentence(values | {"per_joint_nuisance": 1.1})
-    assert "order of representations is the same" in same
-    few = sentence(values, specimens=2)
-    assert "cannot be told: 2 specimens, and that needs 3" in few
-    assert "representations changes" not in few
-    assert sentence({"per_specimen": 1.0, "per_joint": 1.2}) == ""
 
 
 def problems(tmp_path: Path, study: str) -> str:

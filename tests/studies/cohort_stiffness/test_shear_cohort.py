@@ -6,7 +6,6 @@ The force acts at the joint's centre, so that the upper vertebra shifts and does
 displacement is force over stiffness.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +18,14 @@ from cohort_edge_cases import joined_jobs
 
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.problems import InputError
+from spinepipe.report.page.study_page import Results
 from spinepipe.studies import read as studies
+from spinepipe.studies.cohort_stiffness.charts import held_out_error
 from spinepipe.studies.cohort_stiffness.claims_of_errors import overprediction_percent
-from spinepipe.studies.cohort_stiffness.figures.error_map import error_map_figure
-from spinepipe.studies.cohort_stiffness.figures.held_out_error import held_out_error_figure
+from spinepipe.studies.cohort_stiffness.conclusions import conclusions
 from spinepipe.studies.cohort_stiffness.kind import CohortLayout
-from spinepipe.studies.cohort_stiffness.page import left_out
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness, representations_of
+from spinepipe.tables import StudyTables
 
 TRUE_N_PER_MM = {"a": 95.0, "b": 120.0, "c": 150.0, "d": 80.0}
 PUBLISHED_N_PER_M = 149_000.0
@@ -166,13 +166,11 @@ def inputs(project: Written) -> tuple[CohortStiffness, Any]:
     return study_of_kind(CohortStiffness, str(project.root), STUDY)
 
 
-def test_ratios_of_levels_are_left_out_and_told_of(project: Written) -> None:
+def test_ratios_of_levels_are_left_out(project: Written) -> None:
     study, cohort = inputs(project)
     kept = (*FITTED, "partially_pooled")
     assert representations_of(study, cohort.joint_names) == kept
     assert CohortLayout.of(study, cohort).representations == kept
-    (told,) = left_out(study, len(TRUE_N_PER_MM), cohort.joint_names)
-    assert told.startswith("published ratio of levels (no stiffness of single levels is published")
 
 
 def test_who_asks_for_ratios_of_levels_is_told_why_not(tmp_path: Path) -> None:
@@ -182,11 +180,11 @@ def test_who_asks_for_ratios_of_levels_is_told_why_not(tmp_path: Path) -> None:
     assert [one.found for one in refused.value.problems] == ["no value for C6C7"]
 
 
-def test_figures_are_in_millimetres(project: Written, frames: Mapping[str, pd.DataFrame]) -> None:
+def test_page_and_figures_are_in_millimetres(project: Written, frames: Frames) -> None:
     study, cohort = inputs(project)
-    figure = held_out_error_figure(study, cohort, frames)
-    assert "root mean square error of translations (mm)" in {
-        axis.get_xlabel() for axis in figure.axes
-    }
-    mapped = error_map_figure(study, cohort, frames)
-    assert any("(mm)" in axis.get_xlabel() for axis in mapped.axes)
+    told = list(conclusions(study, cohort, Results(StudyTables(frames))))
+    (answer,) = (one for one in told if one.rule == "typical")
+    assert {value.unit for value in answer.values.values()} == {"N/mm"}
+    assert "ratios" in {one.rule for one in told}, "levels that are left out are told of"
+    (panel,) = held_out_error(study, cohort, frames).panels
+    assert panel.x_label == "root mean square error (mm)"

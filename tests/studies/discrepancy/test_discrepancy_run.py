@@ -12,6 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 from small_project import Project, Shared, copy_project
 
+from spinepipe.marks import write_marked
+
 pytestmark = [pytest.mark.slow, pytest.mark.full]
 
 STUDY = "probe"
@@ -74,9 +76,25 @@ def test_the_verdict_and_all_around_it_are_made(searched: Project) -> None:
     made = {name.removeprefix(f"{STUDY}/discrepancy/") for name in searched.files()}
     tables = {f"{name}.parquet" for name in ("gap", "candidates", "where", "confusions")}
     assert made >= tables | {"verdict.json", "held_out.parquet", "report.html"}
-    assert made >= {"model_base.yaml", "model_with_effects.yaml", "figures/gap_map.png"}
-    report = searched.path(f"{FOLDER}/report.html").read_text()
-    assert "The model lacks a neutral zone" in report
+    assert made >= {"model_base.yaml", "model_with_effects.yaml", "figures/misfit.png"}
+    report = searched.path(f"results/{STUDY}/report.html").read_text()
+    assert "lacks neutral zone in flexion–extension" in report
+
+
+def test_where_the_page_once_was_stays_a_target_that_leads_to_it(
+    searched: Project, tmp_path: Path
+) -> None:
+    """Lost it is made when asked for; a page that an earlier version left there is replaced."""
+    project = searched.copy(tmp_path / "project")
+    former = project.path(f"{FOLDER}/report.html")
+    leading = former.read_bytes()
+    assert b'href="../report.html"' in leading
+    former.unlink()
+    assert project.planned() == set()
+    assert f"{STUDY}/discrepancy/report.html" in project.planned(f"{FOLDER}/report.html")
+    write_marked("an earlier page", former, "0" * 64)
+    project.run()
+    assert former.read_bytes() == leading
 
 
 def test_the_verdict_alone_needs_no_picture(searched: Project, tmp_path: Path) -> None:

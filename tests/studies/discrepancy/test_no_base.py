@@ -1,6 +1,7 @@
 """A base model that cannot be fitted: a verdict all the same, with what looks wrong in the data."""
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -104,9 +105,15 @@ def test_figures_and_report_cope(folder: Path) -> None:
     files = DiscrepancyFiles.of(*study_of_kind(Discrepancy, root, STUDY))
     paths = [str(folder / f"{table.name}.parquet") for table in KIND.tables]
     captions = [str(ROOT / path) for path in map(files.caption, files.figures())]
-    output = folder / "report.html"
-    report.run(root, STUDY, "report", paths, drawn, captions, str(output), verdict=verdict)
+    output, leading = folder.parent / "report.html", folder / "report.html"
+    former = {"former": str(leading), "verdict": verdict}
+    report.run(root, STUDY, "report", paths, drawn, captions, str(output), **former)
     page = output.read_text()
+    told = re.findall(r'(?:url=|href=)"?([^"]+)"', leading.read_text())
+    assert told == ["../report.html"] * 2
+    described = json.loads((folder / "datapackage.json").read_text())["resources"]
+    assert all((folder / one["path"]).is_file() for one in described)
+    assert len(described) == len(KIND.tables)
     assert "he base model cannot be fitted: a, test flexion" in page
     assert "Look at the data first: all specimens" in page
     assert "none of the known effects" not in page

@@ -9,14 +9,15 @@ from scipy.optimize import brentq
 from sweeps import sweep
 
 from spinepipe.effects import create
-from spinepipe.studies.discrepancy.quantities import estimate, quantity
+from spinepipe.studies.discrepancy.quantities import Quantity, per_degree, quantities
 from spinepipe.studies.discrepancy.verdict import Estimate, Missing, VerdictScope
 from spinepipe.studies.discrepancy.words import (
+    effects_in_words,
     general,
-    label_of,
     load_axis,
     name_at,
     readable,
+    shape_in_words,
     what_of,
 )
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M
@@ -33,39 +34,46 @@ ASYMMETRY, COUPLING = "flexion_extension_asymmetry", "bending_rotation_coupling"
 @sweep(
     "effect, words",
     [
-        (missing(ASYMMETRY, "extension"), "a flexion–extension asymmetry at C6C7"),
-        (missing(ASYMMETRY, "anterior"), "an anterior–posterior asymmetry at C6C7"),
+        (missing(ASYMMETRY, "extension"), "flexion–extension asymmetry at C6–C7"),
+        (missing(ASYMMETRY, "anterior"), "anterior–posterior asymmetry at C6–C7"),
         (
             missing(ASYMMETRY, "right_bending"),
-            "a right–left asymmetry at C6C7, in lateral bending",
+            "right–left asymmetry in lateral bending at C6–C7",
         ),
-        (missing(ASYMMETRY, "left_rotation"), "a left–right asymmetry at C6C7, in axial rotation"),
+        (missing(ASYMMETRY, "left_rotation"), "left–right asymmetry in axial rotation at C6–C7"),
         (
             missing(COUPLING, "right_bending", "left_rotation"),
-            "bending–rotation coupling at C6C7",
+            "bending–rotation coupling at C6–C7",
         ),
         (
             missing(COUPLING, "anterior", "extension"),
-            "coupling of anterior–posterior translation and flexion–extension at C6C7",
+            "coupling of anterior–posterior translation and flexion–extension at C6–C7",
         ),
         (
             missing("facet_contact", "left_rotation", side="negative"),
-            "facet contact at C6C7, in rotation to the right",
+            "facet contact in rotation to the right at C6–C7",
         ),
         (
             missing("facet_contact", "anterior", side="positive"),
-            "contact (stop) at C6C7, in anterior translation",
+            "contact (stop) in anterior translation at C6–C7",
         ),
         (
             missing("nonlinear_stiffening", "anterior", shape="cubic"),
-            "nonlinear stiffening at C6C7, in anterior–posterior translation",
+            "nonlinear stiffening in anterior–posterior translation at C6–C7",
         ),
     ],
 )
 def test_an_effect_is_named_as_the_field_does_there(effect: Missing, words: str) -> None:
-    assert what_of(effect).removeprefix("an ").removeprefix("a ") == words.removeprefix(
-        "an "
-    ).removeprefix("a ")
+    assert what_of(effect) == words
+
+
+def test_of_many_effects_a_sentence_has_what_fits() -> None:
+    two = [missing("creep"), missing("neutral_zone", "extension")]
+    assert effects_in_words(two, 20) == (
+        "creep at C6–C7 and neutral zone in flexion–extension at C6–C7"
+    )
+    assert effects_in_words(two, 4) == "creep and neutral zone"
+    assert effects_in_words(two, 3) == "2 effects"
 
 
 @sweep("coordinate", COORDINATES)
@@ -82,10 +90,6 @@ def test_without_a_place_no_coordinate_is_said() -> None:
         "contact (stop)",
         "load offset",
     ]
-    assert label_of(missing("nonlinear_stiffening", "extension", shape="tangent")) == (
-        "nonlinear stiffening (tangent)"
-    )
-    assert label_of(missing("facet_contact", "anterior", side="positive")) == "contact (stop)"
 
 
 def test_sentences_of_results_read_as_words() -> None:
@@ -103,36 +107,48 @@ def test_sentences_of_results_read_as_words() -> None:
         "lateral bending over flexion–extension at every joint"
     )
     assert "flexion" not in readable("flexion_extension_asymmetry would explain a part")
+    assert shape_in_words("load over the joint's own left rotation, shared") == (
+        "load over the joint's own axial rotation, alike everywhere"
+    )
 
 
-def told(effect: str, name: str, value: float, unit: str, **variant: Any) -> Any:
+def told(effect: str, one: Estimate, **variant: Any) -> Quantity:
+    scope = VerdictScope()
+    (found,) = quantities(Missing(effect, "joint law", scope, variant, "shared", (one,), 9.0, ()))
+    return found
+
+
+def around(name: str, value: float, unit: str) -> Estimate:
     low, high = sorted((0.9 * value, 1.1 * value))
-    return quantity(effect, variant, Estimate(name, value, unit, (low, high)))
+    return Estimate(name, value, unit, (low, high))
 
 
 @sweep(
     "effect, name, unit, value, words",
     [
         ("facet_contact", "stiffness", "N/m", 120000.0, "stiffness 120 N/mm"),
-        ("facet_contact", "stiffness", "N m/rad", 57.29578, "stiffness 1.00 N m/°"),
-        ("facet_contact", "gap", "mm", 0.6, "gap 0.600 mm"),
+        ("facet_contact", "stiffness", "N m/rad", 57.29578, "stiffness 1 N m/°"),
+        ("facet_contact", "gap", "mm", 0.6, "gap 0.6 mm"),
         (COUPLING, "coupling", "N/rad", 5729.578, "coupling 100 N/°"),
-        ("hysteresis", "force", "N", 12.0, "half loop height 12.0 N"),
+        ("hysteresis", "force", "N", 12.0, "half loop height 12 N"),
+        ("nonlinear_stiffening", "gain", "1", 2.0, "stiffness beyond the break over that within 3"),
+        ("nonlinear_stiffening", "break_at", "mm", 0.8, "break at 0.8 mm"),
+        ("neutral_zone", "width", "deg", 1.6, "half width 1.6 °"),
         (
-            "nonlinear_stiffening",
-            "gain",
-            "1",
-            2.0,
-            "stiffness beyond the break over that within 3.00",
+            "preload_stiffening",
+            "rise",
+            "1/N",
+            1e-3,
+            "stiffness gained by compression 10 % per 100 N",
         ),
-        ("nonlinear_stiffening", "break_at", "mm", 0.8, "break at 0.800 mm"),
-        ("neutral_zone", "width", "deg", 1.6, "half width 1.60°"),
-        ("neutral_zone", "stiffness_ratio", "1", 0.2, "stiffness ratio 0.200"),
-        ("preload_stiffening", "rise", "1/N", 1e-3, "stiffness gained by compression 10.0 % per"),
+        ("brand_new", "rate_of_it", "furlong", 2.0, "rate of it 2 furlong"),
     ],
 )
 def test_units_are_the_fields(effect: str, name: str, unit: str, value: float, words: str) -> None:
-    assert told(effect, name, value, unit).words.startswith(words)
+    found = told(effect, around(name, value, unit))
+    assert found.value is not None
+    assert f"{found.name} {found.value.number:.6g} {found.value.unit}".rstrip() == words
+    assert found.identifiable
 
 
 @sweep(
@@ -168,73 +184,51 @@ def test_stiffness_has_doubled_where_it_is_said(
     def slope(x: float) -> float:
         return (load(x + small) - load(x - small)) / (2.0 * small)
 
-    found = told("nonlinear_stiffening", name, rise, unit, coordinate=coordinate, shape=shape)
-    assert found.name == "stiffness doubles at"
+    options = {"coordinate": coordinate, "shape": shape}
+    found = told("nonlinear_stiffening", around(name, rise, unit), **options).value
+    assert found is not None
     start = slope(0.0) if shape != "exponential" else 1.0
     doubled = brentq(lambda x: slope(x) - 2.0 * start, 1e-3 / border, 60.0 / border)
-    assert found.value == pytest.approx(doubled * border, rel=2e-3)
+    assert found.number == pytest.approx(doubled * border, rel=2e-3)
     assert found.unit == ("mm" if "/m" in unit else "°")
-    assert found.low < found.value < found.high
+    assert found.low is not None
+    assert found.high is not None
+    assert found.low < found.number < found.high
 
 
-def test_an_end_that_is_open_is_told_as_open() -> None:
-    shape = {"shape": "tangent"}
+def test_an_end_that_is_open_stays_open() -> None:
+    """Of what falls where the parameter rises, the other end."""
     growth = Estimate("growth@L4L5@s01", 17.68, "1/rad^2", (16.2, 19.1))
-    found = quantity("nonlinear_stiffening", shape, growth)
+    found = told("nonlinear_stiffening", growth, shape="tangent")
     assert found.place == "L4L5, s01"
-    told = "stiffness doubles at (L4L5, s01)"
-    assert found.words == f"{told} 10.7° (95 % interval 10.3 to 11.2)"
-    assert found.in_brackets == "10.7 [10.3, 11.2]"
-    some = quantity(
-        "nonlinear_stiffening", shape, replace(growth, ci95=(None, 19.1), open_below=True)
+    assert f"{found.value}" == "10.70 (10.30 to 11.18)°"
+    some = told("nonlinear_stiffening", replace(growth, ci95=(None, 19.1)), shape="tangent")
+    much = told("nonlinear_stiffening", replace(growth, ci95=(16.2, None)), shape="tangent")
+    assert f"{some.value:interval}" == "above 10"
+    assert f"{much.value:interval}" == "below 11"
+    assert not some.identifiable
+    assert not much.identifiable
+    never = told(
+        "nonlinear_stiffening", Estimate("growth", 0.0, "1/rad^2", (0.0, 19.1)), shape="tangent"
     )
-    assert some.words == f"{told}: at least 10.3° (95 %, no upper end)"
-    assert some.in_brackets == "at least 10.3, no upper end"
-    much = quantity(
-        "nonlinear_stiffening", shape, replace(growth, ci95=(16.2, None), open_above=True)
-    )
-    assert much.words == f"{told}: at most 11.2° (95 %, no lower end)"
-    assert much.in_brackets == "at most 11.2, no lower end"
-
-
-def test_what_no_reading_tells_is_told_without_its_value() -> None:
-    width = Estimate("width", 3.1, "deg", (None, None), False, True, True, False)
-    found = quantity("neutral_zone", {}, width)
-    assert found.words == "half width: not told by these tests"
-    assert "3.1" not in found.words + found.in_brackets
-    wide = replace(width, ci95=(2.8, None), open_below=False)
-    assert quantity("neutral_zone", {}, wide).words == (
-        "half width: at least 2.80° (95 %, no upper end)"
-    )
-
-
-def test_a_value_at_its_bound_is_told_as_that() -> None:
-    ended = Estimate("gap", 28.6, "deg", (26.0, 28.6), at_bound=True)
-    found = quantity("facet_contact", {}, ended)
-    assert found.words == "gap 28.6°, at its bound"
-    assert found.in_brackets == "28.6, at its bound"
+    assert never.value is None
+    bound = told("facet_contact", Estimate("gap", 28.6, "deg", (26.0, 28.6), at_bound=True))
+    assert not bound.identifiable
 
 
 def test_an_asymmetry_is_the_ratio_of_its_two_sides() -> None:
-    found = told(ASYMMETRY, "asymmetry", 0.2, "1", coordinate="extension")
-    assert found.words.startswith("stiffness in extension over that in flexion 1.50")
-    assert found.low < 1.5 < found.high
-    shear = told(ASYMMETRY, "asymmetry", -0.2, "1", coordinate="anterior")
-    assert "anterior translation over that in posterior translation 0.667" in shear.words
+    found = told(ASYMMETRY, around("asymmetry", 0.2, "1"), coordinate="extension")
+    assert found.name == "stiffness in extension over that in flexion"
+    assert found.value is not None
+    assert found.value.number == pytest.approx(1.5)
+    shear = told(ASYMMETRY, around("asymmetry", -0.2, "1"), coordinate="anterior")
+    assert shear.name == "stiffness in anterior translation over that in posterior translation"
+    assert shear.value is not None
+    assert shear.value.number == pytest.approx(1.0 / 1.5)
 
 
-def test_what_is_not_known_keeps_its_name_and_unit() -> None:
-    assert told("brand_new", "rate_of_it", 2.0, "furlong").words.startswith(
-        "rate of it 2.00 furlong"
-    )
-    assert told("nonlinear_stiffening", "other", 2.0, "1/rad", shape="new").unit == "1/°"
-
-
-def test_estimates_of_what_was_tried_are_in_the_same_units() -> None:
-    value, unit = estimate("nonlinear_stiffening", {"shape": "tangent"}, 17.68, "1/rad^2")
-    assert value == pytest.approx(10.7, abs=0.02)
-    assert unit == "° (stiffness doubles at)"
-    assert estimate("facet_contact", {}, 57.29578, "N m/rad") == (pytest.approx(1.0), "N m/°")
-    value, unit = estimate("creep", {}, float("nan"), "1")
-    assert np.isnan(value)
-    assert unit == ""
+def test_a_coefficient_is_told_by_degrees() -> None:
+    assert per_degree(-138.0, "N m/rad^2") == (pytest.approx(-138.0 / DEG_PER_RAD**2), "N m/°²")
+    assert per_degree(3.0, "N/(mm rad)") == (pytest.approx(3.0 / DEG_PER_RAD), "N/(mm °)")
+    assert per_degree(3.0, "N m s/rad")[1] == "N m s/°"
+    assert per_degree(2.0, "deg per test") == (2.0, "deg per test")

@@ -237,7 +237,7 @@ def coarse(study: Settings) -> Settings:
 
 
 def test_errors_within_reading_error_are_no_miss(study: Settings) -> None:
-    """40 % of the motion; 0.05 degrees are two SDs of a reading, 0.06 would be a miss."""
+    """40 % of the motion, but 0.05 degrees of readings with an SD of 0.025; 0.06 is a miss."""
     for error, verdict in ((0.05, "within"), (0.06, "misses_shared")):
         found = page_of(coarse(study), {"summary": made.summary(40.0, error)})
         assert [one.verdict for one in found.told if one.rule == "agreement"] == [verdict]

@@ -1,199 +1,192 @@
-"""Figures and findings of range of motion, from tables of any size and outcome."""
+"""The page of range of motion, from made-up tables: verdicts, numbers, figures.
 
-import json
-import re
+Would catch a verdict without its condition, a number that no table has, a figure that does not fit.
+"""
+
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from grid_cases import JOINTS, STUDY, made_up, table_of
-from matplotlib.figure import Figure
-from spinepipe.studies.range_of_motion.figures.motion import levels_figure, variance_figure
+from grid_cases import JOINTS, STUDY, project
+from page_rules import (
+    all_verdicts,
+    faults_of_chart,
+    faults_of_page,
+    faults_of_sentences,
+    faults_of_told,
+    verdicts,
+)
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import ResultTables
-from spinepipe.report.style import picture, style
-from spinepipe.studies.range_of_motion import draw
-from spinepipe.studies.range_of_motion.grid import read_grid
-from spinepipe.studies.range_of_motion.page import document, findings
+from spinepipe.report.conclusions import sentences_of
+from spinepipe.report.page.study_page import Page, Results
+from spinepipe.studies.range_of_motion import charts
+from spinepipe.studies.range_of_motion.page import page
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
-from spinepipe.studies.range_of_motion.summary import summary_rows
-from spinepipe.studies.range_of_motion.variance import variance_rows
 from spinepipe.studies.read import check
-from spinepipe.tables import StudyTables, read_frame
+from spinepipe.tables import StudyTables
 
-Size = tuple[int, int, int]
-Lost = tuple[tuple[int, int, int], ...]
-
-
-def results(root: Path, size: Size, lost: Lost = ()) -> tuple[RangeOfMotion, Cohort, ResultTables]:
-    """Tables of a study of made-up numbers."""
-    project = made_up(root, size)
-    path, _ = table_of(root, size, lost)
-    study, cohort = check(project, STUDY)
-    assert isinstance(study, RangeOfMotion)
-    grid = read_grid(str(path), study, cohort)
-    tables = {
-        "rom_summary": pd.DataFrame(summary_rows(grid)),
-        "rom_variance": pd.DataFrame(variance_rows(grid)),
-    }
-    return study, cohort, ResultTables(StudyTables(tables), {}, {})
+PACKAGE = "spinepipe.studies.range_of_motion"
+VIRTUAL = "virtual_tests: {moment_nm: 7.5, tests: [flexion, left_rotation], steps: 1}\n"
+TESTS = {"flexion": ("extension", -1.0), "left_rotation": ("left_rotation", 1.0)}
 
 
-def page_of(study: RangeOfMotion, cohort: Cohort, found: ResultTables) -> str:
-    """The whole report."""
-    return document(study, cohort, found).html(study, cohort)
+def summary(medians: Sequence[float], middle: float, lost: int = 0, n: int = 60) -> pd.DataFrame:
+    """Motion of the joints of two tests; in the second a third of the first."""
+    rows = []
+    for number, (test, (coordinate, sign)) in enumerate(TESTS.items()):
+        for joint, median in zip(JOINTS, medians, strict=True):
+            size, half = median / (1 + 2 * number), middle / (1 + 2 * number) / 2.0
+            ends = sorted(sign * x for x in (size - half, size + half))
+            wide = sorted(sign * x for x in (size - 3 * half, size + 3 * half))
+            there = {"median": sign * size, "low_quartile": ends[0], "high_quartile": ends[1]}
+            there |= {"percentile_5": wide[0], "percentile_95": wide[1]}
+            for specimen in ("*", "a", "b"):
+                rows.append(
+                    {
+                        **{"specimen": specimen, "test": test, "joint": joint},
+                        **{"coordinate": coordinate, "role": "loaded", "unit": "deg"},
+                        **{"n": n, "n_without": lost, **(there if n else {})},
+                        **{"status": "done" if n else "too_few", "message": ""},
+                    }
+                )
+                # runs are counted in the rows of one coordinate
+                rows.append({**rows[-1], "coordinate": "anterior", "role": "coupled", "unit": "mm"})
+    return pd.DataFrame(rows)
 
 
-def words(figure: Figure) -> str:
-    """All text of a figure."""
-    texts = [text.get_text() for text in figure.texts]
-    texts += [legend.get_title().get_text() for legend in figure.legends]
-    texts += [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-    return " ".join(" ".join(texts).split())
-
-
-def figures(root: Path, size: Size, lost: Lost = ()) -> tuple[Figure, Figure]:
-    study, cohort, found = results(root, size, lost)
-    with style():
-        drawn = (
-            levels_figure(study, cohort, found.tables),
-            variance_figure(study, cohort, found.tables),
-        )
-        assert all(picture(figure, "svg") for figure in drawn)
-    return drawn
-
-
-def test_a_panel_for_each_test_a_row_for_each_joint(tmp_path: Path) -> None:
-    for figure in figures(tmp_path, (3, 5, 4), lost=((0, 1, 1),)):
-        assert [axis.get_title("left")[4:] for axis in figure.axes] == ["Flexion", "Left rotation"]
-        first = figure.axes[0]
-        assert [label.get_text() for label in first.get_yticklabels()] == list(JOINTS)
-        assert all("(" in axis.get_xlabel() for axis in figure.axes)  # units
-
-
-def test_what_the_bars_and_symbols_stand_for_is_told(tmp_path: Path) -> None:
-    levels, variance = figures(tmp_path, (3, 5, 4), lost=((0, 1, 1),))
-    assert "120 runs of 2 tests, 2 without an equilibrium" in words(levels)
-    assert "medians of the specimens" in words(levels)
-    assert "3 specimens, 3 drawn poses each, 3 drawn stiffness sets" in words(variance)
-    assert "specimen joint frames stiffness rest" in words(variance)
-
-
-def test_one_specimen_has_no_share_of_specimens(tmp_path: Path) -> None:
-    levels, variance = figures(tmp_path, (1, 5, 4))
-    assert "medians of the specimens" not in words(levels)
-    assert "1 specimen, 4 drawn poses of a" in words(variance)
-    assert words(variance).endswith("joint frames stiffness rest")
-
-
-def test_nothing_to_show_is_said(tmp_path: Path) -> None:
-    levels, variance = figures(tmp_path, (1, 1, 1), lost=((0, 0, 0),))
-    assert "no run has an equilibrium" in words(levels)
-    assert "at least 3 x 3 are needed" in words(variance)
-
-
-@pytest.mark.parametrize("size", [(3, 5, 4), (1, 1, 1)])
-def test_findings_have_the_numbers_of_the_tables(tmp_path: Path, size: Size) -> None:
-    study, cohort, found = results(tmp_path, size)
-    page = page_of(study, cohort, found)
-    assert f"{size[0] * size[1] * size[2] * 2} runs of 2 tests: none without" in page
-    assert "pure moments without weight" in page
-    rows = found.table("rom_summary")
-    chosen = rows[rows["specimen"] == ("*" if size[0] > 1 else "a")]
-    flexion = chosen.query("test == 'flexion' and role == 'loaded'")
-    largest = flexion["median"].abs().max()
-    assert f" to {largest:.1f}° (" in page
-    assert ("of the variance is due to" in page) == (size[1] > 1)
-
-
-def variance_of(stiffness: Sequence[float]) -> pd.DataFrame:
-    """Shares of a cohort's joints in one test; pose takes a third of what stiffness leaves."""
-    shares = np.array(stiffness)
-    return pd.DataFrame(
-        {
-            "specimen": "*",
-            "test": "left_bending",
-            "status": "done",
-            "joint": JOINTS[: len(shares)],
-            "specimen_share": (1.0 - shares) / 3.0,
-            "pose_share": (1.0 - shares) / 3.0,
-            "stiffness_share": shares,
-            "rest_share": (1.0 - shares) / 3.0,
+def variance(shares: Sequence[float], sets: int = 12, poses: int = 20) -> pd.DataFrame:
+    """Of the stiffness, a share for each test; the rest is halved between specimens and poses."""
+    rows = []
+    for (test, (coordinate, _)), share in zip(TESTS.items(), shares, strict=True):
+        parts = {"stiffness": share, "specimen": (1 - share) / 2, "pose": (1 - share) / 2}
+        ends = {
+            f"{name}_{end}": min(max(part + off, 0.0), 1.0)
+            for name, part in {**parts, "rest": 0.0}.items()
+            for end, off in (("share", 0.0), ("low", -0.04), ("high", 0.04))
         }
-    )
+        for joint in JOINTS:
+            rows.append(
+                {
+                    **{"specimen": "*", "test": test, "joint": joint, "coordinate": coordinate},
+                    **{"n_specimens": 2, "n_poses": poses, "n_stiffness": sets, "sd": 1.0},
+                    **ends,
+                    **{"status": "done", "message": ""},
+                }
+            )
+    return pd.DataFrame(rows)
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "says"),
-    [
-        (
-            (0.61, 0.72, 0.55),
-            "most of the variance is due to the stiffness (median 61 %, 55 % to "
-            "72 % over the joints).",
-        ),
-        (
-            (0.45, 0.40, 0.48),
-            "the largest share of the variance is due to the stiffness (median "
-            "45 %, 40 % to 48 % over the joints).",
-        ),
-        (
-            (0.61, 0.72, 0.45),
-            "the largest share of the variance is due to the stiffness (median "
-            "61 %, 45 % to 72 % over the joints).",
-        ),
-        ((0.40,), "the largest share of the variance is due to the stiffness (40 %)."),
-        ((0.60, 0.60), "most of the variance is due to the stiffness (60 % at every joint)."),
-    ],
-)
-def test_most_is_more_than_half_at_every_joint(
-    stiffness: Sequence[float], says: str, tmp_path: Path
-) -> None:
-    study, cohort, found = results(tmp_path, (3, 5, 4))
-    tables = {**found.tables, "rom_variance": variance_of(stiffness)}
-    told = findings(study, cohort, replace(found, tables=StudyTables(tables)))
-    assert f"Left bending: {says}" in [line.replace("\u00a0", " ") for line in told]
+def untold() -> pd.DataFrame:
+    """Shares that were not computed."""
+    few = variance((0.9, 0.9)).assign(status="too_few", message="at least 3 x 3 are needed")
+    return few.astype({name: object for name in few if name.endswith(("share", "low", "high"))})
 
 
-LOADS = """\
-specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm
-*,flexion,0,L1,0,0,0,0,0,0,0,90,0
-*,flexion,1,L1,0,0,0,0,0,-4,0,90,0
-"""
+def made(root: Path, settings: str, header: str, **tables: pd.DataFrame) -> tuple[Any, ...]:
+    """Study, cohort, results and page; its rules held."""
+    sound = project(root, settings, specimens=("a", "b"), header=header)
+    study, cohort = check(sound, STUDY)
+    assert isinstance(study, RangeOfMotion)
+    results = Results(StudyTables(tables))
+    found = page(study, cohort, results)
+    assert list(faults_of_told(found.told)) == []
+    assert list(faults_of_page(found.html(study, cohort, results))) == []
+    return study, cohort, results, found
 
 
-@pytest.mark.parametrize("virtual", [True, False])
-def test_the_segment_is_shown_with_the_loads_that_were_applied(
-    virtual: bool, tmp_path: Path
-) -> None:
-    """Not with those of loads.csv, where the tests are virtual; no landmarks, so no vertebrae."""
-    study, cohort, found = results(tmp_path, (2, 3, 4))
-    (tmp_path / "config/cohorts/stack/loads.csv").write_text(LOADS)
-    parts = []
-    for specimen in cohort.specimen_names:
-        draw.sample_frames(str(tmp_path), STUDY, specimen, str(tmp_path / "frames.parquet"))
-        parts.append(read_frame(tmp_path / "frames.parquet"))
-    tables = {**found.tables, "frames": pd.concat(parts, ignore_index=True)}
-    study = study if virtual else study.model_copy(update={"virtual_tests": None})
-    cohort = check(tmp_path, STUDY)[1]
-    page = page_of(study, cohort, replace(found, tables=StudyTables(tables)))
-    text = page.split('<script type="application/json"')[0]
-    assert re.findall(r'data-group="(\w+)"', text) == ["own", "sampled", *["loads"] * (not virtual)]
-    assert ("Arrows end where" in text) != virtual
-    assert "drums" not in text
-    (scenes,) = re.findall(r'id="scenes">(.*?)</script>', page)
-    shown = json.loads(scenes)
-    assert list(shown) == ["a", "b"]
-    sampled = [t for t in shown["a"]["data"] if t["name"] == "superior axis, sampled"]
-    assert [len(t["x"]) // 3 for t in sampled] == [2 * len(JOINTS)], "pose 0 is no draw"
-    assert any(t["meta"] == "loads" for t in shown["a"]["data"]) != virtual
+SD = "measurement_sd: {rotation_deg: 3.0, translation_mm: 1.2}\n"
+BOTH = VIRTUAL + "poses: 5\nstiffness_sets: 4\n"
+ALIKE, APART = summary((9.0, 9.1, 9.2), 4.0), summary((6.0, 9.0, 14.0), 4.0)
+CASES: dict[str, tuple[str, dict[str, pd.DataFrame], set[tuple[str, str]]]] = {
+    "stiffness makes most": (
+        BOTH,
+        {"rom_summary": ALIKE, "rom_variance": variance((0.9, 0.8))},
+        {("motion", "most"), ("widest", "by_test"), ("factor", "by_test"), ("draws", "both")}
+        | {("levels", "alike"), ("dominant", "all"), ("origins", "no_trace"), ("runs", "ok")}
+        | {("sample", "ok"), ("methods", "virtual"), ("methods_shares", "anova")},
+    ),
+    "most in one test alone": (
+        VIRTUAL + "poses: 1\nstiffness_sets: 4\n",
+        {
+            "rom_summary": summary((6.0, 9.0, 14.0), 4.0, lost=3),
+            "rom_variance": variance((0.9, 0.5), sets=4),
+        },
+        {("dominant", "some"), ("levels", "differ"), ("runs", "check"), ("sample", "check")}
+        | {("draws", "stiffness")},
+    ),
+    "nothing makes most": (
+        VIRTUAL + "poses: 5\nstiffness_sets: 1\n",
+        {
+            "rom_summary": summary((6.0, 9.0, 14.0), 4.0, lost=30),
+            "rom_variance": variance((0.52, 0.5)),
+        },
+        {("motion", "mixed"), ("dominant", "none"), ("runs", "stop"), ("draws", "frames")},
+    ),
+    "no shares": (
+        VIRTUAL + "poses: 1\nstiffness_sets: 1\n",
+        {"rom_summary": APART, "rom_variance": untold()},
+        {("motion", "alone"), ("sample", "check_none"), ("draws", "neither")},
+    ),
+    "no run stands": (
+        BOTH,
+        {"rom_summary": summary((1.0, 1.0, 1.0), 1.0, lost=60, n=0), "rom_variance": untold()},
+        {("motion", "none"), ("runs", "stop")},
+    ),
+}
 
 
-def test_what_the_settings_leave_out_is_told(tmp_path: Path) -> None:
-    study, cohort, found = results(tmp_path, (1, 1, 1))
-    page = page_of(study, cohort, found)
-    assert "drawn joint frames (poses: 1); drawn stiffness sets (stiffness_sets: 1)" in page
-    assert "left out" not in page_of(*results(tmp_path / "more", (1, 5, 4)))
+@pytest.mark.parametrize("name", list(CASES))
+def test_a_made_up_study_comes_to_its_verdicts(name: str, tmp_path: Path) -> None:
+    settings, tables, expected = CASES[name]
+    assert expected <= verdicts(made(tmp_path, settings, SD, **tables)[3].conclusions)
+
+
+def test_every_sentence_is_reached_and_keeps_the_rules(tmp_path: Path) -> None:
+    reached = set().union(*(expected for _, _, expected in CASES.values()))
+    study, cohort, results, _ = made(tmp_path, BOTH, SD, rom_summary=ALIKE)
+    own = study.model_copy(update={"virtual_tests": None})
+    reached |= {("methods", "cohort")} & verdicts(page(own, cohort, results).conclusions)
+    assert reached == all_verdicts(sentences_of(PACKAGE))
+    assert list(faults_of_sentences(PACKAGE)) == []
+
+
+def test_weight_or_a_follower_load_takes_back_that_origins_leave_no_trace(tmp_path: Path) -> None:
+    tables = {"rom_summary": ALIKE}
+    followed = BOTH.replace("steps: 1", "steps: 1, follower_n: 100")
+    found: Page = made(tmp_path, followed, SD, **tables)[3]
+    assert ("origins", "no_trace") not in verdicts(found.conclusions)
+
+
+def test_the_answer_has_the_sizes_of_the_table(tmp_path: Path) -> None:
+    found: Page = made(tmp_path, BOTH, SD, rom_summary=APART)[3]
+    values = found.at("answer")[0].values
+    assert (values["least"].number, values["most"].number) == (6.0, 14.0)
+    (widest,) = (one.values["value"] for one in found.at("key"))
+    assert (widest.low, widest.high) == (8.0, 20.0), "the middle 90 %, flexion as a size"
+
+
+def drawn(cohort: Cohort, study: RangeOfMotion, tables: dict[str, pd.DataFrame]) -> list[Any]:
+    return [draw(study, cohort, tables) for draw in (charts.motion, charts.shares)]
+
+
+def test_figures_hold_their_words(tmp_path: Path) -> None:
+    tables = {"rom_summary": APART, "rom_variance": variance((0.9, 0.3))}
+    study, cohort, _, _ = made(tmp_path, BOTH, SD, **tables)
+    motion, shares = drawn(cohort, study, tables)
+    assert list(faults_of_chart(motion)) == list(faults_of_chart(shares)) == []
+    frame = shares.panels[0].frame
+    total = frame.groupby("row")["value"].sum()
+    np.testing.assert_allclose(total, 100.0)
+    assert motion.panels[0].names[0] == "L1–L2", "cranial first"
+
+
+def test_a_figure_without_results_says_why(tmp_path: Path) -> None:
+    tables = {"rom_summary": ALIKE.assign(n=0), "rom_variance": untold()}
+    study, cohort, _, _ = made(tmp_path, BOTH, SD, **tables)
+    motion, shares = drawn(cohort, study, tables)
+    assert "No run has an equilibrium" in motion.caption
+    assert "at least 3 x 3 are needed" in shares.caption

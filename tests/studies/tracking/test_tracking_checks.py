@@ -387,3 +387,17 @@ def test_levels_without_markers_are_a_warning(tmp_path: Path) -> None:
     assert gaps[1].startswith("1 short gaps, most of T9")
     spare = "not in the set and ignored: T3_a, T3_b, T3_c, T5"
     assert next(iter(repairs_of(cohort, "a"))) == ("stance", spare)
+
+
+def test_remarks_do_not_name_a_subject(tmp_path: Path) -> None:
+    """Two subjects in a file keep their markers' prefixes; the page is not to show who they are."""
+
+    def rename(files: Files) -> None:
+        text = str(files["stance.trc"])
+        files["stance.trc"] = text.replace("T3_a", "Anna:T3_a").replace("T3_b", "Ben:T3_a")
+
+    folder = write(tmp_path, rename)
+    cohort = cohorts.read(folder, (SUBJECTS, *FORMS))
+    told = [text for _, text in repairs_of(cohort, "a")]
+    assert told[0] == "not in the set and ignored: T3_a, T3_a"
+    assert not [text for text in told if "Anna" in text or "Ben" in text]

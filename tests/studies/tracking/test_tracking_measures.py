@@ -286,9 +286,15 @@ def test_a_cost_that_falls_to_the_end_of_what_was_tried_tells_no_stiffness() -> 
     for costs, edge in (([0, 9, 20, 30, 40], "softest"), ([40, 30, 20, 9, 0], "stiffest")):
         found = verdict(ratios, np.array(costs, dtype=float))
         assert (found["low"], found["high"], found["verdict"]) == (None, None, "not_told")
-        assert found["open_below"]
-        assert found["open_above"]
+        # the other end is not open: all that was tried there is excluded
+        assert (found["open_below"], found["open_above"]) == (edge == "softest", edge != "softest")
+        assert found["best_ratio"] == (0.25 if edge == "softest" else 4.0)
         assert edge in found["message"]
+    for end in (0.1, 0.3, 10.0):  # exp(log(x)) is not x
+        tried = np.array(sorted({end, 1.0}))
+        assert verdict(tried, np.where(tried == end, 0.0, 9.0))["best_ratio"] == end
+    flat = verdict(ratios, np.array([0.0, 0.1, 0.2, 0.3, 0.4]))
+    assert (flat["open_below"], flat["open_above"]) == (True, True)
     lost = verdict(ratios, np.array([np.inf, 0.0, 1.0, 9.0, 20.0]))
     assert lost["verdict"] == "not_told"  # the least that settled is the end
     assert "1 of 5 fits did not settle" in lost["message"]

@@ -1,250 +1,423 @@
-"""The report of tracked motions: the answer first, the spine in motion, fetching nothing."""
+"""The page of tracked motions: every verdict from numbers that make it, and from none else.
 
-import json
-import re
-import shutil
+Tables are made up beside the cohort of `tracking_table_cases`, whose true motions are known. Seen
+here: a claim that stays when the numbers turn, an end of a grid that rounding hides, two rules of
+multiple testing, a prior told as data, a text or figure that does not fit.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from drawn import caption
-from study_cases import Size as OtherSize
-from study_cases import project
-from tracking_table_cases import ERROR, FOLDER, Size, cohort_of, study_of, tables_of
-
-from spinepipe.jobs import draw, report
-from spinepipe.report.page.document import Picture, ResultTables
-from spinepipe.report.page.space import Space
-from spinepipe.studies.tracking.in_space import (
-    MOST_FRAMES,
-    MOST_SCENES,
-    boxes,
-    motions_of,
-    spine_in_space,
+from page_rules import (
+    all_verdicts,
+    faults_of_chart,
+    faults_of_page,
+    faults_of_sentences,
+    faults_of_told,
+    verdicts,
 )
-from spinepipe.studies.tracking.kind import KIND
-from spinepipe.studies.tracking.page import READ, document, left_out, shown_tables
-from spinepipe.tables import to_arrow, write
+from scipy import stats
+from scipy.spatial.transform import Rotation
+from statsmodels.stats.multitest import multipletests
+from statsmodels.stats.power import TTestPower
+from tracking_table_cases import COSTS, ERROR, Size, cohort_of, frame, study_of, tables_of
 
-PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
-SIZES = {
-    "three persons": Size(),
-    "one person, no truth": Size(1, truth=False),
-    "stance alone": Size(1, ("stance",)),
-    "nothing found": Size(1, failing=tuple(ERROR)),
-}
-LARGEST_PAGE = 12e6
-"""Bytes that a browser opens without a wait."""
+from spinepipe.cohort import Cohort
+from spinepipe.motion.skeleton import BODIES, JOINTS, LUMBAR_JOINTS, body_poses
+from spinepipe.report.conclusions import Told, sentences_of, told
+from spinepipe.report.page.study_page import Results
+from spinepipe.studies.subjects import subject_of
+from spinepipe.studies.tracking import charts, charts_of_stiffness
+from spinepipe.studies.tracking.conclusions import conclusions
+from spinepipe.studies.tracking.conclusions_of_stiffness import calibrated_values
+from spinepipe.studies.tracking.page import page, shown_tables
+from spinepipe.studies.tracking.persons import skeleton_in
+from spinepipe.studies.tracking.ranking import paired_sample_size, rankings
+from spinepipe.studies.tracking.tables import ERRORS, STIFFNESS
+from spinepipe.studies.tracking.true_motions import true_motions
+from spinepipe.tables import StudyTables
 
-
-def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
-    """Made-up results with a picture."""
-    made = tables_of(size, **changed)
-    picture = Picture.of("kinematics", "How joints turn", PICTURE, "What it shows.")
-    metadata = {name: {"seed": "7", "code_digest": name} for name in made}
-    return ResultTables(made, metadata, {"kinematics": picture})
-
-
-def page_of(size: Size, **changed: pd.DataFrame) -> str:
-    """The page of made-up results."""
-    study, cohort = study_of(size), cohort_of(size)
-    return document(study, cohort, results(size, **changed)).html(study, cohort)
-
-
-def scenes_of(page: str) -> dict[str, Any]:
-    """What the script of the page is given."""
-    found = re.search(r'<script type="application/json" id="scenes">(.*?)</script>', page)
-    assert found is not None
-    scenes: dict[str, Any] = json.loads(found[1])
-    return scenes
+PACKAGE = "spinepipe.studies.tracking"
+GENERIC, BOTH, OWN = "optk_generic", "optk_from_both", "optk_calibrated"
+FIGURES = (
+    *(charts.approach_errors, charts.error_by_level, charts.motion_sharing, charts.kinematics),
+    *(charts_of_stiffness.stiffness_profiles, charts_of_stiffness.stiffness_by_level),
+)
+Changed = Mapping[str, pd.DataFrame]
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
-def test_page_of_any_study_fetches_nothing(size: Size) -> None:
-    page = page_of(size)
-    before_scripts = page.split("<script")[0]
-    for address in re.findall(r' (?:src|href)="([^"]*)"', before_scripts):
-        assert address.startswith(("#", "data:image/svg+xml;base64,")), address
-    assert not re.findall(r"<(?:script|link|iframe)[^>]+(?:src|href)=", page)
-    assert "default-src 'none'" in page
-    assert '<h2 id="findings-title">Verdict</h2>' in page
-    assert "nan" not in re.sub("<[^>]*>", " ", before_scripts).lower().split()
-    drawn = bool(len(tables_of(size)["drawn"]))
-    assert ("drawScene();" in page) == drawn
-    assert ("The spine in 3-D" in page) == drawn
+def errors(by: Mapping[str, tuple[float, ...]], trial: str = "flexion_extension") -> pd.DataFrame:
+    """Errors by approach, one for each subject: centres in mm, angles a third of that in deg."""
+    rows: list[dict[str, Any]] = []
+    for approach, values in by.items():
+        for k, value in enumerate(values):
+            known = {"specimen": f"s0{k + 1}", "trial": trial, "approach": approach}
+            for measure, level, share in (("centre_mm", "L3", 1.0), ("angle_deg", "L3L4", 0.35)):
+                for far in (0.9, 1.1):
+                    told = {"measure": measure, "level": level if far > 1.0 else "L2"}
+                    size = far * share * value
+                    rows.append(known | told | {"mean": size, "p95": size, "largest": size, "n": 9})
+    return frame(ERRORS, rows)
 
 
-def test_the_answer_stands_before_all_else() -> None:
-    page = page_of(Size())
-    order = ["Verdict", 'class="warning"', 'class="headline"', "Figure 1.", "The spine in 3-D"]
-    places = [page.index(words) for words in [*order, "Table 1."]]
-    assert places == sorted(places)
+def steady(value: float, spread: float = 1e-4) -> tuple[float, float, float]:
+    """Three subjects who are nearly alike, so that any difference between approaches is shown."""
+    return value, value * (1.0 + spread), value * (1.0 - 2.0 * spread)
 
 
-def test_tables_are_those_of_the_kind_and_empty_ones_are_left_out() -> None:
-    assert set(READ) <= {table.name for table in KIND.tables}
-    own = {table.name for table in KIND.tables} - {"tracked", "drawn"}
-    shown = [table.name for table in shown_tables(results(Size()))]
-    assert set(shown) == own, "all but the rows of each frame"
-    assert shown[:4] == ["accuracy", "fits", "profiles", "against_wang_2021"]
-    empty = {name: rows.iloc[:0] for name, rows in tables_of(Size(1)).items()}
-    assert not shown_tables(results(Size(1), **empty))
-    assert "No motion can be told" in page_of(Size(1), **empty)
+WIDE = (1.0, 9.0, 5.2)
+"""Three subjects who are not: no difference from a steady approach is shown."""
 
 
-def test_what_went_wrong_stands_at_the_top_of_its_table() -> None:
-    made = tables_of(Size())
-    made["fits"].loc[30, "status"] = "not_converged"
-    made["clusters"].loc[1, ["variability_mm", "status"]] = [9.0, "not_rigid"]
-    shown = {table.name: table for table in shown_tables(ResultTables(made, {}, {}))}
-    assert "not_converged" in [cell.text for cell in shown["fits"].rows[0]]
-    assert "not_rigid" in [cell.text for cell in shown["clusters"].rows[0]]
-    # errors from the least
-    place = [head.name for head in shown["accuracy"].heads].index("mean")
-    first = [row[place].value for row in shown["accuracy"].rows[: len(ERROR)]]
-    assert first == sorted(first, key=lambda value: value or 0.0)
+def changed(table: str, size: Size | None = None, **cells: Any) -> dict[str, pd.DataFrame]:
+    """A table of made-up results with other cells in all rows, or with ``where`` in some."""
+    rows = tables_of(size or Size())[table]
+    where = cells.pop("where", slice(None))
+    chosen = rows.query(where).index if isinstance(where, str) else where
+    for name, value in cells.items():
+        rows[name] = rows[name].astype(object) if isinstance(value, str) else rows[name]
+        rows.loc[chosen, name] = value
+    return {table: rows}
 
 
-def test_what_there_is_nothing_of_is_told_with_its_reason() -> None:
-    assert left_out(results(Size())) == ()
-    size = Size(1, truth=False, approaches=("ik", "optk_generic"))
-    told = left_out(results(size))
-    assert len(told) == 2
-    assert "(where vertebrae truly were is not known)" in told[0]
-    assert "(no approach asks for it)" in told[1]
+def ratios(share: float, beyond: float = 0.1) -> Changed:
+    """Calibrated stiffness of 40 elements, that share of them far beyond what the prior gives."""
+    rows = []
+    for law, k in product((BOTH, "optk_from_flexion", "optk_from_bending"), range(40)):
+        ratio = beyond if k < 40 * share else 1.02
+        told = {"at_high_moment": 100.0 * ratio, "high_moment_nm": 5.0, "ratio_to_generic": ratio}
+        place = {"joint": JOINTS[k % 17], "coordinate": "extension", "side": "positive"}
+        place |= {"specimen": f"s{k // 17}", "law": law}
+        rows.append(place | told | {"a": 1.0, "b": 10.0, "status": "converged", "message": ""})
+    return {"stiffness": frame(STIFFNESS, rows)}
 
 
-def test_every_motion_has_a_scene_and_every_group_a_switch() -> None:
-    page = page_of(Size(1))
-    scenes = scenes_of(page)
-    # three trials by two approaches that the study draws, what moves first, dynamics before others
-    names = re.findall(r"<option>(.*?)</option>", page)
-    assert names == [
-        "flexion–extension, dynamics, generic",
-        "flexion–extension, inverse kinematics",
-        "lateral bending, dynamics, generic",
-        "lateral bending, inverse kinematics",
-        "stance, dynamics, generic",
-        "stance, inverse kinematics",
+def similarity(cmc: float | None) -> Changed:
+    """All approaches alike; undefined where there is no coefficient."""
+    status = "undefined" if cmc is None else "done"
+    return changed("similarity", cmc=np.nan if cmc is None else cmc, status=status)
+
+
+def differing() -> Cohort:
+    """Persons whose true bends differ more than joints do: another joint does all of each."""
+    cohort = cohort_of(Size())
+    parts = []
+    for number, name in enumerate(cohort.specimen_names):
+        skeleton = skeleton_in(cohort, name, subject_of(cohort, name))
+        q = np.zeros((21, len(BODIES), 6))
+        q[:, 1 + 2 * number, 4] = np.sin(np.linspace(0.0, np.pi, 21))
+        parts.append(true_rows(skeleton, name, "lateral_bending", q))
+    return replace(cohort, further={**cohort.further, "truth_centres": pd.concat(parts)})
+
+
+def true_rows(skeleton: Any, name: str, trial: str, q: np.ndarray) -> pd.DataFrame:
+    """Rows of truth_centres.csv of bodies that are posed by coordinates."""
+    turns = body_poses(skeleton, q)[0]
+    rows = [
+        (name, trial, 0.1 * f, body, 0.0, 0.0, 0.0, *angles)
+        for f in range(len(q))
+        for body, angles in zip(
+            BODIES, Rotation.from_matrix(turns[f]).as_euler("ZXY", degrees=True), strict=True
+        )
     ]
-    assert set(scenes) == set(names)
-    groups = set(re.findall(r'data-group="(.*?)"', page))
-    shown = {trace["meta"] for scene in scenes.values() for trace in scene["data"]}
-    assert groups == shown == {"bones", "measured", "modelled"}
+    names = ["specimen", "trial", "time_s", "vertebra", "x_mm", "y_mm", "z_mm"]
+    names += ["extension_deg", "right_bending_deg", "left_rotation_deg"]
+    return pd.DataFrame(rows, columns=names)
 
 
-def test_frames_are_those_of_the_table() -> None:
-    rows = tables_of(Size(1))["drawn"]
-    scene = scenes_of(page_of(Size(1)))["flexion–extension, dynamics, generic"]
-    own = rows[(rows["trial"] == "flexion_extension") & (rows["approach"] == "optk_generic")]
-    assert [frame["name"] for frame in scene["frames"]] == ["0.00 s", "1.00 s", "2.00 s"]
-    kinds = {"joint centres": "body", "markers of the model": "modelled"}
-    for number, trace in enumerate(scene["data"]):
-        for axis in "xyz":
-            first = scene["frames"][0][axis][number]
-            assert trace[axis] == first, "the scene opens with its first frame"
-            assert all(len(f[axis][number]) == len(first) for f in scene["frames"])
-        if trace["name"] not in kinds:
-            continue
-        for k, frame in enumerate(scene["frames"]):
-            now = own[(own["frame"] == 10 * k) & (own["kind"] == kinds[trace["name"]])]
-            told = np.array([frame[axis][number] for axis in "xyz"]).T
-            # places are written to 0.1 mm
-            np.testing.assert_allclose(told, now[["x_mm", "y_mm", "z_mm"]], rtol=0, atol=0.0501)
+Case = tuple[set[tuple[str, str]], Size, Changed, Mapping[str, Any]]
 
 
-def test_a_marker_that_is_not_seen_has_no_place() -> None:
-    scene = scenes_of(page_of(Size(1)))["flexion–extension, dynamics, generic"]
-    number = [trace["meta"] for trace in scene["data"]].index("measured")
-    assert [frame["x"][number][1] is None for frame in scene["frames"]] == [False, True, False]
+def case(says: str, size: Size | None = None, tables: Changed | None = None, **asked: Any) -> Case:
+    """What is said, of which study, with which tables changed and which settings."""
+    pairs = {tuple(one.split(":")) for one in says.split()}
+    return pairs, size or Size(), tables or {}, asked  # type: ignore[return-value]
 
 
-def test_axes_hold_all_frames_and_millimetres_are_equally_long() -> None:
-    scene = scenes_of(page_of(Size(1)))["flexion–extension, dynamics, generic"]
-    shape, axes = scene["layout"]["scene"]["aspectratio"], scene["layout"]["scene"]
-    spans = {}
-    for letter in "xyz":
-        low, high = axes[f"{letter}axis"]["range"]
-        spans[letter] = high - low
-        values = [v for f in scene["frames"] for trace in f[letter] for v in trace if v is not None]
-        assert low < min(values) <= max(values) < high
-    for one, other in ("xy", "yz"):
-        assert shape[one] / shape[other] == pytest.approx(spans[one] / spans[other], rel=1e-3)
+def ranked(**by: tuple[float, ...]) -> Changed:
+    return {"errors": errors(by)}
 
 
-def test_a_stance_alone_has_no_player() -> None:
-    page = page_of(Size(1, ("stance",)))
-    assert 'id="player"' not in page
-    assert all("frames" not in scene for scene in scenes_of(page).values())
-    assert 'id="player"' in page_of(Size(1))
-    assert not Space(scenes={"a": {"data": [], "layout": {}}}).moves
+THREE = {"ik": steady(9.0), GENERIC: steady(4.0), "optk_zero": steady(8.0)}
+SCATTERED = {"ik_smooth": (4.0, 9.0, 6.0)}
+LOST, NOT_ALL = tuple(ERROR), "approach != 'ik' or specimen != 's02'"
+UNUSABLE = changed("fits", where="approach == @GENERIC", status="not_converged")
+NONE_AGAINST = changed("sharing", where="share < 0", share=0.0)
+
+CASES: dict[str, Case] = {
+    "as made": case(
+        "vibration:check against:check sharing:tested likeness:lower closest:other markers:ok "
+        "clusters:ok sizes:ok recordings:check assumed:check profiles:one_sided calibrations:ok "
+        "methods_profiles:profiled fits:ok basis:markers methods:tracked methods_errors:compared"
+    ),
+    "shown": case(
+        "nearest:best error:centre reference:kinematics angle:moving sample:ok by_level:largest "
+        "stiffness_helps:better",
+        tables=ranked(**THREE) | changed("ranges", where="joint == 'L4L5'", range=6.0),
+    ),
+    "another": case(
+        "nearest:best stiffness_helps:worse angle:alone",
+        tables=ranked(**{**THREE, "optk_zero": steady(1.0)}) | changed("ranges", joint="T1T2"),
+    ),
+    "some": case("nearest:some sample:check needed:needed", tables=ranked(**THREE, **SCATTERED)),
+    "not shown": case(
+        "nearest:unsure needed:needed_both stiffness_helps:not_shown calibrated:not_shown",
+        tables=ranked(ik=(9, 12, 8), optk_zero=(8, 14, 9), **{GENERIC: WIDE, OWN: (2, 9, 6)}),
+    ),
+    "hopeless": case("sample:check_many", tables=ranked(ik=(5, 6, 7), ik_smooth=(5.3, 5.71, 7))),
+    "helps": case("calibrated:better", tables=ranked(**THREE, **{OWN: steady(2.0), BOTH: WIDE})),
+    "harms": case("calibrated:worse", tables=ranked(**THREE, **{OWN: steady(6.0)})),
+    "differ": case(
+        "calibrated:split", tables=ranked(**THREE, **{OWN: steady(2.0), BOTH: steady(6.0)})
+    ),
+    "two subjects": case(
+        "nearest:few sample:check_few calibrated:few stiffness_helps:few methods_errors:described",
+        Size(2),
+    ),
+    "one approach": case("nearest:alone sample:ok_alone", tables=ranked(**{GENERIC: WIDE})),
+    "angles": case("error:angle", tables={"errors": errors(THREE).query("measure < 'b'")}),
+    "no truth": case(
+        "nearest:no_truth basis:untested residual:closest sample:check_untested sharing:untested "
+        "likeness:untested",
+        Size(truth=False),
+    ),
+    "neither": case("likeness:untested_undefined", Size(truth=False), similarity(None)),
+    "nothing found": case("fits:stop nearest:none", Size(1, failing=LOST)),
+    "lacking": case("lacking:check", tables={"errors": errors(THREE).query(NOT_ALL)}),
+    "scatters": case("likeness:undefined use:stop_lost", tables=similarity(None) | UNUSABLE),
+    "as alike": case("likeness:alike against:ok", tables=similarity(0.85) | NONE_AGAINST),
+    "too alike": case("likeness:higher", tables=similarity(1.0)),
+    "fixed": case("likeness:fixed", tables=ranked(ik_constrained_christophy_2012=WIDE)),
+    "still": case("sharing:none", Size(moves=False)),
+    "told": case("profiles:all_told profile_fits:ok", Size(verdict="told")),
+    "flat": case("profiles:flat", Size(verdict="not_told")),
+    "falls": case("profiles:edge_only", Size(verdict="falls")),
+    "falls slowly": case("profiles:edge", Size(verdict="falls slowly")),
+    "gap": case("profiles:gap", Size(verdict="gap")),
+    "lost": case("profiles:lost profile_fits:check", Size(verdict="lost")),
+    "within": case("prior:within between:prior", tables=ratios(0.05)),
+    "beyond": case("prior:beyond between:moved", tables=ratios(0.1)),
+    "no load": case("prior:unloaded", tables=changed("stiffness", ratio_to_generic=np.nan)),
+    "poor": case(
+        "clusters:check sizes:check recordings:ok calibrations:check fits:check markers:check",
+        tables=changed("clusters", where=[0], status="not_rigid")
+        | changed("sizes", where=[0], factor=1.2)
+        | changed("stiffness", where="specimen == 's02'", status="not_converged")
+        | changed("fits", where=[1], status="not_converged", largest_deviation_mm=77.0)
+        | {"remarks": tables_of(Size())["remarks"].iloc[:0]},
+    ),
+    "unknown": case(
+        "clusters:check_unknown sizes:check_unknown vibration:ok",
+        tables=changed("clusters", status="too_few")
+        | changed("sizes", status="not_told")
+        | changed("fits", acceleration_rms_deg_per_s2=9.0),
+    ),
+    "scaled": case(
+        "sizes:ok_scaled closest:same",
+        tables=changed("fits", where="approach == @GENERIC", marker_rmse_mm=0.5),
+        scaling="markers",
+    ),
+}
 
 
-def test_boxes_turn_with_their_bodies() -> None:
-    rows = tables_of(Size(1))["drawn"]
-    rows["left_rotation_deg"] = rows["left_rotation_deg"].where(rows["name"] != "L3", 90.0)
-    shown = next(iter(motions_of(rows)))
-    corners = boxes(shown, shown.frames[0]).reshape(-1, 8, 3)
-    sizes = np.ptp(corners, axis=1)
-    still, turned = shown.bodies.index("L4"), shown.bodies.index("L3")
-    assert sizes[still, 0] < sizes[still, 2], "a vertebra is wider than deep"
-    np.testing.assert_allclose(sizes[turned], sizes[still][[2, 1, 0]])
+@dataclass(frozen=True, eq=False)
+class Said:
+    """What a made-up study comes to."""
+
+    verdicts: set[tuple[str, str]]
+    told: list[Told]
+
+    def one(self, rule: str) -> Told:
+        """The first sentence of a rule."""
+        return next(one for one in self.told if one.rule == rule)
 
 
-def test_no_more_than_some_scenes_and_that_is_said() -> None:
-    rows = tables_of(Size(1))["drawn"]
-    many = pd.concat([rows.assign(specimen=f"p{k:02d}") for k in range(6)], ignore_index=True)
-    space = spine_in_space(many)
-    assert len(space.scenes) == MOST_SCENES
-    assert f"{MOST_SCENES} of 36 motions are here." in space.caption
-    assert next(iter(space.scenes)) == "p00, flexion–extension, dynamics, generic"
+def said_of(one: Case, cohort: Cohort | None = None) -> Said:
+    """All conclusions of a case, in words."""
+    _, size, tables, asked = one
+    study = study_of(size).model_copy(update=asked)
+    results = Results(StudyTables(tables_of(size, **tables)))
+    found = list(conclusions(study, cohort or cohort_of(size), results))
+    return Said(verdicts(found), told(found, sentences_of(PACKAGE)))
 
 
-def test_the_largest_animation_leaves_the_page_small_enough() -> None:
-    """Each frame of 18 bodies and 27 markers; what scripts and figures take beside them."""
-    rows = tables_of(Size(1, ("flexion_extension",), approaches=("optk_generic",)))["drawn"]
-    markers = rows[rows["kind"] != "body"]
-    more = [markers.assign(name=markers["name"] + str(k)) for k in range(13)]
-    whole = pd.concat([rows, *more], ignore_index=True)
-    whole[["x_mm", "y_mm", "z_mm"]] += 123.4
-    frames = next(iter(spine_in_space(whole).scenes.values()))["frames"]
-    per_frame = len(json.dumps(frames, separators=(",", ":"))) / len(frames)
-    figures_and_tables, plotly = 3.0e6, 5.0e6
-    assert MOST_FRAMES * per_frame + figures_and_tables + plotly < LARGEST_PAGE
+@cache
+def said(name: str) -> Said:
+    return said_of(CASES[name])
 
 
-def test_figures_of_calibrations_are_there_where_there_are_any() -> None:
-    size = Size(1)
-    files = KIND.files.of(study_of(size), cohort_of(size))
-    assert set(files.figures()) == {figure.name for figure in KIND.figures}
-    without = Size(1, approaches=("ik", "optk_generic"))
-    files = KIND.files.of(study_of(without), cohort_of(without))
-    assert "stiffness_by_level" not in files.figures()
+def test_sentences_of_the_table() -> None:
+    assert not list(faults_of_sentences(PACKAGE))
 
 
-def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
-    project(tmp_path, OtherSize())
-    shutil.copytree(FOLDER, tmp_path / "config/cohorts/tracking_phantom")
-    text = "study: s\nkind: tracking\ncohort: tracking_phantom\n"
-    (tmp_path / "config/studies/s.yaml").write_text(text)
-    files = {}
-    for name, rows in tables_of(Size()).items():
-        files[name] = str(tmp_path / f"{name}.parquet")
-        cells = rows.convert_dtypes().astype(object)
-        told = to_arrow(KIND.table(name), cells.where(cells.notna(), None))
-        write(told, files[name], {"study": "s"})
-    pictures = []
-    for figure in KIND.figures:
-        places = [str(tmp_path / f"{figure.name}.{kind}") for kind in ("svg", "png")]
-        read = [files[name] for name in (*figure.reads, *figure.also)]
-        draw.run(str(tmp_path), "s", figure.name, read, *places)
-        pictures.append(places[0])
-    page = tmp_path / "report.html"
-    captions = [str(caption("tracking", figure.name)) for figure in KIND.figures]
-    report.run(str(tmp_path), "s", "full", list(files.values()), pictures, captions, str(page))
-    text = page.read_text(encoding="utf-8")
-    for figure in KIND.figures:
-        assert f"{figure.title}." in text
-    assert page.stat().st_size < LARGEST_PAGE
+@pytest.mark.parametrize("name", CASES)
+def test_what_the_numbers_make_is_said(name: str) -> None:
+    made = said(name)
+    assert CASES[name][0] <= made.verdicts
+    assert not list(faults_of_told(made.told))
+
+
+def test_persons_who_truly_differ_are_told_as_such() -> None:
+    made = said_of(CASES["scatters"], differing())
+    assert ("likeness", "differ") in made.verdicts
+    assert not list(faults_of_told(made.told))
+
+
+def test_profiles_that_are_told_in_part_are_counted() -> None:
+    parts = [tables_of(Size(verdict=name)) for name in ("told", "falls")]
+    mixed = {
+        name: pd.concat([parts[0][name].iloc[:n], parts[1][name].iloc[n:]], ignore_index=True)
+        for name, n in (("profiles", 2), ("profile_points", 10))
+    }
+    one = said_of(case("", tables=mixed)).one("profiles")
+    assert one.verdict == "told"
+    assert "in 2 of 6 profiles" in one.text.replace("\u00a0", " ")
+
+
+def test_every_verdict_is_reached() -> None:
+    found = set().union(*(said(name).verdicts for name in CASES))
+    assert all_verdicts(sentences_of(PACKAGE)) - found == {
+        ("likeness", "differ"),
+        ("profiles", "told"),
+    }, "seen by the two tests above"
+
+
+def test_the_end_of_a_grid_is_found_though_it_went_through_a_logarithm() -> None:
+    """0.1 came back as 0.10000000000000002, and steep profiles were told as flat ones."""
+    tried = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
+    rows = changed("profiles", Size(verdict="falls"), best_ratio=float(np.exp(np.log(0.1))))
+    points = tables_of(Size(verdict="falls"))["profile_points"]
+    points["ratio"] = tried[points["point"]]
+    tables = rows | {"profile_points": points}
+    one = said_of(case("", Size(verdict="falls"), tables)).one("profiles")
+    assert one.verdict == "edge_only"
+    assert one.values["edge"].number == 6
+    assert one.values["most"].number == max(COSTS["falls"])
+
+
+def test_one_correction_holds_for_all_that_is_said_of_differences() -> None:
+    """Pairs of approaches, both measures, in motion and in stance: corrected by another library."""
+    rows = tables_of(Size())["errors"]
+    rows["mean"] *= 1.0 + 0.2 * np.random.default_rng(5).random(len(rows))
+    found = rankings(cohort_of(Size()), rows)
+    raw, named = [], []
+    for k, one in enumerate(found):
+        for first, other in combinations(one.approaches, 2):
+            raw.append(stats.ttest_rel(one.values[first], one.values[other]).pvalue)
+            named.append((k, first, other))
+    assert len(raw) == 2 * (21 + 10)
+    expected = multipletests(raw, method="holm")[1]
+    for (k, *pair), p in zip(named, expected, strict=True):
+        assert found[k].tests == len(raw)
+        assert found[k].p[frozenset(pair)] == pytest.approx(p)
+        assert (found[k].shown(*pair) != 0) == (p < 0.05)
+
+
+def test_subjects_needed_are_those_of_the_power_of_the_test() -> None:
+    """By the noncentral t distribution; the formula of the code is within two subjects of it."""
+    for effect, level in ((0.5, 0.05), (1.2, 0.05 / 28), (2.0, 0.05 / 86), (0.3, 0.01)):
+        exact = TTestPower().solve_power(effect, alpha=level, power=0.8)
+        found = paired_sample_size(effect, 1.0, level)
+        assert found is not None
+        assert exact - 1.0 <= found <= exact + 2.0
+    assert paired_sample_size(0.01, 1.0, 0.05) is None
+    assert paired_sample_size(0.0, 1.0, 0.05) is None
+    one = said("some").one("needed")
+    by = errors({GENERIC: THREE[GENERIC], **SCATTERED})
+    wide = by[by["measure"] == "centre_mm"].groupby(["specimen", "approach"])["mean"].mean()
+    apart = np.diff(wide.unstack()[["ik_smooth", GENERIC]].to_numpy())[:, 0]
+    exact = TTestPower().solve_power(
+        abs(apart.mean()) / apart.std(ddof=1), alpha=0.05 / one.values["tests"].number, power=0.8
+    )
+    assert one.values["value"].number == pytest.approx(exact, abs=2.0)
+    assert one.values["tests"].number == 2 * 6
+
+
+def test_true_motions_are_those_that_the_truth_was_made_of() -> None:
+    cohort = cohort_of(Size(1))
+    skeleton = skeleton_in(cohort, "s01", subject_of(cohort, "s01"))
+    q = np.zeros((15, len(BODIES), 6))
+    q[:, 1:7, 3:] = 0.05 * np.random.default_rng(3).standard_normal((15, 6, 3))
+    rows = true_rows(skeleton, "s01", "lateral_bending", q)
+    made = replace(cohort, further={**cohort.further, "truth_centres": rows})
+    found = true_motions(made).set_index(["frame", "joint"])
+    for k, joint in enumerate(LUMBAR_JOINTS):
+        own = found.xs(joint, level="joint")[["extension_deg", "right_bending_deg"]]
+        np.testing.assert_allclose(own, np.rad2deg(q[:, 1 + k, 3:5]), atol=1e-6)
+    few = replace(cohort, further={**cohort.further, "truth_centres": rows[rows["time_s"] < 0.5]})
+    assert true_motions(few).empty, "a few X-rays are no course"
+
+
+def test_shares_are_held_against_the_true_ones() -> None:
+    """Shares that are the true ones are not off; one number for an approach, whatever it was."""
+    size = Size()
+    true = said("as made").one("sharing").values["even"].number
+    rows = tables_of(size)["sharing"]
+    rows["share"] = 1.0 / 6.0
+    equal = said_of(case("", tables={"sharing": rows})).one("sharing")
+    assert equal.values["off"].number == pytest.approx(true)
+    assert equal.values["even"].number == pytest.approx(true)
+    assert 1.0 < true < 20.0
+
+
+def test_the_range_of_the_prior_is_that_of_its_draws() -> None:
+    study, cohort = study_of(Size()), cohort_of(Size())
+    values = calibrated_values(study, cohort, ratios(0.0)["stiffness"])
+    random = np.random.default_rng(0)
+    size, shape = np.exp(random.standard_normal((2, 200_000)) * [[0.7], [0.35]])
+    law = pd.read_csv(Path(charts.__file__).parents[2] / "motion/passive.csv", comment="#")
+    a = float(law.query("joint == 'L5S1' and coordinate == 'extension'")["a"].iloc[0])
+    drawn = shape * (5.0 + a * size) / (5.0 + a)
+    row = values[values["joint"] == "L5S1"].iloc[0]
+    ends = np.percentile(drawn, [2.5, 97.5])
+    assert row["prior_low"] == pytest.approx(ends[0], rel=0.15)
+    assert row["prior_high"] == pytest.approx(ends[1], rel=0.15)
+
+
+@pytest.mark.parametrize(
+    "size",
+    [
+        Size(),
+        Size(1, truth=False, verdict="falls", approaches=("ik", GENERIC, BOTH)),
+        Size(1, ("stance",), approaches=(GENERIC,), verdict="lost"),
+        Size(1, failing=LOST),
+    ],
+    ids=["three subjects", "one subject, no truth", "stance", "nothing found"],
+)
+def test_figures_fit_whatever_there_is(size: Size) -> None:
+    made = tables_of(size)
+    for draw in FIGURES:
+        faults = list(faults_of_chart(draw(study_of(size), cohort_of(size), made)))
+        assert not faults, draw.__name__
+
+
+def test_what_vibrates_is_left_out_of_figures_and_named() -> None:
+    rows = tables_of(Size())["tracked"]
+    rows.loc[rows["approach"] == "ik", "extension_deg"] *= 30.0
+    made = tables_of(Size(), tracked=rows)
+    chart = charts.kinematics(study_of(Size()), cohort_of(Size()), made)
+    assert "Not drawn, as it leaves the axis: inverse kinematics." in chart.caption
+    assert {panel.title for panel in chart.panels} >= {"L5–S1", "T12–L1"}
+
+
+def test_tables_of_the_page_have_what_a_reader_compares() -> None:
+    found = {one.name: one for one in shown_tables(Results(StudyTables(tables_of(Size()))))}
+    assert list(found)[:3] == ["accuracy", "fits", "profiles"]
+    assert "cpu s" not in [head.name for head in found["fits"].heads]
+    assert not shown_tables(Results(StudyTables({})))
+
+
+def test_a_page_with_long_names_keeps_the_rules() -> None:
+    long = {"s01": "s01" + "x" * 60, "lateral_bending": "lateral_bending" + "y" * 60}
+    tables = {key: rows.replace(long) for key, rows in tables_of(Size()).items()}
+    results = Results(StudyTables(tables))
+    made = page(study_of(Size()), cohort_of(Size()), results)
+    assert not list(faults_of_page(made.html(study_of(Size()), cohort_of(Size()), results)))
+    assert not list(faults_of_told(made.told))

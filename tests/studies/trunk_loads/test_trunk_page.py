@@ -1,195 +1,493 @@
-"""The report of trunk loads: the answer first, the trunk in space, fetching nothing."""
+"""What the page of trunk loads concludes and shows.
 
-import json
-import re
+Catches: a fault of the model told as a finding about people, an error that counts tasks which are
+not held, measured pressures outside the interval and nothing said, samples lost in silence, a claim
+that stays when the numbers say the opposite, words that leave a figure.
+"""
+
 import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from drawn import caption
+from drawn import drawings
+from page_rules import (
+    all_verdicts,
+    faults_of_chart,
+    faults_of_page,
+    faults_of_sentences,
+    faults_of_told,
+    verdicts,
+)
 from study_cases import Size as OtherSize
 from study_cases import project
-from trunk_table_cases import DRAWN, FOLDER, Size, cohort_of, study_of, tables_of
+from trunk_table_cases import FOLDER, Size, cohort_of, study_of, tables_of
 
 from spinepipe.jobs import draw, report
-from spinepipe.report.page.document import Picture, ResultTables
-from spinepipe.studies.trunk_loads.in_space import MOST_SCENES, trunk_in_space
+from spinepipe.report.conclusions import Conclusion, Told, sentences_of, told
+from spinepipe.report.forms.chart import Drawing
+from spinepipe.report.page.study_page import Results
+from spinepipe.studies.trunk_loads.conclusions import conclusions
 from spinepipe.studies.trunk_loads.kind import KIND
-from spinepipe.studies.trunk_loads.page import READ, document, left_out, shown_tables
-from spinepipe.tables import to_arrow, write
+from spinepipe.studies.trunk_loads.page import left_out, page
+from spinepipe.studies.trunk_loads.samples import INDICES, shares
+from spinepipe.studies.trunk_loads.tables import QUANTITIES
+from spinepipe.tables import StudyTables, to_arrow, write
 
-PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
-SIZES = {
-    "five persons": Size(),
-    "one person, nothing more": Size(1, volunteer=False, samples=False, simplified=False),
-    "nothing drawn": Size(1, drawn=()),
-    "one task": Size(1, ("standing",)),
-    "nothing settled": Size(1, ("standing",), (("standing", "out_of_reach", "<no>"),)),
+PACKAGE = "spinepipe.studies.trunk_loads"
+ONE = Size(1)
+HELD = ("standing", "flexion_50", "flexion_70_with_load")
+"""Tasks with a confirmed measured pressure that the model of the shipped study holds."""
+
+WEAK = tuple((task, "beyond_strength", "") for task in ("load_close", "load_away", "side_20"))
+Frames = dict[str, pd.DataFrame]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A made-up study: tables of a size, changed, and verdicts that its numbers must come to."""
+
+    expected: str
+    size: Size = ONE
+    change: Callable[[Frames], None] = lambda tables: None
+    rebuilt: bool = True
+
+    @property
+    def tables(self) -> Frames:
+        found = tables_of(self.size)
+        self.change(found)
+        return found
+
+    def results(self) -> Results:
+        return Results(StudyTables(self.tables))
+
+    def come_to(self) -> list[Conclusion]:
+        cohort = replace(cohort_of(self.size), rebuilt=self.rebuilt)
+        return list(conclusions(study_of(self.size), cohort, self.results()))
+
+
+def cells(table: str, **changed: Any) -> Callable[[Frames], None]:
+    """Change cells of all rows of a table; keys in ``where_*`` choose the rows."""
+    where = {k.removeprefix("where_"): v for k, v in changed.items() if k.startswith("where_")}
+    values = {k: v for k, v in changed.items() if not k.startswith("where_")}
+
+    def change(tables: Frames) -> None:
+        rows = tables[table].astype(object)
+        chosen = pd.Series(True, rows.index)
+        for column, wanted in where.items():
+            chosen &= rows[column].isin(wanted if isinstance(wanted, tuple) else (wanted,))
+        for column, value in values.items():
+            rows.loc[chosen, column] = (
+                rows.loc[chosen, column].map(value) if callable(value) else value
+            )
+        tables[table] = rows.convert_dtypes(dtype_backend="numpy_nullable").infer_objects()
+
+    return change
+
+
+def all_of(*changes: Callable[[Frames], None]) -> Callable[[Frames], None]:
+    """Several changes."""
+
+    def change(tables: Frames) -> None:
+        for one in changes:
+            one(tables)
+
+    return change
+
+
+def pressures(**off: float) -> Callable[[Frames], None]:
+    """Errors of computed pressures, MPa, of each tier, in all tasks."""
+
+    def change(tables: Frames) -> None:
+        rows = tables["pressures"]
+        tables["pressures"] = rows.assign(
+            computed_mpa=rows["measured_mpa"] + rows["tier"].map(off).fillna(0.0)
+        )
+
+    return change
+
+
+def sampled(held: int, lost: int, times_lost: float = 1.0) -> Callable[[Frames], None]:
+    """So many samples of each sampled task hold, each 100; lost ones carry a multiple of that."""
+
+    def change(tables: Frames) -> None:
+        places = tables["intervals"].drop_duplicates(["specimen", "task"])
+        quantities = tuple(tables["intervals"]["quantity"].unique())
+        rows = [
+            {"specimen": who, "task": task, "sample": k,
+             **dict.fromkeys(quantities, 100.0 if k < held else 100.0 * times_lost),
+             "status": "converged" if k < held else "beyond_strength"}
+            for who, task in zip(places["specimen"], places["task"], strict=True)
+            for k in range(held + lost)
+        ]  # fmt: skip
+        tables["responses"] = pd.DataFrame(rows)
+        counted = {"n_samples": held, "n_failed": lost}
+        if lost > 0.2 * (held + lost):
+            counted |= {"low": None, "high": None, "median": None}
+        cells("intervals", **counted)(tables)
+
+    return change
+
+
+def share(quantity: str, **total: float) -> Callable[[Frames], None]:
+    """Total indices of the inputs named, ends 0.05 away, of the others nought."""
+
+    def change(tables: Frames) -> None:
+        rows = tables["drivers"]
+        own = rows["quantity"] == quantity
+        value = rows["factor"].map(total).fillna(0.0)
+        for column, shift in (("total", 0.0), ("total_low", -0.05), ("total_high", 0.05)):
+            rows.loc[own, column] = value[own] + shift
+
+    return change
+
+
+def extensor_force(left: float, other: float | None = None) -> Callable[[Frames], None]:
+    """Active force of the long back muscles: 100 N while bending, and this share at full bend.
+
+    Of all bodies but the volunteer another share, where it is told.
+    """
+
+    def change(tables: Frames) -> None:
+        rows = tables["muscles"]
+        full = rows["task"].isin(["full_flexion", "forward_100"])
+        share = np.where(rows["specimen"] == "volunteer", left, left if other is None else other)
+        tables["muscles"] = rows.assign(passive_n=0.0, force_n=np.where(full, 100.0 * share, 100.0))
+
+    return change
+
+
+FIVE = ("standing", "load_close", "load_away", "flexion_50", "flexion_70_with_load")
+P, C = "l4l5_pressure_mpa", "l4l5_compression_n"
+
+
+def five_sampled(tables: Frames) -> None:
+    """Five tasks have intervals that lie above all measured pressures."""
+    first = tables["intervals"][tables["intervals"]["task"] == "standing"]
+    rows = [first.assign(task=task, low=5.0, high=6.0) for task in FIVE]
+    tables["intervals"] = pd.concat(rows, ignore_index=True)
+
+
+def stand_full(tables: Frames) -> None:
+    """What was sampled of load_away is of full_flexion."""
+    for table in ("intervals", "drivers"):
+        rows = tables[table]
+        tables[table] = rows.assign(task=rows["task"].replace("load_away", "full_flexion"))
+
+
+ALL_LOST = Size(1, failing=tuple((t, "not_converged", "") for t in tables_of(ONE)["tasks"]["task"]))
+SOUND = Size(1, failing=())
+NO_TONE = cells("tasks", where_task="standing_stable", tone="stable", stable=False)
+
+CASES = (
+    # the answer and key numbers
+    Case("load both|error held|times standing|compression sampled|pressure measured_sampled"),
+    Case("load standing|pressure alone_sampled", replace(ONE, volunteer=False)),
+    Case("load measured", Size(1, ("load_close", "load_away", "flexion_50"))),
+    Case("load alone|pressure alone_single|methods single",
+         Size(1, ("flexion_50",), volunteer=False, samples=False)),
+    Case("load none|held stop|compared stop|not_to_use stop_unsolved", ALL_LOST),
+    Case("compression single|pressure measured_single", replace(ONE, samples=False)),
+    Case("pressure unconfirmed_sampled", Size(1, ("standing", "load_away", "full_flexion")),
+         stand_full),
+    Case("pressure unconfirmed_single", Size(1, ("full_flexion",), samples=False)),
+    # what is not to be used, and what bodies are
+    Case("not_to_use stop_weak|not_to_use stop_reach|held stop|bodies_from check_rebuilt"),
+    Case("held ok|bodies rebuilt", SOUND),
+    Case("held ok|bodies scaled|bodies_from check_scaled", SOUND, rebuilt=False),
+    # measured pressures
+    Case("inside outside", ONE, cells("intervals", where_task="standing", where_quantity=P,
+                                      low=0.51, high=0.9)),
+    Case("inside all", ONE, cells("intervals", where_quantity=P, low=0.1, high=3.0)),
+    Case("inside outside_many", ONE, five_sampled),
+    Case("compared ok|measured check", ONE),
+    Case("compared check", replace(ONE, failing=WEAK)),
+    Case("compared stop",
+         replace(ONE, failing=(*WEAK, ("flexion_50", "cycling", ""),
+                               ("flexion_70_with_load", "cycling", "")))),
+    Case("tuned worse", ONE, pressures(untuned=0.1, left_out=0.3)),
+    Case("tuned better", ONE, pressures(untuned=0.3, left_out=0.1)),
+    Case("tuned same", ONE, pressures(untuned=0.1, left_out=0.15)),
+    Case("tuned few", Size(1, ("standing", "load_away"))),
+    Case("fitted check_loose", ONE),
+    Case("fitted check_loose", ONE, cells("tuning", where_tier="tuned", at_bound=False, low=0.5,
+                                          high=None, identifiable=False)),
+    Case("fitted ok", ONE, cells("tuning", where_tier="tuned", at_bound=False, low=0.5, high=0.9,
+                                 identifiable=True)),
+    Case("fitted check_nominal", ONE, cells("tuning", where_tier="tuned", at_bound=False, low=0.5,
+                                            high=1.2, identifiable=True)),
+    # strength, relaxation, stability, balance
+    Case("effort enough|balance ok", ONE),
+    Case("effort weak", ONE, cells("tasks", where_task="standing", strength_used=0.85)),
+    Case("effort weak", ONE, cells("tasks", where_task="side_20", strength_used=1.6)),
+    Case("effort weak_task", Size(1, ("flexion_50", "side_20")),
+         cells("tasks", where_task="side_20", strength_used=1.6)),
+    Case("balance check", ONE, cells("tasks", where_task="flexion_70_with_load",
+                                     strength_used=1.02, largest_slack_nm=0.4)),
+    Case("relaxation relaxed", ONE, extensor_force(0.05)),
+    Case("relaxation partly", ONE, extensor_force(0.5)),
+    Case("relaxation partly", Size(2), extensor_force(0.97, 0.5)),
+    Case("relaxation partly", Size(2), extensor_force(0.05, 0.5)),
+    Case("relaxation none", ONE, extensor_force(0.97)),
+    Case("stability ok", ONE, cells("tasks", stable=True)),
+    Case("stability check", ONE, cells("tasks", stable=False, tone="none")),
+    Case("stability stop_tone", ONE, NO_TONE),
+    Case("formula ok", Size(1, ("standing", "side_20"))),
+    Case("formula check", ONE, cells("tasks", where_task="standing", inside_eq_6=False)),
+    Case("upright ok", ONE),
+    Case("upright check", ONE, cells("upright", where_body="L5", bound=True)),
+    # samples and what drives them
+    Case("samples ok|methods sampled", ONE, cells("intervals", n_failed=0)),
+    Case("samples check", ONE, sampled(200, 30)),
+    Case("samples check_low", ONE, sampled(200, 30, 1.3)),
+    Case("samples check_high", ONE, sampled(200, 30, 0.7)),
+    Case("samples stop|compression single", ONE, sampled(100, 60)),
+    Case("drivers both", ONE),
+    Case("drivers pressure", ONE, share(C, pcsa=0.3, bmi=0.3)),
+    Case("drivers compression", ONE, share(P, pcsa=0.3, bmi=0.3)),
+    Case("drivers neither", ONE, all_of(share(P, pcsa=0.3, bmi=0.3), share(C, pcsa=0.3, bmi=0.3))),
+    # bodies, levels, simplifications
+    Case("range unsampled", replace(Size(5), samples=False)),
+    Case("range alike", Size(5), cells("intervals", where_quantity=C, low=100.0, high=9000.0)),
+    Case("range differ", Size(5), cells("intervals", where_quantity=C, low=1989.0, high=1991.0)),
+    Case("levels down", ONE),
+    Case("levels elsewhere", ONE, cells("levels", where_level="L2L3", compression_n=9000.0)),
+    Case("simplified matters", ONE),
+    Case("simplified small", ONE, cells("simplified", compression=0, l4l5_compression_n=700.0)),
+)  # fmt: skip
+"""Each verdict of the table of sentences, and its opposite, by numbers written here."""
+
+
+@cache
+def concluded(case: Case) -> tuple[Conclusion, ...]:
+    return tuple(case.come_to())
+
+
+def named(expected: str) -> set[tuple[str, str]]:
+    return {tuple(one.split()) for one in expected.split("|")}  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.expected.partition("|")[0])
+def test_numbers_decide_what_is_concluded(case: Case) -> None:
+    found = concluded(case)
+    assert named(case.expected) <= verdicts(found)
+    one_each = [one.rule for one in found if one.rule != "not_to_use"]
+    assert len(one_each) == len(set(one_each)), "a rule comes to one verdict"
+    assert not list(faults_of_told(told(found, sentences_of(PACKAGE))))
+
+
+def test_every_sentence_is_said_by_some_study() -> None:
+    assert not list(faults_of_sentences(PACKAGE))
+    said = set().union(*(verdicts(concluded(case)) for case in CASES))
+    assert all_verdicts(sentences_of(PACKAGE)) == said
+
+
+# --- single claims --------------------------------------------------------------------------------
+
+
+def says(case: Case, rule: str, place: str = "") -> Told:
+    """The sentence of a rule, at a place."""
+    rows = told(case.come_to(), sentences_of(PACKAGE))
+    return next(one for one in rows if one.rule == rule and one.place in (place or one.place))
+
+
+def test_errors_are_of_held_tasks_alone() -> None:
+    """Held ones are off by 0.1, −0.2 and 0.2 MPa, the others by 5 MPa."""
+    off = {"standing": 0.6, "flexion_50": 0.89, "flexion_70_with_load": 2.5}
+    changes = [cells("tasks", **{P: 9.0})]
+    changes += [cells("tasks", where_task=task, **{P: mpa}) for task, mpa in off.items()]
+    case = Case("", replace(ONE, failing=WEAK), all_of(*changes))
+    for rule in ("load", "error"):
+        value = says(case, rule).values["error" if rule == "load" else "value"]
+        assert value.number == pytest.approx(np.sqrt((0.01 + 0.04 + 0.04) / 3.0))
+        assert value.n == 3
+    fitted = pressures(untuned=0.1, left_out=0.3)
+
+    def spoil(tables: Frames) -> None:
+        fitted(tables)
+        rows = tables["pressures"]
+        rows.loc[~rows["task"].isin(HELD), "computed_mpa"] = 9.0
+
+    tuned = says(Case("", replace(ONE, failing=WEAK), spoil), "tuned")
+    assert [tuned.values[name].number for name in ("before", "after")] == pytest.approx([0.1, 0.3])
+
+
+def test_measured_pressures_outside_are_counted_and_named() -> None:
+    """Measured: standing 0.5, load away 1.8, flexion 50 1.09 MPa."""
+    ends = {"standing": (0.4, 0.6), "load_away": (1.9, 2.2), "flexion_50": (0.2, 1.0)}
+    changes = [
+        cells("intervals", where_task=task, where_quantity=P, low=low, high=high)
+        for task, (low, high) in ends.items()
+    ]
+    found = says(Case("", ONE, all_of(*changes)), "inside")
+    assert "in 2 of 3 sampled tasks: flexion 50 and load away." in found.text
+    assert "12 of" in found.note, "samples lost stand beside the interval"
+
+
+def test_what_the_model_cannot_do_is_told_of_the_model() -> None:
+    for case in (case for case in CASES if case.expected.startswith(("effort w", "stability s"))):
+        found = says(case, case.expected.split()[0])
+        assert "model" in found.text
+        assert "people" in (found.text + found.note).lower(), "and people are told to do it"
+
+
+def test_tasks_that_fail_for_all_are_told_by_what_is_done() -> None:
+    failing = (*WEAK, ("exertion_extension", "beyond_strength", ""))
+    found = says(Case("", replace(Size(5), failing=failing)), "not_to_use")
+    assert found.level == "stop"
+    assert found.text.startswith(
+        "Do not use lifting (load close, load away), exertion (exertion extension), sideways "
+        "bending (side 20): the model's muscles are too weak"
+    )
+    some = cells("tasks", where_task="load_away", where_specimen="woman", status="converged")
+    spared = says(Case("", replace(Size(5), failing=failing), some), "not_to_use")
+    assert "load away" not in spared.text, "one body does it"
+
+
+def test_lost_samples_stand_beside_the_numbers_they_bend() -> None:
+    case = Case("", ONE, sampled(200, 30, 1.3))
+    assert "30 of 230 samples lost" in says(case, "compression").note
+    light = says(case, "samples")
+    assert light.level == "check"
+    assert light.values["more"].number == pytest.approx(30.0)
+    assert "too low" in light.text
+
+
+def test_loads_over_standing_are_of_samples_that_hold_both() -> None:
+    """1000 to 1990 N over 500 N; of 100 samples 5 do not hold standing, and say ten times."""
+
+    def change(tables: Frames) -> None:
+        rows = [
+            {"specimen": "volunteer", "task": task, "sample": k, "status": status}
+            | dict.fromkeys(QUANTITIES, force)
+            for k in range(100)
+            for task, force, status in (
+                ("standing", 500.0 if k >= 5 else 50.0, "converged" if k >= 5 else "cycling"),
+                ("load_away", 1000.0 + 10.0 * k, "converged"),
+            )
+        ]
+        tables["responses"] = pd.DataFrame(rows)
+
+    value = says(Case("", ONE, change), "times").values["value"]
+    expected = np.quantile((1000.0 + 10.0 * np.arange(5, 100)) / 500.0, [0.025, 0.975])
+    assert (value.low, value.high) == pytest.approx(tuple(expected))
+    assert value.n == 95
+
+
+def test_drivers_are_told_with_what_was_assumed_of_them() -> None:
+    text = says(Case(""), "drivers").text.replace("\u00a0", " ")
+    assert text == (
+        "Load away: hand position (±1 mm) makes 60.0 % of the pressure's spread, hand position "
+        "(±1 mm) 60.0 % of the compression's."
+    )
+
+
+def test_where_indices_are_lost_correlations_tell() -> None:
+    """Twice one input and once another: four fifths and one fifth of the variance."""
+    study, tables = study_of(ONE), tables_of(ONE)
+    names = list(study.uncertain.factors)
+    signs = np.array(list(product([-1.0, 1.0], repeat=len(names))))
+    drawn = [
+        {"sample": k, "factor": name, "value": value, "unit": ""}
+        for k, row in enumerate(signs)
+        for name, value in zip(names, row, strict=True)
+    ]
+    outcome = 100.0 + 2.0 * signs[:, 0] + signs[:, 1]
+    place = {"specimen": "volunteer", "task": "load_away"}
+    rows = [{**place, "sample": k, "status": "converged", C: y} for k, y in enumerate(outcome)]
+    tables |= {"design": pd.DataFrame(drawn), "responses": pd.DataFrame(rows)}
+    assert shares(study, tables, place, C)[1] == INDICES
+    tables["drivers"] = tables["drivers"].assign(total=np.nan)
+    found, source = shares(study, tables, place, C)
+    assert source != INDICES
+    assert found["share"].tolist() == pytest.approx([80.0, 20.0, 0.0, 0.0, 0.0])
+    assert (found["low"] < found["share"])[:2].all()
+    assert (found["share"] < found["high"])[:2].all()
+
+
+# --- figures and the page -------------------------------------------------------------------------
+
+LONG = {"standing": "standing_as_usual_in_the_morning_after_breakfast", "volunteer": "v" * 40}
+
+
+def long_names(tables: Frames) -> None:
+    for name, rows in tables.items():
+        tables[name] = rows.replace(LONG)
+
+
+EDGES = {
+    "five bodies": Case("", Size()),
+    "one task": Case("", Size(1, ("standing",))),
+    "nothing held": Case("", ALL_LOST),
+    "no rows": Case("", ONE, lambda tables: tables.update({n: t[:0] for n, t in tables.items()})),
+    "long names": Case("", Size(1, ("standing", "load_away", "side_20")), long_names),
+    "weak": Case("", replace(Size(2), failing=WEAK), all_of(sampled(200, 30), NO_TONE)),
 }
 
 
-def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
-    """Made-up results with a picture."""
-    made = tables_of(size, **changed)
-    picture = Picture.of("load_by_level", "Loads by level", PICTURE, "What it shows.")
-    metadata = {name: {"seed": "7", "code_digest": name} for name in made}
-    return ResultTables(made, metadata, {"load_by_level": picture})
+@pytest.mark.parametrize("case", EDGES.values(), ids=EDGES.keys())
+def test_figures_and_page_of_any_study(case: Case) -> None:
+    study, cohort, tables = study_of(case.size), cohort_of(case.size), StudyTables(case.tables)
+    drawn = {}
+    for name, figure in drawings("trunk_loads").items():
+        needed = {table for one in KIND.figures if one.name == name for table in one.reads}
+        if needed <= set(tables):
+            chart = figure(study, cohort, tables)
+            assert not list(faults_of_chart(chart))
+            drawn[name] = Drawing.read(name, chart.svg())
+    results = Results(tables, {}, drawn)
+    made = page(study, cohort, results)
+    assert not list(faults_of_told(made.told))
+    html = made.html(study, cohort, results)
+    assert not list(faults_of_page(html))
+    assert "nan" not in html.lower().replace(">", " ").replace("<", " ").split()
 
 
-def page_of(size: Size, **changed: pd.DataFrame) -> str:
-    """The page of made-up results."""
-    study, cohort = study_of(size), cohort_of(size)
-    return document(study, cohort, results(size, **changed)).html(study, cohort)
-
-
-def scenes_of(page: str) -> dict[str, Any]:
-    """What the script of the page is given."""
-    found = re.search(r'<script type="application/json" id="scenes">(.*?)</script>', page)
-    assert found is not None
-    scenes: dict[str, Any] = json.loads(found[1])
-    return scenes
-
-
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
-def test_page_of_any_study_fetches_nothing(size: Size) -> None:
-    page = page_of(size)
-    before_scripts = page.split("<script")[0]
-    for address in re.findall(r' (?:src|href)="([^"]*)"', before_scripts):
-        assert address.startswith(("#", "data:image/svg+xml;base64,")), address
-    assert '<h2 id="findings-title">Verdict</h2>' in page
-    assert "nan" not in re.sub("<[^>]*>", " ", before_scripts).lower().split()
-    drawn = bool(len(tables_of(size)["paths"]))
-    assert ("drawScene();" in page) == drawn
-    assert ("The trunk in 3-D" in page) == drawn
-
-
-def test_page_has_the_same_bytes_twice() -> None:
-    assert page_of(Size(1)) == page_of(Size(1))
-
-
-def test_the_answer_stands_before_all_else() -> None:
-    page = page_of(Size(1))
-    order = ["Verdict", "Look at this first", 'class="headline"', "Figure 1.", "The trunk in 3-D"]
-    places = [page.index(words) for words in [*order, "Table 1."]]
-    assert places == sorted(places)
-
-
-def test_tables_are_those_of_the_kind_and_empty_ones_are_left_out() -> None:
-    assert set(READ) <= {table.name for table in KIND.tables}
-    shown = [table.name for table in shown_tables(results(Size(1)))]
-    assert shown[:3] == ["tasks", "agreement", "pressures"]
-    assert not {"masses", "scaling"} & set(shown)
-    empty = {name: rows.iloc[:0] for name, rows in tables_of(Size(1)).items()}
-    assert not shown_tables(results(Size(1), **empty))
-    assert "No load can be told" in page_of(Size(1), **empty)
+def test_what_is_not_held_or_not_confirmed_is_hollow() -> None:
+    size = replace(Size(2), failing=WEAK)
+    chart = drawings("trunk_loads")["pressure_against_measured"](
+        study_of(size), cohort_of(size), StudyTables(tables_of(size))
+    )
+    pressure, compression = (one.frame for one in chart.panels)  # type: ignore[attr-defined]
+    hollow = pressure[pressure["hollow"]].groupby("series")["row"].agg(set)
+    assert hollow["computed"] == {"Load close", "Load away", "Side 20"}
+    assert hollow["measured"] == {"Full flexion", "One handed", "Side 10"}
+    assert {"Load close", "Load away", "Side 20"} <= set(compression[compression["hollow"]]["row"])
+    assert not compression[compression["row"] == "Flexion 50"]["hollow"].any()
+    chart = drawings("trunk_loads")["strength"](study_of(size), cohort_of(size), tables_of(size))
+    rows = chart.panels[0].frame  # type: ignore[attr-defined]
+    assert set(rows[rows["hollow"]]["row"]) == {"Load close", "Load away", "Side 20"}
 
 
 def test_what_the_study_leaves_out_is_told_with_its_reason() -> None:
-    assert left_out(study_of(Size(1))) == ()
-    told = left_out(study_of(Size(1, volunteer=False, samples=False)))
-    assert len(told) == 2
-    assert "(no task is to be sampled)" in told[0]
-    assert "(nobody stands for the volunteer)" in told[1]
+    assert left_out(study_of(ONE)) == ()
+    assert len(left_out(study_of(replace(ONE, volunteer=False, samples=False)))) == 2
+    files = KIND.files.of(study_of(replace(ONE, samples=False)), cohort_of(ONE))
+    assert "pressure_against_measured" in files.figures(full=False)
+    assert not {"drivers", "tuned_pressures"} & set(files.figures(full=False))
 
 
-def test_every_drawn_task_has_a_scene_and_every_group_a_switch() -> None:
-    page = page_of(Size(1))
-    scenes = scenes_of(page)
-    assert set(scenes) == {name.replace("_", " ") for name in DRAWN}
-    assert re.findall(r"<option>(.*?)</option>", page) == [n.replace("_", " ") for n in DRAWN]
-    groups = set(re.findall(r'data-group="(.*?)"', page))
-    shown = {trace["meta"] for scene in scenes.values() for trace in scene["data"]}
-    assert groups == shown
-    assert {"spine", "load", "multifidus"} < groups
-
-
-def test_lines_are_the_paths_and_their_colour_is_the_stress() -> None:
-    rows = tables_of(Size(1))["paths"]
-    scene = scenes_of(page_of(Size(1)))["load away"]
-    trace = next(trace for trace in scene["data"] if trace["meta"] == "psoas")
-    own = rows[(rows["task"] == "load_away") & (rows["group"] == "psoas")]
-    first = own[own["muscle"] == own["muscle"].iloc[0]]
-    n = len(first)
-    drawn = np.array([trace[axis][:n] for axis in "xyz"], dtype=float).T
-    # places are written to 0.1 mm
-    np.testing.assert_allclose(drawn, first[["x_mm", "y_mm", "z_mm"]], rtol=0, atol=0.0501)
-    assert trace["x"][n] is None, "a gap before the next fascicle"
-    assert trace["line"]["color"][0] == pytest.approx(first["stress_mpa"].iloc[0], abs=1e-4)
-    assert len(trace["line"]["color"]) == len(trace["x"]) == len(trace["text"])
-    box = scene["layout"]["coloraxis"]
-    assert box["cmin"] == 0.0
-    assert box["cmax"] == pytest.approx(float(rows["stress_mpa"].max()), abs=1e-4)
-    assert box["colorbar"]["title"]["text"] == "stress (MPa)"
-
-
-def test_millimetres_are_equally_long_along_all_axes() -> None:
-    scene = scenes_of(page_of(Size(1)))["load away"]
-    shape = scene["layout"]["scene"]["aspectratio"]
-    for letter, other in ("xy", "yz"):
-        sizes = []
-        for axis in (letter, other):
-            values = [v for trace in scene["data"] for v in trace[axis] if v is not None]
-            sizes.append(max(values) - min(values))
-        assert shape[letter] / shape[other] == pytest.approx(sizes[0] / sizes[1], rel=1e-3)
-
-
-def test_the_load_stands_where_the_task_says() -> None:
-    scenes = scenes_of(page_of(Size(1)))
-    load = next(trace for trace in scenes["one handed"]["data"] if trace["meta"] == "load")
-    assert (load["x"], load["y"], load["z"]) == ([0.0], [-150.0], [340.0])
-    assert "19.8 kg" in load["text"][0]
-    assert all(trace["meta"] != "load" for trace in scenes["standing"]["data"])
-
-
-def test_no_more_than_some_scenes_and_that_is_said() -> None:
-    made = tables_of(Size())
-    space = trunk_in_space(cohort_of(Size()), made["paths"], made["levels"])
-    assert len(space.scenes) == MOST_SCENES < 15
-    assert f"The first {MOST_SCENES} of 15 postures." in space.caption
-    assert next(iter(space.scenes)) == "standing, volunteer"
-
-
-def test_names_cannot_end_the_script() -> None:
-    rows = tables_of(Size(1))["paths"]
-    rows["muscle"] = rows["muscle"] + "</script><b>"
-    page = page_of(Size(1), paths=rows)
-    assert "</script><b>" not in page
-    assert "&lt;/script&gt;&lt;b&gt;" in json.dumps(scenes_of(page)), "as plotly reads it"
-
-
-def test_a_figure_is_there_without_the_tables_that_it_shows_besides() -> None:
-    without = Size(1, samples=False)
-    files = KIND.files.of(study_of(without), cohort_of(without))
-    assert "pressure_against_measured" in files.figures()
-    assert "drivers" not in files.figures()
-    sampled = KIND.files.of(study_of(Size(1)), cohort_of(Size(1)))
-    assert set(sampled.figures()) == {figure.name for figure in KIND.figures}
-
-
-def test_figures_and_report_are_drawn_from_files(tmp_path: Path) -> None:
+def test_a_figure_and_the_report_are_made_from_files(tmp_path: Path) -> None:
     project(tmp_path, OtherSize())
     shutil.copytree(FOLDER, tmp_path / "config/cohorts/trunk_volunteers")
-    size = Size()
     text = "study: s\nkind: trunk_loads\ncohort: trunk_volunteers\ndrawn_tasks: [standing]\n"
     (tmp_path / "config/studies/s.yaml").write_text(text)
-    files = {}
-    for name, rows in tables_of(size).items():
-        files[name] = str(tmp_path / f"{name}.parquet")
-        cells = rows.convert_dtypes().astype(object)
-        told = to_arrow(KIND.table(name), cells.where(cells.notna(), None))
-        write(told, files[name], {"study": "s"})
-    pictures = []
-    for figure in KIND.figures:
-        places = [str(tmp_path / f"{figure.name}.{kind}") for kind in ("svg", "png")]
-        read = [files[name] for name in (*figure.reads, *figure.also)]
-        draw.run(str(tmp_path), "s", figure.name, read, *places)
-        pictures.append(places[0])
-    page = tmp_path / "report.html"
-    captions = [str(caption("trunk_loads", figure.name)) for figure in KIND.figures]
-    report.run(str(tmp_path), "s", "full", list(files.values()), pictures, captions, str(page))
-    text = page.read_text(encoding="utf-8")
-    for figure in KIND.figures:
-        assert f"{figure.title}." in text
+    files: Mapping[str, str] = {n: str(tmp_path / f"{n}.parquet") for n in tables_of(Size())}
+    for name, rows in tables_of(Size()).items():
+        plain = rows.convert_dtypes().astype(object)
+        table = to_arrow(KIND.table(name), plain.where(plain.notna(), None))
+        write(table, files[name], {"study": "s"})
+    figure = next(one for one in KIND.figures if one.name == "pressure_against_measured")
+    drawn = [str(tmp_path / f"{figure.name}.{kind}") for kind in ("svg", "pdf", "png")]
+    read = [files[name] for name in (*figure.reads, *figure.also)]
+    draw.run(str(tmp_path), "s", figure.name, read, *drawn)
+    made = str(tmp_path / "report.html")
+    report.run(str(tmp_path), "s", "report", list(files.values()), drawn[:1], made)
+    assert f"{figure.title}." in Path(made).read_text(encoding="utf-8")
+    assert (tmp_path / "conclusions.parquet").is_file()

@@ -142,7 +142,8 @@ class LogHandler(LogHandlerBase):
         study = job.wildcards.get("study", "")
         self._last = ": ".join(filter(None, [study, job.rule_name]))
         pages = [Path(self._root, path) for path in job.output or () if path.endswith(".html")]
-        return "\n".join(f"{study}: {page.as_uri()}" for page in pages)
+        # the first one: what else a job of a page writes leads to it
+        return "\n".join(f"{study}: {page.as_uri()}" for page in pages[:1])
 
     def _progress(self, record: Any) -> str | None:
         if record.created - self._line_at < SECONDS_BETWEEN_LINES:

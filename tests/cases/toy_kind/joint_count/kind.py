@@ -16,7 +16,7 @@ class JointCountFiles(StudyFiles):
 
     joined = ("joints",)
     full = ("shares",)
-    drawings = (Figure("joint_bars", "Joints", "figures.bars:bars_figure", ("joints",)),)
+    drawings = (Figure("joint_bars", "Joints", "charts:bars", ("joints",)),)
 
     study: JointCount
 

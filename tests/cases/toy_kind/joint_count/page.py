@@ -1,23 +1,23 @@
-"""The report of a study of joint counts."""
+"""The page of a study of joint counts."""
 
 from spinepipe.studies.joint_count.settings import JointCount
 from spinepipe.studies.joint_count.tables import TOTALS
 
 from spinepipe.cohort import Cohort
-from spinepipe.report.page.document import Document, ResultTables
-from spinepipe.report.page.tables import sortable
+from spinepipe.report.conclusions import Conclusion, Value, sentences_of
+from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.tables import page_tables
 
 READ = ("totals",)
 
 
-def document(study: JointCount, cohort: Cohort, results: ResultTables) -> Document:
-    """One finding, one figure, one table."""
+def page(study: JointCount, cohort: Cohort, results: Results) -> Page:
+    """One answer, one figure, one table."""
     rows = results.table("totals")
-    return Document(
-        question="How many joints are there?",
-        findings=[f"There are {rows['joints'].iloc[0]} joints."],
-        pictures=list(results.pictures.values()),
-        tables=[sortable("totals", "Joints", TOTALS.about, rows, TOTALS.columns)],
-        metadata=results.metadata,
-        left_out=[],
+    joints = Value(int(rows["joints"].iloc[0]), source="totals: joints")
+    return Page(
+        conclusions=[Conclusion("total", "counted", {"joints": joints})],
+        sentences=sentences_of(__package__),
+        key_figure="joint_bars",
+        tables=page_tables(TOTALS, "Joints", rows),
     )

@@ -1,0 +1,182 @@
+"""What a search concludes of other explanations, of what has no name, and of what to do next."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pandas as pd
+
+from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.words import count, listed, plain
+from spinepipe.studies.discrepancy.misfits import (
+    NOISE,
+    WITH_EFFECTS,
+    bare,
+    change_of_misfit,
+    largest,
+    place_of_most,
+)
+from spinepipe.studies.discrepancy.quantities import UNITS
+from spinepipe.studies.discrepancy.verdict import Conclusion as Ended
+from spinepipe.studies.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason
+from spinepipe.studies.discrepancy.words import (
+    SET_UP,
+    general,
+    in_words,
+    name_at,
+    readable,
+    shape_in_words,
+)
+
+UNNAMED = "what no effect explains"
+"""How the subject of advice begins that is on what has no name."""
+
+WITHHELD = "withheld"
+"""How a message begins that tells what an error of the set-up would have to be known to."""
+
+_MOST_WORDS_OF_CURVE = 7
+
+USEFUL = ("advised", "offered")
+"""Status of runs that would tell something."""
+
+
+def alternatives(verdict: Verdict, margin: float, candidates: pd.DataFrame) -> Iterator[Conclusion]:
+    """The next best explanation: of the named effect whose lead is least, or of a set."""
+    needed = Value(margin, source="settings: margin")
+    with_rivals = [one for one in verdict.effects if one.rivals]
+    if with_rivals:
+        leads = [min(one.rivals, key=lambda r: r.log_evidence_margin) for one in with_rivals]
+        rival, effect = min(
+            zip(leads, with_rivals, strict=True), key=lambda both: both[0].log_evidence_margin
+        )
+        how = "verdict: effects, rivals"
+        values = {"margin": Value(rival.log_evidence_margin, source=how), "needed": needed}
+        names = {
+            "effect": name_at(effect.name, effect.scope.coordinates),
+            "rival": name_at(rival.name, rival.coordinates),
+        }
+        yield Conclusion("alternatives", "ahead", values, names)
+    elif verdict.effects:
+        first = verdict.effects[0]
+        names = {"effect": name_at(first.name, first.scope.coordinates)}
+        yield Conclusion("alternatives", "alone", names=names)
+    if verdict.verdict is Ended.SET:
+        best, *others = sorted(verdict.in_set, key=lambda one: (one.behind is None, one.behind))
+        other = next((one for one in others if one.name != best.name), best)
+        names = {
+            "first": name_at(best.name, best.coordinates),
+            "second": name_at(other.name, other.coordinates),
+        }
+        if other.behind is None or best.behind is None:
+            yield Conclusion("alternatives", "set_silent", names=names)
+        else:
+            lead = Value(other.behind - best.behind, source="verdict: candidates, behind")
+            yield Conclusion("alternatives", "set", {"margin": lead, "needed": needed}, names)
+    if verdict.reason is Reason.NO_KNOWN_EFFECT:
+        yield from _nearest(verdict, candidates)
+
+
+def _nearest(verdict: Verdict, candidates: pd.DataFrame) -> Iterator[Conclusion]:
+    """Of what no known effect explains: the one that comes nearest."""
+    threshold = verdict.threshold.log_evidence
+    tried = candidates[candidates["stage"] == "refit 1"] if len(candidates) else candidates
+    if threshold is None or tried.empty or not tried["log_evidence"].max() > threshold:
+        return
+    best = largest(tried, tried["log_evidence"])
+    values = {
+        "evidence": Value(float(best["log_evidence"]), source="candidates: refit 1"),
+        "threshold": Value(threshold, source="verdict: threshold"),
+    }
+    yield Conclusion("alternatives", "nearest", values, {"effect": general(best["effect"])})
+
+
+def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterator[Conclusion]:
+    """Where and what the part without a name is, and how well it can be described without one."""
+    told = verdict.part or verdict.unknown
+    if told is not None and verdict.reason not in (Reason.NO_BASE, Reason.DATA_ERRORS):
+        motion, joint, left = place_of_most(where, gap, WITH_EFFECTS)
+        if left is not None:
+            sizes = {"value": left, "left": bare(left)}
+            rule = "remains" if verdict.effects else "unexplained"
+            yield Conclusion(rule, "place", sizes, {"place": motion, "joint": joint})
+        shape = (
+            verdict.part.left_shape if verdict.part else verdict.unknown and verdict.unknown.shape
+        )
+        names = {"shape": shape_in_words(shape or "")}
+        yield Conclusion("shape", "seen" if shape else "unseen", names=names)
+    formula, table = None if told is None else told.formula, verdict.tabulated
+    if table is not None:
+        values = {"after": Value(table.gap, NOISE, source="verdict: tabulated")}
+        laws = readable(table.place).split("; ")
+        curve = in_words([laws], _MOST_WORDS_OF_CURVE) or f"{len(laws)} motions"
+        yield _described("curve", values, table.held_out_closed, {"curve": curve})
+    if formula is not None:
+        values = {
+            "fit": Value(change_of_misfit(formula.explained), "%", source="verdict: formula"),
+        }
+        terms = {"terms": count(len(formula.terms), "term")}
+        yield _described("formula", values, formula.held_out_closed, terms)
+    for one in {one.name: one for one in reversed(verdict.withheld)}.values():
+        unit, factor = ("%", 100.0) if one.unit == "1" else UNITS.get(one.unit, (one.unit, 1.0))
+        values = {"allowed": Value(factor * one.allowed, unit, source="verdict: withheld")}
+        if one.known_to is not None:
+            values["known"] = Value(factor * one.known_to, unit, source="verdict: withheld")
+        names = {"effect": general(one.name), "imperfection": _set_up(one.imperfection)}
+        yield Conclusion("hidden", "known" if "known" in values else "unknown", values, names)
+
+
+def _described(
+    rule: str, values: dict[str, Value], closed: float | None, names: dict[str, str]
+) -> Conclusion:
+    if closed is None:
+        return Conclusion(rule, "fit", values, names)
+    change = Value(change_of_misfit(closed), "%", source=f"verdict: {rule}, held_out_closed")
+    return Conclusion(rule, "left_out", {**values, "closed": change}, names)
+
+
+def _set_up(kind: str) -> str:
+    return SET_UP.get(kind, plain(kind))
+
+
+def next_test(verdict: Verdict, next_tests: pd.DataFrame) -> Iterator[Conclusion]:
+    """The run that is advised first."""
+    best = advised(verdict, next_tests)
+    if best is None:
+        if len(next_tests):
+            yield Conclusion("next", "none")
+        return
+    subject, how = best["effect_or_pair"], "next_tests: advised"
+    values = {
+        "gain": Value(float(best["gain_in_log_evidence"]), source=how),
+        "cycles": Value(int(best["cycles"]), source=how),
+    }
+    names = {
+        "subject": listed(map(general, subject.split(" or "))),
+        "run": run_in_words(best["test"]),
+    }
+    yield Conclusion("next", _asks(subject), values, names)
+
+
+def advised(verdict: Verdict, next_tests: pd.DataFrame) -> dict[str, Any] | None:
+    """For a set the run that distinguishes its names, else what shows the unexplained."""
+    if next_tests.empty:
+        return None
+    runs = next_tests[next_tests["status"] == USEFUL[0]]
+    runs = runs[(runs["cycles"] > 0) & ~runs["message"].str.startswith(WITHHELD)]
+    order = ["unnamed", "separate", "show"]
+    if verdict.verdict is Ended.SET:
+        order = ["separate", "unnamed", "show"]
+    rows = [{str(name): cell for name, cell in row.items()} for row in runs.to_dict("records")]
+    return min(rows, key=lambda row: order.index(_asks(row["effect_or_pair"])), default=None)
+
+
+def _asks(subject: str) -> str:
+    if subject.startswith(UNNAMED):
+        return "unnamed"
+    return "separate" if " or " in subject else "show"
+
+
+def run_in_words(run: str) -> str:
+    """``flexion–extension, loads 1.5 times as large``."""
+    test, colon, what = run.partition(": ")
+    return f"{plain(test)}{colon.replace(':', ',')}{what}"

@@ -1,0 +1,281 @@
+"""What a study of trunk loads concludes of the loads; the sentences stand in conclusions.csv."""
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from spinepipe.cohort import Cohort
+from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.page.study_page import Results
+from spinepipe.report.words import level, listed, plain, short
+from spinepipe.studies.trunk_loads.conclusions_of_trust import of_trust
+from spinepipe.studies.trunk_loads.measured import beside_measured, counted_and_held, error
+from spinepipe.studies.trunk_loads.samples import (
+    Tables,
+    counts,
+    spread_of,
+    times,
+    with_interval,
+)
+from spinepipe.studies.trunk_loads.selection import (
+    COMPRESSION,
+    PRESSURE,
+    AnsweredTask,
+    answer_of,
+    courses_of,
+    extensor_forces,
+    free_handed,
+    named,
+    of_person,
+    of_task,
+    pushed,
+    sound,
+    upright,
+)
+from spinepipe.studies.trunk_loads.settings import TrunkLoads
+from spinepipe.studies.trunk_loads.words import SIMPLIFIED, task_words
+
+EASY = 0.5
+"""Share of the strength: people stand upright with much less of theirs."""
+
+DEEP_DEG = 80.0
+"""Flexion from which on the long back muscles of people are silent."""
+
+SILENT, AS_STRONG = 0.1, 0.9
+"""Shares of the largest active force: below, muscles have relaxed; above, they have not."""
+
+SMALL = 5.0
+"""Percent of a load: a change that no interval here would show."""
+
+_MOST_NAMES = 4
+
+GROUPS = {
+    "load": "lifting",
+    "push": "exertion",
+    "aside": "sideways bending",
+    "forward": "forward bending",
+    "upright": "standing",
+}
+"""Tasks by what is done, in words."""
+
+
+def conclusions(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[Conclusion]:
+    """All of them."""
+    tables = results.tables
+    tasks = tables.get("tasks", pd.DataFrame())
+    found, beside = answer_of(study, cohort, tables), beside_measured(study, tables)
+    off = counted_and_held(beside)
+    missed = error(
+        off["computed_mpa"], off["measured_mpa"], "tasks: pressures less measured ones, held tasks"
+    )
+    yield from _answer(study, found, tables, beside, missed)
+    rebuilt = "rebuilt" if cohort.rebuilt else "scaled"
+    yield Conclusion("bodies_from", f"check_{rebuilt}")
+    stopped = list(_not_to_use(tasks, cohort)) if len(tasks) else []
+    yield from stopped or [Conclusion("bodies", rebuilt)]
+    if len(tasks):
+        yield from _effort(tasks, cohort)
+        yield from _relaxation(tasks, tables.get("muscles", pd.DataFrame()), cohort)
+    if found is not None:
+        yield from _range(found, tables)
+        yield from _levels(found, tables)
+    yield from _simplified(tables.get("simplified", pd.DataFrame()))
+    yield from of_trust(study, tables, found, beside, missed)
+    yield _methods(study, cohort, tasks)
+
+
+def _answer(
+    study: TrunkLoads,
+    found: AnsweredTask | None,
+    tables: Tables,
+    beside: pd.DataFrame,
+    missed: Value | None,
+) -> Iterator[Conclusion]:
+    """The load of the task that stands for the others, and how far pressures are off."""
+    if found is None:
+        yield Conclusion("load", "none")
+        return
+    row = found.task
+    names = {"task": task_words(row["task"]), "body": task_words(row["specimen"])}
+    load, pressure = (
+        with_interval(tables, row, *what) for what in ((COMPRESSION, "N"), (PRESSURE, "MPa"))
+    )
+    ratio = times(tables, found, COMPRESSION)
+    with_error = "both" if missed is not None else "standing"
+    without = "measured" if missed is not None else "alone"
+    verdict = without if ratio is None else with_error
+    told = {"load": load, "times": ratio, "error": missed}
+    yield Conclusion("load", verdict, {k: v for k, v in told.items() if v is not None}, names)
+    spread, drawn = spread_of(tables, row, COMPRESSION), {}
+    if spread:
+        lost, held = int(spread["n_failed"]), int(spread["n_samples"])
+        drawn = counts("intervals: n_samples and n_failed", lost=lost, samples=lost + held)
+    sampled = "single" if load.low is None else "sampled"
+    yield Conclusion("compression", sampled, {"value": load, **drawn}, names)
+    own = study.volunteer is not None and row["specimen"] == study.volunteer.specimen
+    measured = named(beside[beside["task"] == row["task"]]) if own else []
+    known = "alone"
+    if measured:
+        known = "measured" if measured[0]["confirmed"] else "unconfirmed"
+        mpa = measured[0]["measured_mpa"]
+        drawn["measured"] = Value(mpa, "MPa", source="measured_pressures.csv")
+    yield Conclusion("pressure", f"{known}_{sampled}", {"value": pressure, **drawn}, names)
+    if missed is not None:
+        n = counts("tasks", held=missed.n or 0, counted=int(beside["counted"].sum()))
+        yield Conclusion("error", "held", {"value": missed, **n})
+    if ratio is not None:
+        yield Conclusion("times", "standing", {"value": ratio}, names)
+
+
+def _not_to_use(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
+    """Tasks that fail for every body, by cause and by what is done."""
+    failing = tasks[~sound(tasks)]
+    bodies = tasks["specimen"].nunique()
+    every = failing.groupby("task", sort=False).filter(lambda r: r["specimen"].nunique() == bodies)
+    if every.empty:
+        return
+    causes = {"beyond_strength": "stop_weak", "out_of_reach": "stop_reach"}
+    cause = every["status"].map(causes).fillna("stop_unsolved")
+    by_task = cause.groupby(every["task"], sort=False).agg(lambda rows: rows.mode().iloc[0])
+    group = groups_of(tasks, cohort)
+    for verdict, names in by_task.groupby(by_task, sort=False):
+        own = [str(name) for name in names.index]
+        told = []
+        for what, words in GROUPS.items():
+            some = [name for name in own if group[name] == what]
+            n = sum(one == what for one in group.values())
+            if some:
+                few = ", ".join(map(task_words, some))
+                whole = f"all {n}" if len(some) == n else f"{len(some)} of {n}"
+                told.append(f"{words} ({few if len(some) <= _MOST_NAMES else whole})")
+        values = counts("tasks: status, of every body", tasks=len(own))
+        yield Conclusion(
+            "not_to_use", str(verdict), values, {"which": listed(told, len(told), None)}
+        )
+
+
+def groups_of(tasks: pd.DataFrame, cohort: Cohort) -> dict[str, str]:
+    """What is done in each task, a key of `GROUPS`."""
+    against, still = pushed(cohort), upright(tasks)
+    found = {}
+    for row, straight in zip(named(tasks), still, strict=True):
+        name = str(row["task"])
+        aside = abs(row["trunk_right_bending_deg"]) > abs(row["trunk_extension_deg"])
+        bent = "upright" if straight else "aside" if aside else "forward"
+        loaded = "load" if row["hand_load_kg"] > 0.0 else bent
+        found[name] = "push" if name in against else loaded
+    return found
+
+
+def _effort(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
+    """Whether the model's muscles do what people do easily: tasks with empty hands."""
+    free = free_handed(tasks, cohort).dropna(subset=["strength_used"])
+    if free.empty:
+        return
+    worst = named(free.sort_values("strength_used", kind="stable"))[-1]
+    source = "tasks: strength_used, empty hands, largest of all bodies"
+    values = {"worst": Value(100.0 * worst["strength_used"], "%", source=source)}
+    names = {"task": task_words(worst["task"])}
+    standing = free[upright(free)]["strength_used"]
+    share = float(standing.max()) if len(standing) else 0.0
+    if len(standing):
+        values["standing"] = Value(100.0 * share, "%", source=source)
+    weak = "weak" if len(standing) else "weak_task"
+    fails = share > EASY or worst["strength_used"] > 1.0
+    yield Conclusion("effort", weak if fails else "enough", values, names)
+
+
+def _relaxation(tasks: pd.DataFrame, muscles: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
+    """What is left of the long back muscles' active force in the deepest bend, of all bodies."""
+    left = []
+    for body, course in courses_of(tasks, cohort).items() if len(muscles) else ():
+        forces = extensor_forces(of_person(muscles, body), course)
+        force = forces.groupby("flexion_deg")["active"].sum().sort_index()
+        if len(force) and force.max() > 0.0 and force.index[-1] >= DEEP_DEG:
+            left.append(float(force.iloc[-1] / force.max()))
+    if not left:
+        return
+    how = "muscles: active force of the long extensors, deepest bend over largest"
+    ends = {"least": min(left), "most": max(left)}
+    values = {end: Value(100.0 * x, "%", n=len(left), source=how) for end, x in ends.items()}
+    verdict = "relaxed" if max(left) <= SILENT else "none" if min(left) >= AS_STRONG else "partly"
+    yield Conclusion("relaxation", verdict, values)
+
+
+def _range(found: AnsweredTask, tables: Tables) -> Iterator[Conclusion]:
+    """How far bodies differ in the task of the answer, beside the interval of one of them."""
+    tasks = tables["tasks"]
+    rows = tasks[sound(tasks) & (tasks["task"] == found.task["task"])].dropna(subset=[COMPRESSION])
+    if len(rows) < 2:
+        return
+    ranked = named(rows.sort_values(COMPRESSION, kind="stable"))
+    ends = {"least": ranked[0], "most": ranked[-1]}
+    how = "tasks: compression of L4L5, held tasks"
+    values = {end: Value(row[COMPRESSION], "N", source=how) for end, row in ends.items()}
+    names = {f"{end}_body": short(plain(row["specimen"]), 20) for end, row in ends.items()}
+    one, verdict = with_interval(tables, found.task, COMPRESSION, "N"), "unsampled"
+    if one.low is not None and one.high is not None:
+        wide = one.high - one.low
+        apart = values["most"].number - values["least"].number
+        verdict = "differ" if apart > wide else "alike"
+        values["wide"] = Value(wide, "N", source="intervals: high less low")
+    values |= counts(how, bodies=len(rows))
+    names["task"] = task_words(found.task["task"])
+    yield Conclusion("range", verdict, values, names)
+
+
+def _levels(found: AnsweredTask, tables: Tables) -> Iterator[Conclusion]:
+    """Where in the spine the load of the answer's task is."""
+    rows = of_task(tables.get("levels", pd.DataFrame()), found.task)
+    ranked = named(rows.dropna(subset=["compression_n"])) if len(rows) else []
+    if len(ranked) < 2:
+        return
+    ranked.sort(key=lambda row: float(row["compression_n"]))
+    ends = {"least": ranked[0], "most": ranked[-1]}
+    how = "levels: compression_n"
+    values = {end: Value(row["compression_n"], "N", source=how) for end, row in ends.items()}
+    names = {f"{end}_level": level(row["level"]) for end, row in ends.items()}
+    names["task"] = task_words(found.task["task"])
+    down = (ranked[0]["level"], ranked[-1]["level"]) == ("T11T12", "L5S1")
+    yield Conclusion("levels", "down" if down else "elsewhere", values, names)
+
+
+def changes(simplified: pd.DataFrame) -> pd.DataFrame:
+    """Change of the compression of L4L5 by each simplification, percent of the whole model's.
+
+    Columns simplification, specimen, task, percent, imbalance_nm; tasks that both hold.
+    """
+    columns = ["simplification", "specimen", "task", "percent", "imbalance_nm"]
+    good = simplified[sound(simplified)] if len(simplified) else simplified
+    if good.empty:
+        return pd.DataFrame(columns=columns)
+    place = ["specimen", "task"]
+    whole = good[good["simplification"] == "none"].set_index(place)[COMPRESSION].rename("whole")
+    rows = good[good["simplification"] != "none"].join(whole, on=place).dropna(subset=["whole"])
+    rows = rows[rows["whole"] > 0.0]
+    return rows.assign(percent=100.0 * (rows[COMPRESSION] / rows["whole"] - 1.0))[columns]
+
+
+def _simplified(simplified: pd.DataFrame) -> Iterator[Conclusion]:
+    """Which simplification changes the load most."""
+    found = changes(simplified)
+    if found.empty:
+        return
+    worst = named(found.sort_values("percent", key=abs, kind="stable"))[-1]
+    own = found[found["simplification"] == worst["simplification"]]["percent"]
+    how, worst_percent = "simplified: compression of L4L5", abs(float(worst["percent"]))
+    ends = {"low": float(own.min()), "high": float(own.max()), "size": worst_percent}
+    values = {end: Value(value, "%", n=len(own), source=how) for end, value in ends.items()}
+    fewest = int(found["simplification"].value_counts().min())
+    values |= counts("simplified: status", pairs=len(own), fewest=fewest)
+    names = {"what": SIMPLIFIED.get(worst["simplification"], plain(worst["simplification"]))}
+    yield Conclusion("simplified", "small" if worst_percent < SMALL else "matters", values, names)
+
+
+def _methods(study: TrunkLoads, cohort: Cohort, tasks: pd.DataFrame) -> Conclusion:
+    n = tasks["task"].nunique() if len(tasks) else 0
+    values = counts("specimens.csv and tasks", bodies=len(cohort.specimen_names), tasks=n)
+    if not study.uncertain.tasks:
+        return Conclusion("methods", "single", values)
+    values |= counts("settings: samples", samples=study.uncertain.runs)
+    return Conclusion("methods", "sampled", values)
