@@ -42,7 +42,7 @@ class Run:
 
 FOUNDATION = (
     *("simulations.parquet", "model.yaml", "best.json"),
-    *(f"figures/{name}.svg" for name in ("stiffness", "errors", "joint_pose")),
+    *(f"figures/{name}.svg" for name in ("agreement", "joint_pose")),
 )
 """Results without what the study tells beyond its poses."""
 
