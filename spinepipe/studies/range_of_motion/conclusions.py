@@ -1,6 +1,7 @@
 """What a study of range of motion concludes; the sentences stand in conclusions.csv."""
 
 from collections.abc import Iterator, Sequence
+from math import inf
 from typing import Any
 
 import pandas as pd
@@ -8,7 +9,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.page.study_page import Results
-from spinepipe.report.words import level, plain
+from spinepipe.report.words import level, listed, plain
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import EVERY, FACTORS
 from spinepipe.units import COORDINATES
@@ -16,7 +17,7 @@ from spinepipe.units import COORDINATES
 SOURCES = {
     "specimen": "differences between specimens",
     "pose": "where joint frames are",
-    "stiffness": "the stiffness",
+    "stiffness": "stiffness",
     "rest": "joint frames and stiffness together",
 }
 """Parts of the variance in words."""
@@ -25,6 +26,7 @@ MOST = 0.5
 """Of the variance: more than this comes from a source for sure where its interval lies above."""
 
 FEW_DRAWS = 10
+FEWEST_FOR_QUARTILES = 4
 MANY_LOST = 0.1
 """Share of runs without equilibrium above which the others no longer stand for all."""
 
@@ -43,7 +45,8 @@ def conclusions(study: RangeOfMotion, cohort: Cohort, results: Results) -> Itera
     shared = variance[variance["status"] == "done"] if len(variance) else variance
     if len(moved):
         yield from _motion(moved, shared)
-        yield _levels(moved)
+        if moved["joint"].nunique() > 1 and moved["n"].min() >= FEWEST_FOR_QUARTILES:
+            yield _levels(moved)
     else:
         yield Conclusion("motion", "none")
     if len(shared):
@@ -76,9 +79,8 @@ def _motion(moved: pd.DataFrame, shared: pd.DataFrame) -> Iterator[Conclusion]:
     verdict = "alone" if not len(own) else "mixed" if factor is None else "most"
     told = {"factor": SOURCES[factor]} if factor else {}
     yield Conclusion("motion", verdict, ends, {**names, **places, **told})
-    low, high = sorted(abs(widest[f"percentile_{end}"]) for end in (5, 95))
-    if widest["percentile_5"] * widest["percentile_95"] < 0.0:  # across zero sizes have no order
-        low, high = sorted((widest["percentile_5"], widest["percentile_95"]))
+    sign = -1.0 if widest["median"] < 0.0 else 1.0  # flexion is negative extension
+    low, high = sorted(sign * widest[f"percentile_{end}"] for end in (5, 95))
     between = Value(abs(widest["median"]), "°", low, high, int(widest["n"]), how)
     yield Conclusion("widest", "by_test", {"value": between}, names)
     if factor:
@@ -116,12 +118,13 @@ def _levels(moved: pd.DataFrame) -> Conclusion:
         ends = {"most_joint": sizes.idxmax(), "least_joint": sizes.idxmin()}
         names = {name: level(str(joints.at[at, "joint"])) for name, at in ends.items()}
         found.append((spread - middle, spread, middle, {"test": plain(str(test)), **names}))
-    beyond, spread, middle, names = max(found, key=lambda one: one[0])
+    # the test in which joints are farthest apart for the spread of one
+    beyond, spread, middle, names = max(found, key=lambda one: one[1] / (one[2] or inf))
     values = {
         "medians": Value(spread, "°", source="rom_summary: largest less least median"),
         "middle": Value(middle, "°", source="rom_summary: interquartile range, median of joints"),
     }
-    return Conclusion("levels", "differ" if beyond > 0.0 else "alike", values, names)
+    return Conclusion("levels", "beyond" if beyond > 0.0 else "within", values, names)
 
 
 def _dominant(shared: pd.DataFrame) -> Conclusion:
@@ -130,7 +133,7 @@ def _dominant(shared: pd.DataFrame) -> Conclusion:
     held = [name for name in sources.values() if name]
     if not held:
         return Conclusion("dominant", "none")
-    factor = max(set(held), key=held.count)
+    factor, *others = sorted(dict.fromkeys(held), key=held.count, reverse=True)
     tests = [test for test, name in sources.items() if name == factor]
     rows = shared[shared["test"].isin(tests)]
     least = _row(rows, rows[f"{factor}_share"].idxmin())
@@ -139,8 +142,11 @@ def _dominant(shared: pd.DataFrame) -> Conclusion:
         "held": Value(len(tests), source="rom_variance: tests"),
         "tests": Value(len(sources), source="rom_variance: tests"),
     }
-    verdict = "all" if len(tests) == len(sources) else "some"
-    return Conclusion("dominant", verdict, values, {"factor": SOURCES[factor]})
+    names = {"factor": SOURCES[factor]}
+    if others:
+        told = listed(SOURCES[name] for name in others)
+        return Conclusion("dominant", "differ", values, {**names, "other": told})
+    return Conclusion("dominant", "all" if len(tests) == len(sources) else "some", values, names)
 
 
 def _draws(study: RangeOfMotion) -> Conclusion:

@@ -80,6 +80,15 @@ def variance(shares: Sequence[float], sets: int = 12, poses: int = 20) -> pd.Dat
     return pd.DataFrame(rows)
 
 
+def swapped() -> pd.DataFrame:
+    """Stiffness makes most in one test, joint frames in the other."""
+    rows = variance((0.9, 0.9))
+    other, pairs = rows["test"] == "left_rotation", {}
+    for end in ("share", "low", "high"):
+        pairs |= {f"stiffness_{end}": f"pose_{end}", f"pose_{end}": f"stiffness_{end}"}
+    return pd.concat([rows[~other], rows[other].rename(columns=pairs)])
+
+
 def untold() -> pd.DataFrame:
     """Shares that were not computed."""
     few = variance((0.9, 0.9)).assign(status="too_few", message="at least 3 x 3 are needed")
@@ -106,7 +115,7 @@ CASES: dict[str, tuple[str, dict[str, pd.DataFrame], set[tuple[str, str]]]] = {
         BOTH,
         {"rom_summary": ALIKE, "rom_variance": variance((0.9, 0.8))},
         {("motion", "most"), ("widest", "by_test"), ("factor", "by_test"), ("draws", "both")}
-        | {("levels", "alike"), ("dominant", "all"), ("origins", "no_trace"), ("runs", "ok")}
+        | {("levels", "within"), ("dominant", "all"), ("origins", "no_trace"), ("runs", "ok")}
         | {("sample", "ok"), ("methods", "virtual"), ("methods_shares", "anova")},
     ),
     "most in one test alone": (
@@ -115,7 +124,7 @@ CASES: dict[str, tuple[str, dict[str, pd.DataFrame], set[tuple[str, str]]]] = {
             "rom_summary": summary((6.0, 9.0, 14.0), 4.0, lost=3),
             "rom_variance": variance((0.9, 0.5), sets=4),
         },
-        {("dominant", "some"), ("levels", "differ"), ("runs", "check"), ("sample", "check")}
+        {("dominant", "some"), ("levels", "beyond"), ("runs", "check"), ("sample", "check")}
         | {("draws", "stiffness")},
     ),
     "nothing makes most": (
@@ -125,6 +134,11 @@ CASES: dict[str, tuple[str, dict[str, pd.DataFrame], set[tuple[str, str]]]] = {
             "rom_variance": variance((0.52, 0.5)),
         },
         {("motion", "mixed"), ("dominant", "none"), ("runs", "stop"), ("draws", "frames")},
+    ),
+    "tests differ in what makes most": (
+        BOTH,
+        {"rom_summary": APART, "rom_variance": swapped()},
+        {("dominant", "differ")},
     ),
     "no shares": (
         VIRTUAL + "poses: 1\nstiffness_sets: 1\n",
@@ -152,6 +166,24 @@ def test_every_sentence_is_reached_and_keeps_the_rules(tmp_path: Path) -> None:
     reached |= {("methods", "cohort")} & verdicts(page(own, cohort, results).conclusions)
     assert reached == all_verdicts(sentences_of(PACKAGE))
     assert list(faults_of_sentences(PACKAGE)) == []
+
+
+def test_motion_across_zero_keeps_its_interval(tmp_path: Path) -> None:
+    """A median of -2 with 5th and 95th percentiles of -3 and 1 is a size of 2, from -1 to 3."""
+    wide = summary((2.0, 1.9, 1.8), 1.0)
+    flexion = (wide["test"] == "flexion") & (wide["role"] == "loaded")
+    wide.loc[flexion, ["percentile_5", "percentile_95"]] = -3.0, 1.0
+    found: Page = made(tmp_path, BOTH, SD, rom_summary=wide)[3]
+    (widest,) = (one.values["value"] for one in found.at("key"))
+    assert (widest.number, widest.low, widest.high) == (2.0, -1.0, 3.0)
+
+
+@pytest.mark.parametrize("few", [{"n": 3}, {"joint": "L3L4"}])
+def test_joints_are_not_compared_without_two_of_them_or_quartiles(
+    few: dict[str, Any], tmp_path: Path
+) -> None:
+    found: Page = made(tmp_path, BOTH, SD, rom_summary=APART.assign(**few))[3]
+    assert not [one for one in found.conclusions if one.rule == "levels"]
 
 
 def test_weight_or_a_follower_load_takes_back_that_origins_leave_no_trace(tmp_path: Path) -> None:
