@@ -22,6 +22,10 @@ MOST_WORDS = 25
 """Of an answer and of a finding."""
 
 
+_DUST = 1e-4
+"""In any unit of the field (mm, degrees, N, N m, MPa, %)."""
+
+
 @dataclass(frozen=True)
 class Value:
     """A number of a conclusion.
@@ -73,7 +77,12 @@ class Value:
         """Number and ends, rounded alike."""
         if self.low is None or self.high is None or self.high <= self.low:
             whole = float(self.number).is_integer() and abs(self.number) < 1e6
-            told = rounded_to(self.number, 0) if whole else number(self.number, 2)
+            tiny = abs(self.number) < _DUST  # nobody measures so little: what a solver leaves
+            told = (
+                rounded_to(self.number, 0 if whole else -2)
+                if whole or tiny
+                else number(self.number, 2)
+            )
             low, high = ("" if x is None else number(x, 2) for x in (self.low, self.high))
             return told, low, high
         last = floor(log10(0.5 * (self.high - self.low))) - 1

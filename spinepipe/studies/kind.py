@@ -17,7 +17,6 @@ from spinepipe.problems import InputProblem
 from spinepipe.schema import Table
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles
-from spinepipe.studies.tables import CONCLUSIONS
 
 Check = Callable[[YamlDocument, Any, Cohort], Iterator[InputProblem]]
 """What is asked of a study file, the study and its cohort."""
@@ -155,7 +154,7 @@ class Kind:
 
     def table(self, name: str) -> Table:
         """The table of that name."""
-        return next(table for table in (*self.tables, CONCLUSIONS) if table.name == name)
+        return next(table for table in self.tables if table.name == name)
 
     def figure(self, name: str) -> Figure:
         """The figure of that name."""

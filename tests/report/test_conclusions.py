@@ -13,7 +13,7 @@ from spinepipe.report.conclusions import Conclusion, Sentence, Value, rows_of, t
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (Value(21.243, "N m/rad", 20.51, 22.02), "21.24\u00a0N m/rad"),
+        (Value(21.243, "N m/rad", 20.51, 22.02), "21.24\u00a0N\u00a0m/rad"),
         (Value(334_212.0, "N/m", 311_300.0, 355_100.0), "334\u2009000\u00a0N/m"),
         (Value(-10.112, "°", -12.4, -8.2), "−10.1°"),
         (Value(0.00012, "mm", -0.0024, 0.0026), "0.0001\u00a0mm"),

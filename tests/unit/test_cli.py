@@ -148,7 +148,7 @@ def test_show(tmp_path: Path, run: Run, name: str) -> None:
     assert "flexion      1     1  V1           0   -20" in out
     page = (tmp_path / "results" / "show" / f"{Path(name).name}-b.html").read_text()
     assert page.index("Measured motion") < page.index("Geometry") < page.index("All numbers")
-    assert page.count("data:image/svg+xml") == 1, "the tests drive one coordinate"
+    assert page.count("<h2>Measured ") == 1, "the tests drive one coordinate"
     assert "specimen   b (2 of 2)" in page
     assert 'class="view spine3d"' in page
 
@@ -164,7 +164,8 @@ def test_show_without_landmarks_bodies_motion(tmp_path: Path, run: Run) -> None:
     assert code == 0
     assert "bodies: none" in out
     assert "measured motion: none" in out
-    assert picture.read_text().startswith("<?xml")
+    assert "no picture: no motion was measured" in out
+    assert not picture.exists()
 
 
 def test_show_moments_of_several_tests(tmp_path: Path, run: Run) -> None:

@@ -86,7 +86,7 @@ def test_what_runs_and_what_is_fetched_would_be_seen(tmp_path: Path) -> None:
 def test_names_do_not_run_and_the_page_needs_no_network(kind: str, tmp_path: Path) -> None:
     found = renamed(made(kind, tmp_path), RUNS, tmp_path)
     told = seen(page_of(found), tmp_path)
-    assert told.elements.count("&lt;script&gt;document") > 10, "they do stand in the page"
+    assert told.elements.count("&lt;script&gt;document") > 3, "they do stand in the page"
     assert not told.ran
     assert told.asked_for == ()
     assert [line for line in told.said if "Error" in line or "Uncaught" in line] == []

@@ -23,7 +23,7 @@ def test_its_tables_figure_and_report_are_built(toy: Project) -> None:
     assert "<svg" in (results / "figures" / "joint_bars.svg").read_text("utf-8")
     page = (results / "report.html").read_text("utf-8")
     assert "There are 36 joints." in page
-    assert "Number of joints of each specimen." in page
+    assert "Joints counted." in page
     assert "shares (`make full` makes them" in page
     assert {name for name in toy.files() if "shares" in name or "full" in name} == set()
 

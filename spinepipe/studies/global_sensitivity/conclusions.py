@@ -1,6 +1,7 @@
 """What a study of global sensitivity concludes of its inputs; see conclusions.csv."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import atanh, sqrt, tanh
 from typing import Any
 
@@ -47,17 +48,18 @@ def conclusions(study: GlobalSensitivity, cohort: Cohort, results: Results) -> I
         joints = cohort.joint_names
         yield _leading(found[0], measures, joints)
         yield from _shares(found[0], measures)
-        yield from (_load(one, measures) for one in found if one.kind != found[0].kind)
+        yield from (_load(one, measures, joints) for one in found[1:])
         if measures.of_variance:
             yield from _interaction(found[0], measures)
-            yield _negligible(found, measures)
+            yield _negligible(found[0], with_results(indices, measures), measures)
         yield from _direction(found[0], measures, results, cohort)
         yield from _convergence(found, measures, results.table("convergence"), joints)
     yield from _without(indices)
     yield from of_base(study, results)
     verdict = "ok" if study.dummy else "check"
     yield Conclusion("dummy", verdict)
-    count = Value(len(study.factors), source="settings: factors")
+    # members of a group have one index together
+    count = Value(len(study.compared) - study.dummy, source="settings: factors and groups")
     runs = Value(study.n_runs, source="settings: design")
     yield Conclusion("spreads", "given", {"factors": count})
     yield Conclusion("methods", study.design.method, {"factors": count, "runs": runs})
@@ -84,34 +86,61 @@ def _overlap(rows: Sequence[Mapping[str, Any]]) -> bool:
     return len(rows) > 1 and bool(rows[0]["low"] <= rows[1]["high"])
 
 
+def _clear(parts: Sequence[Output], index: str) -> dict[str, int]:
+    """Factors that lead with an interval apart from the next, and at how many parts."""
+    found: dict[str, int] = {}
+    for one in parts:
+        rows = one.ordered(index)
+        if rows and not _overlap(rows):
+            found[rows[0]["factor"]] = found.get(rows[0]["factor"], 0) + 1
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _leads(output: Output, measures: Measures, joints: Sequence[str]) -> Conclusion | None:
+    """That other factors lead at other joints, or in other specimens; None where none do."""
+    single = output.by_joint(joints)
+    names = dict.fromkeys(output.rows["specimen"])
+    each = [replace(output, rows=output.rows[output.rows["specimen"] == name]) for name in names]
+    for verdict, parts, what in (
+        ("by_specimen", each, "specimens"),
+        ("by_joint", single, "joints"),
+    ):
+        clear = _clear(parts, measures.main)
+        if len(clear) > 1:
+            first, *others = clear
+            values = {
+                "places": Value(clear[first], source=f"indices: {what} that it leads"),
+                what: Value(len(parts), source=f"indices: {what}"),
+            }
+            told = {"first": factor_name(first), "second": listed(map(factor_name, others), 2)}
+            return Conclusion("leading", verdict, values, {"output": output.words, **told})
+    return None
+
+
 def _leading(output: Output, measures: Measures, joints: Sequence[str]) -> Conclusion:
     """What the first output depends on most."""
     names = {"output": output.words}
     rows = output.ordered(measures.main)
     if not rows or rows[0]["factor"] not in _seen(output, measures):
         return Conclusion("leading", "none", names=names)
+    if (differing := _leads(output, measures, joints)) is not None:
+        return differing
     names["first"] = factor_name(rows[0]["factor"])
     values = {"share": _value(rows[0], measures, output.unit, measures.main)}
-    single = output.by_joint(joints)
-    first = [one.ordered(measures.main)[0]["factor"] for one in single]
-    values["joints"] = Value(len(single), source="indices: joints")
-    if len(set(first)) > 1:
-        most = max(dict.fromkeys(first), key=first.count)
-        others = [factor_name(name) for name in dict.fromkeys(first) if name != most]
-        names |= {"first": factor_name(most), "second": listed(others, 2)}
-        values["places"] = Value(first.count(most), source="indices: joints that it leads at")
-        return Conclusion("leading", "by_joint", values, names)
-    if _overlap(rows):
+    without = bool(pd.isna(rows[0]["low"]))
+    if len(rows) > 1 and (without or _overlap(rows)):
         names["second"] = factor_name(rows[1]["factor"])
         values["share2"] = _value(rows[1], measures, output.unit, measures.main)
-        return Conclusion("leading", "overlap", values, names)
+        return Conclusion("leading", "order_only" if without else "overlap", values, names)
+    single = output.by_joint(joints)
     if measures.alone and (output.rows["index"] == measures.alone).any():
-        alone = [one.ordered(measures.alone)[0]["factor"] for one in single]
+        alone = _clear(single, measures.alone)
         others = [name for name in alone if name != rows[0]["factor"]]
         if others:
-            most = max(dict.fromkeys(others), key=others.count)
-            names["alone"] = factor_name(most)
-            values["places"] = Value(others.count(most), source="indices: joints that it leads at")
+            names["alone"] = factor_name(others[0])
+            source = "indices: joints that it leads at, alone"
+            values["places"] = Value(alone[others[0]], source=source)
+            values["joints"] = Value(len(single), source="indices: joints")
             return Conclusion("leading", "with_others", values, names)
     return Conclusion("leading", "clear", values, names)
 
@@ -132,20 +161,22 @@ _MEASURE = {
 }
 
 
-def _load(output: Output, measures: Measures) -> Conclusion:
+def _load(output: Output, measures: Measures, joints: Sequence[str]) -> Conclusion:
     """What a further output depends on most."""
     names = {"output": output.words}
     rows = output.ordered(measures.main)
     if not rows or rows[0]["factor"] not in _seen(output, measures):
         return Conclusion("load", "none", names=names)
+    differing = _leads(output, measures, joints)
+    if differing is not None and differing.verdict == "by_joint":
+        return replace(differing, rule="load")
     names["first"] = factor_name(rows[0]["factor"])
     values = {"share": _value(rows[0], measures, output.unit, measures.main)}
     if not _overlap(rows):
         return Conclusion("load", "one", values, names)
     values["share2"] = _value(rows[1], measures, output.unit, measures.main)
-    return Conclusion(
-        "load", "overlap", values, {**names, "second": factor_name(rows[1]["factor"])}
-    )
+    second = {"second": factor_name(rows[1]["factor"])}
+    return Conclusion("load", "overlap", values, {**names, **second})
 
 
 def _interaction(output: Output, measures: Measures) -> Iterator[Conclusion]:
@@ -159,23 +190,24 @@ def _interaction(output: Output, measures: Measures) -> Iterator[Conclusion]:
         yield Conclusion("interaction", verdict, {"share": value}, {"output": output.words})
 
 
-def _negligible(found: Sequence[Output], measures: Measures) -> Conclusion:
-    """Inputs whose total index lies below 1 % in every output that is told of."""
-    rows = pd.concat([one.rows for one in found])
-    main = rows[(rows["index"] == measures.main) & (rows["factor"] != DUMMY)]
-    if not main["negligible"].notna().any():
-        return Conclusion("negligible", "not_asked")
-    everywhere = main.groupby("factor", sort=False)["negligible"].all()
-    names = [factor_name(str(name)) for name in everywhere[everywhere].index]
-    if not names:
-        return Conclusion("negligible", "none")
-    source = "indices: negligible at every joint of every output"
-    values = {
-        "count": Value(len(names), source=source),
-        "factors": Value(len(everywhere), source="indices: factors"),
-        "limit": Value(100.0 * NEGLIGIBLE, "%", source="rule: negligible"),
-    }
-    return Conclusion("negligible", "some", values, {"names": capital(listed(names, len(names)))})
+def _negligible(first: Output, rows: pd.DataFrame, measures: Measures) -> Conclusion:
+    """Inputs whose total index lies below 1 % in every output there is, else in the first."""
+    for verdict, part in (("some", rows), ("of_first", first.rows)):
+        main = part[(part["index"] == measures.main) & (part["factor"] != DUMMY)]
+        if not main["negligible"].notna().any():
+            return Conclusion("negligible", "not_asked")
+        everywhere = main.groupby("factor", sort=False)["negligible"].all()
+        names = [factor_name(str(name)) for name in everywhere[everywhere].index]
+        if names:
+            values = {
+                "count": Value(len(names), source="indices: negligible at every joint"),
+                "factors": Value(len(everywhere), source="indices: factors"),
+                "outputs": Value(len(main[_PLACE].drop_duplicates()), source="indices: outputs"),
+                "limit": Value(100.0 * NEGLIGIBLE, "%", source="rule: negligible"),
+            }
+            told = {"names": capital(listed(names, len(names))), "output": first.words}
+            return Conclusion("negligible", verdict, values, told)
+    return Conclusion("negligible", "none")
 
 
 def _direction(
@@ -193,8 +225,7 @@ def _direction(
     if found is None or not found.factors or len(found.values) < 5:
         return
     drawn = found.drawn(found.factors[0])
-    # flexion is negative extension: what is told of is the size, in the direction of most runs
-    size = found.values * (-1.0 if found.values.median() < 0.0 else 1.0)
+    size = found.values.abs()  # flexion is negative extension: the size is told of
     rank = float(drawn.corr(size, method="spearman"))
     if pd.isna(rank):  # either of them is constant
         return
@@ -243,7 +274,7 @@ def _convergence(
 
 
 def _why(indices: pd.DataFrame) -> str:
-    lost = indices[indices["status"] != DONE] if len(indices) else indices
+    lost = indices[~indices["status"].isin((DONE, "constant"))] if len(indices) else indices
     reasons = [text for text in lost.get("message", pd.Series(dtype=str)).unique() if text]
     return plain(str(reasons[0])) if reasons else "no run has a result"
 
@@ -252,7 +283,8 @@ def _without(indices: pd.DataFrame) -> Iterator[Conclusion]:
     """Outputs that have no index; those that vary with nothing are no loss."""
     if indices.empty:
         return
-    every = Value(len(indices[_PLACE].drop_duplicates()), source="indices: outputs")
+    vary = indices[indices["status"] != "constant"]
+    every = Value(len(vary[_PLACE].drop_duplicates()), source="indices: outputs that vary")
     lost = indices[~indices["status"].isin((DONE, "constant"))]
     if lost.empty:
         yield Conclusion("without", "ok", {"outputs": every})

@@ -43,6 +43,14 @@ def _stiffness(study: GlobalSensitivity, rows: pd.DataFrame) -> Conclusion:
                 "coordinates": listed(coordinates),
             }
             return Conclusion("stiffness", verdict, names=names)
+    asked = [one.coordinate for one in study.factors if isinstance(one, StiffnessFactor)]
+    own = rows[rows["coordinate"].isin(asked)]
+    kept, open_ = own["source"] == "not_free", own["identifiable"].eq(False)
+    for chosen, verdict in ((kept, "check_free"), (open_, "check_open")):
+        if chosen.any():
+            told = dict.fromkeys(own.loc[chosen, "coordinate"])
+            names = {"coordinates": listed(AXIS[name].lower() for name in told)}
+            return Conclusion("stiffness", verdict, names=names)
     return Conclusion("stiffness", "ok")
 
 
@@ -102,7 +110,9 @@ def _ends(times: Times) -> tuple[float, float]:
 def _runs(study: GlobalSensitivity, rows: pd.DataFrame) -> Iterator[Conclusion]:
     """How many runs failed, test by test; one light where none did."""
     one = rows.drop_duplicates(["specimen", "test"]) if len(rows) else rows
-    if one.empty or not one["failed"].any():
+    if one.empty:
+        return
+    if not one["failed"].any():
         every = Value(study.n_runs, source="settings: design")
         yield Conclusion("runs", "ok", {"runs": every})
         return

@@ -201,5 +201,5 @@ def factor_name(factor: str) -> str:
     head, _, last = factor.rpartition("_")
     if not head or last not in _AXES:
         return plain(factor)
-    about = "about " if head.endswith("direction") else ""  # turned about that axis
-    return f"{plain(head)} ({about}{_AXES[last]})"
+    turned = head.endswith("direction")
+    return f"{plain(head)} ({f'about the {_AXES[last]} axis' if turned else _AXES[last]})"

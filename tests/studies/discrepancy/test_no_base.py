@@ -14,11 +14,9 @@ from discrepancy_cases import files_of_a_search, project
 from sweeps import sweep
 
 from spinepipe.jobs import draw, report
-from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model.file import effects_for, read_model
 from spinepipe.studies.discrepancy import job as search
-from spinepipe.studies.discrepancy.kind import KIND, DiscrepancyFiles
-from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.kind import KIND
 
 ROOT = Path(__file__).resolve().parents[3]
 START = [149000.0, 1890000.0, 135000.0, 51.0, 68.8, 291.0]
@@ -97,17 +95,15 @@ def test_figures_and_report_cope(folder: Path) -> None:
     root, verdict, drawn = str(folder.parents[2]), str(folder / "verdict.json"), []
     for figure in KIND.figures:
         paths = [str(folder / f"{table}.parquet") for table in figure.tables]
-        svg, png = str(folder / f"{figure.name}.svg"), str(folder / f"{figure.name}.png")
+        svg, pdf, png = (str(folder / f"{figure.name}.{end}") for end in ("svg", "pdf", "png"))
         others = {"verdict": verdict} if "verdict.json" in figure.reads else {}
-        draw.run(root, STUDY, figure.name, paths, svg, png, **others)
+        draw.run(root, STUDY, figure.name, paths, svg, pdf, png, **others)
         drawn.append(svg)
         assert "can be shown" in Path(svg).read_text()
-    files = DiscrepancyFiles.of(*study_of_kind(Discrepancy, root, STUDY))
     paths = [str(folder / f"{table.name}.parquet") for table in KIND.tables]
-    captions = [str(ROOT / path) for path in map(files.caption, files.figures())]
     output, leading = folder.parent / "report.html", folder / "report.html"
     former = {"former": str(leading), "verdict": verdict}
-    report.run(root, STUDY, "report", paths, drawn, captions, str(output), **former)
+    report.run(root, STUDY, "report", paths, drawn, str(output), **former)
     page = output.read_text()
     told = re.findall(r'(?:url=|href=)"?([^"]+)"', leading.read_text())
     assert told == ["../report.html"] * 2

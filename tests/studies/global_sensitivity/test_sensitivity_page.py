@@ -221,12 +221,15 @@ def spoilt(found: pd.DataFrame, **changes: tuple[Any, ...]) -> pd.DataFrame:
     return found
 
 
-def base(fits: Sequence[str] = ("fitted",), verdict: str = "near", ratio: float = 1.1) -> Any:
+def base(
+    fits: Sequence[str] = ("fitted",), verdict: str = "near", ratio: float = 1.1, known: bool = True
+) -> Any:
     """Tables of the spine that inputs start from."""
     fitted = [
         {
             **{"specimen": f"s{n}", "joint": "*", "coordinate": "extension", "unit": "N m/rad"},
             **{"source": source, "start": 51.0, "stiffness": 40.0, "low": 30.0, "high": 60.0},
+            **{"identifiable": known if source == "fitted" else None},
             **{"status": "converged", "message": ""},
         }
         for n, source in enumerate(fits)
@@ -268,6 +271,14 @@ def cases() -> dict[str, tuple[dict[str, Any], dict[str, Any], set[tuple[str, st
     none = plain.assign(estimate=np.nan, ci_low=np.nan, ci_high=np.nan, status="too_few")
     none = none.assign(message="too few runs are left")
     fixed = plain.assign(negligible=plain["negligible"] & (plain["factor"] == "nothing"))
+    elsewhere = plain.assign(negligible=plain["negligible"] & (plain["output"] == "motion"))
+    two = indices(specimens=("a", "b"))
+    mine = (two["specimen"] == "b") & (two["index"] == "ST")
+    leads = two["factor"].map({"load_size": 0.3, "load_point_x": 0.7}).where(mine)
+    two["estimate"] = leads.fillna(two["estimate"])
+    two["ci_low"] = (leads - HALF).fillna(two["ci_low"])
+    two["ci_high"] = (leads + HALF).fillna(two["ci_high"])
+    between = spoilt(plain, a=("S1", "load_size", "", 0.40), b=("S1", "load_point_x", "", 0.41))
     ran, design = runs()
     flat = ran.copy()
     angles = [column.name for column in RESPONSES.columns if column.unit in ("deg", "N m")]
@@ -279,7 +290,12 @@ def cases() -> dict[str, tuple[dict[str, Any], dict[str, Any], set[tuple[str, st
     return {
         "clear": (
             {},
-            {"indices": plain, "convergence": convergence(plain, 0.1), **base(["given"])},
+            {
+                "indices": plain,
+                "convergence": convergence(plain, 0.1),
+                "failed_runs": failures(0),
+                **base(["given"]),
+            },
             {("leading", "clear"), ("interaction", "little"), ("negligible", "some")}
             | {("convergence", "level"), ("stiffness", "check_given"), ("base_spine", "ok")}
             | {("runs", "ok"), ("without", "ok"), ("dummy", "ok"), ("load", "one")}
@@ -298,11 +314,33 @@ def cases() -> dict[str, tuple[dict[str, Any], dict[str, Any], set[tuple[str, st
             {("leading", "overlap"), ("load", "overlap"), ("stiffness", "check_bound")}
             | {("base_spine", "stop_far"), ("spread", "check")},
         ),
+        "stiffness is open": (
+            {**FITTED, "factors": [NARROW]},
+            {"indices": plain, **base(known=False)},
+            {("stiffness", "check_open")},
+        ),
+        "stiffness is nobody's": (
+            {**FITTED, "factors": [NARROW]},
+            {"indices": plain, **base(["not_free"])},
+            {("stiffness", "check_free")},
+        ),
         "joints differ": (
             {**FITTED, "factors": [NARROW]},
             {"indices": apart, **base(["fitted", "no_fit"], "no_equilibrium")},
-            {("leading", "by_joint"), ("stiffness", "stop"), ("base_spine", "stop_falls")}
+            {
+                ("leading", "by_joint"),
+                ("load", "by_joint"),
+                ("stiffness", "stop"),
+                ("base_spine", "stop_falls"),
+            }
             | {("spread", "ok")},
+        ),
+        "specimens differ": ({}, {"indices": two}, {("leading", "by_specimen")}),
+        "alone the intervals overlap": ({}, {"indices": between}, {("leading", "clear")}),
+        "negligible for motion alone": (
+            {},
+            {"indices": elsewhere},
+            {("negligible", "of_first")},
         ),
         "nothing above the floor": (
             {},
@@ -332,7 +370,7 @@ def cases() -> dict[str, tuple[dict[str, Any], dict[str, Any], set[tuple[str, st
         "fast": (
             {"design": {"method": "fast", "samples": 256}},
             {"indices": indices("fast")},
-            {("methods", "fast"), ("negligible", "not_asked")},
+            {("methods", "fast"), ("negligible", "not_asked"), ("leading", "order_only")},
         ),
         "morris": (
             {"design": {"method": "morris", "samples": 256}},
@@ -375,7 +413,13 @@ def test_shares_are_those_of_the_closed_form(cohort: Cohort) -> None:
 def test_an_effect_has_the_unit_of_its_output(cohort: Cohort) -> None:
     made = told_of(cohort, study("morris"), indices=indices("morris"))
     assert one(made, "leading").values["share"].unit == "°"
-    assert one(made, "load").values["share"].unit == "N m"
+    units = [found.values["share"].unit for found in made.told if found.rule == "load"]
+    assert units == ["°", "N m", "N m"], "the second test, then loads of both"
+
+
+def test_runs_are_not_told_where_no_table_counts_them(cohort: Cohort) -> None:
+    found = told_of(cohort, study(), indices=indices())
+    assert not [one for one in found.told if one.rule == "runs"]
 
 
 def test_flexion_falls_where_its_negative_extension_rises(cohort: Cohort) -> None:

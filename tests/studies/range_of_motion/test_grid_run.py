@@ -49,8 +49,8 @@ def test_job_files_open_as_one_data_set(eight: Project) -> None:
 
 def test_the_page_counts_the_runs(eight: Project) -> None:
     page = eight.path(f"results/{STUDY}/report.html").read_text()
-    assert page.count('<table class="sortable"') == 3
-    assert "64 runs of 2 tests: none without a stable equilibrium" in page
+    assert page.count('<details class="tab" id="table-') == 3
+    assert "All 64 runs reached a stable equilibrium." in page
 
 
 @pytest.mark.full
