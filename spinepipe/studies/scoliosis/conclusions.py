@@ -1,7 +1,7 @@
 """What a study of scoliotic spines concludes; the sentences stand in conclusions.csv."""
 
 from collections.abc import Iterator, Mapping
-from math import sqrt
+from math import isclose, sqrt
 
 import pandas as pd
 
@@ -19,7 +19,7 @@ from spinepipe.studies.scoliosis.errors_compared import (
     Compared,
     Difference,
 )
-from spinepipe.studies.scoliosis.films import read_films
+from spinepipe.studies.scoliosis.films import read_films, step_sd_deg
 from spinepipe.studies.scoliosis.settings import Scoliosis
 
 DECIDING = "rotation"
@@ -37,6 +37,9 @@ NOT_PERSONAL = "uniform"
 """The law that takes nothing from a spine's bending films."""
 
 PUBLISHED = "tangent"
+
+FROM_POPULATION = "tangent_fitted"
+"""The law that also takes from the films of other spines."""
 
 NOT_COMPARED = ("none", "few", "alone")
 """Verdicts of errors of which there is nothing to compare."""
@@ -63,6 +66,18 @@ def conclusions(study: Scoliosis, cohort: Cohort, results: Results) -> Iterator[
         yield from _scale(tables)
         yield from _enlargement(study, variants)
     yield from quality(results, left_out, fitted)
+    yield from _methods(study)
+
+
+def _methods(study: Scoliosis) -> Iterator[Conclusion]:
+    """Where laws come from, of the models that were asked for."""
+    taken = [LAWS[name] for name in LAWS if name in study.models and name != NOT_PERSONAL]
+    if taken:
+        yield Conclusion("methods_laws", "films", {}, {"laws": listed(taken)})
+    if FROM_POPULATION in study.models:
+        yield Conclusion("methods_laws", "population")
+    if NOT_PERSONAL in study.models:
+        yield Conclusion("methods_laws", "uniform")
     scale = study.scale
     sizes = {"apical_moment": (scale.apical_moment_nm, "N m")}
     sizes["mean_stiffness"] = (scale.mean_stiffness_nm_per_rad, "N m/rad")
@@ -123,7 +138,11 @@ def _noise(cohort: Cohort, compared: Compared) -> Iterator[Conclusion]:
     repeated = any(max(one.readings.values()) > 1 for one in spines)
     value = Value(compared.noise, "°", source="accuracy: reading_noise")
     told = {"value": value, "tilt": _tilt(compared.noise)}
-    yield Conclusion("noise", "ok" if repeated else "check_stated", told)
+    step = step_sd_deg(cohort)
+    # a study states it with one digit
+    only_step = step is not None and isclose(told["tilt"].number, step, rel_tol=0.1)
+    stated = "check_step" if cohort.made_up and only_step else "check_stated"
+    yield Conclusion("noise", "ok" if repeated else stated, told)
     yield Conclusion("detectable", "known", {"value": compared.told_detectable})
 
 
@@ -136,12 +155,14 @@ def _personal(left_out: Compared) -> Iterator[Conclusion]:
     better = [one for one in found if one.less]
     limit = left_out.detectable
     detected = [one for one in better if limit is not None and one.margin.number > limit]
-    worse = sum(one.more for one in found)
+    worse = [one for one in found if one.more]
+    worse_detected = [one for one in worse if limit is not None and -one.margin.number > limit]
     verdict = "none"
     if better:
         verdict = "some" if detected else "some_small" if limit is not None else "some_unread"
     counts = {"laws": len(found), "better": len(better), "detected": len(detected)}
-    counts |= {"worse": worse, "alike": len(found) - len(better) - worse}
+    counts |= {"worse": len(worse), "worse_detected": len(worse_detected)}
+    counts["alike"] = len(found) - len(better) - len(worse)
     source = "statistics: p_holm of pairs with uniform"
     yield Conclusion("personal", verdict, {k: Value(v, source=source) for k, v in counts.items()})
 

@@ -82,7 +82,9 @@ def _fits(laws: pd.DataFrame) -> Iterator[Conclusion]:
         return
     lost = int((fits["fit_status"] == Status.NOT_CONVERGED.value).sum())
     several = int((fits["n_optima"] > 1).sum())
-    verdict = "stop" if lost > MANY * len(fits) else "check" if lost or several else "ok"
+    verdict = "check" if lost else "check_several" if several else "ok"
+    if lost > MANY * len(fits):
+        verdict = "stop"
     source = "laws: fit_status, n_optima"
     yield Conclusion("fits", verdict, counted(source, lost=lost, several=several, fits=len(fits)))
     reference = fits[fits["model"] == REFERENCE]
@@ -93,7 +95,7 @@ def _fits(laws: pd.DataFrame) -> Iterator[Conclusion]:
 
 
 def _segments(laws: pd.DataFrame) -> Iterator[Conclusion]:
-    """Segments of which bending films say nothing."""
+    """Segments of which bending films say little."""
     held = laws[laws["constrained"].astype(bool)]
     names: Mapping[str, str] = {
         "laws": listed(LAWS[name] for name in LAWS if (held["model"] == name).any())

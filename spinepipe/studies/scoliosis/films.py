@@ -206,6 +206,17 @@ def _sd(films: Sequence[Array]) -> Array:
     return found
 
 
+def step_sd_deg(cohort: Cohort) -> float | None:
+    """SD of a tilt that is exact but for its last decimal; None of corners, or without a step."""
+    rows = cohort.further["films"]
+    if rows[list(CORNERS)].notna().any(axis=None):
+        return None
+    tilts = rows["orientation_deg"].to_numpy(float)
+    steps = (10.0**-k for k in range(4) if np.allclose(tilts, tilts.round(k), rtol=0.0, atol=1e-9))
+    step = next(steps, None)
+    return None if step is None else step / float(np.sqrt(12.0))
+
+
 def reading_noise(settings: Scoliosis, cohort: Cohort) -> Array:
     """(2,) SD of what is taken for a place seen from the lowest vertebra (mm, each way) and for a
     vertebra's own tilt (deg); NaN where nothing tells.
