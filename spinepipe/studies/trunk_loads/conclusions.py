@@ -5,9 +5,10 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.cohort import Cohort
+from spinepipe.muscles.trunk import LEVELS
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.page.study_page import Results
-from spinepipe.report.words import level, listed, plain, short
+from spinepipe.report.words import count, level, listed, plain, short
 from spinepipe.studies.trunk_loads.conclusions_of_trust import of_trust
 from spinepipe.studies.trunk_loads.measured import beside_measured, counted_and_held, error
 from spinepipe.studies.trunk_loads.samples import (
@@ -49,6 +50,9 @@ SMALL = 5.0
 
 _MOST_NAMES = 4
 
+_INVENTED = "made up"
+"""Column ``who`` of a body that stands for nobody."""
+
 GROUPS = {
     "load": "lifting",
     "push": "exertion",
@@ -77,11 +81,11 @@ def conclusions(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator
         yield from _effort(tasks, cohort)
         yield from _relaxation(tasks, tables.get("muscles", pd.DataFrame()), cohort)
     if found is not None:
-        yield from _range(found, tables)
+        yield from _range(found, tables, cohort)
         yield from _levels(found, tables)
     yield from _simplified(tables.get("simplified", pd.DataFrame()))
     yield from of_trust(study, tables, found, beside, missed)
-    yield _methods(study, cohort, tasks)
+    yield _methods(study, cohort, tables)
 
 
 def _answer(
@@ -105,6 +109,7 @@ def _answer(
     without = "measured" if missed is not None else "alone"
     verdict = without if ratio is None else with_error
     told = {"load": load, "times": ratio, "error": missed}
+    told |= counts("tasks", held=missed.n or 0) if missed is not None else {}
     yield Conclusion("load", verdict, {k: v for k, v in told.items() if v is not None}, names)
     spread, drawn = spread_of(tables, row, COMPRESSION), {}
     if spread:
@@ -136,7 +141,9 @@ def _not_to_use(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
         return
     causes = {"beyond_strength": "stop_weak", "out_of_reach": "stop_reach"}
     cause = every["status"].map(causes).fillna("stop_unsolved")
-    by_task = cause.groupby(every["task"], sort=False).agg(lambda rows: rows.mode().iloc[0])
+    by_task = cause.groupby(every["task"], sort=False).agg(
+        lambda rows: rows.iloc[0] if rows.nunique() == 1 else "stop_mixed"
+    )
     group = groups_of(tasks, cohort)
     for verdict, names in by_task.groupby(by_task, sort=False):
         own = [str(name) for name in names.index]
@@ -202,9 +209,15 @@ def _relaxation(tasks: pd.DataFrame, muscles: pd.DataFrame, cohort: Cohort) -> I
     yield Conclusion("relaxation", verdict, values)
 
 
-def _range(found: AnsweredTask, tables: Tables) -> Iterator[Conclusion]:
-    """How far bodies differ in the task of the answer, beside the interval of one of them."""
-    tasks = tables["tasks"]
+def _range(found: AnsweredTask, tables: Tables, cohort: Cohort) -> Iterator[Conclusion]:
+    """How far bodies differ in the task of the answer, beside the interval of one of them.
+
+    Without bodies that were invented: what was put in would come out.
+    """
+    people, tasks = cohort.specimens, tables["tasks"]
+    if "who" in people:
+        invented = people[people["who"] == _INVENTED]["specimen"]
+        tasks = tasks[~tasks["specimen"].isin(invented)]
     rows = tasks[sound(tasks) & (tasks["task"] == found.task["task"])].dropna(subset=[COMPRESSION])
     if len(rows) < 2:
         return
@@ -231,12 +244,14 @@ def _levels(found: AnsweredTask, tables: Tables) -> Iterator[Conclusion]:
     if len(ranked) < 2:
         return
     ranked.sort(key=lambda row: float(row["compression_n"]))
+    order = [LEVELS[::-1].index(row["level"]) for row in ranked]
+    rises = order == sorted(order) and not rows["compression_n"].duplicated().any()
     ends = {"least": ranked[0], "most": ranked[-1]}
     how = "levels: compression_n"
     values = {end: Value(row["compression_n"], "N", source=how) for end, row in ends.items()}
     names = {f"{end}_level": level(row["level"]) for end, row in ends.items()}
     names["task"] = task_words(found.task["task"])
-    down = (ranked[0]["level"], ranked[-1]["level"]) == ("T11T12", "L5S1")
+    down = rises and (ranked[0]["level"], ranked[-1]["level"]) == ("T11T12", "L5S1")
     yield Conclusion("levels", "down" if down else "elsewhere", values, names)
 
 
@@ -272,10 +287,15 @@ def _simplified(simplified: pd.DataFrame) -> Iterator[Conclusion]:
     yield Conclusion("simplified", "small" if worst_percent < SMALL else "matters", values, names)
 
 
-def _methods(study: TrunkLoads, cohort: Cohort, tasks: pd.DataFrame) -> Conclusion:
+def _methods(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Conclusion:
+    tasks, sampled = (tables.get(name, pd.DataFrame()) for name in ("tasks", "intervals"))
     n = tasks["task"].nunique() if len(tasks) else 0
     values = counts("specimens.csv and tasks", bodies=len(cohort.specimen_names), tasks=n)
-    if not study.uncertain.tasks:
+    if sampled.empty:
         return Conclusion("methods", "single", values)
     values |= counts("settings: samples", samples=study.uncertain.runs)
-    return Conclusion("methods", "sampled", values)
+    names = {
+        "sampled_bodies": count(sampled["specimen"].nunique(), "body", "bodies"),
+        "sampled_tasks": count(sampled["task"].nunique(), "task"),
+    }
+    return Conclusion("methods", "sampled", values, names)

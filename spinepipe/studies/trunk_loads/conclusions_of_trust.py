@@ -39,6 +39,9 @@ LOADS = {
     "l5s1_shear_n": "shear of L5–S1",
 }
 
+LOADED = {"pressure": PRESSURE, "compression": COMPRESSION}
+"""Loads whose spread is told."""
+
 _MOST_NAMES = 4
 
 
@@ -70,8 +73,9 @@ def of_trust(
 
 
 def _inside(beside: pd.DataFrame) -> Iterator[Conclusion]:
-    """Whether measured pressures lie inside the intervals of the computed ones."""
-    known = beside.dropna(subset=["low", "high"])
+    """Whether confirmed measured pressures lie inside the intervals of the computed ones."""
+    sampled = beside.dropna(subset=["low", "high"])
+    known = sampled[sampled["confirmed"]]
     if known.empty:
         return
     measured = known["measured_mpa"]
@@ -79,7 +83,7 @@ def _inside(beside: pd.DataFrame) -> Iterator[Conclusion]:
     lost, held = int(known["n_failed"].sum()), int(known["n_samples"].sum())
     values = counts(
         "intervals: pressure, beside measured_pressures.csv",
-        outside=len(out), tasks=len(known), unconfirmed=int((~known["confirmed"]).sum()),
+        outside=len(out), tasks=len(known), unconfirmed=len(sampled) - len(known),
         lost=lost, samples=lost + held,
     )  # fmt: skip
     some = "outside" if len(out) <= _MOST_NAMES else "outside_many"
@@ -156,17 +160,20 @@ def _drivers(study: TrunkLoads, tables: Tables, task: Row) -> Iterator[Conclusio
     if tables.get("intervals", pd.DataFrame()).empty:
         return
     values, names, sources = {}, {"task": task_words(task["task"])}, []
-    for name, quantity in (("pressure", PRESSURE), ("compression", COMPRESSION)):
+    for name, quantity in LOADED.items():
         ranked, source = shares(study, tables, task, quantity)
-        sources.append(source)
         first = named(ranked.head(2))
-        if first and (len(first) < 2 or first[0]["low"] > first[1]["share"]):
+        if not first:
+            return
+        sources.append(source)
+        if len(first) < 2 or first[0]["low"] > first[1]["share"]:
             share, low, high = (float(first[0][end]) for end in ("share", "low", "high"))
             values[name] = Value(share, "%", low, high, source=f"drivers or responses: {source}")
             of = input_words(first[0]["factor"])
             names[name] = f"{of} ({assumed(study.uncertain, first[0]['factor'])})"
     names = {key if key == "task" else f"{key}_input": words for key, words in names.items()}
-    names["method"] = sources[-1]
+    each = [f"{source} ({name})" for source, name in zip(sources, LOADED, strict=True)]
+    names["method"] = sources[0] if len(set(sources)) == 1 else "; ".join(each)
     verdict = "both" if len(values) == 2 else next(iter(values), "neither")
     yield Conclusion("drivers", verdict, values, names)
 
@@ -239,8 +246,11 @@ def _stability(held: pd.DataFrame) -> Iterator[Conclusion]:
         return
     stable = known["stable"].astype(bool)
     values = counts("tasks: stable", falling=int((~stable).sum()), postures=len(known))
-    never = known[~stable & (known["tone"] == "stable")]["task"]
-    names = {"which": listed(plain(str(name)) for name in dict.fromkeys(never))}
+    asked = known[known["tone"] == "stable"]
+    never = asked[~stable[asked.index]]
+    n = {"bodies": never["specimen"].nunique(), "asked": asked["specimen"].nunique()}
+    values |= counts("tasks: stable, where tone was sought", **n)
+    names = {"which": listed(plain(str(name)) for name in dict.fromkeys(never["task"]))}
     verdict = "stop_tone" if len(never) else "ok" if stable.all() else "check"
     yield Conclusion("stability", verdict, values, names)
 

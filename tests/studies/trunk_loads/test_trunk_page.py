@@ -183,6 +183,7 @@ def stand_full(tables: Frames) -> None:
 
 ALL_LOST = Size(1, failing=tuple((t, "not_converged", "") for t in tables_of(ONE)["tasks"]["task"]))
 SOUND = Size(1, failing=())
+DOWNWARDS = ("T11T12", "T12L1", "L1L2", "L2L3", "L3L4", "L4L5", "L5S1")
 NO_TONE = cells("tasks", where_task="standing_stable", tone="stable", stable=False)
 
 CASES = (
@@ -199,6 +200,8 @@ CASES = (
     Case("pressure unconfirmed_single", Size(1, ("full_flexion",), samples=False)),
     # what is not to be used, and what bodies are
     Case("not_to_use stop_weak|not_to_use stop_reach|held stop|bodies_from check_rebuilt"),
+    Case("not_to_use stop_mixed", Size(5, failing=WEAK),
+         cells("tasks", where_task="load_away", where_specimen="woman", status="out_of_reach")),
     Case("held ok|bodies rebuilt", SOUND),
     Case("held ok|bodies scaled|bodies_from check_scaled", SOUND, rebuilt=False),
     # measured pressures
@@ -258,6 +261,10 @@ CASES = (
     Case("range differ", Size(5), cells("intervals", where_quantity=C, low=1989.0, high=1991.0)),
     Case("levels down", ONE),
     Case("levels elsewhere", ONE, cells("levels", where_level="L2L3", compression_n=9000.0)),
+    Case("levels elsewhere", ONE, all_of(*(
+        cells("levels", where_level=joint, compression_n=force)
+        for joint, force in zip(DOWNWARDS, (100.0, 900.0, 800.0, 700.0, 600.0, 500.0, 1000.0),
+                                strict=True)))),
     Case("simplified matters", ONE),
     Case("simplified small", ONE, cells("simplified", compression=0, l4l5_compression_n=700.0)),
 )  # fmt: skip
@@ -319,7 +326,7 @@ def test_errors_are_of_held_tasks_alone() -> None:
 
 
 def test_measured_pressures_outside_are_counted_and_named() -> None:
-    """Measured: standing 0.5, load away 1.8, flexion 50 1.09 MPa."""
+    """Measured: standing 0.5, load away 1.8, flexion 50 1.09 MPa; full flexion from memory."""
     ends = {"standing": (0.4, 0.6), "load_away": (1.9, 2.2), "flexion_50": (0.2, 1.0)}
     changes = [
         cells("intervals", where_task=task, where_quantity=P, low=low, high=high)
@@ -328,6 +335,16 @@ def test_measured_pressures_outside_are_counted_and_named() -> None:
     found = says(Case("", ONE, all_of(*changes)), "inside")
     assert "in 2 of 3 sampled tasks: flexion 50 and load away." in found.text
     assert "12 of" in found.note, "samples lost stand beside the interval"
+    none = [cells("intervals", where_quantity=P, low=5.0, high=6.0), stand_full]
+    three = Size(1, ("standing", "load_away", "full_flexion"))
+    found = says(Case("", three, all_of(*none)), "inside")
+    assert "in 1 of 1 sampled tasks: standing." in found.text, "a value from memory rejects nothing"
+    assert found.note.startswith("Left out, not confirmed in print: 1 measured")
+
+
+def test_too_much_load_may_be_why_strength_does_not_do() -> None:
+    heavy = cells("tasks", where_task="standing", strength_used=0.85)
+    assert "strength, lever arms or loads" in says(Case("", ONE, heavy), "effort").text
 
 
 def test_what_the_model_cannot_do_is_told_of_the_model() -> None:
@@ -343,11 +360,39 @@ def test_tasks_that_fail_for_all_are_told_by_what_is_done() -> None:
     assert found.level == "stop"
     assert found.text.startswith(
         "Do not use lifting (load close, load away), exertion (exertion extension), sideways "
-        "bending (side 20): the model's muscles are too weak"
+        "bending (side 20): they exceed the model's strength"
     )
     some = cells("tasks", where_task="load_away", where_specimen="woman", status="converged")
     spared = says(Case("", replace(Size(5), failing=failing), some), "not_to_use")
     assert "load away" not in spared.text, "one body does it"
+
+
+def test_errors_are_told_of_their_own_tasks() -> None:
+    found = says(Case("", replace(ONE, failing=WEAK)), "load")
+    assert "times standing; in 3 tasks, pressures miss measured ones by" in found.text
+
+
+def test_bodies_that_were_invented_are_no_range() -> None:
+    """The woman, the lightest, would carry least."""
+    found = says(Case("", Size(5)), "range")
+    assert "woman" not in found.text
+    assert "means of groups or invented" in says(Case("", SOUND), "bodies").text
+    assert found.values["bodies"].number == 4
+    others = ("ng_2002", "ouaaid_2013", "arjmand_2009")
+    alone = Case("", Size(5), cells("tasks", where_specimen=others, status="cycling"))
+    assert "range" not in {one.rule for one in alone.come_to()}, "the volunteer and the woman"
+
+
+def test_methods_tell_what_was_sampled() -> None:
+    text = says(Case("", Size(5)), "methods").text
+    assert "for 5 bodies in 25 tasks" in text
+    assert "were sampled in 1 body and 3 tasks, 224 times each" in text
+
+
+def test_a_tone_that_some_body_has_is_not_missing_for_all() -> None:
+    change = cells("tasks", where_task="standing_stable", where_specimen="woman", stable=False)
+    found = says(Case("", Size(5), change), "stability")
+    assert found.text.startswith("In 1 of 5 bodies, no muscle tone was found")
 
 
 def test_lost_samples_stand_beside_the_numbers_they_bend() -> None:
@@ -388,10 +433,9 @@ def test_drivers_are_told_with_what_was_assumed_of_them() -> None:
     )
 
 
-def test_where_indices_are_lost_correlations_tell() -> None:
-    """Twice one input and once another: four fifths and one fifth of the variance."""
-    study, tables = study_of(ONE), tables_of(ONE)
-    names = list(study.uncertain.factors)
+def two_inputs_act(tables: Frames) -> None:
+    """Samples of load_away: twice the first input and once the second."""
+    names = list(study_of(ONE).uncertain.factors)
     signs = np.array(list(product([-1.0, 1.0], repeat=len(names))))
     drawn = [
         {"sample": k, "factor": name, "value": value, "unit": ""}
@@ -399,9 +443,27 @@ def test_where_indices_are_lost_correlations_tell() -> None:
         for name, value in zip(names, row, strict=True)
     ]
     outcome = 100.0 + 2.0 * signs[:, 0] + signs[:, 1]
-    place = {"specimen": "volunteer", "task": "load_away"}
-    rows = [{**place, "sample": k, "status": "converged", C: y} for k, y in enumerate(outcome)]
+    place = {"specimen": "volunteer", "task": "load_away", "status": "converged"}
+    rows = [{**place, "sample": k, **dict.fromkeys(QUANTITIES, y)} for k, y in enumerate(outcome)]
     tables |= {"design": pd.DataFrame(drawn), "responses": pd.DataFrame(rows)}
+
+
+def test_drivers_are_told_where_shares_are_known_and_by_which_method() -> None:
+    """No indices and no samples: nothing; of compression samples alone: correlations."""
+    no_indices = cells("drivers", where_quantity=(P, C), total=None)
+    few = Case("", ONE, no_indices)
+    assert "drivers" not in {one.rule for one in few.come_to()}
+    lost = cells("drivers", where_quantity=C, total=None)
+    mixed = says(Case("", ONE, all_of(lost, two_inputs_act)), "drivers")
+    assert "Sobol's total indices (pressure); squared correlations" in mixed.note
+    assert "(compression)" in mixed.note
+
+
+def test_where_indices_are_lost_correlations_tell() -> None:
+    """Twice one input and once another: four fifths and one fifth of the variance."""
+    study, tables = study_of(ONE), tables_of(ONE)
+    two_inputs_act(tables)
+    place = {"specimen": "volunteer", "task": "load_away"}
     assert shares(study, tables, place, C)[1] == INDICES
     tables["drivers"] = tables["drivers"].assign(total=np.nan)
     found, source = shares(study, tables, place, C)
