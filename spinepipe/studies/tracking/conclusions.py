@@ -19,7 +19,14 @@ from spinepipe.studies.tracking.conclusions_of_errors import (
     counted,
 )
 from spinepipe.studies.tracking.conclusions_of_stiffness import conclusions_of_stiffness
-from spinepipe.studies.tracking.ranking import FEWEST, Ranking, chosen_approach, rankings
+from spinepipe.studies.tracking.ranking import (
+    FEWEST,
+    LEVEL,
+    Ranking,
+    chosen_approach,
+    paired_p,
+    rankings,
+)
 from spinepipe.studies.tracking.settings import CONSTRAINED, Tracking
 from spinepipe.studies.tracking.sharing import sharing_rows, similarity_rows
 from spinepipe.studies.tracking.tables import TOLD, TOO_FEW, WINDOW
@@ -87,9 +94,12 @@ def _sharing(rows: pd.DataFrame, truth: pd.DataFrame, name: str) -> Conclusion:
         return Conclusion("sharing", "untested", values, names)
     n, how = int(both["specimen"].nunique()), "sharing beside true motions: mean absolute error"
     for told, share in (("off", both["share"]), ("even", 1.0 / len(LUMBAR_JOINTS))):
-        error = 100.0 * float((share - both["share_true"]).abs().mean())
-        values[told] = Value(error, "%", n=n, source=how)
-    return Conclusion("sharing", "tested", values, names)
+        both[told] = (share - both["share_true"]).abs()
+        values[told] = Value(100.0 * float(both[told].mean()), "%", n=n, source=how)
+    by_subject = both.groupby("specimen", observed=True)[["off", "even"]].mean()
+    p = paired_p((by_subject["off"] - by_subject["even"]).to_numpy(float))
+    verdict = "tested" if p is not None and p < LEVEL else "tested_open"
+    return Conclusion("sharing", verdict, values, {**names, "people": count(n, "subject")})
 
 
 def judged_likeness(
@@ -98,6 +108,7 @@ def judged_likeness(
     """How alike subjects share each motion by an approach, beside how alike they truly do.
 
     Motions of three subjects or more by name, that in which the approach is furthest off first.
+    Each says in how many of those with a true coefficient the approach is near it.
     """
     if rows is None or rows.empty:
         return []
@@ -108,6 +119,12 @@ def judged_likeness(
         for row in window_rows(truth).to_dict("records")
         if row["status"] != TOO_FEW
     }
+    true = own["trial"].map(known).astype(float)
+    near = (own["cmc"].astype(float) - true).abs() <= CLEARLY
+    motions = {"near": near.sum(), "motions": true.notna().sum()}
+    counts = {
+        told: counted(int(n), "similarity beside true motions") for told, n in motions.items()
+    }
     found = []
     for row in own.to_dict("records"):
         trial, values = str(row["trial"]), {}
@@ -115,19 +132,21 @@ def judged_likeness(
             if pd.notna(cmc):
                 source = "similarity: cmc" if told == "cmc" else "CMC of shares of true motions"
                 values[told] = Value(float(cmc), n=int(row["n_specimens"]), source=source)
+        nothing_varies = "cmc" not in values and "nothing varies" in str(row["message"])
         verdict, off = "differ", 0.1
         if name.startswith(CONSTRAINED):
             verdict = "fixed"
         elif trial not in known:
             verdict, off = "untested" if "cmc" in values else "untested_undefined", 0.0
+            verdict = "equal" if nothing_varies else verdict
         elif "true" in values and "cmc" not in values:
-            verdict, off = "undefined", 2.0
+            verdict, off = "equal" if nothing_varies else "undefined", 2.0
         elif "true" in values:
             over = values["cmc"].number - values["true"].number
             verdict = "alike" if abs(over) <= CLEARLY else "lower" if over < 0.0 else "higher"
             off = 0.2 + abs(over)
         names = {"approach": phrase(name), "trial": plain(trial)}
-        found.append((off, trial, Conclusion("likeness", verdict, values, names)))
+        found.append((off, trial, Conclusion("likeness", verdict, values | counts, names)))
     return [(trial, told) for _, trial, told in sorted(found, key=lambda one: -one[0])]
 
 

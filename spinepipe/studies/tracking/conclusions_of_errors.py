@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import pandas as pd
 
-from spinepipe.motion.skeleton import LUMBAR_JOINTS
+from spinepipe.motion.skeleton import JOINTS
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.words import count, level
 from spinepipe.status import Status
@@ -20,7 +20,6 @@ from spinepipe.studies.tracking.ranking import (
 )
 from spinepipe.studies.tracking.tables import MARKER_OFF
 from spinepipe.studies.tracking.words import phrase
-from spinepipe.units import ROTATIONS
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -93,20 +92,32 @@ def _keys(tables: Tables, found: Sequence[Ranking], one: Ranking) -> Iterator[Co
     for other in found:
         same = (other.measure, other.where) == (ANGLES, one.where)
         if same and other is not one and best in other.approaches:
-            values, moved = {"value": other.error(best)}, _lumbar_range(tables["ranges"], one)
+            levels = _levels(tables["errors"], other, best)["level"].unique()
+            joints = [joint for joint in JOINTS if joint in levels]
+            values = {"value": other.error(best)}
+            moved = _sagittal_range(tables["ranges"], other, best, joints)
             values |= {"range": moved} if moved else {}
-            yield Conclusion("angle", "moving" if moved else "alone", values, names)
+            ends = " to ".join(dict.fromkeys((level(joints[0]), level(joints[-1]))))
+            verdict = "moving" if moved else "alone"
+            yield Conclusion("angle", verdict, values, {**names, "joints": ends})
 
 
-def _lumbar_range(rows: pd.DataFrame, one: Ranking) -> Value | None:
-    """How far a lumbar joint turns, by the nearest approach: the scale of its errors."""
+def _levels(errors: pd.DataFrame, one: Ranking, approach: str) -> pd.DataFrame:
+    """Errors of an approach by level, of the motions and the measure of a ranking."""
+    own = errors[(errors["measure"] == one.measure) & (errors["approach"] == approach)]
+    return own[own["trial"].isin(one.trials)]
+
+
+def _sagittal_range(
+    rows: pd.DataFrame, one: Ranking, approach: str, joints: Sequence[str]
+) -> Value | None:
+    """How far joints turn sagittally by an approach: the scale of errors of these angles."""
     if rows.empty:
         return None
-    own = rows[rows["coordinate"].isin(ROTATIONS) & rows["joint"].isin(LUMBAR_JOINTS)]
-    own = own[(own["approach"] == one.approaches[0]) & own["trial"].isin(one.trials)]
-    most = own.groupby(["specimen", "trial", "joint"], observed=True)["range"].max()
-    how = "ranges: median of lumbar joints, each about the axis it turns about most"
-    return Value(float(most.median()), "°", n=len(most), source=how) if len(most) else None
+    own = rows[(rows["coordinate"] == "extension") & rows["joint"].isin(joints)]
+    own = own[(own["approach"] == approach) & own["trial"].isin(one.trials)]
+    how = "ranges: median of extension of the joints of these errors"
+    return Value(float(own["range"].median()), "°", n=len(own), source=how) if len(own) else None
 
 
 def _needed(one: Ranking) -> Iterator[Conclusion]:
@@ -179,9 +190,7 @@ def _stiffness_helps(one: Ranking) -> Iterator[Conclusion]:
 def _by_level(errors: pd.DataFrame, one: Ranking) -> Iterator[Conclusion]:
     """The levels with the largest and the least error."""
     best = one.approaches[0]
-    own = errors[(errors["measure"] == one.measure) & (errors["approach"] == best)]
-    own = own[own["trial"].isin(one.trials)]
-    means = own.groupby("level", observed=True, sort=False)["mean"].mean()
+    means = _levels(errors, one, best).groupby("level", observed=True, sort=False)["mean"].mean()
     if len(means) > 1:
         ends = {"most": str(means.idxmax()), "least": str(means.idxmin())}
         unit, how = one.error(best).unit, "errors: mean over subjects and trials"

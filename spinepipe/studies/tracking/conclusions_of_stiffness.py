@@ -96,12 +96,12 @@ def _profiles(rows: pd.DataFrame, ratios: "pd.Series[float]") -> Iterator[Conclu
         "profiles": counted(len(rows), source),
         **{name: counted(counts.get(name, 0), source) for name in order},
     }
-    sizes = {"most": rows["most"].max(), "low": ratios.min(), "high": ratios.max()}
+    own = rows[rows["says"] == verdict.removeprefix("all_").removesuffix("_only")]
+    sizes = {"most": own["most"].max(), "low": ratios.min(), "high": ratios.max()}
     values |= {n: Value(float(x), source="profile_points") for n, x in sizes.items() if pd.notna(x)}
     who = list(dict.fromkeys(map(str, rows["specimen"])))
     subjects = listed(who) if len(who) <= 3 else count(len(who), "subject")
     end = listed(dict.fromkeys(edges["end"]), last="or")
-    own = rows[rows["says"] == verdict.removeprefix("all_")]
     names = {"whose": subjects, "end": end, "places": _places(own)}
     yield Conclusion("profiles", verdict, values, names)
     partly = rows["message"].fillna("").str.contains("did not settle") | (rows["says"] == "lost")

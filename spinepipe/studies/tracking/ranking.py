@@ -126,7 +126,7 @@ def rankings(cohort: Cohort, errors: pd.DataFrame) -> list[Ranking]:
         for one in _ranking(measure, where, rows[rows["measure"] == measure])
     ]
     pairs = [(k, *pair) for k, one in enumerate(found) for pair in combinations(one.approaches, 2)]
-    raw = [_p(found[k].differences(one, other)) for k, one, other in pairs]
+    raw = [paired_p(found[k].differences(one, other)) for k, one, other in pairs]
     p: list[dict[frozenset[str], float | None]] = [{} for _ in found]
     for (k, *pair), value in zip(pairs, corrected(raw, "holm"), strict=True):
         p[k][frozenset(pair)] = value
@@ -134,7 +134,7 @@ def rankings(cohort: Cohort, errors: pd.DataFrame) -> list[Ranking]:
     return [replace(one, p=own, tests=tests) for one, own in zip(found, p, strict=True)]
 
 
-def _p(apart: Array) -> float | None:
+def paired_p(apart: Array) -> float | None:
     """Of a paired t test; 0 of a difference that is the same in all subjects, none of too few."""
     found = mean_of(apart)
     if found.n < FEWEST or found.value is None:

@@ -40,7 +40,9 @@ from spinepipe.studies.tracking.conclusions_of_stiffness import calibrated_value
 from spinepipe.studies.tracking.page import page, shown_tables
 from spinepipe.studies.tracking.persons import skeleton_in
 from spinepipe.studies.tracking.ranking import paired_sample_size, rankings
-from spinepipe.studies.tracking.tables import ERRORS, STIFFNESS
+from spinepipe.studies.tracking.sharing import similarity_rows
+from spinepipe.studies.tracking.tables import ERRORS, SIMILARITY, STIFFNESS, WINDOW
+from spinepipe.studies.tracking.trials import kinds_of_trials
 from spinepipe.studies.tracking.true_motions import true_motions
 from spinepipe.tables import StudyTables
 
@@ -105,6 +107,12 @@ def similarity(cmc: float | None) -> Changed:
     return changed("similarity", cmc=np.nan if cmc is None else cmc, status=status)
 
 
+def equal_shares() -> Changed:
+    """What comes of motions in which all lumbar joints turn alike."""
+    rows = similarity_rows(tables_of(Size())["tracked"], kinds_of_trials(cohort_of(Size())))
+    return {"similarity": frame(SIMILARITY, list(rows))}
+
+
 def differing() -> Cohort:
     """Persons whose true bends differ more than joints do: another joint does all of each."""
     cohort = cohort_of(Size())
@@ -153,14 +161,14 @@ NONE_AGAINST = changed("sharing", where="share < 0", share=0.0)
 
 CASES: dict[str, Case] = {
     "as made": case(
-        "vibration:check against:check sharing:tested likeness:lower closest:other markers:ok "
+        "vibration:check against:check sharing:tested_open likeness:lower closest:other markers:ok "
         "clusters:ok sizes:ok recordings:check assumed:check profiles:one_sided calibrations:ok "
         "methods_profiles:profiled fits:ok basis:markers methods:tracked methods_errors:compared"
     ),
     "shown": case(
         "nearest:best error:centre reference:kinematics angle:moving sample:ok by_level:largest "
         "stiffness_helps:better",
-        tables=ranked(**THREE) | changed("ranges", where="joint == 'L4L5'", range=6.0),
+        tables=ranked(**THREE) | changed("ranges", joint="L3L4", range=6.0),
     ),
     "another": case(
         "nearest:best stiffness_helps:worse angle:alone",
@@ -191,6 +199,9 @@ CASES: dict[str, Case] = {
     "neither": case("likeness:untested_undefined", Size(truth=False), similarity(None)),
     "nothing found": case("fits:stop nearest:none", Size(1, failing=LOST)),
     "lacking": case("lacking:check", tables={"errors": errors(THREE).query(NOT_ALL)}),
+    "farther": case("sharing:tested", tables=changed("sharing", share=0.9)),
+    "equal": case("likeness:equal", tables=equal_shares()),
+    "equal, no truth": case("likeness:equal", Size(truth=False), equal_shares()),
     "scatters": case("likeness:undefined use:stop_lost", tables=similarity(None) | UNUSABLE),
     "as alike": case("likeness:alike against:ok", tables=similarity(0.85) | NONE_AGAINST),
     "too alike": case("likeness:higher", tables=similarity(1.0)),
@@ -281,12 +292,98 @@ def test_profiles_that_are_told_in_part_are_counted() -> None:
     assert "in 2 of 6 profiles" in one.text.replace("\u00a0", " ")
 
 
+def plainly(one: Told) -> str:
+    """Text and note without hard spaces."""
+    return f"{one.text} {one.note}".replace("\u00a0", " ")
+
+
+def test_values_that_left_the_prior_are_told_beside_those_that_did_not() -> None:
+    """2 of 40 were moved by data, and the page said that data tell little."""
+    text = plainly(said("within").one("prior"))
+    assert "not shown to tell more than the prior: 38 of 40 values" in text
+    assert "which data moved: 2." in text
+    assert "Of 40 elements 2 lie outside" in plainly(said("within").one("between"))
+
+
+def test_errors_of_sagittal_angles_stand_beside_sagittal_turns_of_the_same_joints() -> None:
+    """Another axis and another joint turn further, and were the scale of the errors."""
+    own = changed("ranges", joint="L3L4", range=6.0)["ranges"]
+    other = [own.assign(coordinate="right_bending", range=40.0), own.assign(joint="L5S1", range=50)]
+    tables = ranked(**THREE) | {"ranges": pd.concat([own, *other], ignore_index=True)}
+    one = said_of(case("", tables=tables)).one("angle")
+    assert one.values["range"].number == 6.0
+    assert one.note.startswith("L3–L4 turn by 6° sagittally")
+    whole = said_of(case("", tables=changed("ranges", range=5.0))).one("angle")
+    assert whole.note.startswith("L4–L5 to T7–T8 turn by 5°")
+    assert "(L3–L4)" in said("another").one("angle").text
+
+
+def test_errors_that_do_not_add_up_from_the_pelvis_are_not_said_to() -> None:
+    rows = errors(THREE)
+    rows.loc[rows["level"] == "L2", "level"] = "L5"
+    rows.loc[rows["level"] == "L5", "mean"] *= 2.0
+    text = plainly(said_of(case("", tables={"errors": rows})).one("by_level"))
+    assert "(L3) and" in text
+    assert text.strip().endswith("(L5).")
+    assert "pelvis" not in text
+
+
+def test_a_cost_that_falls_to_an_end_is_not_said_to_bound_nothing() -> None:
+    """All but the softest value is excluded: that is a bound from above."""
+    for name in ("falls", "falls slowly"):
+        text = plainly(said(name).one("profiles"))
+        assert "in 6 of 6 the cost is least at the softest value tried" in text
+        assert "bounded" not in text
+    assert "all other values of these profiles are excluded" in plainly(
+        said("falls").one("profiles")
+    )
+
+
+def test_the_worst_motion_is_not_told_alone() -> None:
+    """Near the truth in one of two motions, far from it in the other."""
+    truth = similarity_rows(true_motions(cohort_of(Size())), kinds_of_trials(cohort_of(Size())))
+    true = {row["trial"]: row["cmc"] for row in truth if row["window"] == WINDOW and row["cmc"]}
+    assert len(true) == 2
+    trial, cmc = next(iter(true.items()))
+    one = said_of(case("", tables=changed("similarity", where=f"trial == '{trial}'", cmc=cmc)))
+    told_of = one.one("likeness")
+    assert told_of.verdict == "lower"
+    assert "In 1 of 2 motions it is within 0.1 of the true one." in plainly(told_of)
+    assert "In 0 of 2 motions" in plainly(said("scatters").one("likeness"))
+
+
+def test_nobody_is_said_to_scatter_whose_shares_are_flat() -> None:
+    for name in ("equal", "scatters", "neither", "as made"):
+        assert "scatters" not in plainly(said(name).one("likeness"))
+
+
+def test_shares_as_far_off_as_equal_ones_are_not_told_as_worse_or_better() -> None:
+    assert "not distinguishable (3 subjects)" in plainly(said("as made").one("sharing"))
+    assert "distinguishable" not in plainly(said("farther").one("sharing"))
+    assert ("sharing", "tested_open") in said("two subjects").verdicts
+
+
+def test_what_is_counted_is_named() -> None:
+    """Fits of motions, means over a part of the cycle, segments; postures without a spline."""
+    made = said("as made")
+    motions = tables_of(Size())["fits"].dropna(subset=["acceleration_rms_deg_per_s2"])
+    assert f"of {len(motions)} fits of motions" in plainly(made.one("vibration"))
+    assert "No fit of a motion" in plainly(said("unknown").one("vibration"))
+    for name in ("as made", "as alike"):
+        assert "over 20–80 % of the cycle" in plainly(said(name).one("against"))
+    for name in ("as made", "poor", "scaled"):
+        assert "segments of" in plainly(said(name).one("sizes")).lower()
+    assert "frame by frame or as a spline with 101 nodes" in plainly(made.one("methods"))
+    for name in ("some", "not shown"):
+        assert "with these differences" in said(name).one("needed").text
+
+
 def test_every_verdict_is_reached() -> None:
     found = set().union(*(said(name).verdicts for name in CASES))
     assert all_verdicts(sentences_of(PACKAGE)) - found == {
         ("likeness", "differ"),
         ("profiles", "told"),
-    }, "seen by the two tests above"
+    }, "seen by two tests above"
 
 
 def test_the_end_of_a_grid_is_found_though_it_went_through_a_logarithm() -> None:
