@@ -54,8 +54,9 @@ def conclusions(
         yield from _readings(main)
         yield from of_parts.bootstraps(study, main, results)
         yield from of_parts.posterior(main, results)
-    if found:
-        yield _identified(found)
+    enough = [one for one in found if len(one.values) >= FEWEST]
+    if enough:
+        yield _identified(enough)
     yield from of_motion.conclusions(study, cohort, results)
     yield from of_parts.conclusions(study, results)
     yield from _fits(study, results)
@@ -68,8 +69,15 @@ def _palpation(
     """How far palpation moves stiffness, beside where the load acts: the answer and key numbers."""
     if main is None:
         kept = max((len(one.values) for one in found), default=0)
+        values = {"kept": Value(kept, source="success: reduced")}
+        names: dict[str, str] = {}
         verdict = "none" if not kept else "few" if kept < FEWEST else "open"
-        yield Conclusion("palpation", verdict, {"kept": Value(kept, source="success: reduced")})
+        bounded = [one for one in found if len(one.values) >= FEWEST and not one.open]
+        if bounded:
+            least = min(bounded, key=lambda one: one.at_bound / len(one.values))
+            verdict, names = "bounded", {"stiffness": least.name}
+            values["at_bound"] = _share([least], [least.at_bound], "at a bound")
+        yield Conclusion("palpation", verdict, values, names)
         return
     alike = [one for one in found if one.coordinate == main.coordinate and one.told]
     share, low, high = main.moved
@@ -87,6 +95,7 @@ def _palpation(
             if effect[f"{way}_sd_mm"] > 0.0
         ]
         yield Conclusion("load", "told", {"value": values["load"]}, {"sds": listed(sds)})
+        yield Conclusion("load_place", "stated", names={"sds": listed(sds)})
     if len(alike) > 1:
         values["rows"] = Value(len(alike), source="calibrations: stiffnesses of this direction")
         yield Conclusion("palpation", "several", values, names)
@@ -104,7 +113,14 @@ def _palpation(
     if None not in main.region:
         how = "calibrations: median ends of the 95 % regions of retained fits"
         region = Value(middle, main.unit, *main.region, n, how)
-        yield Conclusion("region", "told", {"value": region}, names)
+        open_ = _share([main], [main.lost], "not identifiable")
+        yield Conclusion("region", "told", {"value": region, "open": open_}, names)
+
+
+def _share(of: Sequence[Stiffness], counts: Sequence[int], what: str) -> Value:
+    """Of the retained fits of some stiffnesses, those that were counted."""
+    fits = sum(len(one.values) for one in of)
+    return Value(100.0 * sum(counts) / fits, "%", n=fits, source=f"calibrations: {what}")
 
 
 def _load_points(main: Stiffness, results: Results) -> Iterator[Conclusion]:
@@ -132,7 +148,10 @@ def _load_points(main: Stiffness, results: Results) -> Iterator[Conclusion]:
     }
     verdict = "excluded" if excluded else "none_excluded" if len(told) else "too_few"
     verdict = "no_effect" if reach <= main.moved[0] else verdict
-    yield Conclusion("load_points", verdict, found, {"stiffness": main.name})
+    shifts = {way: own[f"{way}_shift_mm"].astype(float) for way in ("anterior", "superior")}
+    ways = [f"{mm.min():g} to {mm.max():g} mm {way}" for way, mm in shifts.items()]
+    names = {"stiffness": main.name, "shifts": listed(ways).replace("-", "−")}
+    yield Conclusion("load_points", verdict, found, names)
 
 
 def _readings(main: Stiffness) -> Iterator[Conclusion]:
@@ -151,22 +170,35 @@ def _readings(main: Stiffness) -> Iterator[Conclusion]:
 
 
 def _identified(found: Sequence[Stiffness]) -> Conclusion:
-    """Which stiffnesses have no number, and how many fits do not identify them."""
-    unknown = [one for one in found if not one.told]
-    worst = max(found, key=lambda one: one.lost / len(one.values))
-    told = unknown or [worst]
-    lost, fits = sum(one.lost for one in told), sum(len(one.values) for one in told)
-    share = Value(100.0 * lost / fits, "%", n=fits, source="calibrations: not identifiable")
-    names = {"worst": worst.name}
-    if not unknown or len(unknown) == len(found):
-        return Conclusion("identified", "none" if unknown else "all", {"lost": share}, names)
+    """Which stiffnesses have no number, and how many fits do not identify them or are at a bound.
+
+    Parameters
+    ----------
+    found : those with enough retained fits.
+    """
+    told, lost = [one for one in found if one.told], [one for one in found if one.open]
+    bounded = [one for one in found if not one.told and not one.open]
+    worst = max(told or found, key=lambda one: one.lost / len(one.values))
+    names, what = {"worst": worst.name}, "not identifiable"
+    of_worst, of_lost = (
+        _share(those, [one.lost for one in those], what) for those in ([worst], lost or [worst])
+    )
+    values = {"lost": of_lost, "worst_lost": of_worst}
+    if len(told) == len(found) or len(lost) == len(found):
+        return Conclusion("identified", "all" if told else "none", values, names)
+    verdict = "some" if lost and told else "bounded"
+    unknown = lost if verdict == "some" else bounded
+    if verdict == "bounded":
+        values = {"at_bound": _share(bounded, [one.at_bound for one in bounded], "at a bound")}
     ways = list(dict.fromkeys(AXIS[one.coordinate].lower() for one in unknown))
     alone = named(unknown[0].coordinate, unknown[0].place)
     several = f"{listed(ways, most=6)} stiffness"
-    whole = {one.coordinate for one in unknown} & {one.coordinate for one in found if one.told}
+    whole = {one.coordinate for one in unknown} & {
+        one.coordinate for one in found if one not in unknown
+    }
     several += f" of {len(unknown)} specimens or joints" if whole else ""
     names["unknown"] = alone if len(unknown) == 1 else several
-    return Conclusion("identified", "some", {"lost": share}, names)
+    return Conclusion("identified", verdict, values, names)
 
 
 def _landmarks(study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Conclusion]:
@@ -198,15 +230,22 @@ def _fits(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]
     yield Conclusion("fits", verdict, values)
     if verdict == "stop" and sums["kept"]:
         yield Conclusion("kept", "stop", values)
-    fits = retained(results.table("calibrations"), results.table("success"))
+    every = results.table("calibrations")
+    fits = retained(every, results.table("success"))
     if fits.empty:
         return
     each = fits.drop_duplicates(["specimen", "pose"])
     least = int(each.groupby("specimen").size().min())
     kept = {"kept": Value(len(each), source="success: reduced")}
-    source = "calibrations of retained fits"
+    source, at_bound = "calibrations of retained fits", Status.CONVERGED_AT_BOUND.value
+    bounded, inside = (
+        int((one.drop_duplicates(["specimen", "pose"])["status"] == at_bound).sum())
+        for one in (every, fits)
+    )
+    ended = {"bounded": bounded, "bounded_out": bounded - inside, "fits": sums["fits"]}
+    told = {name: Value(n, source="calibrations: status") for name, n in ended.items()}
+    yield Conclusion("bounds", "check" if bounded else "ok", told)
     flags = {
-        "bounds": ("bounded", fits["status"] == Status.CONVERGED_AT_BOUND.value),
         "optima": ("several", fits["n_optima"] > 1),
         "freedom": ("exact", fits["degrees_of_freedom"] <= 0),
     }

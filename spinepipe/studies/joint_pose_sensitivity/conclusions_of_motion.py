@@ -65,6 +65,8 @@ def _grid(shares: pd.DataFrame) -> Iterator[Conclusion]:
     source = "variance_shares: signed_share, intervals apart"
     values = {name: Value(n, n=len(pose), source=source) for name, n in above.items()}
     values["errors"] = Value(len(pose), source="variance_shares: joints and coordinates")
+    models = int(done["n_stiffness"].max())
+    values["models"] = Value(models, source="variance_shares: n_stiffness")
     larger = [name for name, n in above.items() if n]
     verdict = "both" if len(larger) == 2 else larger[0] if larger else "neither"
     yield Conclusion("grid", verdict, values)

@@ -52,8 +52,16 @@ def conclusions(study: JointPoseSensitivity, results: Results) -> Iterator[Concl
 def bootstraps(
     study: JointPoseSensitivity, main: Stiffness, results: Results
 ) -> Iterator[Conclusion]:
-    """How far start values, loading and damping move the stiffness that the answer tells."""
-    found = other_fits(study, results.table("bootstrap"), main)
+    """How far start values, loading and damping move the stiffness that the answer tells.
+
+    A fit under which a moving spine never comes to rest has no stiffness, not an infinite one.
+    """
+    fits = results.table("bootstrap")
+    if fits.empty:
+        return
+    fits = fits[fits["specimen"] == main.specimen]
+    each = fits.drop_duplicates(FIT)
+    found = other_fits(study, fits[~fits["message"].str.contains("no rest", regex=False)], main)
     # quartiles of few say nothing, those at a bound have no number
     enough = {key: values for key, values in found.items() if len(values) >= FEWEST_FITS}
     ends = {key: percentiles(values, 25.0, 50.0, 75.0) for key, values in enough.items()}
@@ -61,7 +69,11 @@ def bootstraps(
     spread = {key: 100.0 * float((three[2] - three[0]) / three[1]) for key, three in ends.items()}
     moved, names = main.moved[0], {"stiffness": main.name}
     if ("start", REST) in ends:
-        yield _moved("starts", spread["start", REST], moved, names)
+        at_rest = each[(each["bootstrap"] == "start") & (each["loading"] == REST)]
+        n = {"fits": len(at_rest), "left": len(at_rest) - len(found["start", REST])}
+        n["bounded"] = int((at_rest["status"] == Status.CONVERGED_AT_BOUND.value).sum())
+        counted = {name: Value(count, source="bootstrap: at rest") for name, count in n.items()}
+        yield _moved("starts", spread["start", REST], moved, names, **counted)
         medians = {
             loading: float(three[1]) for (what, loading), three in ends.items() if what == "start"
         }
@@ -69,11 +81,15 @@ def bootstraps(
         if len(medians) > 1:
             change = 100.0 * (medians[at] / medians[REST] - 1.0)
             yield _moved("loading", change, moved, {**names, "loading": READ[at]})
+    drawn = each[each["bootstrap"] == "damping"]
     damped = {loading: share for (what, loading), share in spread.items() if what == "damping"}
     if damped:
         at = max(damped, key=lambda loading: damped[loading])
         more = {"factor": Value(study.damping_bootstrap.factor, source="settings: factor")}
-        yield _moved("damping", damped[at], moved, {**names, "loading": READ[at]}, **more)
+        one = _moved("damping", damped[at], moved, {**names, "loading": READ[at]}, **more)
+        # "at most" is of all loadings, also of those whose quartiles are not told
+        if one.verdict == "more" or len(damped) == drawn["loading"].nunique():
+            yield one
 
 
 def _moved(

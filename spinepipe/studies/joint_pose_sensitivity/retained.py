@@ -98,8 +98,18 @@ class Stiffness:
     @property
     def told(self) -> bool:
         """Whether it has a number: most fits identify it, and few stand at a bound."""
-        n, at_bound = len(self.values), int(self._at_bound(self.values).sum())
-        return n >= FEWEST and self.lost <= MOST_LOST * n and at_bound <= MOST_AT_BOUND * n
+        n = len(self.values)
+        return n >= FEWEST and not self.open and self.at_bound <= MOST_AT_BOUND * n
+
+    @property
+    def open(self) -> bool:
+        """Whether most fits do not identify it."""
+        return self.lost > MOST_LOST * len(self.values)
+
+    @property
+    def at_bound(self) -> int:
+        """How many fits stand at a bound of it."""
+        return int(self._at_bound(self.values).sum())
 
     def at(self, *percents: float) -> Array:
         """Percentiles over the fits; NaN of one that is at a bound."""

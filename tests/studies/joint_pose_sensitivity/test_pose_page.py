@@ -26,6 +26,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.report.conclusions import Value, sentences_of
 from spinepipe.report.page.study_page import Page, Results
+from spinepipe.studies.joint_pose_sensitivity.bootstrap import NO_REST
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import folded, left_out, page
 from spinepipe.studies.joint_pose_sensitivity.retained import moved_by_load
@@ -118,6 +119,13 @@ def precise(**more: Any) -> dict[str, list[made.Row]]:
     return {"required_precision": made.required_precision(**more)}
 
 
+BOUND = {
+    "calibrations": changed(
+        made.calibrations(), 41, extension_nm_per_rad=0.037, superior_n_per_m=110.0
+    )
+}
+"""A fifth of the fits at the lower bound, a thousandth of the start; all are identified."""
+
 NO_LOAD: dict[str, list[made.Row]] = {"load_point_effect": [], "stiffness_over_load_point": []}
 TWO = {"calibrations": made.calibrations() + made.calibrations("b", shift=2.0)}
 CASES = (
@@ -128,6 +136,7 @@ CASES = (
     Case("palpation", "alone", load(anterior_sd_mm=0.0, superior_sd_mm=0.0)),
     Case("palpation", "alone", load(stated_high=None)),
     Case("palpation", "open", {"calibrations": BOTH_UNKNOWN}),
+    Case("palpation", "bounded", BOUND),
     Case("palpation", "few", {"success": made.success(left_out=made.N - 2)}),
     Case("palpation", "none", left_out_of(made.N)),
     Case("median", "told"),
@@ -136,6 +145,7 @@ CASES = (
     Case("region", "told"),
     Case("landmarks", "one"),
     Case("load_place", "known", NO_LOAD, {}),
+    Case("load_place", "stated"),
     Case("load_points", "none_excluded"),
     Case("load_points", "excluded", points(excluded=3)),
     Case("load_points", "too_few", points(allowed=None)),
@@ -149,6 +159,7 @@ CASES = (
     Case("identified", "all"),
     Case("identified", "some", {"calibrations": unknown("superior", "n_per_m", 150)}),
     Case("identified", "none", {"calibrations": BOTH_UNKNOWN}),
+    Case("identified", "bounded", BOUND),
     Case("grid", "pose"),
     Case("grid", "stiffness", grid((0.1, 0.4, 0.5, 0.9))),
     Case("grid", "both", grid((0.1, 0.4, 0.5, 0.9), (0.5, 0.9, 0.1, 0.4))),
@@ -314,7 +325,7 @@ def test_what_is_not_identifiable_or_at_a_bound_has_no_number(study: Settings) -
     for rows in (unknown("extension", "nm_per_rad", 101), at_bound):
         found = page_of(study, {"calibrations": rows})
         assert "inferior–superior" in found.at("answer")[0].text, "the other one is told"
-        assert "flexion–extension" in next(
+        assert "lexion–extension" in next(
             one.text for one in found.told if one.rule == "identified"
         )
         assert not [one for one in found.told if f"{bound * PER_DEG:.0f}" in one.text]
@@ -340,6 +351,82 @@ def test_fits_at_a_bound_make_no_quartile(study: Settings) -> None:
     assert not {"starts", "damping"} & {
         one.rule for one in page_of(study, {"bootstrap": few}).conclusions
     }
+
+
+def told_of(found: Page, rule: str) -> tuple[str, str]:
+    (one,) = (one for one in found.told if one.rule == rule)
+    return one.text, one.note
+
+
+def test_fits_that_leave_an_end_open_are_told_of_stiffness_with_a_number(study: Settings) -> None:
+    """A quarter of the fits leaves flexion–extension open, three quarters inferior–superior."""
+    open_ = {"extension_identifiable": False, "extension_open_above": True}
+    rows = changed(unknown("superior", "n_per_m", 150), 50, **open_)
+    found = page_of(study, {"calibrations": rows})
+    assert "25\u00a0% of fits lack an end" in told_of(found, "region")[1]
+    text, note = told_of(found, "identified")
+    assert "75\u00a0%" in text
+    assert "flexion–extension stiffness is not identified in 25\u00a0% of the fits" in note
+
+
+def test_two_retained_fits_say_nothing_of_what_readings_determine(study: Settings) -> None:
+    two = page_of(study, {"success": made.success(left_out=made.N - 2)})
+    assert "identified" not in {one.rule for one in two.conclusions}
+
+
+def test_fits_at_a_bound_are_not_called_unidentified(study: Settings) -> None:
+    """Of one stiffness, of both, and of one while readings leave the other open."""
+    one = [
+        {**row, "superior_n_per_m": made.SPREAD["superior"][1][at]}
+        for at, row in enumerate(BOUND["calibrations"])
+    ]
+    open_ = [{**row, "superior_identifiable": False} for row in one]
+    told = "lexion–extension stiffness has no number: 20\u00a0%"
+    for rows in (one, open_):
+        assert told in told_of(page_of(study, {"calibrations": rows}), "identified")[0]
+    (answer,) = page_of(study, {"calibrations": open_}).at("answer")
+    assert answer.verdict == "bounded"
+    assert "20\u00a0% for flexion–extension" in answer.text
+
+
+def test_fits_at_a_bound_are_counted_before_the_filters_take_them(study: Settings) -> None:
+    """The last three ended at the upper bound, so they are outliers."""
+    rows = changed(made.calibrations()[::-1], 3, status="converged_at_bound")
+    found = page_of(study, {"calibrations": rows, **left_out_of(3)})
+    assert "3 of 201 fits ended at a bound of a stiffness, 3 of them" in told_of(found, "bounds")[0]
+
+
+def test_damping_without_rest_is_no_infinite_stiffness(study: Settings) -> None:
+    """Quartiles of what does come to rest are told from ten fits on; 'at most' of all loadings."""
+    quasi = [
+        {**row, "loading": "quasi_static"}
+        for row in made.bootstrap()
+        if row["bootstrap"] == "damping"
+    ]
+    for lost, verdicts_ in ((8, ["less"]), (11, [])):
+        moving = {"extension_nm_per_rad": 0.037, "message": f"at its lower bound; {NO_REST}"}
+        rows = [
+            {**row, **moving} if row["bootstrap"] == "damping" and row["set"] < lost else row
+            for row in made.bootstrap()
+        ]
+        found = page_of(study, {"bootstrap": rows + quasi})
+        assert [one.verdict for one in found.told if one.rule == "damping"] == verdicts_
+
+
+def test_starts_tell_what_was_left_out(study: Settings) -> None:
+    """Two of twenty fits at rest at their upper bound, a thousand times the start."""
+    up = {"extension_nm_per_rad": 2e4, "status": "converged_at_bound"}
+    rows = changed(made.bootstrap(), 2, **up)
+    text, note = told_of(page_of(study, {"bootstrap": rows}), "starts")
+    assert text.startswith("Start values and the stiffness held fixed")
+    assert "Of 20 fits read at rest 2 are left out; 2 ended at a bound" in note
+
+
+def test_assumptions_are_told_with_their_numbers(study: Settings) -> None:
+    found = page_of(study, {})
+    assert "1 mm anterior and 10 mm superior" in told_of(found, "load_place")[0]
+    assert "−2 to 2 mm anterior and −20 to 20 mm superior" in told_of(found, "load_points")[1]
+    assert "the 10 best-fitting stiffnesses" in told_of(found, "grid")[0]
 
 
 def test_a_page_of_any_study_keeps_the_rules(study: Settings, tmp_path: Path) -> None:
