@@ -119,6 +119,8 @@ def worst_curves(gap: pd.DataFrame) -> list[pd.DataFrame]:
     keys = list(zip(gap["test"], gap["joint"], strict=True))
     rows = gap.assign(driven=[loads.get(key, "") for key in keys])
     rows = rows[rows["driven"] != ""]
+    if rows.empty:
+        return []
     at = ["specimen", "test", "step", "joint"]
     drives = rows[rows["coordinate"] == rows["driven"]].set_index(at)["load"].rename("drive")
     rows = rows.join(drives, on=at).dropna(subset="drive")
