@@ -176,6 +176,14 @@ def curves(**columns: Any) -> Tables:
     return {"load_displacement": rows}
 
 
+def sure_loops(many: int) -> Tables:
+    """Of all measured loops so many lose work beyond noise."""
+    rows = tables_of(Size())["load_displacement"].assign(hysteresis_area_low_j=-1.0)
+    first = rows.index[rows["source"] == "measured"][:many]
+    rows.loc[first, "hysteresis_area_low_j"] = 0.15
+    return {"load_displacement": rows}
+
+
 CASE, SPECIMEN = "left_out_case", "left_out_specimen"
 THREE = {"a": (1.0, 3.0), "b": 4.0, "c": 6.0}
 ONE, ONE_JOINT = Size(("a",)), Size(vertebrae=("L5", "L4"))
@@ -244,6 +252,12 @@ CASES: dict[str, tuple[Case, str]] = {
         Case(tables=changed("fits", status=["unstable"] + ["converged"] * 83, n_optima=2)),
         "fits check, starts check",
     ),
+    "several optima elsewhere": (
+        Case(tables={"fits": tables_of(Size())["fits"].pipe(
+            lambda fits: fits.assign(n_optima=1 + (fits["representation"] != "per_joint"))
+        )}),
+        "starts ok_others",
+    ),
     "nothing left out": (Case(settings={"cross_validation": NONE}), "checks check_neither"),
     "specimens alone left out": (
         Case(settings={"cross_validation": NONE | {"specimens": True}}),
@@ -291,6 +305,13 @@ CASES: dict[str, tuple[Case, str]] = {
         })),
         "descriptions some",
     ),
+    "better than one in each of two": (
+        Case(tables=claims(**{
+            f"partially_pooled_beats_per_specimen_{CASE}": "yes",
+            f"partially_pooled_beats_per_joint_{SPECIMEN}": "yes",
+        })),
+        "descriptions some",
+    ),
     "one joint": (Case(ONE_JOINT, ALIKE), "descriptions same"),
     "covariates": (
         Case(tables=covariates("yes", UNTOLD, "refused")),
@@ -308,6 +329,8 @@ CASES: dict[str, tuple[Case, str]] = {
         Case(tables=curves(neutral_zone="not_meaningful", hysteresis_area_low_j=-1.0)),
         "zones straight, hysteresis none",
     ),
+    "one loop for sure": (Case(tables=sure_loops(1)), "hysteresis none"),
+    "many loops for sure": (Case(tables=sure_loops(9)), "hysteresis lost"),
     "zones without a number": (
         Case(tables=curves(neutral_zone="not_described", neutral_zone_deg=nan)),
         "zones soft_shapeless",

@@ -297,7 +297,11 @@ def _axes(size: Size) -> Iterator[Row]:
         if not size.solved and key["source"] == "simulated":
             yield row | {"status": "no_pose", "message": "it tips <over>"}
             continue
-        sds = {"centre_anterior_sd_mm": 0.6, "centre_superior_sd_mm": 0.8}
+        sds = {
+            "centre_anterior_sd_mm": 0.6,
+            "centre_superior_sd_mm": 0.8,
+            "centre_right_sd_mm": 0.0,
+        }
         yield (
             row | {"angle_deg": 12.0, "centre_anterior_mm": -3.0, "centre_superior_mm": -8.0} | sds
         )

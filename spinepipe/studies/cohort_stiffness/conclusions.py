@@ -44,7 +44,7 @@ LARGE, SMALL = 1.5, 0.7
 """Residuals as multiples of the reading noise beyond which law or noise is not as assumed."""
 
 MANY = 0.1
-"""Share of fits lost, or of curves beyond noise, above which the rest no longer stands for all."""
+"""Share of fits lost, or of curves or loops beyond noise, above which a verdict changes."""
 
 MOST_PLACES = 4
 
@@ -95,11 +95,15 @@ def _scatter(fits: pd.DataFrame, values: pd.DataFrame) -> Value | None:
     """Residuals of the fits whose stiffness is told, in SDs of a reading: median of specimens."""
     if fits.empty or values.empty:
         return None
-    own = fits[fits["fitted_to"] == joint_label_of(fits)]
-    own = own[own["representation"] == values["representation"].iloc[0]]
-    found = own["scatter"].dropna().astype(float)
+    found = fits[_behind(fits, values)]["scatter"].dropna().astype(float)
     source = "fits: scatter, median"
     return Value(float(found.median()), n=len(found), source=source) if len(found) else None
+
+
+def _behind(fits: pd.DataFrame, values: pd.DataFrame) -> pd.Series:
+    """Which fits have the stiffness that is told: of its description, to all load cases."""
+    told = fits["representation"].isin(values["representation"].unique()[:1])
+    return told & (fits["fitted_to"] == joint_label_of(fits))
 
 
 def _trust(
@@ -158,13 +162,15 @@ def _quality(
     """Fits that ended without a stiffness or hang on their start, values not bounded, residuals."""
     if len(fits):
         lost = fits.loc[~fits["status"].isin(USABLE), "status"]
-        several = int((fits["n_optima"] > 1).sum())
-        counts = {"n": len(fits), "lost": len(lost), "several": several}
+        several = fits["n_optima"] > 1
+        told = int((several & _behind(fits, values)).sum())
+        counts = {"n": len(fits), "lost": len(lost), "several": int(several.sum()), "told": told}
         numbers = counted(counts, "fits: status, n_optima")
         verdict = "ok" if lost.empty else "check" if len(lost) <= MANY * len(fits) else "stop"
         why = [f"{n} {plain(str(name))}" for name, n in lost.value_counts().items()]
         yield Conclusion("fits", verdict, numbers, {"why": listed(why)})
-        yield Conclusion("starts", "check" if several else "ok", numbers)
+        verdict = "check" if told else "ok_others" if several.any() else "ok"
+        yield Conclusion("starts", verdict, numbers)
     if len(values):
         lost_values = int(values["value"].isna().sum())
         counts = {"n": len(values), "lost": lost_values}
@@ -235,15 +241,17 @@ def _experiments(curves: pd.DataFrame, axes: pd.DataFrame) -> Iterator[Conclusio
         if len(loops):
             work = float(loops["measured"].median())
             values["work"] = Value(work, "J", n=len(loops), source="load_displacement: median")
-        verdict = ("lost" if sure else "none") if len(loops) else "check"
+        many = sure > MANY * len(loops)  # chance alone lets some of many lose work
+        verdict = ("lost" if many else "none") if len(loops) else "check"
         yield Conclusion("hysteresis", verdict, values)
     measured = axes[axes["source"] == MEASURED] if len(axes) else axes
     if len(measured):
         placed = measured[measured["status"] == WHOLE]
         values = counted({"n": len(measured), "placed": len(placed)}, "helical_axes: status")
-        sds = placed[["centre_anterior_sd_mm", "centre_superior_sd_mm"]].astype(float).dropna()
+        names = [f"centre_{axis}_sd_mm" for axis in ("anterior", "superior", "right")]
+        sds = placed[names].astype(float).dropna()
         if len(sds):
-            sd = float(np.median(np.hypot(*sds.to_numpy().T)))
+            sd = float(np.median(np.linalg.norm(sds.to_numpy(), axis=1)))
             values["sd"] = Value(sd, "mm", n=len(sds), source="helical_axes: SD, median")
         verdict = "placed" if len(sds) else "no_noise" if len(placed) else "check"
         yield Conclusion("axes", verdict, values)

@@ -31,7 +31,10 @@ UNSEEN = {LEFT_OUT_SPECIMEN: "a left-out specimen", LEFT_OUT_CASE: "a left-out l
 
 PUBLISHED = {
     "cross_validation_beats_literature": ("the other specimens' median", LEFT_OUT_SPECIMEN),
-    "optimised_beats_literature_left_out_case": ("a specimen's own stiffness", LEFT_OUT_CASE),
+    "optimised_beats_literature_left_out_case": (
+        "one stiffness for all joints of a specimen",
+        LEFT_OUT_CASE,
+    ),
 }
 """Claims about published stiffness: what is compared with it, and what both predict."""
 
@@ -118,12 +121,18 @@ def _descriptions(rows: Sequence[Row]) -> Iterator[Conclusion]:
     firsts = [order[0] for order in orders]
     first = max(firsts, key=firsts.count)
     compared = {name for row in rows for name in row["order"]}
-    beaten = {order[1] for order in orders if order[0] == first}
-    best = beaten == compared - {first} and first not in {order[1] for order in orders}
     wins = [row for row in decided if row["order"][0] == first]
+    beaten = {(row["names"]["what"], row["order"][1]) for row in wins}
+    # the best beats all others in predicting the same, and none beats it in anything
+    whole = [what for what in UNSEEN.values() if {(what, n) for n in compared - {first}} <= beaten]
+    best = bool(whole) and first not in {order[1] for order in orders}
     # of the best the closest rival is told, else whether one value for all joints is enough
     told = min(wins, key=lambda row: row["order"][1] != SHARED[0])
-    told = min(wins, key=lambda row: abs(row["value"])) if best else told
+    if best:
+        told = min(
+            (row for row in wins if row["names"]["what"] in whole),
+            key=lambda row: abs(row["value"]),
+        )
     verdict = "best" if best else "some"
     yield Conclusion("descriptions", verdict, {"less": _size(told), **_counts(rows)}, told["names"])
 
@@ -171,8 +180,11 @@ def _differ(claims: Claims, values: pd.DataFrame, what: str, by: str) -> Iterato
     verdict = "alike" if {*holds.values()} == {"no"} else verdict
     numbers = {"times": Value(times[most], source=f"stiffness: largest over least median by {by}")}
     half = (50.0 * (values["high"] - values["low"]) / values["value"]).median()
-    numbers["half"] = Value(0.0 if pd.isna(half) else float(half), "%", source="stiffness: ends")
     words = {"most": direction(most), "differ": directions(differ), "rest": directions(rest)}
+    words["known"] = ""
+    if pd.notna(half):
+        numbers["half"] = Value(float(half), "%", source="stiffness: ends")
+        words["known"] = f"; a single value is known to ± {numbers['half']}"
     yield Conclusion(what, verdict, numbers, words)
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.words import AXIS, level, listed, short
+from spinepipe.report.words import AXIS, count, level, listed, short
+from spinepipe.studies.cohort_stiffness.claims import FEWEST
 from spinepipe.studies.cohort_stiffness.representations import FITTED, OF_JOINTS, SHARED, named
 from spinepipe.studies.cohort_stiffness.stages import own_fits
 from spinepipe.studies.cohort_stiffness.tables import STIFFNESS
@@ -132,6 +133,10 @@ def _answer(values: pd.DataFrame, told: dict[str, Value], names: dict[str, str])
     rows = values[values["coordinate"].isin(letters.values())].dropna(subset="place")
     words = {f"direction_{letter}": direction(name) for letter, name in letters.items()}
     (specimen, joint), *others = rows[["specimen", "joint"]].drop_duplicates().to_numpy(str)
+    n = rows["specimen"].nunique()
+    few = f"{count(n, 'specimen')}' typical joint resists"
+    few = f"joints of {short(specimen)} typically resist" if n == 1 else few
+    words["who"] = few if n < FEWEST else "a typical joint resists"
     if not others:
         what = "each joint" if joint == ALL_JOINTS else f"joint {level(joint)}"
         words |= {"what": what, "specimen": short(specimen)}

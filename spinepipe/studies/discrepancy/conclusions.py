@@ -5,6 +5,7 @@ Misfit is the root of chi2 / dof - 1 (the column ``gap`` of results), in SDs of 
 """
 
 from collections.abc import Iterator
+from math import inf
 
 import pandas as pd
 
@@ -15,7 +16,7 @@ from spinepipe.report.words import count, level, plain
 from spinepipe.studies.discrepancy import verdict as found
 from spinepipe.studies.discrepancy.alternatives import alternatives, next_test, unnamed
 from spinepipe.studies.discrepancy.curve_rows import stiffness_at_rest_and_loaded
-from spinepipe.studies.discrepancy.lights import lights
+from spinepipe.studies.discrepancy.lights import FEW_SPECIMENS, lights
 from spinepipe.studies.discrepancy.misfits import (
     BASE,
     LARGE,
@@ -31,10 +32,10 @@ from spinepipe.studies.discrepancy.misfits import (
     sized,
     stands_for,
 )
-from spinepipe.studies.discrepancy.quantities import UNITS, quantities
+from spinepipe.studies.discrepancy.quantities import DOUBLING, UNITS, quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import MODELS
-from spinepipe.studies.discrepancy.verdict import EVERY, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict import EVERY, Missing, Verdict, read_verdict
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import effects_in_words, general, in_words, name_at
 from spinepipe.units import LOAD_UNITS
@@ -62,7 +63,7 @@ def conclusions(study: Discrepancy, cohort: Cohort, results: Results) -> Iterato
     where, gap = results.table("where"), results.table("gap")
     numbers, held_out = results.table("field_numbers"), results.table("held_out")
     yield answer(verdict, model, where, gap)
-    yield from _misfits(verdict, model, where)
+    yield from _misfits(verdict, model, where, gap)
     if verdict.verdict is found.Conclusion.NULL:
         yield from _power(verdict)
     yield from _by_test(verdict, model, where)
@@ -88,11 +89,12 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
     match verdict.verdict:
         case found.Conclusion.NAMED | found.Conclusion.PART:
             after = sizes["after"]
-            told = "named" if verdict.verdict is found.Conclusion.NAMED else "part"
+            left = after is not None and (after.low or 0.0) > SMALL
+            told = "named" if verdict.verdict is found.Conclusion.NAMED and not left else "part"
             names["rest"] = place_of_most(where, gap, WITH_EFFECTS)[0]
             if after is not None and after.number > LARGE:
                 told = "large"
-            elif told == "part" and (after is None or (after.low or 0.0) <= SMALL):
+            elif told == "part" and not left:
                 told = "part_open"
         case found.Conclusion.SET:
             every = list(dict.fromkeys(name_at(c.name, c.coordinates) for c in verdict.in_set))
@@ -108,14 +110,17 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
             if sizes_found:
                 how = "verdict: smallest_detectable, largest"
                 values["hardest"] = Value(max(sizes_found), source=how)
-            names["shown"] = count(len(sizes_found), "effect")
+            n = len(sizes_found)
+            names["shown"] = f"any of {n} effects" if n > 1 else "the one testable effect"
         case found.Conclusion.UNKNOWN:
             told = f"unknown_{_WITHOUT_A_NAME[verdict.reason or Reason.NO_KNOWN_EFFECT]}"
             names["errors"] = count(len(verdict.suspected_data_errors), "respect")
     return Conclusion("verdict", told, values, names)
 
 
-def _misfits(verdict: Verdict, model: str, where: pd.DataFrame) -> Iterator[Conclusion]:
+def _misfits(
+    verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame
+) -> Iterator[Conclusion]:
     """Key numbers: misfit before and after, and the first value of an effect that is known."""
     before, after = misfit(where, BASE), misfit(where, WITH_EFFECTS)
     names = {"model": model, "effects": stands_for(verdict)}
@@ -130,8 +135,22 @@ def _misfits(verdict: Verdict, model: str, where: pd.DataFrame) -> Iterator[Conc
         for one in quantities(effect):
             if one.value is not None and one.identifiable and not one.place:
                 told_of = {"parameter": one.name, "effect": name_at(effect.name, EVERY)}
-                yield Conclusion("size", "shared", {"value": one.value}, told_of)
+                beyond = one.name == DOUBLING and one.value.number > _farthest(
+                    effect, gap, one.value.unit
+                )
+                told = "beyond" if beyond else "shared"
+                yield Conclusion("size", told, {"value": one.value}, told_of)
                 break
+
+
+def _farthest(effect: Missing, gap: pd.DataFrame, unit: str) -> float:
+    """The largest motion in ° or mm that was measured where an effect acts; 0 where none was."""
+    if gap.empty:
+        return inf
+    rows = gap[gap["unit"] == ("deg" if unit == "°" else unit)]
+    for name, places in (("coordinate", effect.scope.coordinates), ("joint", effect.scope.joints)):
+        rows = rows[rows[name].isin(places)] if tuple(places) != EVERY else rows
+    return float(rows["measured"].abs().max()) if len(rows) else 0.0
 
 
 def _power(verdict: Verdict) -> Iterator[Conclusion]:
@@ -231,7 +250,7 @@ def _carries_over(
 
     It does in a kind of fold where the misfit of all together falls, that of one fold at least
     below its interval before, and none is worse by more than noise makes; of tests the one that
-    gains most in the fit must be among those that fall.
+    gains most in the fit must be among those that fall, and specimens must be `FEW_SPECIMENS`.
     """
     if not stands_for(verdict):
         return
@@ -247,12 +266,14 @@ def _carries_over(
         "readings": Value(int(every["readings"].max()), source="where: readings"),
     }
     better = scored[scored["gap_with_effects"] < scored["gap_base_low"]]
+    values["better"] = Value(len(better), source="held_out: gap_with_effects below gap_base_low")
     gains, good = _compared_tests(where), []
     most = str(largest(gains, gains["gap"] - gains["then"]).name) if len(gains) else ""
     for one in verdict.left_out:
         falls = better[better["kind"] == one.kind]
         own = scored[scored["kind"] == one.kind]
         shown = one.kind != "test" or most in set(falls["fold"])
+        shown = shown and (one.kind != "specimen" or len(own) >= FEW_SPECIMENS)
         if one.gap_closed is None or falls.empty or own["worse"].any() or not shown:
             continue
         how = f"verdict: left_out, {one.kind}"
@@ -260,6 +281,7 @@ def _carries_over(
         if change.number < 0.0:
             good.append(one.kind)
             yield Conclusion("left_out", one.kind, {"value": change})
-    told = "both" if {"test", "specimen"} <= set(good) else good[0] if good else "nowhere"
+    nowhere = "unsure" if len(better) else "nowhere"
+    told = "both" if {"test", "specimen"} <= set(good) else good[0] if good else nowhere
     told = "worse" if scored["worse"].any() else told
     yield Conclusion("carries", told, values, {"effects": stands_for(verdict)})

@@ -11,6 +11,7 @@ from spinepipe.report.page.study_page import Results
 from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.discrepancy.misfits import LARGE, SMALL, WITH_EFFECTS, bare, largest
 from spinepipe.studies.discrepancy.quantities import quantities
+from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, Verdict
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
@@ -108,6 +109,7 @@ def _predicted(held_out: pd.DataFrame, every: int) -> Conclusion:
     }
     names = {"folds": count(folds, "test or specimen", "tests and specimens")}
     light = "check_none" if not scored else "ok" if scored == folds else "check_some"
+    light = "ok_specimens" if light == "ok" and tests.empty else light
     light = "check_few" if light == "ok" and len(tests) and 2 * told < every else light
     return Conclusion("predicted", light, values, names)
 
@@ -187,6 +189,7 @@ def _sample(
             source="verdict: smallest_detectable, not_testable",
         ),
         "threshold": Value(threshold.log_evidence, source=how),
+        "least": Value(LEAST_THRESHOLD, source="a constant of the search"),
         "share": Value(100.0 * threshold.false_alarm, "%", source=how),
         "draws": Value(threshold.draws, source=how),
     }

@@ -16,6 +16,7 @@ from spinepipe.studies.discrepancy.verdict import Estimate, Missing
 from spinepipe.studies.discrepancy.words import ASYMMETRY, TOWARDS
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
+DOUBLING = "motion that doubles the stiffness"
 STIFFENING, PRELOAD = "nonlinear_stiffening", "preload_stiffening"
 
 UNITS: Mapping[str, tuple[str, float]] = {
@@ -147,4 +148,4 @@ def _doubling(shape: Any, unit: str) -> _Way | None:
     def reached(rise: float) -> float:
         return factor * at(rise) if rise > 0.0 else inf
 
-    return _Way("motion that doubles the stiffness", length, reached, falls=True)
+    return _Way(DOUBLING, length, reached, falls=True)

@@ -19,6 +19,7 @@ from cohort_page_cases import (
     BOTH,
     CASE,
     CASES,
+    COORDINATES,
     EDGES,
     ONE,
     ONE_JOINT,
@@ -28,6 +29,7 @@ from cohort_page_cases import (
     THREE,
     UNIT,
     Case,
+    changed,
     claims,
     errors,
     of_all,
@@ -91,6 +93,42 @@ def test_the_first_line_is_the_median_over_specimens_with_their_range() -> None:
         answer.text.replace("\u00a0", " ")
         == "A typical joint resists with 4.0 N m/deg in flexion–extension."
     )
+
+
+def test_few_specimens_are_told_with_the_typical_joint() -> None:
+    """Also with three directions and stiffness at rest the answer is short enough."""
+    values = {"a": (2.0, 4.0), "b": 4.0}
+    for of, words in (({"a": (2.0, 4.0)}, "Joints of a typically"), (values, "2 specimens' typ")):
+        case = Case(Size(tuple(of)), own(of, coordinates=COORDINATES, growth=1.0))
+        (answer,) = case.page.at("answer")
+        assert answer.text.replace("\u00a0", " ").startswith(words)
+        assert "at rest" in answer.text
+        assert not list(faults_of_told(case.page.told))
+
+
+def test_a_centre_is_known_in_all_three_directions() -> None:
+    """SDs of 0.6, 0.8 and 2.4 mm are one of 2.6 mm."""
+    case = Case(tables=changed("helical_axes", centre_right_sd_mm=2.4))
+    assert of_rule(case, "axes")["sd"][0] == pytest.approx(2.6)
+
+
+def test_optima_are_counted_behind_the_stiffness_that_is_told() -> None:
+    fits = tables_of(Size())["fits"]
+    behind = (fits["representation"] == "per_joint") & (fits["fitted_to"] == "all")
+    fits["n_optima"] = 1 + (behind | (fits["representation"] == "per_specimen"))
+    told = of_rule(Case(tables={"fits": fits}), "starts")
+    assert told["told"][0] == behind.sum() < told["several"][0]
+
+
+def test_published_stiffness_is_compared_with_one_for_all_joints() -> None:
+    """And an interval of single values that is not known is not told."""
+    case = Case(tables=claims(**dict.fromkeys(PUBLISHED, "undecided")))
+    (text,) = (one.text for one in case.page.told if one.rule == "published")
+    assert text.startswith("Neither one stiffness for all joints of a specimen")
+    rows = {**own(THREE, high=nan), **claims(**of_all(BOTH, "yes"))}
+    text = " ".join(one.text for one in Case(tables=rows).page.told)
+    assert "times in flexion–extension." in text
+    assert "±" not in text
 
 
 def test_a_single_value_has_its_own_interval_and_one_specimen_the_range_of_its_joints() -> None:

@@ -109,8 +109,8 @@ def slopes(rest: float, loaded: float) -> Change:
     return change
 
 
-def folds(**kinds: tuple[float, float, bool]) -> Change:
-    """Left-out folds, three of each kind: misfit before and after, and whether it is worse."""
+def folds(two: bool = False, **kinds: tuple[float, float, bool]) -> Change:
+    """Left-out folds, three of each kind or two specimens: misfits, and whether it is worse."""
 
     def change(made: dict[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
         rows = [
@@ -118,7 +118,7 @@ def folds(**kinds: tuple[float, float, bool]) -> Change:
             | {"readings": 72, "gap_base": base, "gap_with_effects": then, "worse": worse}
             | {"gap_base_low": base - 0.3, "gap_base_high": base + 0.3}
             for kind, (base, then, worse) in kinds.items()
-            for name in (TESTS if kind == "test" else SPECIMENS)
+            for name in (TESTS if kind == "test" else SPECIMENS[: 2 if two else 3])
         ]
         return {"held_out": pd.DataFrame(rows)}
 
@@ -188,6 +188,16 @@ TIED = [{"name": name, "coordinates": ["extension"]} for name in ("neutral_zone"
 TIED = [one | {"behind": 2.0 * n} for n, one in enumerate(TIED)]
 
 
+def doubling(rise: float) -> dict[str, Any]:
+    """A stiffening effect whose stiffness doubles at 33° over the root of this many 1/rad²."""
+    growth = {"name": "growth", "value": rise, "unit": "1/rad^2", "ci95": [0.9 * rise, 1.1 * rise]}
+    return EFFECT | {
+        "name": "nonlinear_stiffening",
+        "variant": {"shape": "cubic"},
+        "parameters": [growth],
+    }
+
+
 def reason(which: Reason, **more: Any) -> dict[str, Any]:
     return {"unknown": UNKNOWN | {"reason": which.value}, "suspected_data_errors": [], **more}
 
@@ -233,6 +243,7 @@ CASES: tuple[Case, ...] = (
     Case("NAMED", "verdict large; certain stop; remainder stop", after(3.4, 3.1, 3.7)),
     Case("PART", "verdict part; remainder check; remains place; shape seen", after(1.2, 0.9, 1.5),
          {"effects": [EFFECT, SECOND]}),
+    Case("NAMED", "verdict part; remainder check", after(1.7, 1.6, 1.8)),
     Case("PART", "verdict part_open; shape unseen", None, {"part": PART | {"left_shape": None}}),
     Case("SET", "verdict set; misfit_after likeliest; alternatives set_silent; next separate"),
     Case("SET", "verdict set_beside; alternatives set; alternatives alone", None,
@@ -240,6 +251,8 @@ CASES: tuple[Case, ...] = (
     Case("SET", "verdict set_many", None, {"candidates_in_set": [f"e_{n}" for n in range(15)]}),
     Case("NULL", "verdict null; power some; power hardest; power easiest; by_test within",
          whole(0.2, 0.0)),
+    Case("NULL", "verdict null", whole(0.2, 0.0), {
+        "smallest_detectable": VERDICTS["NULL"]["smallest_detectable"][:1]}),
     Case("NULL", "verdict null_misfit; power all; tests ok; by_test base", whole(1.0, 0.8),
          {"not_testable": []}),
     Case("NULL", "verdict null_blind; power stop_blind; tests stop", None,
@@ -272,6 +285,12 @@ CASES: tuple[Case, ...] = (
          left(test=0.5, specimen=-0.5)),
     Case("NAMED", "carries nowhere; predicted check_few", folds(test=(2.0, 1.8, False)),
          left(test=0.1)),
+    Case("NAMED", "carries unsure; predicted ok_specimens",
+         folds(specimen=(2.0, 1.0, False), two=True),
+         left(specimen=0.5), specimens=2),
+    Case("NAMED", "carries test",
+         folds(test=(2.0, 1.0, False), specimen=(2.0, 1.0, False), two=True),
+         left(test=0.5, specimen=0.5), specimens=2),
     Case("NAMED", "carries untold; predicted check_none", without("held_out")),
     Case("NAMED", "predicted check_some",
          folds(test=(2.0, 1.0, False), specimen=(np.nan, np.nan, False))),
@@ -296,6 +315,8 @@ CASES: tuple[Case, ...] = (
     Case("NAMED", "set_up ok_more", set_up(1.0), taken(0.9)),
     Case("NAMED", "set_up ok_alone", set_up(1.0), taken(None)),
     Case("NAMED", "values ok; size shared", None, {"effects": [EFFECT | {"parameters": [KNOWN]}]}),
+    Case("NAMED", "size beyond", None, {"effects": [doubling(1.0)]}),
+    Case("NAMED", "size shared", None, {"effects": [doubling(1e4)]}),
     Case("NAMED", "values check", None, {"effects": [EFFECT | {"parameters": [OPEN]}]}),
     Case("NAMED", "sample check", specimens=2),
     Case("NAMED", "method_left_out tests", specimens=1),
@@ -378,6 +399,16 @@ def test_numbers_of_the_page_are_those_of_the_tables(root: Path) -> None:
     )
     assert "joint centre" in said(shown, "set_up", "light").text
     assert "L4–L5" in shown.at("answer")[0].text
+
+
+def test_what_the_numbers_are_is_told(root: Path) -> None:
+    """SDs of the mean of cycles, a threshold with a floor, readings of tests that are predicted."""
+    _, _, _, shown = made(root, CASES[0])
+    assert "the mean of cycles" in said(shown, "noise", "key").note
+    methods = said(shown, "methods", "methods").text
+    assert "was at least 5, and high enough for at most" in methods
+    assert "SDs of the noise of the mean of cycles" in methods
+    assert "readings of tests" in said(shown, "predicted", "light").text
 
 
 def test_a_large_remainder_makes_no_name_certain(root: Path) -> None:
