@@ -99,7 +99,7 @@ def test_figures_and_report_cope(folder: Path) -> None:
         others = {"verdict": verdict} if "verdict.json" in figure.reads else {}
         draw.run(root, STUDY, figure.name, paths, svg, pdf, png, **others)
         drawn.append(svg)
-        assert "can be shown" in Path(svg).read_text()
+        assert "<desc>" in Path(svg).read_text()
     paths = [str(folder / f"{table.name}.parquet") for table in KIND.tables]
     output, leading = folder.parent / "report.html", folder / "report.html"
     former = {"former": str(leading), "verdict": verdict}
@@ -111,5 +111,5 @@ def test_figures_and_report_cope(folder: Path) -> None:
     assert all((folder / one["path"]).is_file() for one in described)
     assert len(described) == len(KIND.tables)
     assert "he base model cannot be fitted: a, test flexion" in page
-    assert "Look at the data first: all specimens" in page
+    assert "before the files are checked: all specimens" in page
     assert "none of the known effects" not in page
