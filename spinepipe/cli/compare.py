@@ -15,9 +15,9 @@ from spinepipe.report.overview.side_by_side import (
     ONE,
     VALUE,
     VERDICT,
-    Difference,
     Pair,
     SideBySide,
+    StudyDifference,
     counted,
     origins_that_differ,
     paired,
@@ -128,7 +128,7 @@ def _rows(results: Results, name: str) -> int | None:
     return len(results[name]) if name in results else None
 
 
-def _settings(a: Path, b: Path, one_kind: bool) -> tuple[list[Difference], str]:
+def _settings(a: Path, b: Path, one_kind: bool) -> tuple[list[StudyDifference], str]:
     """Settings that differ as the study files have them by now, and a note on what was left out."""
     read: list[Any] = []
     for folder in (a, b):

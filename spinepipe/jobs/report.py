@@ -18,7 +18,7 @@ from spinepipe.marks import KEY, write_marked
 from spinepipe.report.conclusions import rows_of
 from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.comparison import AGAINST, comparison, paper_of
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
@@ -76,7 +76,7 @@ def _write_page(
     digest: str,
 ) -> None:
     """Write the page, beside it its conclusions as a table, and pages of comparisons."""
-    results = Results(
+    results = ResultTables(
         StudyTables.read([path for path in tables if Path(path).stem in kind_page.READ], others),
         {Path(path).stem: read_metadata(path) for path in tables},
         {Path(path).stem: Drawing.read(Path(path).stem, _text(path)) for path in figures},

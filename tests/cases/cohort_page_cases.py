@@ -13,7 +13,7 @@ from page_rules import verdicts
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.forms.chart import Chart, Drawing
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.studies.cohort_stiffness import charts
 from spinepipe.studies.cohort_stiffness.kind import KIND
 from spinepipe.studies.cohort_stiffness.page import page
@@ -44,9 +44,9 @@ class Case:
         return cohort_of(self.size)
 
     @property
-    def results(self) -> Results:
+    def results(self) -> ResultTables:
         scatter = tables_of(self.size)["fits"].assign(scatter=1.0)
-        return Results(StudyTables({**tables_of(self.size), "fits": scatter, **self.tables}))
+        return ResultTables(StudyTables({**tables_of(self.size), "fits": scatter, **self.tables}))
 
     @cached_property
     def page(self) -> Page:

@@ -5,21 +5,21 @@ from importlib import import_module
 from made_results import Made
 
 from spinepipe.report.forms.chart import Drawing
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.studies.registry import PACKAGE, kind_of
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" class="panel"></svg>'
 """An empty panel."""
 
 
-def results_of(found: Made) -> Results:
+def results_of(found: Made) -> ResultTables:
     """What the kind's page is made of."""
     metadata = {name: {"seed": "7", "study": found.study.study} for name in found.tables}
     drawings = {
         one.name: Drawing(one.name, one.title, "Words.", (SVG,))
         for one in kind_of(found.study.kind).figures
     }
-    return Results(found.tables, metadata, drawings)
+    return ResultTables(found.tables, metadata, drawings)
 
 
 def made_page(found: Made) -> Page:

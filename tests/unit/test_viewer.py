@@ -28,12 +28,12 @@ from spinepipe.report.specimen_curves import measured_curves
 from spinepipe.report.viewer.figure import viewer_html, viewer_script
 from spinepipe.report.viewer.meshes import SIDES, Endplate, Mesh, spine_meshes, vertebra
 from spinepipe.report.viewer.scene import (
-    Body,
     Camera,
-    Load,
     Muscle,
     Scene,
-    Step,
+    SceneBody,
+    SceneLoad,
+    SceneStep,
     as_script,
     load_path,
     posed,
@@ -133,15 +133,15 @@ def test_views_from_the_right_from_behind_and_from_above(
     np.testing.assert_allclose(view_matrix(camera) @ [1.0, 2.0, 3.0], seen, atol=1e-12)
 
 
-def box(x: float, y: float) -> Step:
+def box(x: float, y: float) -> SceneStep:
     """One body, turned by 90 degrees to the left about the vertical."""
-    return Step("a", "A.", np.array([[x, y, 0.0, 0.0, 90.0, 0.0]]))
+    return SceneStep("a", "A.", np.array([[x, y, 0.0, 0.0, 90.0, 0.0]]))
 
 
 def test_a_vertex_is_drawn_where_it_is_by_hand() -> None:
     """Turned by 90 degrees about y, x points to the left: from behind the front is at the left."""
     mesh = vertebra(LOW, HIGH, 48.0, 34.0)
-    scene = Scene("s", "Load", [Body("L4", mesh)], [box(5.0, 7.0)], "", Camera(-90.0, 0.0))
+    scene = Scene("s", "Load", [SceneBody("L4", mesh)], [box(5.0, 7.0)], "", Camera(-90.0, 0.0))
     front = mesh.vertices[0]
     turned = np.array([front[2] + 5.0, front[1] + 7.0, -front[0]])
     np.testing.assert_allclose(posed(front, scene.steps[0].poses[0]), turned, atol=1e-9)
@@ -160,7 +160,7 @@ def _view(scene: Scene) -> Array:
 
 def test_only_fronts_are_drawn_and_the_nearest_last() -> None:
     mesh = vertebra(LOW, HIGH, 48.0, 34.0, sacrum=True)
-    scene = Scene("s", "Load", [Body("S1", mesh)], [box(0.0, 0.0)], "", Camera(0.0, 0.0))
+    scene = Scene("s", "Load", [SceneBody("S1", mesh)], [box(0.0, 0.0)], "", Camera(0.0, 0.0))
     faces = [p for p in projected_parts(scene, scene.steps[0], _view(scene)) if p.look == "bone"]
     assert 0 < len(faces) < len(mesh.faces)
     for part in faces:
@@ -189,17 +189,17 @@ def test_above_a_joint_that_was_not_read_nothing_is_drawn() -> None:
     found = measured_poses(frames, motion, np.zeros((3, 6)))
     assert np.isfinite(found).all(axis=1).tolist() == [True, False, False]
     scene = _loaded()
-    step = Step("a", "A.", scene.steps[0].poses, measured=np.full((1, 6), np.nan))
+    step = SceneStep("a", "A.", scene.steps[0].poses, measured=np.full((1, 6), np.nan))
     told = scenes_as_data([Scene("s", "Load", scene.bodies, [step], "")])
     assert told["scenes"][0]["steps"][0]["measured"] == [None]
 
 
 def _loaded(vector: tuple[float, float, float] = (0.0, 0.0, 5.0)) -> Scene:
     mesh = vertebra(LOW, HIGH, 48.0, 34.0)
-    loads = [Load("moment", 0, np.zeros(3), np.array(vector))]
-    loads.append(Load("force", 0, np.array([10.0, 0.0, 0.0]), np.array([0.0, -20.0, 0.0])))
-    step = Step("a", "A.", box(0.0, 0.0).poses, loads=loads)
-    return Scene("s", "Load", [Body("L4", mesh)], [step], "")
+    loads = [SceneLoad("moment", 0, np.zeros(3), np.array(vector))]
+    loads.append(SceneLoad("force", 0, np.array([10.0, 0.0, 0.0]), np.array([0.0, -20.0, 0.0])))
+    step = SceneStep("a", "A.", box(0.0, 0.0).poses, loads=loads)
+    return Scene("s", "Load", [SceneBody("L4", mesh)], [step], "")
 
 
 @pytest.mark.parametrize("vector", [(0.0, 0.0, 5.0), (0.0, -2.0, 0.0), (1.0, 1.0, 0.0)])
@@ -224,8 +224,8 @@ def test_a_moment_turns_right_handed_and_a_force_ends_at_its_point(
 
 def test_the_largest_load_of_its_kind_is_the_longest() -> None:
     scene = _loaded()
-    smaller = Load("force", 0, np.zeros(3), np.array([0.0, -5.0, 0.0]))
-    step = Step("b", "B.", scene.steps[0].poses, loads=[smaller])
+    smaller = SceneLoad("force", 0, np.zeros(3), np.array([0.0, -5.0, 0.0]))
+    step = SceneStep("b", "B.", scene.steps[0].poses, loads=[smaller])
     both = Scene("s", "Load", scene.bodies, [*scene.steps, step], "")
     lengths = [
         float(np.linalg.norm(np.diff(load_path(load, both), axis=0)))
@@ -244,13 +244,13 @@ def test_the_still_is_a_drawing_with_colours_of_the_page() -> None:
     scene = _loaded()
     muscles = [Muscle(np.array([[0.0, 0, 0], [50.0, 50, 0]]), share) for share in (0.05, 0.5)]
     markers = np.array([[0.0, 0, 0, 1, 1, 1], [5.0, 5, 5, np.nan, np.nan, np.nan]])
-    step = Step(
+    step = SceneStep(
         *("a", "A & <b>.", scene.steps[0].poses, scene.steps[0].poses),
         loads=scene.steps[0].loads,
         muscles=muscles,
         markers=markers,
     )
-    drawn = still(Scene("<i>", "Load", [Body("<L4>", scene.bodies[0].mesh)], [step], ""), 0)
+    drawn = still(Scene("<i>", "Load", [SceneBody("<L4>", scene.bodies[0].mesh)], [step], ""), 0)
     svg = ElementTree.fromstring(drawn)
     looks = Counter(element.get("class") for element in svg)
     assert looks["muscle"] == 1, "the faint one is left out"
@@ -268,8 +268,8 @@ def test_the_still_is_a_drawing_with_colours_of_the_page() -> None:
 def test_names_do_not_become_markup() -> None:
     def figure(name: str) -> Structure:
         scene = _loaded()
-        step = Step(name, name, scene.steps[0].poses)
-        body = Body(name, scene.bodies[0].mesh)
+        step = SceneStep(name, name, scene.steps[0].poses)
+        body = SceneBody(name, scene.bodies[0].mesh)
         return Structure(viewer_html([Scene(name, name, [body], [step], name)] * 2, name))
 
     hostile, harmless = figure(PAYLOAD), figure("x")

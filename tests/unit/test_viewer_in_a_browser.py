@@ -18,7 +18,7 @@ from tracking_table_cases import Size, tables_of
 from spinepipe.cohort import read
 from spinepipe.report.viewer.figure import viewer_html, viewer_script, viewer_style
 from spinepipe.report.viewer.meshes import Endplate, vertebra
-from spinepipe.report.viewer.scene import Body, Load, Muscle, Scene, Step
+from spinepipe.report.viewer.scene import Muscle, Scene, SceneBody, SceneLoad, SceneStep
 from spinepipe.report.viewer.specimens import specimen_scenes
 from spinepipe.report.viewer.still import projected_parts, view_matrix
 from spinepipe.studies.tracking.scenes import tracking_scenes
@@ -112,12 +112,12 @@ def test_the_script_draws_what_the_still_draws(tmp_path: Path) -> None:
     """Every part of a step, one by one: what it is, where it is, and how light."""
     flat = np.eye(3)
     ends = [Endplate(np.array([0.0, y, 0.0]), flat) for y in (0.0, 27.0)]
-    bodies = [Body("S1", vertebra(*ends, 48.0, 34.0, sacrum=True), fixed=True)]
-    bodies.append(Body("L5", vertebra(*ends, 46.0, 33.0)))
+    bodies = [SceneBody("S1", vertebra(*ends, 48.0, 34.0, sacrum=True), fixed=True)]
+    bodies.append(SceneBody("L5", vertebra(*ends, 46.0, 33.0)))
     poses = np.array([[1.0, 2, 3, -20, 5, 0], [8.0, 36, -4, 10, -30, 15]])
-    step = Step(
+    step = SceneStep(
         *("a", "A.", poses, poses + np.array([3.0, 1, 0, 0, 0, 5])),
-        loads=[Load("moment", 1, np.array([1.0, 2.0, 3.0]), np.array([1.0, -2.0, 5.0]))],
+        loads=[SceneLoad("moment", 1, np.array([1.0, 2.0, 3.0]), np.array([1.0, -2.0, 5.0]))],
         disc=np.array([0.4]),
         muscles=[Muscle(np.array([[0.0, 0, 0], [20.0, 60, 10], [5.0, 90, 30]]), 0.5)],
         markers=np.array([[10.0, 20, 30, 11, 21, 31], [5.0, 6, 7, np.nan, np.nan, np.nan]]),
@@ -155,8 +155,8 @@ def test_the_script_draws_what_the_still_draws(tmp_path: Path) -> None:
 
 def test_no_name_runs(tmp_path: Path) -> None:
     scene = specimen_scenes(read(ROOT / "config/cohorts/l4l5_disc"))[0]
-    body = [Body(RUNS, one.mesh) for one in scene.bodies]
-    step = Step(RUNS, RUNS, scene.steps[0].poses)
+    body = [SceneBody(RUNS, one.mesh) for one in scene.bodies]
+    step = SceneStep(RUNS, RUNS, scene.steps[0].poses)
     hostile = Scene(RUNS, RUNS, body, [step, step], RUNS)
     found = seen(page([hostile, hostile], ""), tmp_path)
     assert not found.ran

@@ -21,7 +21,7 @@ from small_project import Project
 from small_studies import SMALL
 
 from spinepipe.report.forms.chart import Drawing
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study_files import StudyFiles
@@ -76,7 +76,7 @@ def test_a_page_is_written_from_the_tables_of_all(eight: Project, kind: str) -> 
         for one in kind_of(kind).figures
         if one.name in files.figures(full=False)
     }
-    results = Results(StudyTables.read(read, others), {}, drawings)
+    results = ResultTables(StudyTables.read(read, others), {}, drawings)
     page = module.page(study, cohort, results)
     assert list(faults_of_told(page.told)) == []
     html = page.html(study, cohort, results)

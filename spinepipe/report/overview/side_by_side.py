@@ -31,7 +31,7 @@ _DIGESTS = ("code", "data")
 
 
 @dataclass(frozen=True)
-class Difference:
+class StudyDifference:
     """Something with a name that two sides have differently, as text; `NONE` where one lacks it."""
 
     name: str
@@ -116,10 +116,10 @@ class SideBySide:
 
     names: tuple[str, str]
     kinds: tuple[str, str]
-    settings: Sequence[Difference]
+    settings: Sequence[StudyDifference]
     settings_note: str
     conclusions: Sequence[Pair]
-    origin: Sequence[Difference]
+    origin: Sequence[StudyDifference]
     tables: Sequence[TableCount]
     left_out: Sequence[str] = ()
 
@@ -228,13 +228,13 @@ def are_apart(a: StoredValue, b: StoredValue) -> bool:
 
 def settings_that_differ(
     a: Mapping[str, Any], b: Mapping[str, Any], one_kind: bool
-) -> list[Difference]:
+) -> list[StudyDifference]:
     """Settings by dotted names, without that of the study; of two kinds those that both have."""
     left, right = (dict(_flat(one)) for one in (a, b))
     names = [name for name in dict.fromkeys([*left, *right]) if name not in ("study", "kind")]
     if not one_kind:
         names = [name for name in names if name in left and name in right]
-    told = (Difference(name, left.get(name, NONE), right.get(name, NONE)) for name in names)
+    told = (StudyDifference(name, left.get(name, NONE), right.get(name, NONE)) for name in names)
     return [one for one in told if one.a != one.b]
 
 
@@ -249,7 +249,7 @@ def _flat(settings: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, s
 
 def origins_that_differ(
     a: Mapping[str, Mapping[str, str]], b: Mapping[str, Mapping[str, str]]
-) -> list[Difference]:
+) -> list[StudyDifference]:
     """What metadata of tables say: seeds, versions, and which tables other code or data made.
 
     Digests of settings are left out: they hold the study's name, and settings are told by name.
@@ -259,12 +259,12 @@ def origins_that_differ(
     for name in (name for name in facts if name == "seed" or name.startswith(_VERSION)):
         sides = (sorted({told.get(name, "") for told in one.values()}) for one in (a, b))
         left, right = (", ".join(filter(None, one)) or NONE for one in sides)
-        found.append(Difference(name.removeprefix(_VERSION), left, right))
+        found.append(StudyDifference(name.removeprefix(_VERSION), left, right))
     for what in _DIGESTS:
         key = f"{what}_digest"
         for name in (name for name in a if name in b):
             left, right = (one[name].get(key, NONE)[:12] for one in (a, b))
-            found.append(Difference(f"{what} of {name}", left, right))
+            found.append(StudyDifference(f"{what} of {name}", left, right))
     return [one for one in found if one.a != one.b]
 
 

@@ -37,7 +37,7 @@ LEVELS = {"stop": "stop", "check": "check", "ok": "fine"}
 
 
 @dataclass(frozen=True, eq=False)
-class Results:
+class ResultTables:
     """Results of one study, as its page reads them.
 
     Attributes
@@ -92,7 +92,7 @@ class Page:
         self,
         study: Study,
         cohort: Cohort,
-        results: Results,
+        results: ResultTables,
         *,
         papers: Mapping[str, str] | None = None,
         date: str = "",

@@ -32,7 +32,7 @@ class Camera:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class SceneBody:
     """A vertebra.
 
     Attributes
@@ -46,7 +46,7 @@ class Body:
 
 
 @dataclass(frozen=True, eq=False)
-class Load:
+class SceneLoad:
     """A load on a vertebra; its point moves with the vertebra, its direction does not.
 
     Attributes
@@ -75,7 +75,7 @@ class Muscle:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class SceneStep:
     """One place of the slider.
 
     Attributes
@@ -91,7 +91,7 @@ class Step:
     says: str
     poses: Array
     measured: Array | None = None
-    loads: Sequence[Load] = ()
+    loads: Sequence[SceneLoad] = ()
     disc: Array | None = None
     muscles: Sequence[Muscle] = ()
     markers: Array | None = None
@@ -111,8 +111,8 @@ class Scene:
 
     title: str
     slider: str
-    bodies: Sequence[Body]
-    steps: Sequence[Step]
+    bodies: Sequence[SceneBody]
+    steps: Sequence[SceneStep]
     caption: str
     camera: Camera = Camera()
     pause_ms: int = 700
@@ -134,7 +134,7 @@ def posed(points: Array, pose: Array) -> Array:
     return points @ posed_axes(pose[None, :])[0].T + pose[:3]
 
 
-def load_path(load: Load, scene: Scene) -> Array:
+def load_path(load: SceneLoad, scene: Scene) -> Array:
     """(P, 3) mm from the load's point, ground axes: an arrow that ends there, or an arc."""
     size = float(np.linalg.norm(load.vector))
     alike = [other for step in scene.steps for other in step.loads if other.kind == load.kind]
@@ -180,7 +180,7 @@ def scenes_as_data(scenes: Sequence[Scene]) -> dict[str, Any]:
     return {"sides": SIDES, "shapes": list(shapes), "meshes": kept, "scenes": told}
 
 
-def _step(step: Step, scene: Scene) -> dict[str, Any]:
+def _step(step: SceneStep, scene: Scene) -> dict[str, Any]:
     """A step as plain data, without what it does not have."""
     told: dict[str, Any] = {"label": step.label, "says": step.says, "poses": _poses(step.poses)}
     if step.measured is not None:

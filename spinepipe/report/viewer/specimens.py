@@ -12,7 +12,7 @@ from spinepipe.frames import Pose, transform_of
 from spinepipe.report.specimen import SpecimenView, view_of
 from spinepipe.report.specimen_curves import main_coordinate
 from spinepipe.report.viewer.meshes import Endplate, spine_meshes
-from spinepipe.report.viewer.scene import Body, Load, Scene, Step, rotation_vector
+from spinepipe.report.viewer.scene import Scene, SceneBody, SceneLoad, SceneStep, rotation_vector
 from spinepipe.report.words import AXIS, after_number, case, fixed, number
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, MM_PER_M, from_si
 
@@ -48,13 +48,13 @@ def specimen_scene(cohort: Cohort, view: SpecimenView, with_loads: bool = True) 
     # a body's frame: at the middle of its mesh, with the axes of ground in the neutral pose
     origins = [0.5 * (m.vertices.min(axis=0) + m.vertices.max(axis=0)) for m in meshes]
     bodies = [
-        Body(name, mesh.seen_from(origin, np.eye(3)), fixed=k == 0)
+        SceneBody(name, mesh.seen_from(origin, np.eye(3)), fixed=k == 0)
         for k, (name, mesh, origin) in enumerate(
             zip(cohort.vertebrae, meshes, origins, strict=True)
         )
     ]
     neutral = np.column_stack([origins, np.zeros((len(bodies), 3))])
-    steps = [Step("Neutral", "Neutral pose.", neutral)]
+    steps = [SceneStep("Neutral", "Neutral pose.", neutral)]
     if with_loads:
         of_test: dict[str, list[MeasuredCycle]] = {}
         for one in view.tested:
@@ -88,27 +88,27 @@ def measured_poses(frames: Sequence[Pose], motion: Array, neutral: Array) -> Arr
     return found
 
 
-def _loaded(cohort: Cohort, view: SpecimenView, cycle: MeasuredCycle, neutral: Array) -> Step:
+def _loaded(cohort: Cohort, view: SpecimenView, cycle: MeasuredCycle, neutral: Array) -> SceneStep:
     """The largest load of a test, with the pose that was measured under it."""
     loads, sizes = [], []
     for wrench in cycle.case.steps[cycle.peak].wrenches:
         body = wrench.body + 1  # wrenches count moving bodies
         at = wrench.point * MM_PER_M - neutral[body, :3]
         if wrench.force.any():
-            loads.append(Load("force", body, at, wrench.force))
+            loads.append(SceneLoad("force", body, at, wrench.force))
             sizes.append(f"{number(float(np.linalg.norm(wrench.force)))} N")
         if wrench.moment.any():
             # files give a pure moment no point: it is drawn at the middle of its vertebra
             at = at if wrench.force.any() else np.zeros(3)
-            loads.append(Load("moment", body, at, wrench.moment))
+            loads.append(SceneLoad("moment", body, at, wrench.moment))
             sizes.append(f"{number(float(np.linalg.norm(wrench.moment)))} N m")
     label = " ".join([case(cycle.case.test), " and ".join(dict.fromkeys(sizes))]).strip()
     motion = cycle.readings[cycle.peak]
     if not np.isfinite(motion).any():
-        return Step(label, f"{label}. No motion was measured.", neutral, loads=loads)
+        return SceneStep(label, f"{label}. No motion was measured.", neutral, loads=loads)
     measured = measured_poses(view.frames, motion, neutral)
     says = f"{label}. {_motion_in_words(cohort, cycle, motion)}"
-    return Step(label, says, neutral, measured, loads)
+    return SceneStep(label, says, neutral, measured, loads)
 
 
 def _motion_in_words(cohort: Cohort, cycle: MeasuredCycle, motion: Array) -> str:
@@ -134,7 +134,7 @@ def _motion_in_words(cohort: Cohort, cycle: MeasuredCycle, motion: Array) -> str
     )
 
 
-def _caption(cohort: Cohort, steps: Sequence[Step]) -> str:
+def _caption(cohort: Cohort, steps: Sequence[SceneStep]) -> str:
     if cohort.landmarks is not None:
         size = ", between the endplates that landmarks tell"
     elif len(cohort.joint_names) > 1:

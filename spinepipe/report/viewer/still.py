@@ -12,7 +12,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.report.viewer.meshes import SIDES
-from spinepipe.report.viewer.scene import Camera, Scene, Step, load_path, posed
+from spinepipe.report.viewer.scene import Camera, Scene, SceneStep, load_path, posed
 
 WIDTH, HEIGHT = 640, 420
 
@@ -63,7 +63,7 @@ def telling_step(scene: Scene) -> int:
     One with muscles, where there are any.
     """
 
-    def places(step: Step) -> Array:
+    def places(step: SceneStep) -> Array:
         if step.measured is None:
             return step.poses[:, :3]
         return np.where(np.isfinite(step.measured), step.measured, step.poses)[:, :3]
@@ -97,7 +97,7 @@ def still(scene: Scene, number: int) -> str:
     )
 
 
-def projected_parts(scene: Scene, step: Step, view: Array) -> Iterator[Part]:
+def projected_parts(scene: Scene, step: SceneStep, view: Array) -> Iterator[Part]:
     """All that a step shows, in the frame of the reader (`view_matrix`), not yet sorted."""
     corners = [
         posed(b.mesh.vertices, pose) for b, pose in zip(scene.bodies, step.poses, strict=True)

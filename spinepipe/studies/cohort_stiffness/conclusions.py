@@ -8,7 +8,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.experiment.double_sigmoid import Zone
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import SIGNS, count, level, listed, plain, short
 from spinepipe.status import USABLE
 from spinepipe.studies.cohort_stiffness.claims import FEWEST
@@ -58,7 +58,9 @@ FAR = 3.0
 """SDs of a prior beyond which hardly anything of it lies: one in 370."""
 
 
-def conclusions(study: CohortStiffness, cohort: Cohort, results: Results) -> Iterator[Conclusion]:
+def conclusions(
+    study: CohortStiffness, cohort: Cohort, results: ResultTables
+) -> Iterator[Conclusion]:
     """All of them."""
     table, specimens = results.table, len(cohort.specimen_names)
     stiffness, fits, signs = (table(name) for name in ("stiffness", "fits", "sign_checks"))

@@ -7,7 +7,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import Value, sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, sortable
 from spinepipe.report.words import AXIS, level
 from spinepipe.schema import Column, Table
@@ -58,7 +58,7 @@ READ = (
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def page(study: CohortStiffness, cohort: Cohort, results: Results) -> Page:
+def page(study: CohortStiffness, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows."""
     return Page(
         conclusions=list(conclusions(study, cohort, results)),
@@ -93,7 +93,7 @@ def _stiffness(stiffness: pd.DataFrame) -> list[Sortable]:
     return [sortable("stiffness", "Stiffness of each specimen", about, rows, _STIFFNESS)]
 
 
-def _rows(study: CohortStiffness, cohort: Cohort, results: Results, name: str) -> pd.DataFrame:
+def _rows(study: CohortStiffness, cohort: Cohort, results: ResultTables, name: str) -> pd.DataFrame:
     """Rows that the page shows: no claim that could not be decided or is none of unseen motion."""
     rows = results.table(name)
     if name == FINDINGS.name and len(rows):

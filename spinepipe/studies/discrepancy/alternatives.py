@@ -16,8 +16,8 @@ from spinepipe.studies.discrepancy.misfits import (
     place_of_most,
 )
 from spinepipe.studies.discrepancy.quantities import UNITS
-from spinepipe.studies.discrepancy.verdict import Conclusion as Ended
 from spinepipe.studies.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.verdict import VerdictKind as Ended
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import (
     SET_UP,

@@ -37,7 +37,7 @@ from spinepipe.studies.discrepancy.misfits import model_name, stands_for
 from spinepipe.studies.discrepancy.quantities import UNITS
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import MODELS
-from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, Conclusion, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, Verdict, VerdictKind, read_verdict
 from spinepipe.studies.discrepancy.words import general, load_axis, motion_of, name_at
 from spinepipe.tables import StudyTables
 from spinepipe.units import LOAD_UNITS
@@ -280,7 +280,7 @@ def evidence(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
     title = "Evidence for each effect"
     verdict = read_verdict(tables.files["verdict"])
     threshold, panels = verdict.threshold.log_evidence, []
-    if verdict.verdict is Conclusion.NULL and verdict.smallest_detectable:
+    if verdict.verdict is VerdictKind.NULL and verdict.smallest_detectable:
         title = "What these tests could have shown"
         found = sorted((one.gap, general(one.name), "") for one in verdict.smallest_detectable)
         panels.append(_bars("To be found", "smallest misfit (× noise SD)", found))

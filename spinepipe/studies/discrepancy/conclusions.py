@@ -11,7 +11,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import count, level, plain
 from spinepipe.studies.discrepancy import verdict as found
 from spinepipe.studies.discrepancy.alternatives import alternatives, next_test, unnamed
@@ -56,7 +56,7 @@ _WITHOUT_A_NAME = {
 }
 
 
-def conclusions(study: Discrepancy, cohort: Cohort, results: Results) -> Iterator[Conclusion]:
+def conclusions(study: Discrepancy, cohort: Cohort, results: ResultTables) -> Iterator[Conclusion]:
     """All of them."""
     verdict = read_verdict(results.tables.files["verdict"])
     model = model_name(study)
@@ -64,7 +64,7 @@ def conclusions(study: Discrepancy, cohort: Cohort, results: Results) -> Iterato
     numbers, held_out = results.table("field_numbers"), results.table("held_out")
     yield answer(verdict, model, where, gap)
     yield from _misfits(verdict, model, where, gap)
-    if verdict.verdict is found.Conclusion.NULL:
+    if verdict.verdict is found.VerdictKind.NULL:
         yield from _power(verdict)
     yield from _by_test(verdict, model, where)
     yield from _stiffness(numbers, model)
@@ -87,22 +87,22 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
     named = effects_in_words(verdict.effects, MOST_WORDS)
     names = {"model": model, "effects": named, "place": place_of_most(where, gap, BASE)[0]}
     match verdict.verdict:
-        case found.Conclusion.NAMED | found.Conclusion.PART:
+        case found.VerdictKind.NAMED | found.VerdictKind.PART:
             after = sizes["after"]
             left = after is not None and (after.low or 0.0) > SMALL
-            told = "named" if verdict.verdict is found.Conclusion.NAMED and not left else "part"
+            told = "named" if verdict.verdict is found.VerdictKind.NAMED and not left else "part"
             names["rest"] = place_of_most(where, gap, WITH_EFFECTS)[0]
             if after is not None and after.number > LARGE:
                 told = "large"
             elif told == "part" and not left:
                 told = "part_open"
-        case found.Conclusion.SET:
+        case found.VerdictKind.SET:
             every = list(dict.fromkeys(name_at(c.name, c.coordinates) for c in verdict.in_set))
             names["names"] = in_words([every], _MOST_WORDS_OF_SET, "or")
             values["many"] = Value(len(every), source="verdict: candidates")
             told = "set_beside" if verdict.effects else "set"
             told = told if names["names"] else "set_many"
-        case found.Conclusion.NULL:
+        case found.VerdictKind.NULL:
             sizes_found = [one.gap for one in verdict.smallest_detectable]
             told = "null" if sizes_found else "null_blind"
             if sizes["before"] is not None and (sizes["before"].low or 0.0) > SMALL:
@@ -112,7 +112,7 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
                 values["hardest"] = Value(max(sizes_found), source=how)
             n = len(sizes_found)
             names["shown"] = f"any of {n} effects" if n > 1 else "the one testable effect"
-        case found.Conclusion.UNKNOWN:
+        case found.VerdictKind.UNKNOWN:
             told = f"unknown_{_WITHOUT_A_NAME[verdict.reason or Reason.NO_KNOWN_EFFECT]}"
             names["errors"] = count(len(verdict.suspected_data_errors), "respect")
     return Conclusion("verdict", told, values, names)

@@ -65,9 +65,9 @@ from spinepipe.studies.discrepancy.tables import (
 )
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
-    Conclusion,
     Threshold,
     Verdict,
+    VerdictKind,
     write_verdict,
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason, UnnamedMisfit
@@ -169,7 +169,7 @@ def _without_base(ready: Prepared, trouble: NoBase) -> DiscrepancyResults:
     errors = before_a_fit(ready.measured, cohort.joint_names, noise.sd, zeroed=noise.zeroed)
     verdict = Verdict(
         cohort=cohort.name,
-        verdict=Conclusion.UNKNOWN,
+        verdict=VerdictKind.UNKNOWN,
         why=f"the base model cannot be fitted: {trouble}",
         noise=noise_summary(noise),
         unknown=UnnamedMisfit(str(trouble), NO_SHAPE, Reason.NO_BASE),
@@ -244,7 +244,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
 def _beyond(ended: Investigation, run: PieceRunner) -> ResidualModel:
     """What no effect explains, described; nothing where nothing is left, or the data look wrong."""
     final, outcome = ended.found.final, ended.ended
-    told = outcome.verdict in (Conclusion.UNKNOWN, Conclusion.PART)
+    told = outcome.verdict in (VerdictKind.UNKNOWN, VerdictKind.PART)
     if not told or outcome.reason is Reason.DATA_ERRORS:
         return ResidualModel(None, None, final)
     stays = model_residual(final, ended.rules, run)

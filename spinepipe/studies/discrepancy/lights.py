@@ -7,7 +7,7 @@ from scipy.stats import norm
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.discrepancy.misfits import LARGE, SMALL, WITH_EFFECTS, bare, largest
 from spinepipe.studies.discrepancy.quantities import quantities
@@ -33,7 +33,7 @@ _UNITS = {"deg": "°", "1": "%"}
 
 
 def lights(
-    study: Discrepancy, cohort: Cohort, verdict: Verdict, results: Results, after: Value | None
+    study: Discrepancy, cohort: Cohort, verdict: Verdict, results: ResultTables, after: Value | None
 ) -> Iterator[Conclusion]:
     """All of them, and the methods.
 
@@ -167,7 +167,7 @@ def _place(row: pd.Series) -> dict[str, str]:
 
 
 def _sample(
-    study: Discrepancy, cohort: Cohort, verdict: Verdict, results: Results
+    study: Discrepancy, cohort: Cohort, verdict: Verdict, results: ResultTables
 ) -> Iterator[Conclusion]:
     """How much there is, how a name was decided upon, and the methods."""
     gap, threshold = results.table("gap"), verdict.threshold

@@ -8,7 +8,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, sortable
 from spinepipe.report.words import level, listed, plain
 from spinepipe.schema import Column, Table
@@ -99,7 +99,7 @@ _WORDS: Mapping[str, Callable[[Any], object]] = {
 """How cells are told, by column."""
 
 
-def page(study: Discrepancy, cohort: Cohort, results: Results) -> Page:
+def page(study: Discrepancy, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows."""
     verdict = read_verdict(results.tables.files["verdict"])
     return Page(
@@ -193,7 +193,7 @@ def _motions(coordinates: Sequence[str]) -> str:
     return "" if tuple(coordinates) == EVERY else listed(map(motion_of, coordinates))
 
 
-def _of_files(results: Results) -> Iterator[Sortable]:
+def _of_files(results: ResultTables) -> Iterator[Sortable]:
     """Rows of the result files that a reader compares, in plain words."""
     shapes: Mapping[str, Table] = {shape.name: shape for shape in SHAPES}
     for name, (title, about, shown) in _SHOWN.items():

@@ -39,7 +39,7 @@ UNIT = "noise sd"
 """Of `MisfitSizes`, as the file has it: SDs of the noise of one reading."""
 
 
-class Conclusion(StrEnum):
+class VerdictKind(StrEnum):
     """What a search came to.
 
     NAMED: these effects are missing and nothing else. PART: these are, and more stays, unnamed.
@@ -411,7 +411,7 @@ class Verdict:
     """
 
     cohort: str
-    verdict: Conclusion
+    verdict: VerdictKind
     why: str = ""
     effects: tuple[Missing, ...] = ()
     candidates_in_set: tuple[str, ...] = ()

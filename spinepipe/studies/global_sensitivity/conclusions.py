@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import capital, level, listed, plain
 from spinepipe.sensitivity_analysis.global_indices.design import DUMMY
 from spinepipe.sensitivity_analysis.global_indices.floor import NEGLIGIBLE
@@ -37,7 +37,9 @@ _RANKS = ("first", "second", "third")
 _PLACE = ["specimen", "output", "test", "step", "joint", "coordinate"]
 
 
-def conclusions(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Iterator[Conclusion]:
+def conclusions(
+    study: GlobalSensitivity, cohort: Cohort, results: ResultTables
+) -> Iterator[Conclusion]:
     """All of them."""
     indices = results.table("indices")
     measures = measures_of(indices)
@@ -211,7 +213,7 @@ def _negligible(first: Output, rows: pd.DataFrame, measures: Measures) -> Conclu
 
 
 def _direction(
-    output: Output, measures: Measures, results: Results, cohort: Cohort
+    output: Output, measures: Measures, results: ResultTables, cohort: Cohort
 ) -> Iterator[Conclusion]:
     """Whether the output rises or falls with what it depends on most.
 

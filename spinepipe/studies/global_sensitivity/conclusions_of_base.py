@@ -6,7 +6,7 @@ from math import exp, inf
 import pandas as pd
 
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import AXIS, listed, plain
 from spinepipe.studies.global_sensitivity.factors import StiffnessFactor, Times
 from spinepipe.studies.global_sensitivity.outputs import factor_name
@@ -20,7 +20,7 @@ REACH = 2.0
 """SDs of a log-normal spread that count as its ends."""
 
 
-def of_base(study: GlobalSensitivity, results: Results) -> Iterator[Conclusion]:
+def of_base(study: GlobalSensitivity, results: ResultTables) -> Iterator[Conclusion]:
     """All of them."""
     stiffness, motion = (results.table(name) for name in ("base_stiffness", "base_motion"))
     yield _stiffness(study, stiffness)

@@ -4,7 +4,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, page_tables, sortable
 from spinepipe.sensitivity_analysis.global_indices.design import DUMMY
 from spinepipe.studies.global_sensitivity.conclusions import conclusions
@@ -30,7 +30,7 @@ _SHOWN = (
 """Columns of indices that a reader compares; the file has all."""
 
 
-def page(study: GlobalSensitivity, cohort: Cohort, results: Results) -> Page:
+def page(study: GlobalSensitivity, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows."""
     return Page(
         conclusions=list(conclusions(study, cohort, results)),
@@ -58,7 +58,7 @@ def left_out(study: GlobalSensitivity) -> tuple[str, ...]:
     return tuple(f"{part} ({setting})" for part, setting, done in parts if not done)
 
 
-def _tables(results: Results) -> list[Sortable]:
+def _tables(results: ResultTables) -> list[Sortable]:
     """Indices, the largest first, and what they rest on."""
     indices = results.table("indices")
     found = []

@@ -21,7 +21,7 @@ from spinepipe.studies.joint_pose_sensitivity.retained import (
     MIDDLE_HALF,
     READ,
     UNIT,
-    Stiffness,
+    RetainedStiffness,
     effect_on,
     moved_by_load,
     other_fits,
@@ -96,7 +96,7 @@ def _in_order(names: Collection[str]) -> list[str]:
 
 
 def _sources(
-    one: Stiffness, effects: pd.DataFrame, alone: bool
+    one: RetainedStiffness, effects: pd.DataFrame, alone: bool
 ) -> list[tuple[str, dict[str, Any]]]:
     """What leaves how much of a stiffness; of one without a number the region alone."""
     low, high = one.region

@@ -12,7 +12,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import AXIS, listed
 from spinepipe.status import USABLE, Status
 from spinepipe.studies.joint_pose_sensitivity import conclusions_of_motion as of_motion
@@ -22,7 +22,7 @@ from spinepipe.studies.joint_pose_sensitivity.retained import (
     COLUMN,
     FACTOR,
     FEWEST,
-    Stiffness,
+    RetainedStiffness,
     effect_on,
     most_moved,
     moved_by_load,
@@ -40,7 +40,7 @@ MOST_LEFT_OUT = 0.5
 
 
 def conclusions(
-    study: JointPoseSensitivity, cohort: Cohort, results: Results
+    study: JointPoseSensitivity, cohort: Cohort, results: ResultTables
 ) -> Iterator[Conclusion]:
     """All of them."""
     found = stiffnesses(study, cohort, results.tables)
@@ -64,7 +64,7 @@ def conclusions(
 
 
 def _palpation(
-    found: Sequence[Stiffness], main: Stiffness | None, results: Results
+    found: Sequence[RetainedStiffness], main: RetainedStiffness | None, results: ResultTables
 ) -> Iterator[Conclusion]:
     """How far palpation moves stiffness, beside where the load acts: the answer and key numbers."""
     if main is None:
@@ -117,13 +117,13 @@ def _palpation(
         yield Conclusion("region", "told", {"value": region, "open": open_}, names)
 
 
-def _share(of: Sequence[Stiffness], counts: Sequence[int], what: str) -> Value:
+def _share(of: Sequence[RetainedStiffness], counts: Sequence[int], what: str) -> Value:
     """Of the retained fits of some stiffnesses, those that were counted."""
     fits = sum(len(one.values) for one in of)
     return Value(100.0 * sum(counts) / fits, "%", n=fits, source=f"calibrations: {what}")
 
 
-def _load_points(main: Stiffness, results: Results) -> Iterator[Conclusion]:
+def _load_points(main: RetainedStiffness, results: ResultTables) -> Iterator[Conclusion]:
     """Whether the readings exclude load points, and what stiffness does over the others."""
     effect = effect_on(main, results.table("load_point_effect"))
     if effect is None:
@@ -154,7 +154,7 @@ def _load_points(main: Stiffness, results: Results) -> Iterator[Conclusion]:
     yield Conclusion("load_points", verdict, found, names)
 
 
-def _readings(main: Stiffness) -> Iterator[Conclusion]:
+def _readings(main: RetainedStiffness) -> Iterator[Conclusion]:
     """The region of one fit beside the middle 95 % over palpations."""
     low, high = main.region
     first, last = map(float, main.at(2.5, 97.5))
@@ -169,7 +169,7 @@ def _readings(main: Stiffness) -> Iterator[Conclusion]:
     yield Conclusion("readings", verdict, {"value": region}, {"stiffness": main.name, **names})
 
 
-def _identified(found: Sequence[Stiffness]) -> Conclusion:
+def _identified(found: Sequence[RetainedStiffness]) -> Conclusion:
     """Which stiffnesses have no number, and how many fits do not identify them or are at a bound.
 
     Parameters
@@ -212,7 +212,7 @@ def _landmarks(study: JointPoseSensitivity, cohort: Cohort) -> Iterator[Conclusi
     yield Conclusion("landmarks", verdict, {"least": least, "most": most})
 
 
-def _fits(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]:
+def _fits(study: JointPoseSensitivity, results: ResultTables) -> Iterator[Conclusion]:
     """How many fits are retained and why others are not; how the retained ones ended."""
     counts = results.table("counts")
     if counts.empty:
@@ -258,7 +258,7 @@ def _fits(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]
     yield Conclusion("sample", "ok" if least >= MANY else "check", fewest)
 
 
-def _methods(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]:
+def _methods(study: JointPoseSensitivity, results: ResultTables) -> Iterator[Conclusion]:
     values = {
         "poses": Value(study.poses, source="settings: poses"),
         "times": Value(study.success.outlier_times_start, source="settings: success"),

@@ -6,7 +6,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import AXIS, unit
 from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.retained import place_of
@@ -23,7 +23,7 @@ KEYS = ["specimen", "joint", "coordinate"]
 
 
 def conclusions(
-    study: JointPoseSensitivity, cohort: Cohort, results: Results
+    study: JointPoseSensitivity, cohort: Cohort, results: ResultTables
 ) -> Iterator[Conclusion]:
     """All of them."""
     shares = results.table("variance_shares")

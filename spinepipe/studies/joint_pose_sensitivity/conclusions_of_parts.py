@@ -7,7 +7,7 @@ import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import listed
 from spinepipe.status import Status
 from spinepipe.studies.joint_pose_sensitivity.retained import (
@@ -15,7 +15,7 @@ from spinepipe.studies.joint_pose_sensitivity.retained import (
     FACTOR,
     READ,
     REST,
-    Stiffness,
+    RetainedStiffness,
     other_fits,
     percentiles,
 )
@@ -32,7 +32,7 @@ IN_BAND = 0.9
 """Of the readings that lie in a 95 % band: fewer speak against the model."""
 
 
-def conclusions(study: JointPoseSensitivity, results: Results) -> Iterator[Conclusion]:
+def conclusions(study: JointPoseSensitivity, results: ResultTables) -> Iterator[Conclusion]:
     """Of parts that tell no stiffness."""
     counts = results.table("counts")
     if len(counts):
@@ -50,7 +50,7 @@ def conclusions(study: JointPoseSensitivity, results: Results) -> Iterator[Concl
 
 
 def bootstraps(
-    study: JointPoseSensitivity, main: Stiffness, results: Results
+    study: JointPoseSensitivity, main: RetainedStiffness, results: ResultTables
 ) -> Iterator[Conclusion]:
     """How far start values, loading and damping move the stiffness that the answer tells.
 
@@ -148,7 +148,7 @@ def _precision(study: JointPoseSensitivity, rows: pd.DataFrame) -> Iterator[Conc
     yield Conclusion("precision", verdict, {"value": value, "share": share}, names)
 
 
-def posterior(main: Stiffness, results: Results) -> Iterator[Conclusion]:
+def posterior(main: RetainedStiffness, results: ResultTables) -> Iterator[Conclusion]:
     """The interval of the stiffness that the answer tells, with landmarks as unknowns too."""
     rows = results.table("posterior")
     if rows.empty:
@@ -171,7 +171,7 @@ def posterior(main: Stiffness, results: Results) -> Iterator[Conclusion]:
         yield Conclusion("posterior", verdict, values, {"stiffness": main.name})
 
 
-def _sampled(results: Results) -> Iterator[Conclusion]:
+def _sampled(results: ResultTables) -> Iterator[Conclusion]:
     """Whether the sampler converged, its band, and whether the readings prefer palpations."""
     rows, motion = results.table("posterior"), results.table("posterior_motion")
     if rows.empty:

@@ -7,7 +7,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, sortable
 from spinepipe.schema import Column, all_declared
 from spinepipe.studies.joint_pose_sensitivity.conclusions import conclusions
@@ -76,7 +76,7 @@ FOLDED = (
 )
 
 
-def page(study: JointPoseSensitivity, cohort: Cohort, results: Results) -> Page:
+def page(study: JointPoseSensitivity, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows, of the tables that there are by then."""
     return Page(
         conclusions=list(conclusions(study, cohort, results)),
@@ -104,7 +104,7 @@ def left_out(study: JointPoseSensitivity) -> tuple[str, ...]:
     return told if study.load_point.asked else (*told, point)
 
 
-def shown_tables(study: JointPoseSensitivity, results: Results) -> list[Sortable]:
+def shown_tables(study: JointPoseSensitivity, results: ResultTables) -> list[Sortable]:
     """Tables that the study has, of retained fits where there are others too."""
     found = []
     for name, (title, columns) in SHOWN.items():

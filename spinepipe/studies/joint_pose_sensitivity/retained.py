@@ -63,7 +63,7 @@ def place_of(specimen: str, joint: str, cohort: Cohort) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Stiffness:
+class RetainedStiffness:
     """One stiffness of a specimen, or of one of its joints, over the retained fits.
 
     Attributes
@@ -148,7 +148,7 @@ def retained(rows: pd.DataFrame, success: pd.DataFrame) -> pd.DataFrame:
 
 def stiffnesses(
     study: JointPoseSensitivity, cohort: Cohort, tables: Mapping[str, pd.DataFrame]
-) -> list[Stiffness]:
+) -> list[RetainedStiffness]:
     """Every fitted stiffness: by coordinate, specimen, and joint from above.
 
     Parameters
@@ -169,13 +169,15 @@ def stiffnesses(
     ]
 
 
-def _of(study: JointPoseSensitivity, cohort: Cohort, rows: pd.DataFrame, name: str) -> Stiffness:
+def _of(
+    study: JointPoseSensitivity, cohort: Cohort, rows: pd.DataFrame, name: str
+) -> RetainedStiffness:
     factor, wide = FACTOR[name], study.calibration.bound_factor
     start = factor * study.stiffness.in_order()[COORDINATES.index(name)]
     _, low, high, below, above, identifiable = region_columns(name)
     specimen, joint = rows[["specimen", "joint"]].iloc[0]
     values = factor * rows[COLUMN[name]].to_numpy(float)
-    return Stiffness(
+    return RetainedStiffness(
         specimen=specimen,
         joint=joint,
         coordinate=name,
@@ -199,7 +201,7 @@ def _end(ends: pd.Series, is_open: pd.Series, beyond: float) -> float | None:
     return None if middle == beyond else middle
 
 
-def most_moved(found: list[Stiffness]) -> Stiffness | None:
+def most_moved(found: list[RetainedStiffness]) -> RetainedStiffness | None:
     """The stiffness that the answer tells: of the first coordinate with a number, the one that
     palpation moves most. Rotations come first, in which spines are compared.
     """
@@ -228,7 +230,7 @@ def moved_by_load(effect: pd.Series) -> float | None:
     return moved if ways and np.isfinite(moved) else None
 
 
-def effect_on(one: Stiffness, effects: pd.DataFrame) -> pd.Series | None:
+def effect_on(one: RetainedStiffness, effects: pd.DataFrame) -> pd.Series | None:
     """The row of ``load_point_effect`` of the same stiffness, where there is one with a fit."""
     if effects.empty:
         return None
@@ -247,7 +249,7 @@ def percentiles(values: Array, *percents: float) -> Array:
 
 
 def other_fits(
-    study: JointPoseSensitivity, fits: pd.DataFrame, one: Stiffness
+    study: JointPoseSensitivity, fits: pd.DataFrame, one: RetainedStiffness
 ) -> dict[tuple[str, str], Array]:
     """A stiffness of retained fits from other starts and with other damping.
 

@@ -8,7 +8,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import level, listed, plain
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
 from spinepipe.studies.range_of_motion.tables import EVERY, FACTORS
@@ -37,7 +37,9 @@ def whole(cohort: Cohort, rows: pd.DataFrame) -> pd.DataFrame:
     return rows[rows["specimen"] == chosen] if len(rows) else rows
 
 
-def conclusions(study: RangeOfMotion, cohort: Cohort, results: Results) -> Iterator[Conclusion]:
+def conclusions(
+    study: RangeOfMotion, cohort: Cohort, results: ResultTables
+) -> Iterator[Conclusion]:
     """All of them."""
     summary = whole(cohort, results.table("rom_summary"))
     variance = whole(cohort, results.table("rom_variance"))

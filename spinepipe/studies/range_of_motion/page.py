@@ -2,7 +2,7 @@
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import page_tables
 from spinepipe.report.viewer.specimens import specimen_scenes
 from spinepipe.studies.range_of_motion.conclusions import conclusions, whole
@@ -13,7 +13,7 @@ READ = ("rom_summary", "rom_variance", "stiffness_sets")
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def page(study: RangeOfMotion, cohort: Cohort, results: Results) -> Page:
+def page(study: RangeOfMotion, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows; rows of the cohort, those of each specimen are in the file."""
     summary, variance = (whole(cohort, results.table(name)) for name in READ[:2])
     return Page(

@@ -22,7 +22,7 @@ from spinepipe.studies.scoliosis.conclusions import (
     most_moved,
     tried,
 )
-from spinepipe.studies.scoliosis.errors_compared import FILMS, Compared, Difference
+from spinepipe.studies.scoliosis.errors_compared import FILMS, Compared, LawDifference
 from spinepipe.studies.scoliosis.settings import Scoliosis
 
 SHORT = {
@@ -103,7 +103,7 @@ def differences(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
     return Chart(title, [_differences(compared, NOT_PERSONAL, found)], caption)
 
 
-def _differences(compared: Compared, law: str, found: list[Difference]) -> Rows:
+def _differences(compared: Compared, law: str, found: list[LawDifference]) -> Rows:
     limit = compared.detectable
     frame = pd.DataFrame(
         [_row(SHORT[one.other], one.margin) | {"hollow": not one.significant} for one in found]

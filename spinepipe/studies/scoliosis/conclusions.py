@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import listed
 from spinepipe.studies.scoliosis.accuracy import READINGS_OF_A_ROTATION
 from spinepipe.studies.scoliosis.conclusions_quality import quality
@@ -17,7 +17,7 @@ from spinepipe.studies.scoliosis.errors_compared import (
     FILMS,
     LAWS,
     Compared,
-    Difference,
+    LawDifference,
 )
 from spinepipe.studies.scoliosis.films import read_films, step_sd_deg
 from spinepipe.studies.scoliosis.settings import Scoliosis
@@ -45,7 +45,7 @@ NOT_COMPARED = ("none", "few", "alone")
 """Verdicts of errors of which there is nothing to compare."""
 
 
-def conclusions(study: Scoliosis, cohort: Cohort, results: Results) -> Iterator[Conclusion]:
+def conclusions(study: Scoliosis, cohort: Cohort, results: ResultTables) -> Iterator[Conclusion]:
     """All of them."""
     tables = results.tables
     left_out = Compared.of(tables, "held_out", DECIDING)
@@ -117,7 +117,7 @@ def _answer(left_out: Compared, fitted_only: bool) -> Iterator[Conclusion]:
         yield Conclusion("precision", "too_coarse", {**values, "tilt": tilt, **exact})
 
 
-def _told(one: Difference) -> tuple[dict[str, Value], dict[str, str]]:
+def _told(one: LawDifference) -> tuple[dict[str, Value], dict[str, str]]:
     """Numbers and names of a difference of two laws."""
     values = {"error": one.errors[0], "other_error": one.errors[1], "margin": one.margin}
     values["n"] = Value(one.margin.n or 0, source=one.margin.source)

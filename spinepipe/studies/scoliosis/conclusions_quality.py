@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import listed
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis.errors import REFERENCE
@@ -22,7 +22,7 @@ def counted(source: str, **counts: int) -> dict[str, Value]:
     return {name: Value(int(n), source=source) for name, n in counts.items()}
 
 
-def quality(results: Results, *groups: Compared) -> Iterator[Conclusion]:
+def quality(results: ResultTables, *groups: Compared) -> Iterator[Conclusion]:
     """All lights but those of the reading noise and of what was varied."""
     positions, laws = results.table("positions"), results.table("laws")
     if len(positions):

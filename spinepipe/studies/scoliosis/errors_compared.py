@@ -42,7 +42,7 @@ SIGNS = {"deg": "°", "mm": "mm"}
 
 
 @dataclass(frozen=True)
-class Difference:
+class LawDifference:
     """How much less one law errs than another, over the spines of both.
 
     Attributes
@@ -144,7 +144,7 @@ class Compared:
         low, high = found.interval or (None, None)
         return Value(float(found.value or 0.0), self.sign, low, high, found.n, how)
 
-    def difference(self, one: str, other: str) -> Difference:
+    def difference(self, one: str, other: str) -> LawDifference:
         """How much less the one errs."""
         both = self.each[[one, other]].dropna()
         margin = self.mean(both[other] - both[one])
@@ -157,10 +157,10 @@ class Compared:
             if (row["response"], row["factor"]) in toward
         )
         errors = self.mean(both[one]), self.mean(both[other])
-        return Difference(one, other, errors, margin, significant)
+        return LawDifference(one, other, errors, margin, significant)
 
     @cached_property
-    def beside_best(self) -> list[Difference]:
+    def beside_best(self) -> list[LawDifference]:
         """Of the law of least error to each other one, the nearest first."""
         best, *others = self.laws
         found = [self.difference(best, other) for other in others]
@@ -187,7 +187,7 @@ class Compared:
         return "clear" if self.beside_best[0].margin.number > self.detectable else "small"
 
     @property
-    def nearest(self) -> Difference:
+    def nearest(self) -> LawDifference:
         """The law from which the first differs least; where some are alike, of these."""
         alike = [one for one in self.beside_best if not one.less]
         return (alike or self.beside_best)[0]

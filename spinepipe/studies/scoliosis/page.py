@@ -3,7 +3,7 @@
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, sortable
 from spinepipe.report.words import plain
 from spinepipe.studies.scoliosis.charts import SHORT
@@ -51,7 +51,7 @@ READ = tuple(table.name for table in _READ)
 _WORDS = {**SHORT, "held_out": "left-out", "beyond": "beyond the end"}
 
 
-def page(study: Scoliosis, cohort: Cohort, results: Results) -> Page:
+def page(study: Scoliosis, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows."""
     return Page(
         conclusions=list(conclusions(study, cohort, results)),
@@ -65,7 +65,7 @@ def page(study: Scoliosis, cohort: Cohort, results: Results) -> Page:
     )
 
 
-def shown_tables(results: Results) -> list[Sortable]:
+def shown_tables(results: ResultTables) -> list[Sortable]:
     """Tables that the study has, with names of laws and films in words."""
     found = []
     for shape, (title, names) in _SHOWN.items():
@@ -83,7 +83,7 @@ def _in_words(cell: object) -> object:
     return " ".join(plain(_WORDS.get(part, part)) for part in cell.split("/"))
 
 
-def left_out(study: Scoliosis, cohort: Cohort, results: Results) -> tuple[str, ...]:
+def left_out(study: Scoliosis, cohort: Cohort, results: ResultTables) -> tuple[str, ...]:
     """Parts that the settings or the films leave out, each with the reason."""
     films = cohort.further["films"]
     parts = [f"{SHORT[name]} (models)" for name in MODELS if name not in study.models]

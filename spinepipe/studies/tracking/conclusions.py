@@ -9,7 +9,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import LUMBAR_JOINTS
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.tracking.conclusions_of_errors import (
     ENDED,
@@ -45,7 +45,7 @@ UNLIKE = 10.0
 MOST_NAMES = 3
 
 
-def conclusions(study: Tracking, cohort: Cohort, results: Results) -> Iterator[Conclusion]:
+def conclusions(study: Tracking, cohort: Cohort, results: ResultTables) -> Iterator[Conclusion]:
     """All of them."""
     tables: Tables = defaultdict(pd.DataFrame, results.tables)
     errors = tables["errors"]

@@ -3,7 +3,7 @@
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, page_tables
 from spinepipe.studies.tracking import tables as shapes
 from spinepipe.studies.tracking.conclusions import conclusions, window_rows
@@ -35,7 +35,7 @@ _IN_THE_FILE = {
 """Columns that nobody compares on a page."""
 
 
-def page(study: Tracking, cohort: Cohort, results: Results) -> Page:
+def page(study: Tracking, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows."""
     parts = []
     if results.table("errors").empty:
@@ -53,7 +53,7 @@ def page(study: Tracking, cohort: Cohort, results: Results) -> Page:
     )
 
 
-def shown_tables(results: Results) -> list[Sortable]:
+def shown_tables(results: ResultTables) -> list[Sortable]:
     """Tables that the study has, with the columns that a reader compares."""
     found: list[Sortable] = []
     for shape, title in _SHOWN:

@@ -9,7 +9,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.report.viewer.meshes import Endplate, spine_meshes
-from spinepipe.report.viewer.scene import Body, Scene, Step, posed_axes, rotation_vector
+from spinepipe.report.viewer.scene import Scene, SceneBody, SceneStep, posed_axes, rotation_vector
 from spinepipe.report.words import count, fixed, plain
 from spinepipe.studies.tracking.words import short_of
 from spinepipe.units import ROTATIONS
@@ -37,7 +37,7 @@ def tracking_scenes(drawn: pd.DataFrame) -> list[Scene]:
         if sum(len(other) for _, _, other in kept) + len(chosen) <= MOST_FRAMES:
             kept.append((name, rows, chosen))
     caption = _caption(len(kept), len(every))
-    shaped: dict[tuple[str, ...], list[Body]] = {}
+    shaped: dict[tuple[str, ...], list[SceneBody]] = {}
     return [_scene(name, rows, chosen, caption, shaped) for name, rows, chosen in kept]
 
 
@@ -61,7 +61,7 @@ def _scene(
     rows: pd.DataFrame,
     frames: list[int],
     caption: str,
-    shaped: dict[tuple[str, ...], list[Body]],
+    shaped: dict[tuple[str, ...], list[SceneBody]],
 ) -> Scene:
     """One motion at these frames; ``shaped`` keeps the vertebrae of a person for all motions."""
     of_kind = {kind: rows[rows["kind"] == kind] for kind in ("body", "modelled", "measured")}
@@ -75,7 +75,7 @@ def _scene(
     seen = [_grid(of_kind[kind], frames, markers, _XYZ) for kind in ("modelled", "measured")]
     times = of_kind["body"].groupby("frame")["time_s"].first().astype(float)
     steps = [
-        Step(
+        SceneStep(
             f"{fixed(times[frame])} s",
             _says(float(times[frame]), both),
             pose,
@@ -89,7 +89,7 @@ def _scene(
     return Scene(title, "Time", shaped[person], steps, caption, pause_ms=100)
 
 
-def _bodies(names: list[str], poses: Array) -> list[Body]:
+def _bodies(names: list[str], poses: Array) -> list[SceneBody]:
     """Vertebrae shaped by the first frame: a body's frame is at the joint below it.
 
     The first one's, the pelvis, is at the joint above it.
@@ -98,7 +98,7 @@ def _bodies(names: list[str], poses: Array) -> list[Body]:
     joints = [Endplate(pose[:3], turn) for pose, turn in zip(poses[1:], axes[1:], strict=True)]
     meshes = spine_meshes(names, joints)
     return [
-        Body(name, mesh.seen_from(pose[:3], turn), fixed=name == BODIES[0])
+        SceneBody(name, mesh.seen_from(pose[:3], turn), fixed=name == BODIES[0])
         for name, mesh, pose, turn in zip(names, meshes, poses, axes, strict=True)
     ]
 

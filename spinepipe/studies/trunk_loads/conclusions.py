@@ -7,7 +7,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import count, level, listed, plain, short
 from spinepipe.studies.trunk_loads.conclusions_of_trust import of_trust
 from spinepipe.studies.trunk_loads.measured import beside_measured, counted_and_held, error
@@ -63,7 +63,7 @@ GROUPS = {
 """Tasks by what is done, in words."""
 
 
-def conclusions(study: TrunkLoads, cohort: Cohort, results: Results) -> Iterator[Conclusion]:
+def conclusions(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Iterator[Conclusion]:
     """All of them."""
     tables = results.tables
     tasks = tables.get("tasks", pd.DataFrame())

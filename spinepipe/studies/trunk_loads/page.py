@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, sortable
 from spinepipe.schema import Table
 from spinepipe.studies.trunk_loads.conclusions import conclusions
@@ -64,7 +64,7 @@ READ = (
 """Tables whose rows the page needs; of the others it tells where they come from."""
 
 
-def page(study: TrunkLoads, cohort: Cohort, results: Results) -> Page:
+def page(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows."""
     return Page(
         conclusions=list(conclusions(study, cohort, results)),
@@ -79,7 +79,7 @@ def page(study: TrunkLoads, cohort: Cohort, results: Results) -> Page:
     )
 
 
-def _tables(study: TrunkLoads, results: Results) -> list[Sortable]:
+def _tables(study: TrunkLoads, results: ResultTables) -> list[Sortable]:
     """Tables that have rows; of levels those of one body, of remarks each once."""
     tasks = results.table("tasks")
     body = shown_person(study, tasks[sound(tasks)]) if len(tasks) else None

@@ -9,7 +9,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.report.viewer.meshes import Endplate, spine_meshes
-from spinepipe.report.viewer.scene import Body, Load, Muscle, Scene, Step, posed_axes
+from spinepipe.report.viewer.scene import Muscle, Scene, SceneBody, SceneLoad, SceneStep, posed_axes
 from spinepipe.report.words import capital, count, fixed, number, plain
 from spinepipe.studies.trunk_loads.forms import HANDS
 from spinepipe.studies.trunk_loads.words import ENDED, newton
@@ -75,7 +75,7 @@ def _scene(
     ]
     meshes = spine_meshes(cohort.vertebrae, joints)
     bodies = [
-        Body(name, mesh.seen_from(pose[:3], turn), fixed=k == 0)
+        SceneBody(name, mesh.seen_from(pose[:3], turn), fixed=k == 0)
         for k, (name, mesh, pose, turn) in enumerate(
             zip(cohort.vertebrae, meshes, start, axes, strict=True)
         )
@@ -93,7 +93,7 @@ def _scene(
         says = f"{capital(plain(task))}{says}. {_loads_in_words(rows, cohort.vertebrae)}"
         says += "" if muscles else " Its muscle forces are not stored by line."
         steps.append(
-            Step(capital(plain(task)), says, poses, loads=loads, disc=disc, muscles=muscles)
+            SceneStep(capital(plain(task)), says, poses, loads=loads, disc=disc, muscles=muscles)
         )
     return Scene(person, "Task", bodies, steps, caption, one_scale=False)
 
@@ -129,7 +129,7 @@ def _muscles(paths: pd.DataFrame, top_mpa: float) -> list[Muscle]:
     ]
 
 
-def _hands(asked: pd.DataFrame, thorax: Array, body: int) -> tuple[list[Load], str]:
+def _hands(asked: pd.DataFrame, thorax: Array, body: int) -> tuple[list[SceneLoad], str]:
     """Weight in the hands, held by the uppermost vertebra of pose (6,), and in words."""
     if asked.empty or not {"hand_load_kg", *HANDS} <= set(asked):
         return [], ""
@@ -140,7 +140,7 @@ def _hands(asked: pd.DataFrame, thorax: Array, body: int) -> tuple[list[Load], s
     if not np.isfinite(place).all():
         return [], words
     at = (np.array(place) - thorax[:3]) @ posed_axes(thorax[None, :])[0]
-    return [Load("force", body, at, kg * STANDARD_GRAVITY)], words
+    return [SceneLoad("force", body, at, kg * STANDARD_GRAVITY)], words
 
 
 def _loads_in_words(rows: pd.DataFrame, vertebrae: Sequence[str]) -> str:

@@ -18,7 +18,7 @@ from cohort_edge_cases import joined_jobs
 
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.problems import InputError
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.studies import read as studies
 from spinepipe.studies.cohort_stiffness.charts import held_out_error
 from spinepipe.studies.cohort_stiffness.claims_of_errors import overprediction_percent
@@ -182,7 +182,7 @@ def test_who_asks_for_ratios_of_levels_is_told_why_not(tmp_path: Path) -> None:
 
 def test_page_and_figures_are_in_millimetres(project: Written, frames: Frames) -> None:
     study, cohort = inputs(project)
-    told = list(conclusions(study, cohort, Results(StudyTables(frames))))
+    told = list(conclusions(study, cohort, ResultTables(StudyTables(frames))))
     (answer,) = (one for one in told if one.rule == "typical")
     assert {value.unit for value in answer.values.values()} == {"N/mm"}
     assert "ratios" in {one.rule for one in told}, "levels that are left out are told of"

@@ -21,7 +21,7 @@ from spinepipe.studies.discrepancy.search.prediction import Simulated
 from spinepipe.studies.discrepancy.search.residual_model import fit_tables
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Conclusion, plain_data, verdict_of
+from spinepipe.studies.discrepancy.verdict import VerdictKind, plain_data, verdict_of
 from spinepipe.studies.discrepancy.verdict_unnamed import Tabulated
 from spinepipe.units import ROTATIONS
 
@@ -126,7 +126,7 @@ def test_the_table_has_the_law_point_by_point(results: DiscrepancyResults) -> No
 @pytest.mark.slow
 def test_the_verdict_hands_over_a_formula_and_no_name(results: DiscrepancyResults) -> None:
     verdict = results.verdict
-    assert verdict.verdict is Conclusion.UNKNOWN
+    assert verdict.verdict is VerdictKind.UNKNOWN
     assert verdict.effects == ()
     assert verdict.unknown is not None
     told = verdict.unknown.formula

@@ -33,7 +33,7 @@ from spinepipe.api.missing_effects import PACKAGE, _result
 from spinepipe.model.file import ModelFile
 from spinepipe.report.conclusions import Sentence, Told, sentences_of
 from spinepipe.report.forms.chart import Chart, Drawing
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.studies.discrepancy.alternatives import UNNAMED
 from spinepipe.studies.discrepancy.design import advice
 from spinepipe.studies.discrepancy.job import DiscrepancyResults
@@ -329,14 +329,14 @@ CASES: tuple[Case, ...] = (
 # fmt: on
 
 
-def made(root: Path, case: Case) -> tuple[Any, Any, Results, Page]:
+def made(root: Path, case: Case) -> tuple[Any, Any, ResultTables, Page]:
     """Study, cohort, results and page of a case."""
     settings, cohort = study_of(root)
     rows = frames(case.answer)
     rows |= case.tables(rows) if case.tables else {}
     key = Drawing("load_displacement", "Load over motion", "Words.", ('<svg width="1"></svg>',))
     read = tables(VERDICTS[case.answer] | case.changed, rows, root)
-    results = Results(read, drawings={key.name: key})
+    results = ResultTables(read, drawings={key.name: key})
     settings = settings.model_copy(update=case.settings)
     cohort = replace(cohort, specimens=cohort.specimens.head(case.specimens))
     return settings, cohort, results, page(settings, cohort, results)

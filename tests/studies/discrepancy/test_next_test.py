@@ -43,7 +43,7 @@ from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.search.search_state import Rules
 from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.tables import NEXT_TESTS
-from spinepipe.studies.discrepancy.verdict import Conclusion
+from spinepipe.studies.discrepancy.verdict import VerdictKind
 from spinepipe.tables import from_rows
 from spinepipe.units import ROTATIONS
 
@@ -176,7 +176,7 @@ def test_a_set_gets_a_test_that_tells_its_names_apart():
     )
     found = search(grounds, rules, at_once)
     ended = outcome(found, MARGIN)
-    assert ended.verdict is Conclusion.SET
+    assert ended.verdict is VerdictKind.SET
     hidden = hidden_effects(found, ended, rules, at_once)
     told = advice(found, ended, rules, bench(grounds, None), at_once, hidden)
     (best,) = [one for one in told if one.status == ADVISED]

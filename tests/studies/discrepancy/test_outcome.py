@@ -24,7 +24,7 @@ from spinepipe.studies.discrepancy.search.search_state import (
     SelectedTerm,
 )
 from spinepipe.studies.discrepancy.summary import nearest_candidates
-from spinepipe.studies.discrepancy.verdict import Candidate, Conclusion, SuspectedError
+from spinepipe.studies.discrepancy.verdict import Candidate, SuspectedError, VerdictKind
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 MARGIN = 3.0
@@ -117,7 +117,7 @@ def says(found: SearchResult, **more: Any) -> tuple[str, str]:
 
 
 def assert_unknown(result: Outcome, *words: str) -> None:
-    assert (result.verdict, result.named, result.tied) == (Conclusion.UNKNOWN, (), ())
+    assert (result.verdict, result.named, result.tied) == (VerdictKind.UNKNOWN, (), ())
     for word in words:
         assert word in result.why
 
@@ -183,7 +183,7 @@ def test_a_small_prop_takes_no_name_from_what_explains_nearly_all() -> None:
     prop = stands("load_offset", log_evidence=40.0, alone=1.0)
     sure = replace(stands(), gain=1000.0)
     result = outcome(ended(sure, prop, gain=1100.0), MARGIN)
-    assert (result.verdict, result.named) == (Conclusion.PART, (sure,))
+    assert (result.verdict, result.named) == (VerdictKind.PART, (sure,))
     assert_unknown(outcome(ended(replace(sure, gain=890.0), prop, gain=990.0), MARGIN), "imitate")
 
 
@@ -279,7 +279,7 @@ def test_what_stays_elsewhere_does_not_silence_an_effect() -> None:
     """Right bending is unexplained: the effect in extension is there, and not all."""
     found = ended(stands(), elsewhere=60.0)
     result = outcome(found, MARGIN)
-    assert (result.verdict, result.named) == (Conclusion.PART, found.standing)
+    assert (result.verdict, result.named) == (VerdictKind.PART, found.standing)
     assert "right bending" in result.left[0]
     assert_unknown(outcome(ended(stands(), lack=60.0), MARGIN), "stays in extension")
 
@@ -300,7 +300,7 @@ def test_without_rivals_there_is_no_name() -> None:
     assert_unknown(outcome(ended(unknown), MARGIN), "its rivals are not known")
     sure = stands()
     result = outcome(ended(sure, unknown), MARGIN)
-    assert (result.verdict, result.named) == (Conclusion.PART, (sure,))
+    assert (result.verdict, result.named) == (VerdictKind.PART, (sure,))
 
 
 def test_what_closes_less_than_half_of_the_held_out_gap_is_a_part() -> None:
@@ -320,7 +320,7 @@ def test_ties_come_after_what_is_unexplained_or_unproven() -> None:
 def test_rivals_within_the_margin_make_a_set() -> None:
     rivals = [("hysteresis", -0.5), ("load_offset", 2.9), ("marker_bias", 3.0)]
     result = outcome(ended(stands(rivals=rivals)), MARGIN)
-    assert (result.verdict, result.named) == (Conclusion.SET, ())
+    assert (result.verdict, result.named) == (VerdictKind.SET, ())
     assert result.tied == ("creep", "hysteresis", "load_offset")
     assert "creep, hysteresis or load_offset" in result.why
 
@@ -329,14 +329,14 @@ def test_what_was_not_recorded_excludes_no_rival() -> None:
     """Without times creep is never fitted: evidence for friction is none against creep."""
     friction = stands("hysteresis", rivals=[("creep", 40.0)])
     result = outcome(ended(friction), MARGIN, not_excluded={"hysteresis": ("creep",)})
-    assert (result.verdict, result.tied) == (Conclusion.SET, ("hysteresis", "creep"))
+    assert (result.verdict, result.tied) == (VerdictKind.SET, ("hysteresis", "creep"))
     assert says(ended(friction))[0] == "NAMED"
 
 
 def test_beside_a_tie_what_is_sure_is_named() -> None:
     sure = stands("local_laxity")
     result = outcome(ended(stands(rivals=[("hysteresis", 1.0)]), sure), MARGIN)
-    assert (result.verdict, result.named) == (Conclusion.SET, (sure,))
+    assert (result.verdict, result.named) == (VerdictKind.SET, (sure,))
     assert result.tied == ("creep", "hysteresis")
 
 
@@ -344,7 +344,7 @@ def test_effects_that_stand_beside_one_another_are_no_ties() -> None:
     one = stands("creep", rivals=[("hysteresis", 1.0), ("load_offset", 9.0)])
     other = stands("hysteresis", rivals=[("creep", 0.5)])
     result = outcome(ended(one, other), MARGIN)
-    assert (result.verdict, result.named, result.tied) == (Conclusion.NAMED, (one, other), ())
+    assert (result.verdict, result.named, result.tied) == (VerdictKind.NAMED, (one, other), ())
     assert result.why.startswith("creep and hysteresis: ")
 
 
@@ -355,7 +355,7 @@ def test_an_effect_on_another_coordinate_is_still_a_rival_here() -> None:
         "facet_contact", rivals=[("nonlinear_stiffening", 0.5)], coordinate="right_bending"
     )
     result = outcome(ended(sure, here), MARGIN)
-    assert (result.verdict, result.named) == (Conclusion.SET, (sure,))
+    assert (result.verdict, result.named) == (VerdictKind.SET, (sure,))
     assert result.tied == ("facet_contact", "nonlinear_stiffening")
 
 
@@ -384,7 +384,7 @@ def test_why_there_is_no_name_is_told_to_programs_too(
 ) -> None:
     result = outcome(found, MARGIN, **more)
     assert result.reason is reason
-    assert (result.verdict is Conclusion.UNKNOWN) == (reason is not None)
+    assert (result.verdict is VerdictKind.UNKNOWN) == (reason is not None)
 
 
 @sweep(

@@ -29,7 +29,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
 from spinepipe.studies.discrepancy.search.regions import values_with_regions
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Conclusion
+from spinepipe.studies.discrepancy.verdict import VerdictKind
 
 STEPS_MM = np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 1.4, 0.6])
 STIFFNESS, FORCE_SD, MOTION_SD = 6e4, 1.0, 0.02
@@ -191,7 +191,7 @@ def searched(folder: Path, growth_per_mm2: float) -> Investigation:
 def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) -> None:
     """With the growth that made the forces, 0.15 per mm2, in its interval."""
     found = searched(tmp_path, 0.15)
-    assert found.ended.verdict is Conclusion.NAMED
+    assert found.ended.verdict is VerdictKind.NAMED
     (standing,) = found.ended.named
     assert standing.name == "nonlinear_stiffening"
     assert dict(standing.supposed.form.variant.options)["coordinate"] == "anterior"
@@ -203,4 +203,4 @@ def test_stiffening_that_a_machine_measures_as_force_is_named(tmp_path: Path) ->
 
 
 def test_a_machine_that_measures_a_straight_line_shows_nothing(tmp_path: Path) -> None:
-    assert searched(tmp_path, 0.0).ended.verdict is Conclusion.NULL
+    assert searched(tmp_path, 0.0).ended.verdict is VerdictKind.NULL

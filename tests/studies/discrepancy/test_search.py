@@ -13,7 +13,7 @@ import search_cases as cases
 from search_cases import Array, Searched, exponential, one_sided, searched
 
 from spinepipe.studies.discrepancy.search.regions import values_with_regions
-from spinepipe.studies.discrepancy.verdict import Conclusion
+from spinepipe.studies.discrepancy.verdict import VerdictKind
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +35,7 @@ def two() -> Searched:
 def test_stiffening_is_named_with_its_coordinate_and_rate() -> None:
     found, ended = stiffening().found, stiffening().ended
     assert (ended.verdict, [one.name for one in ended.named]) == (
-        Conclusion.NAMED,
+        VerdictKind.NAMED,
         ["nonlinear_stiffening"],
     )
     options = dict(found.standing[0].supposed.form.variant.options)
@@ -56,21 +56,21 @@ def test_a_whole_library_finds_the_same() -> None:
 
 def test_springs_lack_nothing() -> None:
     result = searched(cases.readings(2, {}))
-    assert (result.ended.verdict, result.found.standing) == (Conclusion.NULL, ())
+    assert (result.ended.verdict, result.found.standing) == (VerdictKind.NULL, ())
     assert result.found.base_gap.interval[0] == 0.0
     assert max(result.evidence().values()) < result.found.stages[0].screen.threshold
 
 
 def test_what_no_effect_does_is_unknown_and_said_where() -> None:
     result = searched(cases.readings(3, {"bending": cases.wavy}))
-    assert (result.ended.verdict, result.ended.named) == (Conclusion.UNKNOWN, ())
+    assert (result.ended.verdict, result.ended.named) == (VerdictKind.UNKNOWN, ())
     assert "right bending" in result.ended.why
     assert result.found.base_gap.gap > 1.0
 
 
 def test_two_effects_are_both_named_with_their_values() -> None:
     found, ended = two().found, two().ended
-    assert ended.verdict is Conclusion.NAMED
+    assert ended.verdict is VerdictKind.NAMED
     values = {}
     for number, one in enumerate(found.standing):
         (value,) = values_with_regions(found.final.fit, found.final.setting, number)
@@ -124,7 +124,7 @@ def test_order_and_names_of_specimens_and_order_of_tests_decide_nothing() -> Non
 def test_what_these_steps_cannot_tell_apart_is_a_set() -> None:
     """A weak stiffening bends the curve as a neutral zone does, seen at three loads to a side."""
     result = searched(cases.readings(1, {"flexion": exponential(1.2)}))
-    assert result.ended.verdict is Conclusion.SET
+    assert result.ended.verdict is VerdictKind.SET
     assert set(result.ended.tied) == {"nonlinear_stiffening", "neutral_zone"}
     assert result.ended.named == ()
     for name in result.ended.tied:
@@ -135,7 +135,7 @@ def test_a_tie_beside_a_sure_effect_leaves_that_one_named() -> None:
     laws = {"flexion": one_sided(0.04), "bending": exponential(1.2)}
     ended = searched(cases.readings(5, laws)).ended
     assert (ended.verdict, [one.name for one in ended.named]) == (
-        Conclusion.SET,
+        VerdictKind.SET,
         ["flexion_extension_asymmetry"],
     )
     assert set(ended.tied) == {"nonlinear_stiffening", "neutral_zone"}

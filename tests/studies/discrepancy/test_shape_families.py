@@ -17,7 +17,7 @@ from spinepipe.effects import PlaceSpread, create, registered
 from spinepipe.model.file import EffectEntry, ModelFile, Values, effects_for
 from spinepipe.studies.discrepancy.search.hypothesis import Variant, shape_grid, trials
 from spinepipe.studies.discrepancy.search.refit import _degenerate
-from spinepipe.studies.discrepancy.verdict import Conclusion
+from spinepipe.studies.discrepancy.verdict import VerdictKind
 from spinepipe.units import COORDINATES, ROTATIONS
 
 
@@ -157,7 +157,7 @@ def sliders(joint: int, moments: Array, k: float) -> Array:
 def test_another_formula_of_the_same_physics_has_its_name(law, levels, name: str) -> None:
     given = chains.readings(2, {"flexion": law}, ("a", "b"), levels=levels, joints=3)
     result = searched(given, effects=FEW)
-    assert result.ended.verdict is Conclusion.NAMED
+    assert result.ended.verdict is VerdictKind.NAMED
     assert [effect.name for effect in result.ended.named] == [name]
     assert result.found.base_gap.gap > 1.0
     assert result.found.final_gap.gap < 0.5

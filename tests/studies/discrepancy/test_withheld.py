@@ -14,7 +14,7 @@ from spinepipe.studies.discrepancy.search.outcome import outcome
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.search.search_state import Rules, look
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Conclusion
+from spinepipe.studies.discrepancy.verdict import VerdictKind
 from spinepipe.units import COORDINATES
 
 NEEDED = 5.0
@@ -63,7 +63,7 @@ def test_a_null_says_what_would_have_to_be_known_better():
     rules = Rules(all_trials(), COORDINATES, 0.01, 50, 3.0, 3, 0)
     found = search(grounds, rules, at_once)
     ended = outcome(found, 3.0)
-    assert ended.verdict is Conclusion.NULL
+    assert ended.verdict is VerdictKind.NULL
     hidden = hidden_effects(found, ended, rules, at_once)
     told = advice(found, ended, rules, bench(grounds, None), at_once, hidden)
     (best,) = [one for one in told if one.status == ADVISED]

@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from sweeps import sweep
 
 from spinepipe.effects.contract import Array
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.studies.global_sensitivity import base, design, respond
 from spinepipe.studies.global_sensitivity.base import compared
 from spinepipe.studies.global_sensitivity.batch import base_stiffness
@@ -66,7 +66,7 @@ class Based:
     def verdicts(self) -> dict[str, str]:
         """What the page concludes of the spine that inputs start from."""
         tables = {"base_stiffness": self.stiffness, "base_motion": self.motion}
-        found = of_base(self.study, Results(StudyTables(tables)))
+        found = of_base(self.study, ResultTables(StudyTables(tables)))
         return {one.rule: one.verdict for one in found}
 
 

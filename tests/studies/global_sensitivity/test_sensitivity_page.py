@@ -23,7 +23,7 @@ from page_rules import (
 
 from spinepipe.cohort import Cohort, read
 from spinepipe.report.conclusions import Told, sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.schema import Table
 from spinepipe.studies.global_sensitivity import charts
 from spinepipe.studies.global_sensitivity.page import page
@@ -198,7 +198,7 @@ def study(method: str = "sobol", **more: Any) -> GlobalSensitivity:
 
 def told_of(cohort: Cohort, asked: GlobalSensitivity, **tables: pd.DataFrame) -> Page:
     """The page of these tables, its rules held."""
-    results = Results(StudyTables(tables))
+    results = ResultTables(StudyTables(tables))
     made = page(asked, cohort, results)
     assert list(faults_of_told(made.told)) == []
     assert list(faults_of_page(made.html(asked, cohort, results))) == []

@@ -21,7 +21,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.forms.chart import Chart, Drawing
 from spinepipe.report.forms.curves import Curves
 from spinepipe.report.forms.rows import Rows
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import page
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
@@ -208,7 +208,7 @@ def test_numbers_of_the_paper_stand_beside_its_own_cohort_alone(name: str, study
 def test_a_page_with_its_figures_keeps_the_rules(study: Settings) -> None:
     tables = made.frames(made.whole())
     drawings = {name: Drawing.read(name, drawing(name)(*study, tables).svg()) for name in FIGURES}
-    results = Results(StudyTables(tables), {}, drawings)
+    results = ResultTables(StudyTables(tables), {}, drawings)
     html = page(*study, results).html(*study, results)
     assert list(faults_of_page(html)) == []
     assert html.count('<article class="finding') == 5

@@ -25,7 +25,7 @@ from study_cases import STUDY, Size, project
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.report.conclusions import Value, sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.studies.joint_pose_sensitivity.bootstrap import NO_REST
 from spinepipe.studies.joint_pose_sensitivity.inputs import study_and_cohort
 from spinepipe.studies.joint_pose_sensitivity.page import folded, left_out, page
@@ -58,7 +58,7 @@ def page_of(
 ) -> Page:
     """The page of the base study with some other tables; a table without rows is not there."""
     rows = {name: one for name, one in {**made.base(), **tables}.items() if one}
-    results = Results(StudyTables(made.frames(rows)))
+    results = ResultTables(StudyTables(made.frames(rows)))
     return page(settings(study[0], asked), study[1], results)
 
 
@@ -438,7 +438,7 @@ def test_a_page_of_any_study_keeps_the_rules(study: Settings, tmp_path: Path) ->
         (several, several_tables()),
     ):  # fmt: skip
         found = page_of(settings_, tables)
-        html = found.html(*settings_, Results(StudyTables({})))
+        html = found.html(*settings_, ResultTables(StudyTables({})))
         faults = [fault for fault in faults_of_page(html) if "before the first figure" not in fault]
         assert faults == []
         assert list(faults_of_told(found.told)) == []

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.studies.joint_pose_sensitivity import poses, posterior
 from spinepipe.studies.joint_pose_sensitivity.charts import posterior as posterior_chart
 from spinepipe.studies.joint_pose_sensitivity.conclusions_of_parts import conclusions
@@ -106,7 +106,7 @@ def test_chains_too_short_tell_no_numbers(tmp_path: Path) -> None:
     assert drawn["laplace_mean"].notna().all()
     assert motion[["median", "inside"]].isna().all(axis=None)
     settings, cohort = study_and_cohort(str(tmp_path), "felt")
-    told = {one.rule: one for one in conclusions(settings, Results(StudyTables(tables)))}
+    told = {one.rule: one for one in conclusions(settings, ResultTables(StudyTables(tables)))}
     assert told["sampler"].names == {"specimens": "p"}
     assert "band" not in told
     assert "did not converge" in posterior_chart(settings, cohort, tables).caption

@@ -22,7 +22,7 @@ from page_rules import (
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.studies.range_of_motion import charts
 from spinepipe.studies.range_of_motion.page import page
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
@@ -100,7 +100,7 @@ def made(root: Path, settings: str, header: str, **tables: pd.DataFrame) -> tupl
     sound = project(root, settings, specimens=("a", "b"), header=header)
     study, cohort = check(sound, STUDY)
     assert isinstance(study, RangeOfMotion)
-    results = Results(StudyTables(tables))
+    results = ResultTables(StudyTables(tables))
     found = page(study, cohort, results)
     assert list(faults_of_told(found.told)) == []
     assert list(faults_of_page(found.html(study, cohort, results))) == []

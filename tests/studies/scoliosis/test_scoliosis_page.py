@@ -20,7 +20,7 @@ from sweeps import sweep
 
 from spinepipe.report.conclusions import Conclusion, sentences_of, told
 from spinepipe.report.forms.chart import Drawing
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.studies.scoliosis import charts, charts_of_films
 from spinepipe.studies.scoliosis.conclusions import MEASURED, conclusions
 from spinepipe.studies.scoliosis.films import LEFT, RIGHT
@@ -213,7 +213,7 @@ def concluded(
     tables: Mapping[str, pd.DataFrame], settings: Scoliosis = STUDY, cohort: Any = None
 ) -> list[Conclusion]:
     """All conclusions of tables."""
-    return list(conclusions(settings, cohort or shipped(3), Results(StudyTables(tables))))
+    return list(conclusions(settings, cohort or shipped(3), ResultTables(StudyTables(tables))))
 
 
 def test_sentences_are_plain_and_each_could_be_false() -> None:
@@ -404,7 +404,7 @@ SIZES = {
 }
 
 
-def results(size: Size, **changed: pd.DataFrame) -> Results:
+def results(size: Size, **changed: pd.DataFrame) -> ResultTables:
     """Results with all figures that their tables allow."""
     tables = StudyTables(tables_of(size) | changed)
     drawings = {}
@@ -414,7 +414,7 @@ def results(size: Size, **changed: pd.DataFrame) -> Results:
             draw = getattr(charts if module == "charts" else charts_of_films, function)
             chart = draw(study_of(size), cohort_of(size), tables)
             drawings[figure.name] = Drawing.read(figure.name, chart.svg())
-    return Results(tables, {name: {"seed": "7"} for name in tables}, drawings)
+    return ResultTables(tables, {name: {"seed": "7"} for name in tables}, drawings)
 
 
 @cache
@@ -447,10 +447,10 @@ def test_tables_have_laws_in_words_and_no_comparison_over_unlike_spines() -> Non
 
 
 def test_what_is_left_out_is_told_with_its_reason() -> None:
-    made = Results(StudyTables({"variants": pd.DataFrame({"a": [1]})}))
+    made = ResultTables(StudyTables({"variants": pd.DataFrame({"a": [1]})}))
     assert left_out(study_of(Size()), cohort_of(Size()), made) == ()
     bare = Size(errors={"uniform": 0.3, "tangent": 0.2}, positions=(RIGHT, LEFT, "neutral"))
-    parts = left_out(study_of(bare), cohort_of(bare), Results(StudyTables({})))
+    parts = left_out(study_of(bare), cohort_of(bare), ResultTables(StudyTables({})))
     assert "position traction (nobody has a film of it)" in parts
     assert "linear, by region (models)" in parts
     assert "make full" in parts[-1]

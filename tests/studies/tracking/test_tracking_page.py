@@ -32,7 +32,7 @@ from tracking_table_cases import COSTS, ERROR, Size, cohort_of, frame, study_of,
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import BODIES, JOINTS, LUMBAR_JOINTS, body_poses
 from spinepipe.report.conclusions import Told, sentences_of, told
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking import charts, charts_of_stiffness
 from spinepipe.studies.tracking.conclusions import conclusions
@@ -254,7 +254,7 @@ def said_of(one: Case, cohort: Cohort | None = None) -> Said:
     """All conclusions of a case, in words."""
     _, size, tables, asked = one
     study = study_of(size).model_copy(update=asked)
-    results = Results(StudyTables(tables_of(size, **tables)))
+    results = ResultTables(StudyTables(tables_of(size, **tables)))
     found = list(conclusions(study, cohort or cohort_of(size), results))
     return Said(verdicts(found), told(found, sentences_of(PACKAGE)))
 
@@ -505,16 +505,16 @@ def test_what_vibrates_is_left_out_of_figures_and_named() -> None:
 
 
 def test_tables_of_the_page_have_what_a_reader_compares() -> None:
-    found = {one.name: one for one in shown_tables(Results(StudyTables(tables_of(Size()))))}
+    found = {one.name: one for one in shown_tables(ResultTables(StudyTables(tables_of(Size()))))}
     assert list(found)[:3] == ["accuracy", "fits", "profiles"]
     assert "cpu s" not in [head.name for head in found["fits"].heads]
-    assert not shown_tables(Results(StudyTables({})))
+    assert not shown_tables(ResultTables(StudyTables({})))
 
 
 def test_a_page_with_long_names_keeps_the_rules() -> None:
     long = {"s01": "s01" + "x" * 60, "lateral_bending": "lateral_bending" + "y" * 60}
     tables = {key: rows.replace(long) for key, rows in tables_of(Size()).items()}
-    results = Results(StudyTables(tables))
+    results = ResultTables(StudyTables(tables))
     made = page(study_of(Size()), cohort_of(Size()), results)
     assert not list(faults_of_page(made.html(study_of(Size()), cohort_of(Size()), results)))
     assert not list(faults_of_told(made.told))

@@ -32,7 +32,7 @@ from trunk_table_cases import FOLDER, Size, cohort_of, study_of, tables_of
 from spinepipe.jobs import draw, report
 from spinepipe.report.conclusions import Conclusion, Told, sentences_of, told
 from spinepipe.report.forms.chart import Drawing
-from spinepipe.report.page.study_page import Results
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.studies.trunk_loads.conclusions import conclusions
 from spinepipe.studies.trunk_loads.kind import KIND
 from spinepipe.studies.trunk_loads.page import left_out, page
@@ -64,8 +64,8 @@ class Case:
         self.change(found)
         return found
 
-    def results(self) -> Results:
-        return Results(StudyTables(self.tables))
+    def results(self) -> ResultTables:
+        return ResultTables(StudyTables(self.tables))
 
     def come_to(self) -> list[Conclusion]:
         cohort = replace(cohort_of(self.size), rebuilt=self.rebuilt)
@@ -503,7 +503,7 @@ def test_figures_and_page_of_any_study(case: Case) -> None:
             chart = figure(study, cohort, tables)
             assert not list(faults_of_chart(chart))
             drawn[name] = Drawing.read(name, chart.svg())
-    results = Results(tables, {}, drawn)
+    results = ResultTables(tables, {}, drawn)
     made = page(study, cohort, results)
     assert not list(faults_of_told(made.told))
     html = made.html(study, cohort, results)

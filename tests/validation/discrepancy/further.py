@@ -19,7 +19,7 @@ from spinepipe.studies.discrepancy.search.investigation import Investigation
 from spinepipe.studies.discrepancy.search.residual_model import model_residual
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.verdict import Conclusion
+from spinepipe.studies.discrepancy.verdict import VerdictKind
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 Told = dict[str, Any]
@@ -107,7 +107,7 @@ def repeats_of(grounds: BaselineFit) -> float:
 @_told
 def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
     """Where most is left by the model that the verdict stands for, as the verdict file says it."""
-    if ended.ended.verdict not in (Conclusion.UNKNOWN, Conclusion.PART):
+    if ended.ended.verdict not in (VerdictKind.UNKNOWN, VerdictKind.PART):
         return {}
     told = ended.for_verdict().found.final
     left = worst(places(residual_frame(told, told.fit, joints)), PLACES_KEPT)
@@ -119,7 +119,7 @@ def table_told(ended: Investigation) -> Told:
     """Of UNKNOWN and PART: what a tabulated law and a formula close of held-out readings."""
     final, said = ended.for_verdict().found.final, ended.ended
     if (
-        said.verdict not in (Conclusion.UNKNOWN, Conclusion.PART)
+        said.verdict not in (VerdictKind.UNKNOWN, VerdictKind.PART)
         or said.reason is Reason.DATA_ERRORS
     ):
         return {}

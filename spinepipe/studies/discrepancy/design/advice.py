@@ -27,7 +27,7 @@ from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.tables import ADVICE
-from spinepipe.studies.discrepancy.verdict import Conclusion
+from spinepipe.studies.discrepancy.verdict import VerdictKind
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 ADVISED, OFFERED, TELLS_NOTHING, NO_POSE, WOULD_DO, NOT_ENOUGH = ADVICE
@@ -87,7 +87,7 @@ def advice(
         return ()
     grounds = found.final if ended.named or ended.tied else found.base
     rows = [row for pair in _pairs(found, ended, rules) for row in _of_pair(*pair, place, run)]
-    if ended.verdict in (Conclusion.PART, Conclusion.UNKNOWN):
+    if ended.verdict in (VerdictKind.PART, VerdictKind.UNKNOWN):
         rows += run(_of_unnamed, grounds, rules, place)
     threshold = found.stages[0].screen.threshold
     for one in hidden:
@@ -130,7 +130,7 @@ def _pairs(found: SearchResult, ended: Outcome, rules: Rules) -> Iterator[Pair]:
                     RivalFits(found.final, fits[1], fits[0]),
                     rules.margin - max(rival.margin, 0.0),
                 )
-    if ended.verdict is Conclusion.UNKNOWN:
+    if ended.verdict is VerdictKind.UNKNOWN:
         yield from _leading(found, rules)
 
 

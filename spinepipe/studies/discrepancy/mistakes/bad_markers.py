@@ -39,7 +39,7 @@ _SHIFTS, _TURNS = slice(0, 3), slice(3, 6)
 
 
 @dataclass(frozen=True)
-class Scatter:
+class MarkerScatter:
     """SD (S, J, 6) of specimens and joints, NaN where unknown, and the numbers behind (S, J, 6)."""
 
     sd: Array
@@ -47,7 +47,7 @@ class Scatter:
 
 
 def bad_markers(
-    scatter: Scatter, specimens: Sequence[str], joints: Sequence[str], *, in_every: bool
+    scatter: MarkerScatter, specimens: Sequence[str], joints: Sequence[str], *, in_every: bool
 ) -> list[SuspectedError]:
     """Joints of large scatter; ``in_every`` coordinate that was read, or in all together."""
     if not np.isfinite(scatter.sd).any():
@@ -93,7 +93,7 @@ def _usual(sd: Array) -> Array:
     return found
 
 
-def between_cycles(readings: Sequence[SpecimenReadings]) -> Scatter:
+def between_cycles(readings: Sequence[SpecimenReadings]) -> MarkerScatter:
     """Robust SDs of cycles around their mean; all readings, outliers too.
 
     Readings of one cycle are not independent: a cycle counts once for each test and coordinate.
@@ -109,7 +109,7 @@ def between_cycles(readings: Sequence[SpecimenReadings]) -> Scatter:
                 sd[number, joint, coordinate] = np.median(np.abs(there)) / MAD_PER_SD
                 cycles = [int(np.isfinite(v).any(axis=1).sum()) - 1 for v in values]
                 freedom[number, joint, coordinate] = sum(max(0, n) for n in cycles)
-    return Scatter(sd, freedom)
+    return MarkerScatter(sd, freedom)
 
 
 def _deviations(test: Repeats) -> Array:
@@ -122,7 +122,7 @@ def _deviations(test: Repeats) -> Array:
 
 def beside_the_curve(
     readings: Sequence[SpecimenReadings], predicted: Mapping[str, Sequence[Array]]
-) -> Scatter:
+) -> MarkerScatter:
     """SDs of what a fit leaves beside smooth curves over the load of each joint."""
     found = []
     for one in readings:
@@ -132,7 +132,7 @@ def beside_the_curve(
         found.append(total)
     squares, freedom = np.stack(found, axis=1)
     sd = np.where(freedom > 0.0, np.sqrt(squares / np.maximum(freedom, 1.0)), np.nan)
-    return Scatter(sd, freedom)
+    return MarkerScatter(sd, freedom)
 
 
 def _rough(residual: Array, loads: Array) -> Array:

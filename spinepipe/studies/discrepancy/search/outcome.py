@@ -18,7 +18,7 @@ from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.lack_of_fit import FAMILIES, OWN
 from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.search.search_state import Rival, SearchResult, SelectedTerm
-from spinepipe.studies.discrepancy.verdict import Conclusion, SuspectedError, share_of_gap
+from spinepipe.studies.discrepancy.verdict import SuspectedError, VerdictKind, share_of_gap
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 UNEXPLAINED_SHARE = 0.1
@@ -67,7 +67,7 @@ class Outcome:
     left : why what is named is not all, a sentence each.
     """
 
-    verdict: Conclusion
+    verdict: VerdictKind
     why: str
     named: tuple[SelectedTerm, ...] = ()
     tied: tuple[str, ...] = ()
@@ -123,14 +123,14 @@ def outcome(
         unexplained = doubts[0] if doubts and not kept else _unproven(found, proof)
     if unexplained:
         reason, why = unexplained
-        return Outcome(Conclusion.UNKNOWN, why, reason=reason)
+        return Outcome(VerdictKind.UNKNOWN, why, reason=reason)
     if not found.standing:
         why = "no effect has evidence above what noise alone would show on these tests"
-        return Outcome(Conclusion.NULL, why)
+        return Outcome(VerdictKind.NULL, why)
     left = _left(found, doubts, proof)
     if tied:
         why = f"something is missing, but these tests cannot tell which: {_listed(tied, 'or')}"
-        return Outcome(Conclusion.SET, why, named, tied, left=left)
+        return Outcome(VerdictKind.SET, why, named, tied, left=left)
     names = _listed(list(dict.fromkeys(one.name for one in named)), "and")
     why = (
         f"{names}: more evidence than noise alone would show, and at least {margin:g} more than "
@@ -138,8 +138,8 @@ def outcome(
     )
     if left:
         why = f"{why}; but more stays: {'; '.join(left)}"
-        return Outcome(Conclusion.PART, why, named, left=left)
-    return Outcome(Conclusion.NAMED, why, named)
+        return Outcome(VerdictKind.PART, why, named, left=left)
+    return Outcome(VerdictKind.NAMED, why, named)
 
 
 def _doubt(found: SearchResult, one: SelectedTerm, margin: float) -> _NoName | None:

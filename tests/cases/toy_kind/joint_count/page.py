@@ -5,13 +5,13 @@ from spinepipe.studies.joint_count.tables import TOTALS
 
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value, sentences_of
-from spinepipe.report.page.study_page import Page, Results
+from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import page_tables
 
 READ = ("totals",)
 
 
-def page(study: JointCount, cohort: Cohort, results: Results) -> Page:
+def page(study: JointCount, cohort: Cohort, results: ResultTables) -> Page:
     """One answer, one figure, one table."""
     rows = results.table("totals")
     joints = Value(int(rows["joints"].iloc[0]), source="totals: joints")
