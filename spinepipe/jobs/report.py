@@ -5,6 +5,7 @@ says nothing that the tables and their code do not, so no digest holds it and no
 """
 
 import os
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +20,7 @@ from spinepipe.report.conclusions import rows_of
 from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.comparison import AGAINST, comparison, paper_of
 from spinepipe.report.page.study_page import ResultTables
+from spinepipe.report.words import listed
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
@@ -82,6 +84,10 @@ def _write_page(
         {Path(path).stem: Drawing.read(Path(path).stem, _text(path)) for path in figures},
     )
     made = kind_page.page(study, cohort, results)
+    added = files_of(study, cohort).adds
+    if page == "report" and added:
+        more = f"{listed(added)} (`make full` makes them and the page full.html)"
+        made = replace(made, left_out=(*made.left_out, more))
     newest = max((Path(path).stat().st_mtime for path in tables), default=0.0)
     date = datetime.fromtimestamp(newest, UTC).date().isoformat()
     folder = Path(output).parent

@@ -11,7 +11,6 @@ from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.discrepancy.misfits import LARGE, SMALL, WITH_EFFECTS, bare, largest
 from spinepipe.studies.discrepancy.quantities import quantities
-from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, Verdict
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
@@ -189,7 +188,6 @@ def _sample(
             source="verdict: smallest_detectable, not_testable",
         ),
         "threshold": Value(threshold.log_evidence, source=how),
-        "least": Value(LEAST_THRESHOLD, source="a constant of the search"),
         "share": Value(100.0 * threshold.false_alarm, "%", source=how),
         "draws": Value(threshold.draws, source=how),
     }
