@@ -10,10 +10,10 @@ import pandas as pd
 from spinepipe.api.result import with_units
 from spinepipe.jobs.expected import Expected
 from spinepipe.marks import mark_in
-from spinepipe.report.overview.stored import CONCLUSIONS
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import kind_of
+from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import read_frame, read_metadata
 
 
@@ -30,7 +30,7 @@ class Results(Mapping[str, pd.DataFrame]):
         # conclusions lie beside the page, tables of some kinds in a folder below
         places = (self.path, *sorted(one for one in self.path.glob("*") if one.is_dir()))
         for place in places:
-            found = sorted(one for one in place.glob("*.parquet") if one.stem != CONCLUSIONS)
+            found = sorted(one for one in place.glob("*.parquet") if one.stem != CONCLUSIONS.name)
             if found:
                 break
         else:

@@ -10,6 +10,7 @@ from spinepipe.api.results import Results, compare
 from spinepipe.cli.find import unknown
 from spinepipe.files import appearing, folders_in
 from spinepipe.problems import InputError, InputProblem
+from spinepipe.report.overview.index import TEMPLATES
 from spinepipe.report.overview.side_by_side import (
     APART,
     ONE,
@@ -24,7 +25,7 @@ from spinepipe.report.overview.side_by_side import (
     settings_that_differ,
 )
 from spinepipe.report.overview.stored import stored_conclusions
-from spinepipe.report.overview.template import rendered
+from spinepipe.report.page.study_page import rendered
 from spinepipe.studies import read as studies
 from spinepipe.studies.study import STUDIES
 from spinepipe.tables import read_metadata
@@ -53,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     if options.output:  # first: who reads the lines may stop early, as `head` does
         title = f"{both.names[0]} and {both.names[1]}"
         with appearing(options.output) as temporary:
-            page = rendered("compare.html", title=title, both=both, levels=LEVELS)
+            page = rendered("compare.html", (TEMPLATES,), title=title, both=both, levels=LEVELS)
             temporary.write_text(page, "utf-8")
         told.append(f"\npage: {options.output}")
     print("\n".join(told))

@@ -13,6 +13,8 @@ from functools import cache
 from importlib.resources import files
 from math import floor, isfinite, log10
 
+import pandas as pd
+
 from spinepipe.report.words import number, rounded_to
 
 PLACES = ("answer", "key", "depends", "finding", "light", "methods")
@@ -90,6 +92,11 @@ class Value:
         return value, low, high
 
 
+def numbers_from(source: str, **numbers: float) -> dict[str, Value]:
+    """Numbers of a sentence that are read from one place, by their names in it."""
+    return {name: Value(number, source=source) for name, number in numbers.items()}
+
+
 @dataclass(frozen=True)
 class Conclusion:
     """The verdict that a rule came to.
@@ -136,12 +143,7 @@ def sentences_of(package: str) -> tuple[Sentence, ...]:
 
 @dataclass(frozen=True)
 class Told:
-    """A conclusion in words.
-
-    Attributes
-    ----------
-    order : of its sentence in the table, from 0 on: how important it is.
-    """
+    """A conclusion in words, at one place of a page; fields as of `Sentence`."""
 
     place: str
     rule: str
@@ -151,7 +153,6 @@ class Told:
     note: str
     figure: str
     values: Mapping[str, Value]
-    order: int
 
     @property
     def level(self) -> str:
@@ -181,8 +182,9 @@ def told(conclusions: Iterable[Conclusion], sentences: Sequence[Sentence]) -> li
             text, note = (part.format(**words) for part in (row.text, row.note))
             text = text[:1].upper() + text[1:]
             head = (row.place, row.rule, row.verdict, row.heading)
-            found.append(Told(*head, text, note, row.figure, one.values, order))
-    return sorted(found, key=lambda one: (PLACES.index(one.place), one.order))
+            in_words = Told(*head, text, note, row.figure, one.values)
+            found.append((PLACES.index(row.place), order, in_words))
+    return [one for _, _, one in sorted(found, key=lambda each: each[:2])]
 
 
 def rows_of(conclusions: Iterable[Told]) -> list[dict[str, object]]:
@@ -198,3 +200,26 @@ def rows_of(conclusions: Iterable[Told]) -> list[dict[str, object]]:
             empty = {"unit": told_of["unit"] or "", "source": told_of["source"] or ""}
             rows.append({**head, "name": name, **told_of, **empty})
     return rows
+
+
+def read_back(rows: pd.DataFrame) -> list[Told]:
+    """Conclusions from rows of the table ``conclusions``; headings are part of their texts."""
+    return [_read_one(of) for _, of in rows.groupby("order", sort=True)]
+
+
+def _read_one(rows: pd.DataFrame) -> Told:
+    """One sentence: a row for each of its numbers, or one that has none."""
+    first = rows.iloc[0]
+    place, rule, verdict, text = (str(first[key]) for key in ("place", "rule", "verdict", "text"))
+    values = {}
+    for row in rows[rows["value"].notna()].to_dict("records"):
+        low, high = (_end(row[name]) for name in ("low", "high"))
+        n = None if pd.isna(row["n"]) else int(row["n"])
+        told_of = (float(row["value"]), row["unit"] or "", low, high, n, row["source"] or "")
+        values[str(row["name"])] = Value(*told_of)
+    return Told(place, rule, verdict, "", text, "", "", values)
+
+
+def _end(cell: float | None) -> float | None:
+    """An end of an interval; None where it is empty, or infinite in another program's file."""
+    return float(cell) if cell is not None and pd.notna(cell) and isfinite(cell) else None

@@ -22,7 +22,7 @@ def specimen_page(cohort: Cohort, view: SpecimenView) -> str:
         "specimen_page.html",
         ("spinepipe.report",),
         title=f"{cohort.name}, {view.specimen}",
-        tag=tag(cohort),
+        tag=tag(cohort.made_up, cohort.rebuilt),
         cohort=cohort,
         specimen=view.specimen,
         curves=[Drawing.read(f"curves-{n}", chart.svg()) for n, chart in enumerate(charts)],

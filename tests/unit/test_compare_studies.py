@@ -21,6 +21,7 @@ from sweeps import sweep
 from spinepipe.api.results import open_results
 from spinepipe.cli import main
 from spinepipe.cli.compare import side_by_side
+from spinepipe.report.conclusions import Told, Value
 from spinepipe.report.overview.side_by_side import (
     APART,
     ONE,
@@ -30,7 +31,6 @@ from spinepipe.report.overview.side_by_side import (
     paired,
     settings_that_differ,
 )
-from spinepipe.report.overview.stored import StoredConclusion, StoredValue
 from spinepipe.studies.registry import kind_of
 from spinepipe.tables import to_arrow, write
 
@@ -170,8 +170,8 @@ def test_a_page_of_another_ending_is_refused(compare: Compare, tmp_path: Path) -
     assert "FILE.html" in told
 
 
-def value(low: float | None, high: float | None, unit: str = "mm") -> StoredValue:
-    return StoredValue(1.0, unit, low, high)
+def value(low: float | None, high: float | None, unit: str = "mm") -> Value:
+    return Value(1.0, unit, low, high)
 
 
 @sweep(
@@ -190,7 +190,7 @@ def value(low: float | None, high: float | None, unit: str = "mm") -> StoredValu
     ],
 )
 def test_intervals_are_apart_where_they_have_no_number_in_common(
-    a: StoredValue, b: StoredValue, apart: bool
+    a: Value, b: Value, apart: bool
 ) -> None:
     assert are_apart(a, b) is are_apart(b, a) is apart
 
@@ -198,21 +198,21 @@ def test_intervals_are_apart_where_they_have_no_number_in_common(
 @sweep(
     "given, told",
     [
-        (StoredValue(2.03, "°", 1.5, 2.4), "2.03 (1.50 to 2.40)°"),
-        (StoredValue(2149.0, "N", 1950.0, 2250.0), "2\u2009150 (1\u2009950 to 2\u2009250)\u00a0N"),
-        (StoredValue(-0.004, "mm", -1.5, 1.5), "0.0 (\u22121.5 to 1.5)\u00a0mm"),
-        (StoredValue(3.0, "", None, None), "3"),
-        (StoredValue(1800.0, "", None, None), "1\u2009800"),
-        (StoredValue(0.5961, "°", None, None), "0.60°"),
-        (StoredValue(5000.0, "N/m", 4400.0, None), "5\u2009000 (above 4\u2009400)\u00a0N/m"),
+        (Value(2.03, "°", 1.5, 2.4), "2.03 (1.50 to 2.40)°"),
+        (Value(2149.0, "N", 1950.0, 2250.0), "2\u2009150 (1\u2009950 to 2\u2009250)\u00a0N"),
+        (Value(-0.004, "mm", -1.5, 1.5), "0.0 (\u22121.5 to 1.5)\u00a0mm"),
+        (Value(3.0, "", None, None), "3"),
+        (Value(1800.0, "", None, None), "1\u2009800"),
+        (Value(0.5961, "°", None, None), "0.60°"),
+        (Value(5000.0, "N/m", 4400.0, None), "5\u2009000 (above 4\u2009400)\u00a0N/m"),
     ],
 )
-def test_numbers_are_rounded_by_their_interval(given: StoredValue, told: str) -> None:
-    assert str(given) == told
+def test_numbers_are_rounded_by_their_interval(given: Value, told: str) -> None:
+    assert f"{given}" == told
 
 
-def sentence(place: str, rule: str, verdict: str = "v") -> StoredConclusion:
-    return StoredConclusion(place, rule, verdict, f"{place} by {rule}", {})
+def sentence(place: str, rule: str, verdict: str = "v") -> Told:
+    return Told(place, rule, verdict, "", f"{place} by {rule}", "", "", {})
 
 
 def test_answers_meet_whatever_made_them_and_several_of_a_rule_in_turn() -> None:

@@ -145,10 +145,6 @@ class Chart:
         return content.getvalue()
 
 
-_LETTERS = 40
-"""Of a line of a message."""
-
-
 def saying(title: str, message: str) -> Chart:
     """A figure that has nothing to show and says why."""
     return Chart(title, [_Message(message=message)], message)

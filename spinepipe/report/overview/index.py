@@ -18,23 +18,22 @@ from spinepipe.documents.yaml_text import read_yaml
 from spinepipe.files import appearing, files_in, folders_in
 from spinepipe.marks import DamagedFile
 from spinepipe.problems import InputError
+from spinepipe.report.conclusions import Told
 from spinepipe.report.overview.stored import (
-    CONCLUSIONS,
-    StoredConclusion,
     StoredFiles,
     stored_conclusions,
     stored_files,
 )
-from spinepipe.report.overview.template import rendered
+from spinepipe.report.page.study_page import SIGNS, rendered, tag
 from spinepipe.report.words import count
 from spinepipe.studies.read import ENDING, read_selection
 from spinepipe.studies.registry import kind_names, kind_of
 from spinepipe.studies.study import STUDIES, cohort_folder
+from spinepipe.studies.tables import CONCLUSIONS
 
 INDEX = Path("results") / "index.html"
 
-LEVELS = {"stop": "■", "check": "▲", "ok": "●"}
-"""Of quality lights, the most urgent first, with their signs."""
+TEMPLATES = "spinepipe.report.overview"
 
 _NO_STUDY = "its study file is gone"
 _STATES = {
@@ -70,7 +69,7 @@ class Entry:
     state: str
     trouble: str
     log: str
-    told: tuple[StoredConclusion, ...]
+    told: tuple[Told, ...]
     files: StoredFiles
 
     @property
@@ -82,7 +81,7 @@ class Entry:
     def key(self) -> str:
         """The first of the key numbers and what it is; empty where there is none."""
         for one in (one for one in self.told if one.place == "key"):
-            values = map(str, one.values.values())
+            values = map("{}".format, one.values.values())
             return ": ".join([*islice(values, 1), one.text])
         return ""
 
@@ -95,7 +94,7 @@ class Entry:
     def lights(self) -> list[tuple[str, str, int]]:
         """Level, sign and number of its quality lights, of levels that have any."""
         found = Counter(one.level for one in self.told if one.place == "light")
-        return [(level, sign, found[level]) for level, sign in LEVELS.items() if found[level]]
+        return [(level, sign, found[level]) for level, sign in SIGNS.items() if found[level]]
 
     @property
     def size(self) -> str:
@@ -126,12 +125,13 @@ def write_index(root: Path, up_to_date: Mapping[str, bool | None]) -> Path:
     newest = max((one for one in run if one.files.newest), key=_newest, default=None)
     page = rendered(
         "index.html",
+        (TEMPLATES,),
         title="spinepipe: all studies",
         groups=groups,
         not_run=[one for one in entries if one.state == "not run"],
         eyebrow=" · ".join([_summary(states), *([newest.day] if newest else [])]),
         version=spinepipe.__version__,
-        levels=LEVELS,
+        levels=SIGNS,
     )
     with appearing(root / INDEX) as temporary:
         temporary.write_text(page, "utf-8")
@@ -164,7 +164,7 @@ def _names(root: Path) -> Iterable[str]:
 
 def _has_results(folder: Path) -> bool:
     """Whether it is the folder of a study, and no other one among results."""
-    return any((folder / name).is_file() for name in ("report.html", f"{CONCLUSIONS}.parquet"))
+    return any((folder / name).is_file() for name in ("report.html", f"{CONCLUSIONS.name}.parquet"))
 
 
 def entry(root: Path, name: str, up_to_date: Mapping[str, bool | None]) -> Entry:
@@ -184,13 +184,13 @@ def entry(root: Path, name: str, up_to_date: Mapping[str, bool | None]) -> Entry
         more = files.failure.count - 1
         trouble = files.failure.why + (f" (and {count(more, 'job')} more)" if more else "")
         log = quote(files.failure.log.as_posix())
-    data, tag = _cohort(root, cohort) if isinstance(cohort, str) and cohort else ("", "")
+    data, source = _cohort(root, cohort) if isinstance(cohort, str) and cohort else ("", "")
     return Entry(
         name=name,
         address=f"{quote(name, safe='')}/report.html" if files.page else "",
         question=kind_of(str(kind)).question if known else "Other questions",
         data=data,
-        tag=tag,
+        tag=source,
         state=state,
         trouble=trouble,
         log=log,
@@ -226,9 +226,8 @@ def _cohort(root: Path, name: str) -> tuple[str, str]:
     header = _yaml(folder / COHORT_YAML)
     if not header:
         return "", ""
-    tags = {"made_up": "Simulated data", "rebuilt": "Rebuilt from print"}
-    tag = next((tags[key] for key in tags if header.get(key) is True), "Measured data")
-    return _size(folder, header), tag
+    made_up, rebuilt = (header.get(key) is True for key in ("made_up", "rebuilt"))
+    return _size(folder, header), tag(made_up, rebuilt)
 
 
 def _size(folder: Path, header: Mapping[str, Any]) -> str:

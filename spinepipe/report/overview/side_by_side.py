@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from spinepipe.report.overview.stored import StoredConclusion, StoredValue
+from spinepipe.report.conclusions import Told, Value
 from spinepipe.report.words import count
 
 VERDICT, APART, VALUE, ONE = (
@@ -60,8 +60,8 @@ class Pair:
 
     rule: str
     place: str
-    a: StoredConclusion | None
-    b: StoredConclusion | None
+    a: Told | None
+    b: Told | None
     values: tuple[ValuePair, ...]
     remarks: tuple[str, ...]
 
@@ -161,9 +161,7 @@ class SideBySide:
         return f"Different: {', '.join(parts) or 'code, data or versions alone'}."
 
 
-def paired(
-    a: Sequence[StoredConclusion], b: Sequence[StoredConclusion], one_kind: bool
-) -> list[Pair]:
+def paired(a: Sequence[Told], b: Sequence[Told], one_kind: bool) -> list[Pair]:
     """Conclusions held together by their rule, in the order of a's page, what b adds behind them.
 
     A rule whose verdict stands at several places counts once, at the first; one that came to
@@ -179,9 +177,9 @@ def paired(
     return [one for one in found if one_kind or (one.a and one.b)]
 
 
-def _by_rule(told: Sequence[StoredConclusion]) -> dict[str, list[StoredConclusion]]:
+def _by_rule(told: Sequence[Told]) -> dict[str, list[Told]]:
     places: dict[str, str] = {}
-    found: dict[str, list[StoredConclusion]] = {}
+    found: dict[str, list[Told]] = {}
     for one in told:
         rule = "" if one.place == "answer" else one.rule
         if places.setdefault(rule, one.place) == one.place:
@@ -190,7 +188,7 @@ def _by_rule(told: Sequence[StoredConclusion]) -> dict[str, list[StoredConclusio
     return {rule: found[rule] for rule in found if rule not in answers}
 
 
-def _pair(rule: str, a: StoredConclusion | None, b: StoredConclusion | None) -> Pair:
+def _pair(rule: str, a: Told | None, b: Told | None) -> Pair:
     one = a or b
     assert one is not None
     if a is None or b is None:
@@ -204,15 +202,14 @@ def _pair(rule: str, a: StoredConclusion | None, b: StoredConclusion | None) -> 
     return Pair(one.rule, one.place, a, b, values, tuple(remarks))
 
 
-def _values(name: str, a: StoredValue | None, b: StoredValue | None) -> ValuePair:
-    remark = ""
-    if a != b:
-        remark = APART if a and b and are_apart(a, b) else VALUE
-    left, right = (NONE if one is None else str(one) for one in (a, b))
-    return ValuePair(name, left, right, remark)
+def _values(name: str, a: Value | None, b: Value | None) -> ValuePair:
+    left, right = (NONE if one is None else f"{one}" for one in (a, b))
+    if a and b and (a.number, a.unit, a.low, a.high) == (b.number, b.unit, b.low, b.high):
+        return ValuePair(name, left, right, "")
+    return ValuePair(name, left, right, APART if a and b and are_apart(a, b) else VALUE)
 
 
-def are_apart(a: StoredValue, b: StoredValue) -> bool:
+def are_apart(a: Value, b: Value) -> bool:
     """Whether two intervals, in the same unit, have no number in common.
 
     An end that is open holds all; a value without any end has no interval, and nothing is told.
@@ -220,7 +217,7 @@ def are_apart(a: StoredValue, b: StoredValue) -> bool:
     if a.unit != b.unit or any(one.low is None and one.high is None for one in (a, b)):
         return False
 
-    def ends(one: StoredValue) -> tuple[float, float]:
+    def ends(one: Value) -> tuple[float, float]:
         return -inf if one.low is None else one.low, inf if one.high is None else one.high
 
     return max(ends(a)[0], ends(b)[0]) > min(ends(a)[1], ends(b)[1])

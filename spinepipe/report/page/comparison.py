@@ -86,7 +86,7 @@ def comparison(shape: Table, title: str, rows: pd.DataFrame, study: Study, cohor
         "comparison.html",
         title=f"{study.study}: {said}",
         study=study.study,
-        tag=tag(cohort),
+        tag=tag(cohort.made_up, cohort.rebuilt),
         heading=title,
         answer=said,
         lines=list(lines(evidence)),

@@ -35,6 +35,9 @@ _MOST_NAMES = 6
 LEVELS = {"stop": "stop", "check": "check", "ok": "fine"}
 """Of lights, the worst first, with the word that follows their number."""
 
+SIGNS = {"stop": "■", "check": "▲", "ok": "●"}
+"""Of lights, told apart without colour too."""
+
 
 @dataclass(frozen=True, eq=False)
 class ResultTables:
@@ -116,7 +119,7 @@ class Page:
         scenes = specimen_scenes(cohort) if self.scenes is None else self.scenes
         run = origin(study, results.metadata)
         shown = {
-            "tag": tag(cohort),
+            "tag": tag(cohort.made_up, cohort.rebuilt),
             "data": f"{cohort.title} · {_specimens(cohort)}",
             "study": study.study,
             "answer": self.at("answer")[0],
@@ -150,15 +153,8 @@ class Page:
         return rendered("study_page.html", page=shown, title=title, index="../index.html")
 
 
-def rendered(
-    template: str, packages: Sequence[str] = (), more_style: str = "", **values: object
-) -> str:
-    """A template of this folder, or of further packages, in the frame that all pages share.
-
-    Parameters
-    ----------
-    more_style : rules of a style sheet behind those of all pages.
-    """
+def rendered(template: str, packages: Sequence[str] = (), **values: object) -> str:
+    """A template of this folder, or of further packages, in the frame that all pages share."""
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(name, "") for name in (_HERE, *packages)]),
         autoescape=True,
@@ -166,21 +162,20 @@ def rendered(
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.globals["SIGNS"] = SIGNS
     style, script = (
         files(_HERE).joinpath(f"study_page.{end}").read_text("utf-8") for end in ("css", "js")
     )
     return environment.get_template(template).render(
-        style=Markup(style) + viewer_style() + Markup(more_style),
+        style=Markup(style) + viewer_style(),
         script=Markup(script) + viewer_script(),
         **values,
     )
 
 
-def tag(cohort: Cohort) -> str:
-    """Where the data come from, in a word or two."""
-    if cohort.made_up:
-        return "Simulated data"
-    return "Rebuilt from print" if cohort.rebuilt else "Measured data"
+def tag(made_up: bool, rebuilt: bool) -> str:
+    """Where the data of a cohort come from, in a word or two."""
+    return "Simulated data" if made_up else "Rebuilt from print" if rebuilt else "Measured data"
 
 
 def _specimens(cohort: Cohort) -> str:

@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.experiment.double_sigmoid import Zone
-from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import SIGNS, count, level, listed, plain, short
 from spinepipe.status import USABLE
@@ -18,7 +18,6 @@ from spinepipe.studies.cohort_stiffness.conclusions_of_claims import (
     covariate_conclusions,
 )
 from spinepipe.studies.cohort_stiffness.conclusions_of_stiffness import (
-    counted,
     directions,
     joint_values,
     stiffness_conclusions,
@@ -68,7 +67,7 @@ def conclusions(
     scatter = _scatter(fits, values)
     yield from stiffness_conclusions(values)
     yield from _trust(study, signs, values, scatter)
-    needed = counted({"n": specimens, "needed": FEWEST}, "cohort: specimens")
+    needed = numbers_from("cohort: specimens", n=specimens, needed=FEWEST)
     words = {"specimens": count(specimens, "specimen")}
     yield Conclusion("sample", "few" if specimens < FEWEST else "ok", needed, words)
     same = one_joint_errors(table("ranking"), len(cohort.joint_names))
@@ -117,7 +116,7 @@ def _trust(
     if rows:
         counts = {name: len(part) for name, part in rows.items()} | {"n": len(signs)}
         counts["moved"] += counts["wrong"]
-        numbers = counted(counts, "sign_checks: verdict")
+        numbers = numbers_from("sign_checks: verdict", **counts)
         places = [
             f"{short(row['specimen'])} {level(row['joint'])} in {plain(row['test'])}"
             for row in rows["flipped"].to_dict("records")
@@ -167,7 +166,7 @@ def _quality(
         several = fits["n_optima"] > 1
         told = int((several & _behind(fits, values)).sum())
         counts = {"n": len(fits), "lost": len(lost), "several": int(several.sum()), "told": told}
-        numbers = counted(counts, "fits: status, n_optima")
+        numbers = numbers_from("fits: status, n_optima", **counts)
         verdict = "ok" if lost.empty else "check" if len(lost) <= MANY * len(fits) else "stop"
         why = [f"{n} {plain(str(name))}" for name, n in lost.value_counts().items()]
         yield Conclusion("fits", verdict, numbers, {"why": listed(why)})
@@ -176,7 +175,7 @@ def _quality(
     if len(values):
         lost_values = int(values["value"].isna().sum())
         counts = {"n": len(values), "lost": lost_values}
-        numbers = counted(counts, "stiffness: identifiable, at_bound")
+        numbers = numbers_from("stiffness: identifiable, at_bound", **counts)
         yield Conclusion("bounded", "check" if lost_values else "ok", numbers)
     if study.cost == "published":
         yield Conclusion("noise", "check_none")
@@ -217,7 +216,7 @@ def _checks(
     ]
     known = pd.concat([own[:0], *parts])["identifiable"].eq(True)
     if len(known) and not known.all():
-        numbers = counted({"n": len(known), "lost": int((~known).sum())}, "stiffness: identifiable")
+        numbers = numbers_from("stiffness: identifiable", n=len(known), lost=int((~known).sum()))
         yield Conclusion("left_out_stiffness", "check", numbers)
 
 
@@ -228,7 +227,7 @@ def _priors(rows: pd.DataFrame) -> Iterator[Conclusion]:
         far = int((whole["pull"].abs() > FAR).sum())
         bounded = whole["standard_error"].astype(float) < 0.5 * whole["prior_sd"].astype(float)
         numbers = {"n": len(whole), "far": far, "bounded": int(bounded.sum())}
-        values = counted(numbers, "nuisances: pull, standard_error")
+        values = numbers_from("nuisances: pull, standard_error", **numbers)
         yield Conclusion("priors", "check" if far else "ok", values)
 
 
@@ -239,7 +238,7 @@ def _experiments(curves: pd.DataFrame, axes: pd.DataFrame) -> Iterator[Conclusio
         yield from _zones(curves)
         loops = paired_curves(curves, "hysteresis_area", "j").dropna(subset=["measured"])
         sure = int((loops["measured"] - loops["measured_way"] > 0.0).sum())
-        values = counted({"n": len(loops), "sure": sure}, "load_displacement: hysteresis area")
+        values = numbers_from("load_displacement: hysteresis area", n=len(loops), sure=sure)
         if len(loops):
             work = float(loops["measured"].median())
             values["work"] = Value(work, "J", n=len(loops), source="load_displacement: median")
@@ -249,7 +248,7 @@ def _experiments(curves: pd.DataFrame, axes: pd.DataFrame) -> Iterator[Conclusio
     measured = axes[axes["source"] == MEASURED] if len(axes) else axes
     if len(measured):
         placed = measured[measured["status"] == WHOLE]
-        values = counted({"n": len(measured), "placed": len(placed)}, "helical_axes: status")
+        values = numbers_from("helical_axes: status", n=len(measured), placed=len(placed))
         names = [f"centre_{axis}_sd_mm" for axis in ("anterior", "superior", "right")]
         sds = placed[names].astype(float).dropna()
         if len(sds):
@@ -277,7 +276,7 @@ def ranges(pairs: pd.DataFrame) -> Iterator[Conclusion]:
     counts = {"n": len(off), "known": n, "outside": outside, "inside": n - outside}
     values = {"middle": Value(float(off.median()), "°", n=len(off), source=source)}
     verdict = "no_noise" if not n else "differ" if outside > MANY * n else "agree"
-    yield Conclusion("ranges", verdict, values | counted(counts, source))
+    yield Conclusion("ranges", verdict, values | numbers_from(source, **counts))
 
 
 def _zones(rows: pd.DataFrame) -> Iterator[Conclusion]:
@@ -287,7 +286,7 @@ def _zones(rows: pd.DataFrame) -> Iterator[Conclusion]:
     asked = measured[measured["neutral_zone"].isin([*bent, Zone.NOT_MEANINGFUL.value])]
     soft, of_model = (part[part["neutral_zone"].isin(bent)] for part in (asked, model))
     counts = {"n": len(asked), "soft": len(soft), "model": len(of_model)}
-    values = counted(counts, "load_displacement: neutral_zone")
+    values = numbers_from("load_displacement: neutral_zone", **counts)
     zone = soft["neutral_zone_deg"].dropna().astype(float)
     if len(zone):
         middle = float(zone.median())
@@ -300,7 +299,7 @@ def _methods(study: CohortStiffness, stiffness: pd.DataFrame, n: int) -> Iterato
     tests = load_cases(stiffness["fitted_to"]) if len(stiffness) else ()
     words = {"directions": directions(study.free), "tests": count(len(tests), "load case")}
     verdict = "published" if study.cost == "published" else "noise"
-    yield Conclusion("methods", verdict, counted({"n": n}, "cohort: specimens"), words)
+    yield Conclusion("methods", verdict, numbers_from("cohort: specimens", n=n), words)
     if set(study.representations) & set(POOLED):
         yield Conclusion("methods_more", "pooled")
     if n >= FEWEST:

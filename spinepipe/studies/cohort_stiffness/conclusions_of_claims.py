@@ -8,13 +8,12 @@ from typing import Any
 
 import pandas as pd
 
-from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import SIGNS, listed
 from spinepipe.studies.cohort_stiffness.claims import CIRCULAR, DECIDED, UNDECIDED
 from spinepipe.studies.cohort_stiffness.claims_of_errors import CONTESTS
 from spinepipe.studies.cohort_stiffness.claims_of_stiffness import SPECIFIC
 from spinepipe.studies.cohort_stiffness.conclusions_of_stiffness import (
-    counted,
     differences,
     direction,
     directions,
@@ -107,7 +106,7 @@ def _size(row: Row) -> Value:
 
 
 def _counts(rows: Sequence[Row]) -> dict[str, Value]:
-    return counted({"compared": len(rows), "decided": len(_decided(rows))}, "findings")
+    return numbers_from("findings", compared=len(rows), decided=len(_decided(rows)))
 
 
 def _descriptions(rows: Sequence[Row]) -> Iterator[Conclusion]:
@@ -195,7 +194,7 @@ def _load_cases(claims: Claims) -> Iterator[Conclusion]:
         row = claims.get(claim.finding)
         if row and row["holds"] in verdicts and pd.notna(row["value"]):
             n, source = int(row["specimens"]), f"findings: {claim.finding}"
-            numbers = counted({"below": round(row["value"] * n), "n": n}, source)
+            numbers = numbers_from(source, below=round(row["value"] * n), n=n)
             words = {"described": named(representation).sentence}
             yield Conclusion("load_cases", verdicts[row["holds"]], numbers, words)
             break
@@ -209,7 +208,7 @@ def covariate_conclusions(rows: pd.DataFrame) -> Iterator[Conclusion]:
     for row in held.to_dict("records"):
         factor, low, high = (float(row[name]) for name in ("factor", "low", "high"))
         n = int(row["specimens"])
-        numbers = counted({"n": n}, "covariates: specimens")
+        numbers = numbers_from("covariates: specimens", n=n)
         numbers["factor"] = Value(factor, "", low, high, n, "covariates: factor")
         words = {"direction": direction(row["coordinate"]), "covariate": row["name"]}
         yield Conclusion("covariates", "yes", numbers, {**words, "step": str(row["step"])})

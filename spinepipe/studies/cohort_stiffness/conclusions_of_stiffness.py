@@ -1,12 +1,12 @@
 """How stiff the joints are, in units of the field; the sentences stand in conclusions.csv."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from math import isfinite, pi
 
 import numpy as np
 import pandas as pd
 
-from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import AXIS, count, level, listed, short
 from spinepipe.studies.cohort_stiffness.claims import FEWEST
 from spinepipe.studies.cohort_stiffness.representations import FITTED, OF_JOINTS, SHARED, named
@@ -95,11 +95,6 @@ def kind_of(rows: pd.DataFrame) -> str:
     return "joints" if len(known) > 1 else "single"
 
 
-def counted(numbers: Mapping[str, int], source: str) -> dict[str, Value]:
-    """Counts as values."""
-    return {name: Value(int(n), source=source) for name, n in numbers.items()}
-
-
 def direction(coordinate: str) -> str:
     """A coordinate as a direction of motion in a sentence."""
     words = AXIS[coordinate].lower()
@@ -123,7 +118,7 @@ def stiffness_conclusions(values: pd.DataFrame) -> Iterator[Conclusion]:
     for name, value in told.items():
         rows = values[values["coordinate"] == name]
         more = {**names, "direction": direction(name)}
-        n = counted({"n": value.n or 0}, value.source)
+        n = numbers_from(value.source, n=value.n or 0)
         yield Conclusion("direction", kind_of(rows), {"value": value, **n}, more)
     yield from _open(values, [name for name in found if name not in told])
 

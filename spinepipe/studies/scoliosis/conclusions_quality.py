@@ -6,7 +6,7 @@ from math import comb
 import numpy as np
 import pandas as pd
 
-from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import listed
 from spinepipe.status import PrescribedStatus, Status
@@ -15,11 +15,6 @@ from spinepipe.studies.scoliosis.errors_compared import FILMS, LAWS, SIGNIFICANT
 
 MANY = 0.1
 """Share of poses or fits lost above which the others no longer stand for all."""
-
-
-def counted(source: str, **counts: int) -> dict[str, Value]:
-    """Whole numbers of a sentence."""
-    return {name: Value(int(n), source=source) for name, n in counts.items()}
 
 
 def quality(results: ResultTables, *groups: Compared) -> Iterator[Conclusion]:
@@ -44,12 +39,12 @@ def _poses(positions: pd.DataFrame) -> Iterator[Conclusion]:
     gave_up = int((status == PrescribedStatus.NOT_CONVERGED.value).sum())
     lost, poses = unstable + gave_up, len(positions)
     verdict = "ok" if not lost else "check" if lost <= MANY * poses else "stop"
-    counts = counted("positions: status", lost=lost, poses=poses, unstable=unstable)
-    yield Conclusion("poses", verdict, counts | counted("positions: status", gave_up=gave_up))
+    counts = numbers_from("positions: status", lost=lost, poses=poses, unstable=unstable)
+    yield Conclusion("poses", verdict, counts | numbers_from("positions: status", gave_up=gave_up))
     missed = positions[status == PrescribedStatus.UNREACHABLE.value]
     if len(missed):
         most = Value(float(missed["missed_mm"].max()), "mm", source="positions: missed_mm")
-        values = counted("positions: status", missed=len(missed), poses=poses)
+        values = numbers_from("positions: status", missed=len(missed), poses=poses)
         yield Conclusion("reached", "check", {**values, "mm": most})
 
 
@@ -58,7 +53,7 @@ def _spines(compared: Compared) -> Iterator[Conclusion]:
     if compared.each.empty:
         return
     n, spines = len(compared.same), len(compared.each)
-    values = counted("positions: spines with all poses", n=n, spines=spines)
+    values = numbers_from("positions: spines with all poses", n=n, spines=spines)
     names = {"films": FILMS[compared.group]}
     yield Conclusion("spines", "ok" if n == spines else "check", values, names)
 
@@ -71,7 +66,7 @@ def _sample(left_out: Compared) -> Iterator[Conclusion]:
     pairs = comb(laws, 2)
     # the least p of an exact signed rank test is 2^(1 - n), times all pairs by Holm's first step
     needed = int(np.floor(np.log2(2.0 * pairs / SIGNIFICANT))) + 1
-    values = counted("statistics: least p of pairs", n=n, pairs=pairs, needed=needed)
+    values = numbers_from("statistics: least p of pairs", n=n, pairs=pairs, needed=needed)
     yield Conclusion("sample", "ok" if n >= needed else "check", values)
 
 
@@ -86,11 +81,13 @@ def _fits(laws: pd.DataFrame) -> Iterator[Conclusion]:
     if lost > MANY * len(fits):
         verdict = "stop"
     source = "laws: fit_status, n_optima"
-    yield Conclusion("fits", verdict, counted(source, lost=lost, several=several, fits=len(fits)))
+    yield Conclusion(
+        "fits", verdict, numbers_from(source, lost=lost, several=several, fits=len(fits))
+    )
     reference = fits[fits["model"] == REFERENCE]
     if len(reference):
         held = int((reference["fit_status"] == Status.CONVERGED_AT_BOUND.value).sum())
-        values = counted("laws: fit_status", held=held, spines=len(reference))
+        values = numbers_from("laws: fit_status", held=held, spines=len(reference))
         yield Conclusion("bounds", "check" if held else "ok", values, {"law": LAWS[REFERENCE]})
 
 
@@ -100,9 +97,9 @@ def _segments(laws: pd.DataFrame) -> Iterator[Conclusion]:
     names: Mapping[str, str] = {
         "laws": listed(LAWS[name] for name in LAWS if (held["model"] == name).any())
     }
-    values = counted("laws: constrained", held=len(held), all=len(laws))
+    values = numbers_from("laws: constrained", held=len(held), all=len(laws))
     yield Conclusion("constrained", "check" if len(held) else "ok", values, names)
     segments = laws.drop_duplicates(["specimen", "joint"])
     against = int(segments["opposite"].astype(bool).sum())
-    values = counted("laws: opposite", against=against, segments=len(segments))
+    values = numbers_from("laws: opposite", against=against, segments=len(segments))
     yield Conclusion("opposite", "check" if against else "ok", values)

@@ -8,7 +8,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.motion.skeleton import LUMBAR_JOINTS
-from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.tracking.conclusions_of_errors import (
@@ -16,7 +16,6 @@ from spinepipe.studies.tracking.conclusions_of_errors import (
     MANY_LOST,
     Tables,
     conclusions_of_errors,
-    counted,
 )
 from spinepipe.studies.tracking.conclusions_of_stiffness import conclusions_of_stiffness
 from spinepipe.studies.tracking.ranking import (
@@ -83,8 +82,8 @@ def _sharing(rows: pd.DataFrame, truth: pd.DataFrame, name: str) -> Conclusion:
     most = 100.0 * float(shares[joint].mean())
     values = {
         "share": Value(most, "%", n=len(shares), source="sharing: mean over subjects"),
-        "agree": counted(int((shares.idxmax(axis="columns") == joint).sum()), "sharing"),
-        "subjects": counted(len(shares), "sharing"),
+        "agree": Value(int((shares.idxmax(axis="columns") == joint).sum()), source="sharing"),
+        "subjects": Value(len(shares), source="sharing"),
     }
     names = {"approach": phrase(name), "joint": level(joint), "trial": plain(trial)}
     keys = ["specimen", "trial", "joint", "share"]
@@ -123,7 +122,7 @@ def judged_likeness(
     near = (own["cmc"].astype(float) - true).abs() <= CLEARLY
     motions = {"near": near.sum(), "motions": true.notna().sum()}
     counts = {
-        told: counted(int(n), "similarity beside true motions") for told, n in motions.items()
+        told: Value(int(n), source="similarity beside true motions") for told, n in motions.items()
     }
     found = []
     for row in own.to_dict("records"):
@@ -156,7 +155,7 @@ def _against(rows: pd.DataFrame) -> Iterator[Conclusion]:
     if known.empty:
         return
     out = known[(known["share"] < 0.0) | (known["share"] > 1.0)]
-    values = {"out": counted(len(out), "sharing"), "shares": counted(len(known), "sharing")}
+    values = numbers_from("sharing", out=len(out), shares=len(known))
     names = {"approaches": _named(out["approach"])}
     yield Conclusion("against", "check" if len(out) else "ok", values, names)
 
@@ -176,7 +175,7 @@ def _lights(
     if len(fits):
         lost = fits[~fits["status"].isin(ENDED)]
         verdict = "ok" if lost.empty else "check" if len(lost) <= MANY_LOST * len(fits) else "stop"
-        values = {"lost": counted(len(lost), "fits"), "fits": counted(len(fits), "fits")}
+        values = {"lost": Value(len(lost), source="fits"), "fits": Value(len(fits), source="fits")}
         yield Conclusion("fits", verdict, values, {"approaches": _named(lost["approach"])})
         yield from _beyond("markers", fits, "largest_deviation_mm", study.largest_deviation_mm)
         yield from _beyond("vibration", fits, ACCELERATION, scales.turn_deg_per_s2)
@@ -200,8 +199,8 @@ def _beyond(rule: str, fits: pd.DataFrame, column: str, limit: float) -> Iterato
     far = known[column].astype(float) > limit
     unit, source = "°/s²" if column == ACCELERATION else "mm", f"fits: {column}"
     values = {
-        "far": counted(int(far.sum()), source),
-        "all": counted(len(known), source),
+        "far": Value(int(far.sum()), source=source),
+        "all": Value(len(known), source=source),
         "most": Value(float(known[column].max()), unit, source=source),
         "limit": Value(limit, unit, source="settings"),
     }
@@ -216,7 +215,7 @@ def _recordings(study: Tracking, tables: Tables) -> Iterator[Conclusion]:
         known = clusters[clusters["status"] != TOO_FEW]
         loose = int((known["status"] == "not_rigid").sum())
         numbers = {"loose": loose, "known": len(known), "unseen": len(clusters) - len(known)}
-        values = {name: counted(n, "clusters: status") for name, n in numbers.items()}
+        values = {name: Value(n, source="clusters: status") for name, n in numbers.items()}
         if len(known):
             most = float(known["variability_mm"].max())
             values["most"] = Value(most, "mm", source="clusters: variability_mm")
@@ -230,7 +229,7 @@ def _recordings(study: Tracking, tables: Tables) -> Iterator[Conclusion]:
         verdict = unscaled if study.scaling == "none" else "ok_scaled"
         yield Conclusion("sizes", verdict if len(told) else "check_unknown", values)
     who = remarks["specimen"].nunique() if len(remarks) else 0
-    values = {"remarks": counted(len(remarks), "remarks"), "subjects": counted(who, "remarks")}
+    values = numbers_from("remarks", remarks=len(remarks), subjects=who)
     yield Conclusion("recordings", "check" if len(remarks) else "ok", values)
 
 
@@ -238,10 +237,10 @@ def _methods(
     study: Tracking, cohort: Cohort, tables: Tables, found: list[Ranking]
 ) -> Iterator[Conclusion]:
     values = {
-        "approaches": counted(len(study.approaches), "settings: approaches"),
-        "nodes": counted(study.intervals + 1, "settings: intervals"),
-        "ratios": counted(len(study.profiles.ratios), "settings: profiles"),
-        "tests": counted(max((one.tests for one in found), default=0), "errors: pairs"),
+        "approaches": Value(len(study.approaches), source="settings: approaches"),
+        "nodes": Value(study.intervals + 1, source="settings: intervals"),
+        "ratios": Value(len(study.profiles.ratios), source="settings: profiles"),
+        "tests": Value(max((one.tests for one in found), default=0), source="errors: pairs"),
     }
     who = {"subjects": count(len(cohort.specimen_names), "subject")}
     yield Conclusion("methods", "tracked", values, who)

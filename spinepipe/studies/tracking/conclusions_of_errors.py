@@ -32,11 +32,6 @@ MANY_LOST = 0.1
 TESTED = "errors: paired t tests, all corrected together (Holm)"
 
 
-def counted(n: int, source: str) -> Value:
-    """A number of things."""
-    return Value(n, source=source)
-
-
 def conclusions_of_errors(tables: Tables, found: Sequence[Ranking]) -> Iterator[Conclusion]:
     """All of them; without a truth how closely markers are met."""
     fits = tables["fits"]
@@ -77,8 +72,8 @@ def _nearest(one: Ranking) -> Conclusion:
         verdict = "few"
     else:
         verdict = "unsure" if not beaten else "best" if beaten == len(others) else "some"
-    values = {"error": one.error(best), "beaten": counted(beaten, TESTED)}
-    values["others"] = counted(len(others), "errors: approaches with all motions")
+    values = {"error": one.error(best), "beaten": Value(beaten, source=TESTED)}
+    values["others"] = Value(len(others), source="errors: approaches with all motions")
     return Conclusion("nearest", verdict, values, _words(one, best))
 
 
@@ -130,7 +125,7 @@ def _needed(one: Ranking) -> Iterator[Conclusion]:
         yield Conclusion("sample", verdict, names=names)
         return
     names["rival"] = phrase(ties[0])
-    values = {"tests": counted(one.tests, "errors: pairs of approaches")}
+    values = {"tests": Value(one.tests, source="errors: pairs of approaches")}
     how = "errors: paired t test with the SD of these differences, power 80 %, corrected level"
     needed = {other: one.needed(best, other) for other in (ties[0], IK) if other in ties}
     told = {other: Value(n, n=one.n, source=how) for other, n in needed.items() if n is not None}
@@ -149,7 +144,10 @@ def _use(fits: pd.DataFrame, one: Ranking) -> Iterator[Conclusion]:
     own = fits[fits["trial"].isin(one.trials) & (fits["approach"] == one.approaches[0])]
     lost = int((~own["status"].isin(ENDED)).sum())
     if lost > MANY_LOST * len(own):
-        values = {"lost": counted(lost, "fits: status"), "fits": counted(len(own), "fits")}
+        values = {
+            "lost": Value(lost, source="fits: status"),
+            "fits": Value(len(own), source="fits"),
+        }
         yield Conclusion("use", "stop_lost", values, _words(one, one.approaches[0]))
 
 
@@ -171,9 +169,9 @@ def _calibrated(one: Ranking) -> Iterator[Conclusion]:
     values = {
         "calibrated": one.error(there[0]),
         "generic": one.error(GENERIC),
-        "better": counted(better, TESTED),
-        "worse": counted(worse, TESTED),
-        "asked": counted(len(there), "errors: approaches"),
+        "better": Value(better, source=TESTED),
+        "worse": Value(worse, source=TESTED),
+        "asked": Value(len(there), source="errors: approaches"),
     }
     words = _words(one, there[0])
     yield Conclusion("calibrated", "split" if better and worse else verdict, values, words)
@@ -212,8 +210,8 @@ def _closest(fits: pd.DataFrame, one: Ranking) -> Iterator[Conclusion]:
     values = {
         "markers": Value(float(off[closest]), "mm", source=source),
         "best_markers": Value(float(off[best]), "mm", source=source),
-        "rank": counted(one.approaches.index(closest) + 1, "errors: order of mean errors"),
-        "approaches": counted(len(one.approaches), "errors: approaches"),
+        "rank": Value(one.approaches.index(closest) + 1, source="errors: order of mean errors"),
+        "approaches": Value(len(one.approaches), source="errors: approaches"),
     }
     names = {**_words(one, best), "closest": phrase(closest)}
     yield Conclusion("closest", "same" if closest == best else "other", values, names)

@@ -10,10 +10,12 @@ from spinepipe.cohort import Cohort
 from spinepipe.motion.joint_tables import SIDES
 from spinepipe.motion.passive import passive_elements
 from spinepipe.motion.skeleton import JOINTS
-from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import AXIS, count, level, listed, plain, tick
 from spinepipe.status import Status
-from spinepipe.studies.tracking.conclusions_of_errors import Tables, counted
+from spinepipe.studies.tracking.conclusions_of_errors import (
+    Tables,
+)
 from spinepipe.studies.tracking.settings import LEARNT, Tracking
 from spinepipe.studies.tracking.tables import LIMIT
 from spinepipe.studies.tracking.trials import PASSIVE
@@ -93,8 +95,8 @@ def _profiles(rows: pd.DataFrame, ratios: "pd.Series[float]") -> Iterator[Conclu
         verdict = "edge_only"
     source = "profiles and profile_points"
     values = {
-        "profiles": counted(len(rows), source),
-        **{name: counted(counts.get(name, 0), source) for name in order},
+        "profiles": Value(len(rows), source=source),
+        **{name: Value(counts.get(name, 0), source=source) for name in order},
     }
     own = rows[rows["says"] == verdict.removeprefix("all_").removesuffix("_only")]
     sizes = {"most": own["most"].max(), "low": ratios.min(), "high": ratios.max()}
@@ -105,7 +107,7 @@ def _profiles(rows: pd.DataFrame, ratios: "pd.Series[float]") -> Iterator[Conclu
     names = {"whose": subjects, "end": end, "places": _places(own)}
     yield Conclusion("profiles", verdict, values, names)
     partly = rows["message"].fillna("").str.contains("did not settle") | (rows["says"] == "lost")
-    lost = {"lost": counted(int(partly.sum()), source), "profiles": values["profiles"]}
+    lost = {"lost": Value(int(partly.sum()), source=source), "profiles": values["profiles"]}
     yield Conclusion("profile_fits", "check" if partly.any() else "ok", lost)
 
 
@@ -123,7 +125,10 @@ def _places(rows: pd.DataFrame) -> str:
 def _ended(rows: pd.DataFrame) -> Iterator[Conclusion]:
     fits = rows.drop_duplicates(["specimen", "law"])
     lost = int((fits["status"] != Status.CONVERGED.value).sum())
-    values = {"lost": counted(lost, "stiffness: status"), "fits": counted(len(fits), "stiffness")}
+    values = {
+        "lost": Value(lost, source="stiffness: status"),
+        "fits": Value(len(fits), source="stiffness"),
+    }
     yield Conclusion("calibrations", "check" if lost else "ok", values)
 
 
@@ -166,7 +171,7 @@ def _prior(values: pd.DataFrame) -> Iterator[Conclusion]:
     source = "stiffness: ratio_to_generic beside the prior of A and B"
     moved = own.loc[own["outside"], "joint"].value_counts()
     counts = {"values": len(own), "outside": outside, "inside": len(own) - outside}
-    told = {name: counted(n, source) for name, n in counts.items()}
+    told = {name: Value(n, source=source) for name, n in counts.items()}
     median = float(own["ratio_to_generic"].median())
     told["median"] = Value(median, n=len(own), source="stiffness: median of ratio_to_generic")
     names = {"approach": phrase(law), "joint": level(str(moved.index[0])) if outside else ""}
@@ -189,7 +194,6 @@ def _between(values: pd.DataFrame) -> Iterator[Conclusion]:
     source = "stiffness: larger over smaller ratio_to_generic less 1, median of elements"
     values_told = {
         "apart": Value(100.0 * (float(np.median(told)) - 1.0), "%", n=len(told), source=source),
-        "elements": counted(len(both), source),
-        "moved": counted(int(moved.sum()), source),
+        **numbers_from(source, elements=len(both), moved=int(moved.sum())),
     }
     yield Conclusion("between", "prior" if within else "moved", values_told)

@@ -6,14 +6,13 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.trunk import LEVELS
-from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import count, level, listed, plain, short
 from spinepipe.studies.trunk_loads.conclusions_of_trust import of_trust
 from spinepipe.studies.trunk_loads.measured import beside_measured, counted_and_held, error
 from spinepipe.studies.trunk_loads.samples import (
     Tables,
-    counts,
     spread_of,
     times,
     with_interval,
@@ -109,12 +108,12 @@ def _answer(
     without = "measured" if missed is not None else "alone"
     verdict = without if ratio is None else with_error
     told = {"load": load, "times": ratio, "error": missed}
-    told |= counts("tasks", held=missed.n or 0) if missed is not None else {}
+    told |= numbers_from("tasks", held=missed.n or 0) if missed is not None else {}
     yield Conclusion("load", verdict, {k: v for k, v in told.items() if v is not None}, names)
     spread, drawn = spread_of(tables, row, COMPRESSION), {}
     if spread:
         lost, held = int(spread["n_failed"]), int(spread["n_samples"])
-        drawn = counts("intervals: n_samples and n_failed", lost=lost, samples=lost + held)
+        drawn = numbers_from("intervals: n_samples and n_failed", lost=lost, samples=lost + held)
     sampled = "single" if load.low is None else "sampled"
     yield Conclusion("compression", sampled, {"value": load, **drawn}, names)
     own = study.volunteer is not None and row["specimen"] == study.volunteer.specimen
@@ -126,7 +125,7 @@ def _answer(
         drawn["measured"] = Value(mpa, "MPa", source="measured_pressures.csv")
     yield Conclusion("pressure", f"{known}_{sampled}", {"value": pressure, **drawn}, names)
     if missed is not None:
-        n = counts("tasks", held=missed.n or 0, counted=int(beside["counted"].sum()))
+        n = numbers_from("tasks", held=missed.n or 0, counted=int(beside["counted"].sum()))
         yield Conclusion("error", "held", {"value": missed, **n})
     if ratio is not None:
         yield Conclusion("times", "standing", {"value": ratio}, names)
@@ -155,7 +154,7 @@ def _not_to_use(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
                 few = ", ".join(map(task_words, some))
                 whole = f"all {n}" if len(some) == n else f"{len(some)} of {n}"
                 told.append(f"{words} ({few if len(some) <= _MOST_NAMES else whole})")
-        values = counts("tasks: status, of every body", tasks=len(own))
+        values = numbers_from("tasks: status, of every body", tasks=len(own))
         yield Conclusion(
             "not_to_use", str(verdict), values, {"which": listed(told, len(told), None)}
         )
@@ -232,7 +231,7 @@ def _range(found: AnsweredTask, tables: Tables, cohort: Cohort) -> Iterator[Conc
         apart = values["most"].number - values["least"].number
         verdict = "differ" if apart > wide else "alike"
         values["wide"] = Value(wide, "N", source="intervals: high less low")
-    values |= counts(how, bodies=len(rows))
+    values |= numbers_from(how, bodies=len(rows))
     names["task"] = task_words(found.task["task"])
     yield Conclusion("range", verdict, values, names)
 
@@ -282,7 +281,7 @@ def _simplified(simplified: pd.DataFrame) -> Iterator[Conclusion]:
     ends = {"low": float(own.min()), "high": float(own.max()), "size": worst_percent}
     values = {end: Value(value, "%", n=len(own), source=how) for end, value in ends.items()}
     fewest = int(found["simplification"].value_counts().min())
-    values |= counts("simplified: status", pairs=len(own), fewest=fewest)
+    values |= numbers_from("simplified: status", pairs=len(own), fewest=fewest)
     names = {"what": SIMPLIFIED.get(worst["simplification"], plain(worst["simplification"]))}
     yield Conclusion("simplified", "small" if worst_percent < SMALL else "matters", values, names)
 
@@ -290,10 +289,10 @@ def _simplified(simplified: pd.DataFrame) -> Iterator[Conclusion]:
 def _methods(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Conclusion:
     tasks, sampled = (tables.get(name, pd.DataFrame()) for name in ("tasks", "intervals"))
     n = tasks["task"].nunique() if len(tasks) else 0
-    values = counts("specimens.csv and tasks", bodies=len(cohort.specimen_names), tasks=n)
+    values = numbers_from("specimens.csv and tasks", bodies=len(cohort.specimen_names), tasks=n)
     if sampled.empty:
         return Conclusion("methods", "single", values)
-    values |= counts("settings: samples", samples=study.uncertain.runs)
+    values |= numbers_from("settings: samples", samples=study.uncertain.runs)
     names = {
         "sampled_bodies": count(sampled["specimen"].nunique(), "body", "bodies"),
         "sampled_tasks": count(sampled["task"].nunique(), "task"),

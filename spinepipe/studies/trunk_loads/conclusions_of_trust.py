@@ -4,13 +4,12 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from spinepipe.report.conclusions import Conclusion, Value
+from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import listed, plain
 from spinepipe.studies.trunk_loads.measured import FEWEST, counted_and_held, error
 from spinepipe.studies.trunk_loads.samples import (
     Tables,
     carried_by_lost,
-    counts,
     lost_and_all,
     shares,
 )
@@ -81,11 +80,14 @@ def _inside(beside: pd.DataFrame) -> Iterator[Conclusion]:
     measured = known["measured_mpa"]
     out = known[(measured < known["low"]) | (measured > known["high"])]
     lost, held = int(known["n_failed"].sum()), int(known["n_samples"].sum())
-    values = counts(
+    values = numbers_from(
         "intervals: pressure, beside measured_pressures.csv",
-        outside=len(out), tasks=len(known), unconfirmed=len(sampled) - len(known),
-        lost=lost, samples=lost + held,
-    )  # fmt: skip
+        outside=len(out),
+        tasks=len(known),
+        unconfirmed=len(sampled) - len(known),
+        lost=lost,
+        samples=lost + held,
+    )
     some = "outside" if len(out) <= _MOST_NAMES else "outside_many"
     names = {"which": listed(plain(name) for name in out["task"])}
     yield Conclusion("inside", some if len(out) else "all", values, names)
@@ -96,11 +98,14 @@ def _compared(beside: pd.DataFrame, missed: Value | None) -> Iterator[Conclusion
     if beside.empty:
         return
     held, counted = len(counted_and_held(beside)), int(beside["counted"].sum())
-    values = counts(
+    values = numbers_from(
         "tasks: status, beside measured_pressures.csv",
-        held=held, counted=counted, measured=len(beside), fewest=FEWEST,
+        held=held,
+        counted=counted,
+        measured=len(beside),
+        fewest=FEWEST,
         unconfirmed=int((~beside["confirmed"]).sum()),
-    )  # fmt: skip
+    )
     if missed is None:
         yield Conclusion("compared", "stop", values)
     else:
@@ -126,7 +131,7 @@ def _tuned(tables: Tables) -> Iterator[Conclusion]:
             for tier, own in tiers.items()
         )
         counted = rows[rows["tier"] == "untuned"]["task"].nunique()
-        n = counts("pressures: status", held=len(both), fewest=FEWEST, counted=counted)
+        n = numbers_from("pressures: status", held=len(both), fewest=FEWEST, counted=counted)
         if before is None or after is None:
             yield Conclusion("tuned", "few", n)
         else:
@@ -186,7 +191,7 @@ def _samples(tables: Tables) -> Iterator[Conclusion]:
     lost, drawn = lost_and_all(rows)
     empty = rows[rows["low"].isna()].drop_duplicates(["specimen", "task"])
     source = "intervals: n_samples and n_failed, over tasks"
-    values = counts(source, lost=lost, samples=drawn, tasks=len(empty))
+    values = numbers_from(source, lost=lost, samples=drawn, tasks=len(empty))
     if not lost:
         yield Conclusion("samples", "ok", values)
         return
@@ -210,10 +215,14 @@ def _held(tasks: pd.DataFrame) -> Conclusion:
         int((tasks["status"] == status).sum()) for status in ("beyond_strength", "out_of_reach")
     )
     lost = int((~sound(tasks)).sum())
-    values = counts(
+    values = numbers_from(
         "tasks: status",
-        pairs=len(tasks), lost=lost, weak=weak, reach=reach, unsolved=lost - weak - reach,
-    )  # fmt: skip
+        pairs=len(tasks),
+        lost=lost,
+        weak=weak,
+        reach=reach,
+        unsolved=lost - weak - reach,
+    )
     return Conclusion("held", "stop" if lost else "ok", values)
 
 
@@ -221,7 +230,7 @@ def _range_of_formula(held: pd.DataFrame) -> Iterator[Conclusion]:
     known = held.dropna(subset=["inside_eq_6"])
     if len(known):
         out = int((~known["inside_eq_6"].astype(bool)).sum())
-        values = counts("tasks: inside_eq_6", outside=out, pressures=len(known))
+        values = numbers_from("tasks: inside_eq_6", outside=out, pressures=len(known))
         yield Conclusion("formula", "check" if out else "ok", values)
 
 
@@ -234,7 +243,7 @@ def _left_over(held: pd.DataFrame) -> Iterator[Conclusion]:
     # to 0.001, as less is what a solver leaves
     values = {"slack": Value(round(float(slack.max()), 3), "N\u00a0m", source="tasks")}
     if len(over):
-        values |= counts("tasks: strength_used above 1", pairs=len(over))
+        values |= numbers_from("tasks: strength_used above 1", pairs=len(over))
         values["most"] = Value(100.0 * float(over["strength_used"].max()), "%", source="tasks")
     yield Conclusion("balance", "check" if len(over) else "ok", values)
 
@@ -245,11 +254,11 @@ def _stability(held: pd.DataFrame) -> Iterator[Conclusion]:
     if known.empty:
         return
     stable = known["stable"].astype(bool)
-    values = counts("tasks: stable", falling=int((~stable).sum()), postures=len(known))
+    values = numbers_from("tasks: stable", falling=int((~stable).sum()), postures=len(known))
     asked = known[known["tone"] == "stable"]
     never = asked[~stable[asked.index]]
     n = {"bodies": never["specimen"].nunique(), "asked": asked["specimen"].nunique()}
-    values |= counts("tasks: stable, where tone was sought", **n)
+    values |= numbers_from("tasks: stable, where tone was sought", **n)
     names = {"which": listed(plain(str(name)) for name in dict.fromkeys(never["task"]))}
     verdict = "stop_tone" if len(never) else "ok" if stable.all() else "check"
     yield Conclusion("stability", verdict, values, names)
@@ -258,5 +267,5 @@ def _stability(held: pd.DataFrame) -> Iterator[Conclusion]:
 def _upright(rows: pd.DataFrame) -> Iterator[Conclusion]:
     if len(rows):
         bound = int(rows["bound"].sum())
-        values = counts("upright: bound", bound=bound, rotations=len(rows))
+        values = numbers_from("upright: bound", bound=bound, rotations=len(rows))
         yield Conclusion("upright", "check" if bound else "ok", values)

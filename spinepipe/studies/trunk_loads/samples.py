@@ -25,11 +25,6 @@ _Z = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
 
 
-def counts(source: str, **numbers: float) -> dict[str, Value]:
-    """Numbers of a sentence that are read from one place."""
-    return {name: Value(number, source=source) for name, number in numbers.items()}
-
-
 def spread_of(tables: Tables, row: Row, quantity: str) -> Row:
     """Row of table intervals of a body and task; nothing where it was not sampled."""
     rows = of_task(tables.get("intervals", pd.DataFrame()), row)
