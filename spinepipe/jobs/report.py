@@ -6,7 +6,6 @@ says nothing that the tables and their code do not, so no digest holds it and no
 
 import os
 from dataclasses import replace
-from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -88,8 +87,6 @@ def _write_page(
     if page == "report" and added:
         more = f"{listed(added)} (`make full` makes them and the page full.html)"
         made = replace(made, left_out=(*made.left_out, more))
-    newest = max((Path(path).stat().st_mtime for path in tables), default=0.0)
-    date = datetime.fromtimestamp(newest, UTC).date().isoformat()
     folder = Path(output).parent
     papers = {}
     for shape in kind_of(study.kind).tables:
@@ -99,7 +96,7 @@ def _write_page(
             beside = comparison(shape, title, rows, study, cohort)
             write_marked(beside, folder / f"{shape.name}.html", digest)
     subfolder = kind_of(study.kind).files.subfolder
-    html = made.html(study, cohort, results, papers=papers, date=date, folder=subfolder)
+    html = made.html(study, cohort, results, papers=papers, folder=subfolder)
     write_marked(html, output, digest)
     if page == "report":
         metadata = {"study": study.study, "kind": study.kind, KEY: digest}

@@ -42,6 +42,10 @@ document.querySelectorAll('details.tab').forEach(table => {
   };
 });
 
+// The day is that of the file: in it, the same results would make other bytes each day.
+const written = new Date(document.lastModified);
+document.querySelectorAll('.day').forEach(place => { place.textContent = written.toLocaleDateString('en-CA'); });
+
 document.querySelectorAll('[data-copy]').forEach(button => button.onclick = async () => {
   await navigator.clipboard.writeText(document.getElementById(button.dataset.copy).textContent);
   button.textContent = 'Copied';

@@ -98,15 +98,14 @@ class Page:
         results: ResultTables,
         *,
         papers: Mapping[str, str] | None = None,
-        date: str = "",
         folder: str = "",
     ) -> str:
-        """The page. It loads nothing from the network, and the same results make the same bytes.
+        """The page. It loads nothing from the network; the same results make the same bytes.
 
         Parameters
         ----------
         papers : pages of comparisons with papers, by file, with the words of the link.
-        date : of the results. folder : of tables and figures as the page reaches it, with a slash.
+        folder : of tables and figures as the page reaches it, with a slash.
         """
         findings, lights = self.at("finding"), self.at("light")
         drawings = dict(results.drawings)
@@ -137,17 +136,13 @@ class Page:
             "tables": self.tables,
             "methods": self.at("methods"),
             "origin": run,
-            "date": date,
             "folder": folder,
             "left_out": self.left_out,
             "source": cohort.source,
             "papers": (papers or {}).items(),
             "version": spinepipe.__version__,
             "cite": f"spinepipe {spinepipe.__version__}, study {study.study} ({study.kind}) of the "
-            f"cohort {cohort.name}"
-            + (f", results of {date}" if date else "")
-            + ". Data: "
-            + cohort.source,
+            f"cohort {cohort.name}. Data: {cohort.source}",
         }
         title = f"{study.study}: {self.at('answer')[0].text}"
         return rendered("study_page.html", page=shown, title=title, index="../index.html")

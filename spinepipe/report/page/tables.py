@@ -136,16 +136,14 @@ def _cell(value: Any, column: Column) -> Cell:
     return Cell(str(value), None)
 
 
-def page_tables(shape: Table, title: str, frame: pd.DataFrame) -> list[Sortable]:
-    """A result table as a page has it.
-
-    None without rows, else one.
+def page_tables(shape: Table, title: str, frame: pd.DataFrame, columns: str = "") -> list[Sortable]:
+    """A result table as a page has it; none without rows.
 
     Parameters
     ----------
     shape : the table as it is declared. frame : its rows.
+    columns : names of those that a reader compares, between spaces; all by default.
     """
-    if frame.empty:
-        return []
-    whole = sortable(shape.name, title, shape.about, frame, shape.columns)
+    shown = [*map(shape.column, columns.split())] or shape.columns
+    whole = sortable(shape.name, title, shape.about, frame, shown)
     return [whole] if whole.rows else []

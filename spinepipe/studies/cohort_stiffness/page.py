@@ -8,7 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import Value, sentences_of
 from spinepipe.report.page.study_page import Page, ResultTables
-from spinepipe.report.page.tables import Sortable, sortable
+from spinepipe.report.page.tables import Sortable, page_tables, sortable
 from spinepipe.report.words import AXIS, level
 from spinepipe.schema import Column, Table
 from spinepipe.studies.cohort_stiffness.claims import FEWEST
@@ -67,9 +67,11 @@ def page(study: CohortStiffness, cohort: Cohort, results: ResultTables) -> Page:
         tables=[
             *_stiffness(results.table("stiffness")),
             *(
-                sortable(shape.name, title, shape.about, rows, [*map(shape.column, names.split())])
+                table
                 for shape, (title, names) in _SHOWN.items()
-                if len(rows := _rows(study, cohort, results, shape.name))
+                for table in page_tables(
+                    shape, title, _rows(study, cohort, results, shape.name), names
+                )
             ),
         ],
         left_out=papers.left_out(GOULD_2024B.cited, GOULD_2024B.stands_for(cohort.name)),

@@ -4,7 +4,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import sentences_of
 from spinepipe.report.page.study_page import Page, ResultTables
-from spinepipe.report.page.tables import Sortable, sortable
+from spinepipe.report.page.tables import Sortable, page_tables
 from spinepipe.report.words import plain
 from spinepipe.studies.scoliosis.charts import SHORT
 from spinepipe.studies.scoliosis.conclusions import PUBLISHED, conclusions
@@ -67,13 +67,10 @@ def page(study: Scoliosis, cohort: Cohort, results: ResultTables) -> Page:
 
 def shown_tables(results: ResultTables) -> list[Sortable]:
     """Tables that the study has, with names of laws and films in words."""
-    found = []
+    found: list[Sortable] = []
     for shape, (title, names) in _SHOWN.items():
-        rows = results.table(shape.name)
-        if len(rows):
-            columns = [shape.column(name) for name in names.split()]
-            told = rows.apply(lambda cells: cells.map(_in_words))
-            found.append(sortable(shape.name, title, shape.about, told, columns))
+        told = results.table(shape.name).apply(lambda cells: cells.map(_in_words))
+        found += page_tables(shape, title, told, names)
     return found
 
 

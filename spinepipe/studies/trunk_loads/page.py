@@ -6,7 +6,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison import papers
 from spinepipe.report.conclusions import sentences_of
 from spinepipe.report.page.study_page import Page, ResultTables
-from spinepipe.report.page.tables import Sortable, sortable
+from spinepipe.report.page.tables import Sortable, page_tables
 from spinepipe.schema import Table
 from spinepipe.studies.trunk_loads.conclusions import conclusions
 from spinepipe.studies.trunk_loads.scenes import trunk_scenes
@@ -83,16 +83,14 @@ def _tables(study: TrunkLoads, results: ResultTables) -> list[Sortable]:
     """Tables that have rows; of levels those of one body, of remarks each once."""
     tasks = results.table("tasks")
     body = shown_person(study, tasks[sound(tasks)]) if len(tasks) else None
-    found = []
+    found: list[Sortable] = []
     for shape, (title, names) in SHOWN.items():
         rows = results.table(shape.name)
         if shape is LEVELS_TABLE:
             rows = of_person(rows, body)
         elif shape is REMARKS and len(rows):
             rows = rows.drop_duplicates("remark")
-        columns = tuple(map(shape.column, names.split()))
-        table = sortable(shape.name, title, shape.about, rows, columns)
-        found += [table] if table.rows else []
+        found += page_tables(shape, title, rows, names)
     return found
 
 
