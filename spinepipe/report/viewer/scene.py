@@ -45,6 +45,22 @@ class SceneBody:
     fixed: bool = False
 
 
+def bodies_at(
+    names: Sequence[str], meshes: Sequence[Mesh], origins: Array, axes: Array
+) -> list[SceneBody]:
+    """Vertebrae from below, the first one fixed.
+
+    Parameters
+    ----------
+    meshes : in ground. origins : (B, 3) mm, axes : (B, 3, 3), of the bodies' frames in ground.
+    """
+    rows = zip(names, meshes, origins, axes, strict=True)
+    return [
+        SceneBody(name, mesh.seen_from(origin, turn), fixed=k == 0)
+        for k, (name, mesh, origin, turn) in enumerate(rows)
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class SceneLoad:
     """A load on a vertebra; its point moves with the vertebra, its direction does not.

@@ -12,7 +12,7 @@ from spinepipe.frames import Pose, transform_of
 from spinepipe.report.specimen import SpecimenView, view_of
 from spinepipe.report.specimen_curves import main_coordinate
 from spinepipe.report.viewer.meshes import Endplate, spine_meshes
-from spinepipe.report.viewer.scene import Scene, SceneBody, SceneLoad, SceneStep, rotation_vector
+from spinepipe.report.viewer.scene import Scene, SceneLoad, SceneStep, bodies_at, rotation_vector
 from spinepipe.report.words import AXIS, after_number, case, fixed, number
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, MM_PER_M, from_si
 
@@ -46,13 +46,9 @@ def specimen_scene(cohort: Cohort, view: SpecimenView, with_loads: bool = True) 
     joints = [Endplate(frame.origin * MM_PER_M, frame.rotation) for frame in view.frames]
     meshes = spine_meshes(cohort.vertebrae, joints, view.points)
     # a body's frame: at the middle of its mesh, with the axes of ground in the neutral pose
-    origins = [0.5 * (m.vertices.min(axis=0) + m.vertices.max(axis=0)) for m in meshes]
-    bodies = [
-        SceneBody(name, mesh.seen_from(origin, np.eye(3)), fixed=k == 0)
-        for k, (name, mesh, origin) in enumerate(
-            zip(cohort.vertebrae, meshes, origins, strict=True)
-        )
-    ]
+    ends = [(m.vertices.min(axis=0), m.vertices.max(axis=0)) for m in meshes]
+    origins = np.mean(ends, axis=1)
+    bodies = bodies_at(cohort.vertebrae, meshes, origins, np.tile(np.eye(3), (len(meshes), 1, 1)))
     neutral = np.column_stack([origins, np.zeros((len(bodies), 3))])
     steps = [SceneStep("Neutral", "Neutral pose.", neutral)]
     if with_loads:

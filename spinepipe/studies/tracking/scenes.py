@@ -9,7 +9,14 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.report.viewer.meshes import Endplate, spine_meshes
-from spinepipe.report.viewer.scene import Scene, SceneBody, SceneStep, posed_axes, rotation_vector
+from spinepipe.report.viewer.scene import (
+    Scene,
+    SceneBody,
+    SceneStep,
+    bodies_at,
+    posed_axes,
+    rotation_vector,
+)
 from spinepipe.report.words import count, fixed, plain
 from spinepipe.studies.tracking.words import short_of
 from spinepipe.units import ROTATIONS
@@ -97,10 +104,7 @@ def _bodies(names: list[str], poses: Array) -> list[SceneBody]:
     axes = posed_axes(poses)
     joints = [Endplate(pose[:3], turn) for pose, turn in zip(poses[1:], axes[1:], strict=True)]
     meshes = spine_meshes(names, joints)
-    return [
-        SceneBody(name, mesh.seen_from(pose[:3], turn), fixed=name == BODIES[0])
-        for name, mesh, pose, turn in zip(names, meshes, poses, axes, strict=True)
-    ]
+    return bodies_at(names, meshes, poses[:, :3], axes)
 
 
 def _says(time_s: float, markers: Array) -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.report.viewer.meshes import Endplate, spine_meshes
-from spinepipe.report.viewer.scene import Muscle, Scene, SceneBody, SceneLoad, SceneStep, posed_axes
+from spinepipe.report.viewer.scene import Muscle, Scene, SceneLoad, SceneStep, bodies_at, posed_axes
 from spinepipe.report.words import capital, count, fixed, number, plain
 from spinepipe.studies.trunk_loads.forms import HANDS
 from spinepipe.studies.trunk_loads.words import ENDED, newton
@@ -74,12 +74,7 @@ def _scene(
         for k, centre in enumerate(tasks[order[0]][1])
     ]
     meshes = spine_meshes(cohort.vertebrae, joints)
-    bodies = [
-        SceneBody(name, mesh.seen_from(pose[:3], turn), fixed=k == 0)
-        for k, (name, mesh, pose, turn) in enumerate(
-            zip(cohort.vertebrae, meshes, start, axes, strict=True)
-        )
-    ]
+    bodies = bodies_at(cohort.vertebrae, meshes, start[:, :3], axes)
     top_mpa, top_n = top
     asked = cohort.further.get("tasks", pd.DataFrame())
     steps = []

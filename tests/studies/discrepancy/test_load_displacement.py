@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from discrepancy_cases import frames
 
+from spinepipe.cohort.load_response import joint_loads
 from spinepipe.effects import Wrench
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.discrepancy.charts import ways, worst_curves
 from spinepipe.studies.discrepancy.curve_rows import driven_coordinates
-from spinepipe.studies.discrepancy.search.readings import applied_loads
 
 RNG = np.random.default_rng(11)
 FRAMES = tuple(
@@ -40,7 +40,7 @@ def test_loads_at_joints_are_those_of_virtual_work() -> None:
         Wrench(body, RNG.normal(0.0, 0.05, 3), RNG.normal(0.0, 50.0, 3), RNG.normal(0.0, 5.0, 3))
         for body in (1, 2)
     )
-    (found,) = applied_loads(FRAMES, LoadCase("any", 1, (LoadStep(0, wrenches),)))
+    (found,) = joint_loads(FRAMES, LoadCase("any", 1, (LoadStep(0, wrenches),)))
     small = 1e-6
     for joint in range(3):
         for at in range(6):
@@ -52,7 +52,7 @@ def test_loads_at_joints_are_those_of_virtual_work() -> None:
 
 def test_a_joint_above_the_loaded_vertebra_is_not_loaded() -> None:
     wrench = Wrench(0, np.zeros(3), np.array([10.0, 0.0, 0.0]), np.zeros(3))
-    (found,) = applied_loads(FRAMES, LoadCase("any", 1, (LoadStep(0, (wrench,)),)))
+    (found,) = joint_loads(FRAMES, LoadCase("any", 1, (LoadStep(0, (wrench,)),)))
     assert np.abs(found[0]).max() > 1.0
     assert not found[1:].any()
 

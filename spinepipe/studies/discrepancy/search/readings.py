@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.load_response import joint_loads
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import LoadCase
 from spinepipe.units import COORDINATES
-
-_ROTATION_AXES = [2, 0, 1]
-"""Axis of the joint frame about which each rotation turns in the neutral pose."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class SpecimenReadings:
     @property
     def applied(self) -> tuple[Array, ...]:
         """(T, J, 6) N and N m of each test: what its loads do at each joint, weight not counted."""
-        return tuple(applied_loads(self.frames, case) for case in self.cases)
+        return tuple(joint_loads(self.frames, case) for case in self.cases)
 
 
 def specimen_readings(
@@ -106,23 +104,3 @@ def _loads(case: LoadCase) -> tuple[object, ...]:
         for step in case.steps
     )
     return (case.test, *steps)
-
-
-def applied_loads(frames: Sequence[Pose], case: LoadCase) -> Array:
-    """(T, J, 6) N and N m, conjugate to the coordinates of each joint in the neutral pose.
-
-    Every wrench loads all joints below the vertebra it acts on, with its force along the axes of
-    the joint's frame and its moment about the frame's origin.
-
-    Parameters
-    ----------
-    frames : of the joints in ground, caudal to cranial; joint j carries vertebra j.
-    """
-    found = np.zeros((len(case.steps), len(frames), 6))
-    for t, step in enumerate(case.steps):
-        for wrench in step.wrenches:
-            for j, frame in enumerate(frames[: wrench.body + 1]):
-                arm = wrench.point - frame.origin
-                moment = frame.rotation.T @ (wrench.moment + np.cross(arm, wrench.force))
-                found[t, j] += [*(frame.rotation.T @ wrench.force), *moment[_ROTATION_AXES]]
-    return found
