@@ -1,25 +1,19 @@
-"""Make a cohort folder of a testing machine's files, and say in plain sentences what was done."""
+"""A testing machine's files as the tables of a cohort, and in plain sentences what was done."""
 
-import csv
-import os
-import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from dataclasses import replace as with_values
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import yaml
 
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.cohort.columns import COHORT_YAML, TABLES
-from spinepipe.documents.form import TableForm
+from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.documents.settings import validate
-from spinepipe.documents.yaml_text import read_yaml
-from spinepipe.problems import InputError, InputProblem
-from spinepipe.schema import Column, Table
-from spinepipe.schema.datapackage import FILE, descriptor
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
+from spinepipe.problems import InputError
+from spinepipe.report.words import count
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.load_steps import (
     ReadingPrecision,
@@ -31,8 +25,12 @@ from spinepipe.testing_machine.recording import Recording, read_recording
 from spinepipe.testing_machine.settings import MachineMapping, check_mapping
 from spinepipe.units import COORDINATE_COLUMNS
 
-BY_HAND = ("joints.csv", "specimens.csv")
-"""Files that are made to be edited: they stay when a folder is made again."""
+BY_HAND = {
+    "joints.csv": "joints.csv is a template: it has the first joint at the origin, all axes along "
+    "ground. Put in where the joints are before you trust anything but rotations under moments.",
+    "specimens.csv": "",
+}
+"""Files that are made to be edited, and what is said of them."""
 
 LEVEL_APART_MM = 35.0
 NOT_READ = {"deg": 0.1, "mm": 0.1}
@@ -41,18 +39,17 @@ NOT_READ = {"deg": 0.1, "mm": 0.1}
 _POINT = ("px_mm", "py_mm", "pz_mm")
 _FRAME = ("x_mm", "y_mm", "z_mm", "extension_deg", "right_bending_deg", "left_rotation_deg")
 
-_UNITS = {
-    **{"mm": "mm", "deg": "deg", "n": "N", "nm": "N m", "s": "s"},
-    **{"kg": "kg", "m": "m", "m2": "kg m2", "years": "years"},
-}
-"""Units as names of columns end with them."""
-
 Rows = list[Sequence[object]]
 
 
 @dataclass(frozen=True)
-class ImportedCohort:
-    """A cohort that is read and not yet written."""
+class ImportedTests:
+    """What the settings say, and all tests on their load steps.
+
+    Attributes
+    ----------
+    rotation, translation : how sure readings are, deg and mm; None where none were read.
+    """
 
     mapping: MachineMapping
     tests: tuple[ResampledTest, ...]
@@ -60,19 +57,26 @@ class ImportedCohort:
     translation: ReadingPrecision | None
 
 
-def read(path: Path) -> ImportedCohort:
-    """Read the YAML and all files that it names.
+def read(folder: Path, document: YamlDocument) -> ImportedTests:
+    """Read all files that the settings name.
+
+    Parameters
+    ----------
+    folder : where the settings are; files are told relative to it.
 
     Raises
     ------
     InputError
-        With every problem of the YAML, else of all files, else of all tests.
+        With every problem of the settings, else of all files, else of all tests.
     """
-    mapping = _mapping(path)
-    problems: list[InputProblem] = []
+    mapping, problems = validate(MachineMapping, document)
+    if mapping is not None:
+        problems += check_mapping(document, mapping)
+    if problems or mapping is None:
+        raise InputError(problems)
     recordings: dict[tuple[str, str], list[Recording]] = {}
     for of in mapping.files:
-        recording, faults = read_recording(path.parent / of.file, of, mapping)
+        recording, faults = read_recording(folder / of.file, of, mapping)
         problems += faults
         if recording is not None:
             recordings.setdefault((of.specimen, of.test), []).append(recording)
@@ -85,96 +89,77 @@ def read(path: Path) -> ImportedCohort:
     if problems:
         raise InputError(problems)
     sures = [reading_precision(tests, unit, mapping.zeroed) for unit in ("_deg", "_mm")]
-    return ImportedCohort(mapping, tuple(tests), *sures)
+    return ImportedTests(mapping, tuple(tests), *sures)
 
 
-def _mapping(path: Path) -> MachineMapping:
-    if not path.is_file():
-        allowed = "the YAML that says what the columns are"
-        raise InputError(
-            [InputProblem(str(path), None, None, "no such file", allowed, "check the name")]
+def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
+    """As `read`, with the tables of the cohort folder."""
+    tests = read(folder, document)
+    mapping = tests.mapping
+    return ImportedCohort(
+        name=mapping.cohort,
+        title=mapping.title,
+        files={
+            COHORT_YAML: _header(tests),
+            "specimens.csv": csv_text([("specimen",), *((name,) for name in _specimens(tests))]),
+            "joints.csv": csv_text(_joints(tests)),
+            "loads.csv": csv_text(_loads(tests)),
+            "motion.csv": csv_text(_motion(tests)),
+        },
+        by_hand=BY_HAND,
+        sentences=tuple(_sentences(tests)),
+    )
+
+
+def _sentences(tests: ImportedTests) -> Iterator[str]:
+    """What was done with each file, and what the readings are worth."""
+    for test in tests.tests:
+        yield from _of_test(test)
+    yield f"SD of a reading: {sd_sentence(tests)}"
+    if tests.mapping.zeroed:
+        yield "Readings count from those of step 0 of their cycle (zeroed_at_step_0: true)."
+    else:
+        yield "Readings stay as they are: their zero must be the neutral pose."
+    steps = sum(len(cycle.motion) for test in tests.tests for cycle in test.cycles)
+    yield f"{count(steps, 'load step')} in all."
+
+
+def _of_test(test: ResampledTest) -> list[str]:
+    lines = []
+    for one, found in zip(test.recordings, test.cuts, strict=True):
+        kept = len(found.kept)
+        rows = count(len(one.lines), "row")
+        if one.spikes:
+            rows += f" without {count(one.spikes, 'row')} in which a reading jumps"
+        lines.append(
+            f"{one.file}: {rows}; the load "
+            f"runs from {found.low:.3g} to {found.high:.3g} {_unit(one)} and turns back "
+            f"{count(found.reversals, 'time')}: {count(len(found.cycles), 'cycle')}, {kept} kept."
         )
-    document, problems = read_yaml(path, path.name)
-    if document is None:
-        raise InputError(problems)
-    mapping, faults = validate(MachineMapping, document)
-    problems += faults
-    if mapping is not None:
-        problems += check_mapping(document, mapping)
-    if problems or mapping is None:
-        raise InputError(problems)
-    return mapping
+        lines += [f"  Cycle {number} is left out: {why}." for number, why in found.left_out]
+    unit = _unit(test.recordings[0])
+    lines.append(
+        f"  {test.specimen}, {test.test}: {count(len(test.cycles), 'cycle')} of "
+        f"{count(len(test.levels), 'load step')} each, from {min(test.levels):.3g} to "
+        f"{max(test.levels):.3g} {unit}, there and back."
+    )
+    return lines
 
 
-def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
-    """Write the cohort folder, and return the names of files that were there and stayed.
-
-    Parameters
-    ----------
-    replace : whether a folder that is there may be written again; what is edited by hand stays.
-
-    Raises
-    ------
-    InputError
-        When the folder is there and must not be touched.
-    """
-    if folder.exists() and not replace:
-        remedy = "choose another `cohort:` in the YAML, or add --replace"
-        found = "a folder of this name"
-        raise InputError([InputProblem(str(folder), None, None, found, "a new folder", remedy)])
-    texts = {
-        COHORT_YAML: _header(imported),
-        "specimens.csv": _table([("specimen",), *((name,) for name in _specimens(imported))]),
-        "joints.csv": _table(_joints(imported)),
-        "loads.csv": _table(_loads(imported)),
-        "motion.csv": _table(_motion(imported)),
-    }
-    stay = [name for name in BY_HAND if (folder / name).exists()]
-    here = texts | {name: (folder / name).read_text("utf-8", "replace") for name in stay}
-    forms = [form for form in TABLES.values() if form.file in here]
-    tables = [(_shape(form, here[form.file]), form.file) for form in forms]
-    texts[FILE] = descriptor(imported.mapping.cohort, imported.mapping.title, tables)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}")
-    shutil.rmtree(temporary, ignore_errors=True)
-    temporary.mkdir()
-    try:
-        for name, text in texts.items():
-            if name not in stay:
-                (temporary / name).write_text(text, encoding="utf-8")
-        if folder.exists():
-            for path in temporary.iterdir():
-                os.replace(path, folder / path.name)
-        else:
-            temporary.rename(folder)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-    return stay
+def _unit(one: Recording) -> str:
+    return "N" if one.driving.endswith("_n") else "N m"
 
 
-def _shape(form: TableForm, text: str) -> Table:
-    """What the columns of a file of a cohort are, in its own order; somebody's own are text."""
-    declared: dict[str, Column] = {
-        one.name: with_values(one, unit=_UNITS.get(one.name.rpartition("_")[2], ""))
-        for one in form.columns
-    }
-    header = next(csv.reader(StringIO(text)), [])
-    own = {name: Column(name, "text", "carried through", nullable=True) for name in header}
-    columns = tuple((own | declared)[name] for name in header)
-    keys = tuple(key for key in form.keys if key in header)
-    return Table(form.stem, f"One row per {form.row}", keys, columns)
-
-
-def _header(imported: ImportedCohort) -> str:
-    mapping = imported.mapping
+def _header(tests: ImportedTests) -> str:
+    mapping = tests.mapping
     files = ", ".join(dict.fromkeys(of.file for of in mapping.files))
-    rows = np.concatenate([cycle.rows for test in imported.tests for cycle in test.cycles])
+    rows = np.concatenate([cycle.rows for test in tests.tests for cycle in test.cycles])
     end = "" if mapping.source.rstrip().endswith(".") else "."
     source = (
         f"{mapping.source.rstrip()}{end} Made by `spinepipe import` of {files}: cycles cut at "
         "reversals of the load, each reading by local regression on the load over "
         f"{int(np.median(rows))} rows (median), loading and unloading apart. "
-        f"measurement_sd: {sd_sentence(imported)}"
+        f"measurement_sd: {sd_sentence(tests)}"
     )
     document = {
         "cohort": mapping.cohort,
@@ -184,8 +169,8 @@ def _header(imported: ImportedCohort) -> str:
         "gravity": False,
         "zeroed_at_step_0": mapping.zeroed,
         "measurement_sd": {
-            "rotation_deg": _declared(imported.rotation, "deg"),
-            "translation_mm": _declared(imported.translation, "mm"),
+            "rotation_deg": _declared(tests.rotation, "deg"),
+            "translation_mm": _declared(tests.translation, "mm"),
         },
     }
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)
@@ -199,10 +184,10 @@ def _declared(sure: ReadingPrecision | None, unit: str) -> float:
     return float(f"{np.ceil(sure.sd * scale - 1e-9) / scale:.10g}")
 
 
-def sd_sentence(imported: ImportedCohort) -> str:
+def sd_sentence(tests: ImportedTests) -> str:
     """Where the declared SDs come from."""
     words = []
-    for sure, unit in ((imported.rotation, "deg"), (imported.translation, "mm")):
+    for sure, unit in ((tests.rotation, "deg"), (tests.translation, "mm")):
         if sure is None:
             words.append(f"No motion in {unit} was read, {NOT_READ[unit]} stands for its SD.")
         elif sure.sd == 0.0:
@@ -221,58 +206,47 @@ def sd_sentence(imported: ImportedCohort) -> str:
     return " ".join(words)
 
 
-def _specimens(imported: ImportedCohort) -> list[str]:
-    return list(dict.fromkeys(test.specimen for test in imported.tests))
+def _specimens(tests: ImportedTests) -> list[str]:
+    return list(dict.fromkeys(test.specimen for test in tests.tests))
 
 
-def _joints(imported: ImportedCohort) -> Rows:
+def _joints(tests: ImportedTests) -> Rows:
     """A template: joints above each other, axes of ground."""
-    joints = joint_names(imported.mapping.vertebrae)
+    joints = joint_names(tests.mapping.vertebrae)
     rows: Rows = [("specimen", "joint", *_FRAME)]
-    for specimen in _specimens(imported):
+    for specimen in _specimens(tests):
         for number, joint in enumerate(joints):
             rows.append((specimen, joint, 0, f"{number * LEVEL_APART_MM:g}", 0, 0, 0, 0))
     return rows
 
 
-def _loads(imported: ImportedCohort) -> Rows:
-    point = imported.mapping.load_point_mm or ("", "", "")
-    vertebra = imported.mapping.loaded_vertebra
+def _loads(tests: ImportedTests) -> Rows:
+    point = tests.mapping.load_point_mm or ("", "", "")
+    vertebra = tests.mapping.loaded_vertebra
     rows: Rows = [
         ("specimen", "test", "cycle", "step", "vertebra", *LOAD_COLUMNS, *_POINT, "time_s")
     ]
-    for test in imported.tests:
+    for test in tests.tests:
         for number, cycle in enumerate(test.cycles, start=1):
             for step, loads in enumerate(cycle.loads):
-                time = "" if cycle.time is None else _number(cycle.time[step])
-                values = [_number(value) for value in loads]
+                time = "" if cycle.time is None else rounded(cycle.time[step])
+                values = [rounded(value) for value in loads]
                 key = (test.specimen, test.test, number, step, vertebra)
                 rows.append((*key, *values, *point, time))
     return rows
 
 
-def _motion(imported: ImportedCohort) -> Rows:
-    joints = joint_names(imported.mapping.vertebrae)
+def _motion(tests: ImportedTests) -> Rows:
+    joints = joint_names(tests.mapping.vertebrae)
     rows: Rows = [("specimen", "test", "cycle", "step", "joint", *COORDINATE_COLUMNS)]
-    for test in imported.tests:
+    for test in tests.tests:
         at = {place: number for number, place in enumerate(test.places)}
         for number, cycle in enumerate(test.cycles, start=1):
             for step, values in enumerate(cycle.motion):
                 for joint in joints:
                     cells = [
-                        _number(values[at[joint, name]]) if (joint, name) in at else ""
+                        rounded(values[at[joint, name]]) if (joint, name) in at else ""
                         for name in COORDINATE_COLUMNS
                     ]
                     rows.append((test.specimen, test.test, number, step, joint, *cells))
     return rows
-
-
-def _number(value: float) -> str:
-    """Six decimals at most, no minus before zero."""
-    return f"{round(float(value), 6) + 0.0:.10g}"
-
-
-def _table(rows: Iterable[Sequence[object]]) -> str:
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()

@@ -146,6 +146,9 @@ class MachineMapping(BaseModel):
 
     model_config = FORM
 
+    kind: Literal["testing_machine"] = Field(
+        default="testing_machine", description="what the files are"
+    )
     cohort: str = Field(
         pattern=r"^[a-z0-9_]+$", description="name of the cohort folder that is made"
     )

@@ -45,12 +45,21 @@ ROOMS = (
         "statistics",
         "sensitivity_analysis",
         "cohort",
-        "testing_machine",
         "plausibility",
         "tables",
         "comparison",
     ),
-    *("studies", "report", "jobs", "kinds", "api", "reference", "cli"),
+    *(
+        "studies",
+        "report",
+        "jobs",
+        "imports",
+        "testing_machine",
+        "kinds",
+        "api",
+        "reference",
+        "cli",
+    ),
 )
 """Ground floor first; a room imports only itself and rooms before it.
 

@@ -22,6 +22,9 @@ from spinepipe.calibration import Problem, fit
 from spinepipe.cli import main
 from spinepipe.cohort.measured import measured_specimen
 from spinepipe.cohort.specimen import joint_frames, on_bushings
+from spinepipe.imports.imported import write
+from spinepipe.imports.registry import read as imported
+from spinepipe.imports.registry import read_settings
 from spinepipe.problems import InputError
 from spinepipe.statics import free_parameters
 from spinepipe.testing_machine import folder as folders
@@ -62,7 +65,11 @@ def written(folder: Path, text: str | None = None, **changes: object) -> Path:
     return path
 
 
-def motion_and_loads(imported: folders.ImportedCohort) -> tuple[np.ndarray, np.ndarray]:
+def read(path: Path) -> folders.ImportedTests:
+    return folders.read(path.parent, read_settings(path))
+
+
+def motion_and_loads(imported: folders.ImportedTests) -> tuple[np.ndarray, np.ndarray]:
     """(C, T) extension, deg, and moment about z, N m."""
     (test,) = imported.tests
     return (
@@ -97,7 +104,7 @@ def test_the_whole_way_from_a_file_to_a_stiffness(
 
 def test_signs_units_and_steps(tmp_path: Path) -> None:
     """Positive numbers of the machine are flexion, which is negative extension here."""
-    imported = folders.read(written(tmp_path, zeroed=False))
+    imported = read(written(tmp_path, zeroed=False))
     motion, loads = motion_and_loads(imported)
     assert loads.shape == (3, 21)
     sizes = [0, 1.5, 3, 4.5, 6, 7.5]
@@ -111,13 +118,13 @@ def test_signs_units_and_steps(tmp_path: Path) -> None:
 
 def test_a_loop_stays_a_loop(tmp_path: Path) -> None:
     """Loading and unloading differ by what friction holds: 0.4 N m on either side."""
-    motion, _ = motion_and_loads(folders.read(written(tmp_path)))
+    motion, _ = motion_and_loads(read(written(tmp_path)))
     width = (motion[1:, 3] - motion[1:, 7]).mean()  # at -4.5 N m, there and back
     assert width == pytest.approx(2 * 0.4 / STIFFNESS, rel=0.1)
 
 
 def test_time_is_that_of_the_steps(tmp_path: Path) -> None:
-    (test,) = folders.read(written(tmp_path)).tests
+    (test,) = read(written(tmp_path)).tests
     for cycle in test.cycles:
         assert cycle.time is not None
         # straight lines of 40 s a cycle; a row is 0.1 s, noise of the load some rows
@@ -132,7 +139,7 @@ def test_the_declared_sd_is_that_of_the_readings(tmp_path: Path, noise: float) -
     found, declared = [], []
     for seed in range(30):
         text = german(*record(linear, rig, seed), offset=0.0)
-        imported = folders.read(written(tmp_path, text, zeroed=False))
+        imported = read(written(tmp_path, text, zeroed=False))
         found.append(motion_and_loads(imported)[0][0])
         assert imported.rotation is not None
         assert math.isnan(imported.rotation.cycles)
@@ -147,7 +154,7 @@ def test_repeats_that_differ_more_than_noise_count(tmp_path: Path) -> None:
     time, moment, turned = record(linear, replace(NOISY, noise_deg=0.01), seed=2)
     drifting = turned * (1 + 0.05 * (time // 40.0))
     text = german(time, moment, drifting, 0.0)
-    rotation = folders.read(written(tmp_path, text)).rotation
+    rotation = read(written(tmp_path, text)).rotation
     assert rotation is not None
     assert rotation.sd == rotation.cycles > 3 * rotation.regression
 
@@ -156,7 +163,7 @@ def test_noise_makes_no_reversal_and_spikes_are_told(tmp_path: Path) -> None:
     time, moment, turned = record(linear, replace(NOISY, noise_nm=0.4), seed=3)
     moment[[100, 700]] += 30.0
     turned[[300, 301]] = 60.0
-    imported = folders.read(written(tmp_path, german(time, moment, turned, 0.0)))
+    imported = read(written(tmp_path, german(time, moment, turned, 0.0)))
     (test,) = imported.tests
     assert test.recordings[0].spikes == 4
     assert test.cuts[0].reversals == 6
@@ -166,7 +173,7 @@ def test_noise_makes_no_reversal_and_spikes_are_told(tmp_path: Path) -> None:
 @sweep("way", [1.0, -1.0])
 def test_loads_to_one_side(tmp_path: Path, way: float) -> None:
     rig = replace(NOISY, both_sides=False, peak_nm=way * 5.0)
-    imported = folders.read(written(tmp_path, german(*record(linear, rig, 4), offset=1.0)))
+    imported = read(written(tmp_path, german(*record(linear, rig, 4), offset=1.0)))
     _, loads = motion_and_loads(imported)
     there = [0, 1, 2, 3, 4, 5]
     np.testing.assert_allclose(loads[2], [-way * x for x in [*there, *there[-2::-1]]], atol=1e-9)
@@ -184,7 +191,7 @@ def test_cycles_on_a_preload(tmp_path: Path, asked: float | None, sizes: list[fl
         "load_point_mm": [0, 20, 0],
         "steps": {"per_side": 2, "reference": asked},
     }
-    (test,) = folders.read(written(tmp_path, text, **changes)).tests
+    (test,) = read(written(tmp_path, text, **changes)).tests
     assert len(test.cycles) == 3
     expected = [-size for size in [*sizes, sizes[1], sizes[0]]]
     np.testing.assert_allclose(test.cycles[1].loads[:, 1], expected, atol=3.0)
@@ -200,14 +207,14 @@ def test_a_load_held_at_each_level(tmp_path: Path) -> None:
     time = np.arange(len(moment)) / 5.0
     text = german(time, moment, linear(moment), 0.0)
     changes = {"steps": {"levels": [2.5, 5, 7.5]}}
-    motion, loads = motion_and_loads(folders.read(written(tmp_path, text, **changes)))
+    motion, loads = motion_and_loads(read(written(tmp_path, text, **changes)))
     np.testing.assert_allclose(loads, [[-size for size in sizes]] * 3, atol=1e-9)
     np.testing.assert_allclose(motion, loads / STIFFNESS, atol=0.03)
 
 
 def test_a_load_that_only_rises_is_half_a_cycle(tmp_path: Path) -> None:
     time, moment, turned = (part[:101] for part in record(linear, NOISY, seed=6))
-    imported = folders.read(written(tmp_path, german(time, moment, turned, 0.0)))
+    imported = read(written(tmp_path, german(time, moment, turned, 0.0)))
     _, loads = motion_and_loads(imported)
     assert loads.shape == (1, 6)
 
@@ -225,7 +232,7 @@ def test_what_is_cut_off_or_falls_short_is_left_out_and_told() -> None:
 
 def test_cycles_of_several_files_of_a_test_are_repeats(tmp_path: Path) -> None:
     path = written(tmp_path, files=DOCUMENT["files"] * 2)
-    (test,) = folders.read(path).tests
+    (test,) = read(path).tests
     assert len(test.cycles) == 6
 
 
@@ -246,8 +253,7 @@ def test_asked_levels_and_a_force_on_the_side(tmp_path: Path) -> None:
         "steps": {"levels": [2, 5]},
         "files": [{"file": "raw.csv", "specimen": "s01", "test": "bending", "driving": 2}],
     }
-    imported = folders.read(written(tmp_path, text, **changes))
-    folders.write(imported, tmp_path / "rig", replace=False)
+    write(imported(written(tmp_path, text, **changes)), tmp_path / "rig", replace=False)
     cohort = cohorts.read(tmp_path / "rig")
     assert cohort.loads is not None
     first = cohort.loads[cohort.loads["cycle"] == 1]
@@ -337,7 +343,7 @@ def test_every_fault_has_a_place_and_a_remedy(
     tmp_path: Path, changes: dict[str, object], says: str
 ) -> None:
     with pytest.raises(InputError) as caught:
-        folders.read(written(tmp_path, **changes))
+        read(written(tmp_path, **changes))
     assert says in str(caught.value)
 
 
@@ -348,7 +354,7 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path: Path) -> None:
     lines[21] = lines[21].rpartition(";")[0] + ";nan"
     lines[30] = "0,00;" + lines[30].partition(";")[2]
     with pytest.raises(InputError) as caught:
-        folders.read(written(tmp_path, "\n".join(lines)))
+        read(written(tmp_path, "\n".join(lines)))
     told = [(p.row, p.column) for p in caught.value.problems]
     assert told == [(31, "Zeit"), (11, "Moment"), (21, "Winkel")]
     assert "an empty cell and 1 more such lines" in str(caught.value)

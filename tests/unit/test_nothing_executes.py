@@ -17,12 +17,12 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import read_yaml
+from spinepipe.imports.registry import read as read_mapping
 from spinepipe.marks import DamagedFile, read_json
 from spinepipe.model.file import read_model
 from spinepipe.problems import InputError
 from spinepipe.studies.read import names_by_kind, read, read_selection
 from spinepipe.tables import read_frame
-from spinepipe.testing_machine.folder import read as read_mapping
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = sorted((ROOT / "spinepipe").rglob("*.py"))
@@ -68,6 +68,7 @@ BY_NAME = {
     "cli/check.py": "what a kind says of a sound study besides",
     "cli/export.py": "what a kind declares",
     "cli/program.py": "commands, each a file of its folder",
+    "imports/registry.py": "what reads a settings file, by its kind, which is one written there",
     "studies/discrepancy/codec.py": "classes of data of spinepipe, see its tests",
 }
 """Files that import modules by a name, and whose names these are."""

@@ -1,0 +1,129 @@
+"""A cohort that is read and not yet written, and how it is written: as a whole or not at all."""
+
+import csv
+import os
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from dataclasses import replace as with_values
+from io import StringIO
+from pathlib import Path
+
+from spinepipe.cohort.columns import TABLES
+from spinepipe.documents.form import TableForm
+from spinepipe.problems import InputError, InputProblem
+from spinepipe.schema import Column, Table
+from spinepipe.schema.datapackage import FILE, descriptor
+
+_UNITS = {
+    **{"mm": "mm", "deg": "deg", "n": "N", "nm": "N m", "s": "s"},
+    **{"kg": "kg", "m": "m", "m2": "kg m2", "years": "years"},
+}
+"""Units as names of columns end with them."""
+
+
+@dataclass(frozen=True)
+class ImportedCohort:
+    """What an import makes of the files of a laboratory.
+
+    Attributes
+    ----------
+    name : of the cohort and its folder. title : one line.
+    files : of the folder, by name: a text, or a file that is copied as it is.
+    by_hand : those that are made to be edited: they stay when a folder is made again; with what
+        is to be said of each where it is new.
+    sentences : what was done, for people.
+    forms : of tables that are no cohort's own, as kinds of study read them; told in
+        ``datapackage.json``.
+    """
+
+    name: str
+    title: str
+    files: Mapping[str, str | Path]
+    by_hand: Mapping[str, str]
+    sentences: tuple[str, ...]
+    forms: tuple[TableForm, ...] = field(default=())
+
+
+def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
+    """Write the cohort folder, and return the names of files that were there and stayed.
+
+    Parameters
+    ----------
+    replace : whether a folder that is there may be written again; what is edited by hand stays,
+        and so does what the import does not write.
+
+    Raises
+    ------
+    InputError
+        When the folder is there and must not be touched.
+    """
+    if folder.exists() and not replace:
+        remedy = "choose another `cohort:` in the YAML, or add --replace"
+        found = "a folder of this name"
+        raise InputError([InputProblem(str(folder), None, None, found, "a new folder", remedy)])
+    stay = [name for name in imported.by_hand if (folder / name).exists()]
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    new = folder.with_name(f".{folder.name}.{os.getpid()}")
+    old = folder.with_name(f".{folder.name}.before.{os.getpid()}")
+    shutil.rmtree(new, ignore_errors=True)
+    try:
+        if folder.exists():
+            shutil.copytree(folder, new)
+        else:
+            new.mkdir()
+        for name, content in imported.files.items():
+            if isinstance(content, Path):
+                shutil.copyfile(content, new / name)
+            elif name not in stay:
+                (new / name).write_text(content, encoding="utf-8")
+        (new / FILE).write_text(_descriptor(imported, new), encoding="utf-8")
+        # the new folder is whole before the old one goes, and the old one is kept until it is there
+        if folder.exists():
+            folder.rename(old)
+        try:
+            new.rename(folder)
+        except OSError:
+            if old.exists():
+                old.rename(folder)
+            raise
+        shutil.rmtree(old, ignore_errors=True)
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+    return stay
+
+
+def csv_text(rows: Iterable[Sequence[object]]) -> str:
+    """Rows as the text of a table, the header first."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def rounded(value: float) -> str:
+    """A number of a table: six decimals at most, no minus before zero."""
+    return f"{round(float(value), 6) + 0.0:.10g}"
+
+
+def _descriptor(imported: ImportedCohort, folder: Path) -> str:
+    """What the columns of the tables are, for other programs; nothing here reads it."""
+    forms = [*TABLES.values(), *imported.forms]
+    tables = [
+        (_shape(form, (folder / form.file).read_text("utf-8", "replace")), form.file)
+        for form in forms
+        if (folder / form.file).is_file()
+    ]
+    return descriptor(imported.name, imported.title, tables)
+
+
+def _shape(form: TableForm, text: str) -> Table:
+    """What the columns of a file of a cohort are, in its own order; somebody's own are text."""
+    declared: dict[str, Column] = {
+        one.name: with_values(one, unit=_UNITS.get(one.name.rpartition("_")[2], ""))
+        for one in form.columns
+    }
+    header = next(csv.reader(StringIO(text)), [])
+    own = {name: Column(name, "text", "carried through", nullable=True) for name in header}
+    columns = tuple((own | declared)[name] for name in header)
+    keys = tuple(key for key in form.keys if key in header)
+    return Table(form.stem, f"One row per {form.row}", keys, columns)
