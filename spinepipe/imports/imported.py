@@ -8,12 +8,42 @@ from dataclasses import dataclass, field
 from dataclasses import replace as with_values
 from io import StringIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
 
-from spinepipe.cohort.columns import TABLES
-from spinepipe.documents.form import TableForm
+import yaml
+from pydantic import BaseModel, Field, StringConstraints
+
+from spinepipe.cohort import Reader
+from spinepipe.cohort.cohort import FORM, VertebraName
+from spinepipe.cohort.columns import COHORT_YAML, TABLES
+from spinepipe.documents.form import TableForm, read_forms
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
+from spinepipe.studies.plausibility import refusals
+from spinepipe.studies.registry import every_form
+
+CARRIED = read_forms(Path(__file__).with_name("forms.yaml"))
+"""Tables that an import writes and that no study reads yet, by stem."""
+
+LineText = Annotated[str, StringConstraints(min_length=1)]
+
+
+class ImportSettings(BaseModel):
+    """What every settings file of an import says of the cohort that is made."""
+
+    model_config = FORM
+
+    cohort: str = Field(pattern=r"^[a-z0-9_]+$", description="name of the folder that is made")
+    title: LineText = Field(description="one line that says what the cohort is")
+    source: LineText = Field(description="who measured what, when, how; licence")
+    vertebrae: tuple[VertebraName, ...] = Field(
+        strict=False,
+        min_length=2,
+        description="names from caudal to cranial, the first is fixed to ground",
+    )
+
 
 _UNITS = {
     **{"mm": "mm", "deg": "deg", "n": "N", "nm": "N m", "s": "s"},
@@ -91,6 +121,61 @@ def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
     finally:
         shutil.rmtree(new, ignore_errors=True)
     return stay
+
+
+def checked(
+    settings: ImportSettings,
+    made_of: str,
+    tables: Mapping[str, Sequence[Sequence[object]]],
+    sentences: Sequence[str],
+    origins: Mapping[str, Sequence[tuple[str, int | None]]],
+    copied: Sequence[Path] = (),
+) -> ImportedCohort:
+    """A cohort that was read as `spinepipe check` reads it, before anything is written.
+
+    Parameters
+    ----------
+    made_of : end of the sentence that says what the cohort was made of.
+    tables : rows by stem, cells in the order of the form; tables without rows are left out.
+    origins : of each row of a table, by stem: the file and line that it came from.
+    copied : files that become part of the folder as they are.
+
+    Raises
+    ------
+    InputError
+        With every fault of the cohort, at the place that it came from.
+    """
+    forms = TABLES | {form.stem: form for form in every_form()} | CARRIED
+    header = settings.model_dump(include=set(ImportSettings.model_fields), mode="json")
+    header["source"] += f" Made by `spinepipe import` of {made_of}"
+    header["gravity"] = any(path.name == "bodies.csv" for path in copied)
+    texts = {
+        forms[stem].file: csv_text([forms[stem].names[: len(rows[0])], *rows])
+        for stem, rows in tables.items()
+        if rows
+    }
+    text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=110)
+    files = {COHORT_YAML: text, **texts, **{path.name: path for path in copied}}
+    further = tuple(form for stem, form in forms.items() if stem not in TABLES)
+    by_hand = {"specimens.csv": ""}
+    cohort = ImportedCohort(
+        settings.cohort, settings.title, files, by_hand, tuple(sentences), further
+    )
+    with TemporaryDirectory() as parent:
+        write(cohort, folder := Path(parent) / cohort.name, replace=False)
+        try:
+            found = refusals(Reader().read(folder, every_form()))
+        except InputError as error:
+            found = error.problems
+    if not found:
+        return cohort
+    told = []
+    for one in found:
+        rows_of = origins.get(one.file.rpartition("/")[2].removesuffix(".csv"), ())
+        at = (one.row or 0) - 2  # the header of a table is line 1
+        place = rows_of[at] if 0 <= at < len(rows_of) else (one.file, one.row)
+        told.append(with_values(one, file=place[0], row=place[1], rows=()))
+    raise InputError(told)
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:

@@ -12,6 +12,8 @@ TESTING_MACHINE = "testing_machine"
 
 KINDS: Mapping[str, str] = {
     TESTING_MACHINE: "spinepipe.testing_machine.folder",
+    "landmarks": "spinepipe.imports.landmarks",
+    "motion_capture": "spinepipe.imports.motion_capture",
 }
 """Module by kind. Its `imported(folder, document)` returns an `ImportedCohort`, or raises
 `InputError` with every problem; `folder` is where the settings file is."""

@@ -1,0 +1,305 @@
+"""Points picked in 3D Slicer (`.mrk.json`, `.fcsv`) as the landmarks of a cohort.
+
+Formats by Slicer's developer guide, "Markups": a `.mrk.json` that does not tell them has axes LPS
+and mm; older `.fcsv` tell their axes by a number.
+"""
+
+import csv
+import glob
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from spinepipe.cohort.cohort import FORM
+from spinepipe.documents.settings import validate
+from spinepipe.documents.text import MOST_CSV_BYTES, read_bytes, read_text
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.effects.contract import Array
+from spinepipe.imports.imported import ImportedCohort, ImportSettings, checked, rounded
+from spinepipe.problems import InputError, InputProblem, did_you_mean
+from spinepipe.report.words import count
+
+LOWER_FACE, UPPER_FACE = "superior_endplate_centre", "inferior_endplate_centre"
+"""That of the lower and of the upper vertebra of a joint."""
+ALL_FOUR = (LOWER_FACE, UPPER_FACE, "left_pedicle_base", "right_pedicle_base")
+
+LPS = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+"""Anterior, superior and right (rows) in axes of a scanner to the left, posterior and superior."""
+RAS = LPS @ np.diag([-1.0, -1.0, 1.0])
+AXES = {"LPS": LPS, "RAS": RAS, "1": LPS, "0": RAS}
+MM_PER = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3}
+
+NEAR_MM = 10.0
+"""Landmarks lie on bone; the nearest corner of a coarse surface is some mm away."""
+
+POSTURE = (
+    "The neutral pose is that of the scan (lying, as a rule), on the axes of the scanner: how the "
+    "specimen lay in it is not corrected."
+)
+
+
+class LandmarkFiles(BaseModel):
+    """One file, or all whose names follow a pattern."""
+
+    model_config = FORM
+
+    file: str = Field(
+        description="path, relative to this YAML; `{specimen}`, `{vertebra}` and `*` stand for "
+        "parts of names, and every file that fits is read"
+    )
+    specimen: str = Field(default="", description="whose it is; empty: `{specimen}` of the path")
+
+
+class Surfaces(BaseModel):
+    """Surfaces of vertebrae, which stay where they are."""
+
+    model_config = FORM
+
+    file: str = Field(description="path of an STL file, with `{specimen}` and `{vertebra}`")
+    unit: Literal["mm", "cm", "m"] = Field(default="mm", description="unit of its numbers")
+    axes: Literal["LPS", "RAS"] = Field(default="LPS", description="its axes, as they were chosen")
+
+
+class LandmarkSettings(ImportSettings):
+    """The keys of a YAML of kind `landmarks`."""
+
+    kind: Literal["landmarks"] = Field(description="what the files are")
+    files: tuple[LandmarkFiles, ...] = Field(strict=False, description="the files")
+    labels: dict[str, str] = Field(
+        default_factory=dict,
+        description="your label: vertebra and landmark, as `L4_superior_endplate_centre`; "
+        "`{vertebra}` on both sides stands for each vertebra",
+    )
+    sd_mm: float | None = Field(
+        default=None, ge=0, le=50, description="SD of a picked point along each axis"
+    )
+    surfaces: Surfaces | None = Field(default=None, description="surfaces of the vertebrae")
+
+
+@dataclass(frozen=True)
+class PickedPoint:
+    """A point of a file; ``place`` (3,) mm on ground axes, None where it was never placed."""
+
+    file: str
+    line: int | None
+    label: str
+    axes: str
+    place: Array | None
+
+
+Landmarks = dict[tuple[str, str], PickedPoint]
+"""Points of a specimen by vertebra and landmark."""
+
+
+def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
+    """Read all files that the settings name.
+
+    Raises
+    ------
+    InputError
+        With every problem of the settings, else of all files, else of the cohort they make.
+    """
+    settings, problems = validate(LandmarkSettings, document)
+    if settings is None:
+        raise InputError(problems)
+    found, unread = dict[str, Landmarks](), dict[str, list[str]]()
+    for number, of in enumerate(settings.files):
+        matched = list(_matched(folder, of))
+        if not matched:
+            place = (document.file, document.line_of(f"files.{number}"), f"files.{number}.file")
+            remedy = "correct the path; without `specimen:` it needs `{specimen}`"
+            problems.append(InputProblem(*place, f"no file '{of.file}'", "files", remedy))
+        for specimen, vertebra, file in matched:
+            points, faults = read_points(folder / file, file)
+            problems += faults
+            landmarks = found.setdefault(specimen, {})
+            for point in points:
+                key = _meant(point.label, vertebra, settings)
+                if key is None or point.place is None:
+                    why = "" if point.place is not None else " (not placed)"
+                    unread.setdefault(specimen, []).append(point.label + why)
+                elif key in landmarks:
+                    told = f"'{point.label}' a second time, after {landmarks[key].file}"
+                    where, remedy = (point.file, point.line, None), "delete or rename one of them"
+                    problems.append(InputProblem(*where, told, "each point once", remedy))
+                else:
+                    landmarks[key] = point
+    place = (document.file, document.line_of("files"), "files")
+    for specimen, landmarks in found.items():
+        problems += _lacking(place, settings, specimen, landmarks, unread.get(specimen, []))
+    surfaces, told_of_surfaces = _surfaces(folder, document, settings, found, problems)
+    if problems:
+        raise InputError(problems)
+    picked = [(who, *key, point) for who, points in found.items() for key, point in points.items()]
+    sd = "" if settings.sd_mm is None else f"{settings.sd_mm:g}"
+    rows = [(*key, *map(rounded, one.place), sd) for *key, one in picked if one.place is not None]
+    tables = {"specimens": [(who,) for who in found], "landmarks": rows, "surfaces": surfaces}
+    sentences = (*_sentences(found, unread), *told_of_surfaces, POSTURE)
+    files = ", ".join(dict.fromkeys(point.file for *_, point in picked))
+    origins = {"landmarks": [(point.file, point.line) for *_, point in picked]}
+    return checked(settings, f"{files}. {POSTURE}", tables, sentences, origins)
+
+
+def _matched(folder: Path, of: LandmarkFiles) -> Iterator[tuple[str, str, str]]:
+    """Specimen, vertebra (empty: not told) and path of every file that fits a pattern."""
+    pattern, stars = re.escape(of.file).replace(r"\*", "[^/]*"), of.file
+    for name in ("specimen", "vertebra"):
+        pattern = pattern.replace(rf"\{{{name}\}}", f"(?P<{name}>[^/]+?)", 1)
+        pattern = pattern.replace(rf"\{{{name}\}}", f"(?P={name})")
+        stars = stars.replace(f"{{{name}}}", "*")
+    for file in sorted(glob.glob(stars, root_dir=folder)):
+        match = re.fullmatch(pattern, file)
+        names = match.groupdict() if match else {}
+        if specimen := of.specimen or names.get("specimen", ""):
+            yield specimen, names.get("vertebra", ""), file
+
+
+def read_points(path: Path, file: str) -> tuple[list[PickedPoint], list[InputProblem]]:
+    """Points of a file, and what is wrong with it.
+
+    Parameters
+    ----------
+    file : its name in messages.
+    """
+    text, problems = read_text(path, file, MOST_CSV_BYTES)
+    points = list[PickedPoint]()
+    try:
+        raw = () if problems else (_of_fcsv if path.suffix == ".fcsv" else _of_json)(text)
+        for line, label, axes, unit, place, status in raw:
+            if axes not in AXES or unit not in MM_PER:
+                allowed = f"axes LPS or RAS, in {', '.join(MM_PER)}"
+                told = f"axes '{axes}', in '{unit}'"
+                problems = [InputProblem(file, None, None, told, allowed, "say which they are")]
+                continue
+            placed = status in ("defined", "2")
+            mm = MM_PER[unit] * AXES[axes] @ np.array(place, float) if placed else None
+            points.append(PickedPoint(file, line, label, axes, mm))
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        told, allowed = f"what Slicer does not write ({error})", "a .mrk.json or .fcsv"
+        problems = [InputProblem(file, None, None, told, allowed, "save the points again")]
+    return points, problems
+
+
+Raw = Iterator[tuple[int | None, str, str, str, Any, str]]
+"""Line, label, axes, unit, place and status of points."""
+
+
+def _of_json(text: str) -> Raw:
+    for markup in json.loads(text)["markups"]:
+        unit = markup.get("coordinateUnits", "mm")  # a word, or a code with its scheme and meaning
+        of_all = (markup.get("coordinateSystem", "LPS"), unit if isinstance(unit, str) else unit[0])
+        for point in markup.get("controlPoints", ()):
+            status = point.get("positionStatus", "defined")
+            yield None, point.get("label", ""), *of_all, point.get("position"), status
+
+
+def _of_fcsv(text: str) -> Raw:
+    axes = set(re.findall(r"^# *CoordinateSystem *= *(\w+)", text, re.MULTILINE))
+    for line, row in enumerate(csv.reader(text.splitlines()), start=1):
+        if row and not row[0].startswith("#"):
+            # newer versions write behind the columns that they name how a point was placed
+            status = row[14] if len(row) > 14 else "2"
+            yield line, row[11], " and ".join(sorted(axes)), "mm", row[1:4], status
+
+
+def _meant(label: str, vertebra: str, settings: LandmarkSettings) -> tuple[str, str] | None:
+    """Vertebra and landmark of a label, None where it tells none."""
+    for own, meant in settings.labels.items():
+        for one in settings.vertebrae:
+            if label == own.replace("{vertebra}", one):
+                label = meant.replace("{vertebra}", one)
+                break
+    for option in (label, f"{vertebra}_{label}"):
+        of, _, landmark = option.partition("_")
+        if of in settings.vertebrae and landmark:
+            return of, landmark
+    return None
+
+
+def _lacking(
+    place: tuple[str, int | None, str],
+    settings: LandmarkSettings,
+    specimen: str,
+    points: Landmarks,
+    unread: list[str],
+) -> Iterator[InputProblem]:
+    """All landmarks without which joints have no frame, told at once."""
+    needed = dict[tuple[str, str], None]()
+    for lower, upper in pairwise(settings.vertebrae):
+        needed |= {(upper, UPPER_FACE): None, (lower, LOWER_FACE): None}
+        four = [[(one, name) for name in ALL_FOUR] for one in (lower, upper)]
+        needed |= dict.fromkeys(min(four, key=lambda keys: sum(k not in points for k in keys)))
+    if lacking := ["_".join(key) for key in needed if key not in points]:
+        known = ["_".join(key) for key in points if key not in needed] + unread
+        found = f"'{specimen}' without {', '.join(lacking)}; further points: {', '.join(known)}"
+        allowed = "both endplate centres at each joint, and all four points of one of its vertebrae"
+        otherwise = "place them, or say in `labels` what they are called"
+        yield InputProblem(*place, found, allowed, did_you_mean(lacking[0], known, otherwise))
+
+
+def _sentences(found: Mapping[str, Landmarks], unread: Mapping[str, list[str]]) -> Iterator[str]:
+    for specimen, points in found.items():
+        axes = " and ".join(sorted({point.axes for point in points.values()}))
+        files = ", ".join(dict.fromkeys(point.file for point in points.values()))
+        yield f"{specimen}: {count(len(points), 'landmark')} from {files}, on axes {axes}."
+        if specimen in unread:
+            yield f"  Not read: {', '.join(unread[specimen])}."
+
+
+def _surfaces(
+    folder: Path,
+    document: YamlDocument,
+    settings: LandmarkSettings,
+    found: Mapping[str, Landmarks],
+    problems: list[InputProblem],
+) -> tuple[list[tuple[str, ...]], list[str]]:
+    """Rows of surfaces.csv, and sentences on surfaces that landmarks are not near.
+
+    Those that are near with another unit or other axes alone are added to the problems.
+    """
+    rows, told = list[tuple[str, ...]](), list[str]()
+    of = settings.surfaces
+    for specimen, vertebra in [(a, b) for a in found for b in settings.vertebrae if of]:
+        file = of.file.replace("{specimen}", specimen).replace("{vertebra}", vertebra)
+        rows.append((specimen, vertebra, file, of.unit, of.axes))
+        data, faults = read_bytes(folder / file, file, MOST_CSV_BYTES)
+        problems += faults
+        corners = _corners(data)
+        picked = [p.place for (one, _), p in found[specimen].items() if one == vertebra]
+        # median over the landmarks of the distance to the nearest corner, however it is read
+        far = {
+            (unit, axes): float(np.median([np.linalg.norm(at - p, axis=1).min() for p in picked]))
+            for unit in ("mm", "cm", "m")
+            for axes in ("LPS", "RAS")
+            for at in (MM_PER[unit] * corners @ AXES[axes].T,)
+            if len(corners) and picked
+        }
+        best = min(far, key=far.__getitem__, default=(of.unit, of.axes))
+        if far.get((of.unit, of.axes), -inf) > NEAR_MM:
+            away = f"landmarks {far[of.unit, of.axes]:.0f} mm from the surface {file}"
+            place = (document.file, document.line_of("surfaces"), "surfaces")
+            remedy = f"did you mean `unit: {best[0]}` and `axes: {best[1]}`?"
+            if far[best] <= NEAR_MM:
+                allowed = f"at most {NEAR_MM:g} mm"
+                problems.append(InputProblem(*place, away, allowed, remedy))
+            else:
+                told.append(f"Look at {specimen}, {vertebra}: {away}.")
+    return rows, told
+
+
+def _corners(data: bytes) -> Array:
+    """(n, 3) corners of an STL file, binary or text; none where it is neither."""
+    triangle = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    number = int.from_bytes(data[80:84], "little")
+    if len(data) == 84 + number * triangle.itemsize:
+        return np.frombuffer(data, triangle, number, 84)["corners"].reshape(-1, 3).astype(float)
+    lines = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
+    return np.array(lines, dtype=float).reshape(-1, 3)
