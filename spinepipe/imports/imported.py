@@ -6,9 +6,11 @@ import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from dataclasses import replace as with_values
+from functools import cache
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Annotated
 
 import yaml
@@ -26,6 +28,13 @@ from spinepipe.studies.registry import every_form
 
 CARRIED = read_forms(Path(__file__).with_name("forms.yaml"))
 """Tables that an import writes and that no study reads yet, by stem."""
+
+
+@cache
+def all_forms() -> Mapping[str, TableForm]:
+    """Every table that a cohort may have, by stem."""
+    return {**TABLES, **{form.stem: form for form in every_form()}, **CARRIED}
+
 
 LineText = Annotated[str, StringConstraints(min_length=1)]
 
@@ -129,7 +138,7 @@ def checked(
     tables: Mapping[str, Sequence[Sequence[object]]],
     sentences: Sequence[str],
     origins: Mapping[str, Sequence[tuple[str, int | None]]],
-    copied: Sequence[Path] = (),
+    copied: Mapping[str, Path] = MappingProxyType({}),
 ) -> ImportedCohort:
     """A cohort that was read as `spinepipe check` reads it, before anything is written.
 
@@ -138,24 +147,24 @@ def checked(
     made_of : end of the sentence that says what the cohort was made of.
     tables : rows by stem, cells in the order of the form; tables without rows are left out.
     origins : of each row of a table, by stem: the file and line that it came from.
-    copied : files that become part of the folder as they are.
+    copied : files that become part of the folder as they are, by their names there.
 
     Raises
     ------
     InputError
         With every fault of the cohort, at the place that it came from.
     """
-    forms = TABLES | {form.stem: form for form in every_form()} | CARRIED
+    forms = all_forms()
     header = settings.model_dump(include=set(ImportSettings.model_fields), mode="json")
     header["source"] += f" Made by `spinepipe import` of {made_of}"
-    header["gravity"] = any(path.name == "bodies.csv" for path in copied)
+    header["gravity"] = "bodies.csv" in copied
     texts = {
         forms[stem].file: csv_text([forms[stem].names[: len(rows[0])], *rows])
         for stem, rows in tables.items()
         if rows
     }
     text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=110)
-    files = {COHORT_YAML: text, **texts, **{path.name: path for path in copied}}
+    files = {COHORT_YAML: text, **texts, **copied}
     further = tuple(form for stem, form in forms.items() if stem not in TABLES)
     by_hand = {"specimens.csv": ""}
     cohort = ImportedCohort(

@@ -51,11 +51,14 @@ class LandmarkFiles(BaseModel):
 
     model_config = FORM
 
-    file: str = Field(
-        description="path, relative to this YAML; `{specimen}`, `{vertebra}` and `*` stand for "
-        "parts of names, and every file that fits is read"
+    file: str = Field(default="", description="its path, relative to this YAML")
+    glob: str = Field(
+        default="",
+        description="instead of `file`: a pattern of paths with *; {specimen} and {vertebra} in it "
+        "tell these",
     )
-    specimen: str = Field(default="", description="whose it is; empty: `{specimen}` of the path")
+    specimen: str = Field(default="", description="whose it is")
+    vertebra: str = Field(default="", description="of which, where labels are of landmarks alone")
 
 
 class Surfaces(BaseModel):
@@ -114,9 +117,10 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     for number, of in enumerate(settings.files):
         matched = list(_matched(folder, of))
         if not matched:
-            place = (document.file, document.line_of(f"files.{number}"), f"files.{number}.file")
-            remedy = "correct the path; without `specimen:` it needs `{specimen}`"
-            problems.append(InputProblem(*place, f"no file '{of.file}'", "files", remedy))
+            place = (document.file, document.line_of(f"files.{number}"), f"files.{number}")
+            lacking = f"no file '{of.glob}'" if of.glob else "a file of nobody"
+            remedy = "name `file` and `specimen`, or a `glob` with {specimen} that files follow"
+            problems.append(InputProblem(*place, lacking, "files and whose", remedy))
         for specimen, vertebra, file in matched:
             points, faults = read_points(folder / file, file)
             problems += faults
@@ -149,17 +153,18 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
 
 
 def _matched(folder: Path, of: LandmarkFiles) -> Iterator[tuple[str, str, str]]:
-    """Specimen, vertebra (empty: not told) and path of every file that fits a pattern."""
-    pattern, stars = re.escape(of.file).replace(r"\*", "[^/]*"), of.file
+    """Specimen, vertebra (empty: not told) and path of every file that is meant."""
+    pattern, stars = re.escape(of.glob).replace(r"\*", "[^/]*"), of.glob
     for name in ("specimen", "vertebra"):
         pattern = pattern.replace(rf"\{{{name}\}}", f"(?P<{name}>[^/]+?)", 1)
         pattern = pattern.replace(rf"\{{{name}\}}", f"(?P={name})")
         stars = stars.replace(f"{{{name}}}", "*")
-    for file in sorted(glob.glob(stars, root_dir=folder)):
+    for file in [of.file] if of.file else sorted(glob.glob(stars, root_dir=folder)):
+        told = {"specimen": of.specimen, "vertebra": of.vertebra}
         match = re.fullmatch(pattern, file)
-        names = match.groupdict() if match else {}
-        if specimen := of.specimen or names.get("specimen", ""):
-            yield specimen, names.get("vertebra", ""), file
+        told |= match.groupdict() if match else {}
+        if told["specimen"]:
+            yield told["specimen"], told["vertebra"], file
 
 
 def read_points(path: Path, file: str) -> tuple[list[PickedPoint], list[InputProblem]]:
@@ -237,12 +242,16 @@ def _lacking(
         needed |= {(upper, UPPER_FACE): None, (lower, LOWER_FACE): None}
         four = [[(one, name) for name in ALL_FOUR] for one in (lower, upper)]
         needed |= dict.fromkeys(min(four, key=lambda keys: sum(k not in points for k in keys)))
-    if lacking := ["_".join(key) for key in needed if key not in points]:
-        known = ["_".join(key) for key in points if key not in needed] + unread
-        found = f"'{specimen}' without {', '.join(lacking)}; further points: {', '.join(known)}"
-        allowed = "both endplate centres at each joint, and all four points of one of its vertebrae"
-        otherwise = "place them, or say in `labels` what they are called"
-        yield InputProblem(*place, found, allowed, did_you_mean(lacking[0], known, otherwise))
+    known = ["_".join(key) for key in points if key not in needed] + unread
+    for vertebra in settings.vertebrae:
+        lacking = [key[1] for key in needed if key[0] == vertebra and key not in points]
+        if lacking:
+            found = f"'{specimen}' without {', '.join(lacking)} of {vertebra}"
+            allowed = "both endplate centres at each joint; all four points of one of its vertebrae"
+            otherwise = "place them, or say in `labels` what they are called"
+            remedy = did_you_mean(f"{vertebra}_{lacking[0]}", known, otherwise)
+            remedy += f"; further points: {', '.join(known)}" if known else ""
+            yield InputProblem(*place, found, allowed, remedy)
 
 
 def _sentences(found: Mapping[str, Landmarks], unread: Mapping[str, list[str]]) -> Iterator[str]:

@@ -18,7 +18,14 @@ from spinepipe.documents.settings import validate
 from spinepipe.documents.text import MOST_CSV_BYTES, NUMBER, read_text
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
-from spinepipe.imports.imported import CARRIED, ImportedCohort, ImportSettings, checked, rounded
+from spinepipe.imports.imported import (
+    CARRIED,
+    ImportedCohort,
+    ImportSettings,
+    all_forms,
+    checked,
+    rounded,
+)
 from spinepipe.motion.reading import axes_of, read_motion
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
@@ -48,6 +55,8 @@ CELLS = re.compile(r"\s*[,;\t]\s*|\s+")
 NEEDED = ("joints.csv or landmarks.csv", "marker_set.csv")
 """What a study of tracked motions asks for besides what an import makes."""
 
+MADE = ("cohort.yaml", "specimens.csv", "subjects.csv", "trials.csv", "datapackage.json")
+
 Place = tuple[str, int | None, str]
 
 
@@ -75,6 +84,8 @@ class Trial(BaseModel):
     )
     file: str = Field(description="markers: .c3d, .trc or .csv, relative to this YAML")
     arms: Literal["hanging", "behind_head", "crossed"] = Field(description="where the arms were")
+    start_s: float | None = Field(default=None, description="what is before is cut off")
+    end_s: float | None = Field(default=None, description="what is after is cut off")
     shift_s: float = Field(
         default=0.0, description="what is added to times of its tables to give those of the markers"
     )
@@ -152,7 +163,9 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     sentences, without = list[str](), {of.file: list[str]() for of in settings.tables}
     for index, trial in enumerate(settings.trials):
         try:
-            markers = read_motion(folder / trial.file, settings.axes, file=trial.file)
+            markers = read_motion(
+                folder / trial.file, settings.axes, trial.start_s, trial.end_s, trial.file
+            )
         except InputError as error:
             problems += error.problems
             continue
@@ -185,9 +198,24 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
             sentences.append(f"{of.table}: no {of.file} of {lacking}.")
     if problems:
         raise InputError(problems)
-    copied = [folder / one for one in (*(of.file for of in settings.trials), *settings.copied)]
-    names = [path.name for path in copied]
-    if lacking := [one for one in NEEDED if not set(one.split(" or ")) & set(names)]:
+    # recordings keep their names where these are no table's, and each another's
+    known = [Path(of.file).name for of in settings.trials]
+    names = [
+        f"{of.specimen}_{of.trial}{Path(name).suffix}"
+        if name.removesuffix(".csv") in all_forms() or known.count(name) > 1
+        else name
+        for of, name in zip(settings.trials, known, strict=True)
+    ]
+    copied = {name: folder / of.file for of, name in zip(settings.trials, names, strict=True)}
+    for one in settings.copied:
+        if not (folder / one).is_file() or Path(one).name in (*MADE, *copied, *rows):
+            found, remedy = f"'{one}'", "correct it, or delete what the import makes itself"
+            allowed = "files that are there, and that the import does not make"
+            problems.append(InputProblem(*place("copied"), found, allowed, remedy))
+        copied[Path(one).name] = folder / one
+    if problems:
+        raise InputError(problems)
+    if lacking := [one for one in NEEDED if not set(one.split(" or ")) & set(copied)]:
         sentences.append(f"A study of tracked motions needs {listed(lacking)} besides.")
     if rows:
         sentences.append(f"No study reads {listed(list(rows))} yet: they come along.")
@@ -196,8 +224,9 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         for p in settings.persons
     ]
     trials = [
-        (t.specimen, t.trial, t.kind, Path(t.file).name, "", "", settings.axes, t.arms)
-        for t in settings.trials
+        (t.specimen, t.trial, t.kind, name, *ends, settings.axes, t.arms)
+        for t, name in zip(settings.trials, names, strict=True)
+        for ends in (["" if one is None else rounded(one) for one in (t.start_s, t.end_s)],)
     ]
     tables = {"specimens": [one[:1] for one in people], "subjects": people, "trials": trials}
     persons = [place(f"persons.{k}")[:2] for k in range(len(people))]
@@ -205,7 +234,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         **{"specimens": persons, "subjects": persons},
         "trials": [place(f"trials.{k}")[:2] for k in range(len(trials))],
     }
-    return checked(settings, f"{', '.join(names)}.", tables | rows, sentences, origins, copied)
+    return checked(settings, f"{', '.join(known)}.", tables | rows, sentences, origins, copied)
 
 
 def _misnamed_columns(place: Place, of: RecordedTable) -> Iterator[InputProblem]:
