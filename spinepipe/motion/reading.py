@@ -10,11 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from spinepipe.documents.text import MOST_CSV_BYTES
 from spinepipe.effects.contract import Array
 from spinepipe.motion.reading_c3d import read_c3d
-from spinepipe.motion.reading_text import read_csv, read_trc
-from spinepipe.motion.recording import MarkerRecording, without_subjects
+from spinepipe.motion.reading_text import read_csv
+from spinepipe.motion.reading_trc import read_trc
+from spinepipe.motion.recording import (
+    MOST_RECORDING_BYTES,
+    MarkerRecording,
+    numbered,
+    without_subjects,
+)
 from spinepipe.problems import InputError, InputProblem
 
 DEFAULT_AXES = "x y z"
@@ -95,8 +100,8 @@ def read_motion(
         found = "no such file" if reader else f"a file '{path.suffix}'"
         allowed = f"a file of motion: {', '.join(READERS)}"
         raise InputError([InputProblem(name, None, None, found, allowed, "correct the name")])
-    if (size := path.stat().st_size) > MOST_CSV_BYTES:
-        found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_CSV_BYTES / 1e6:g} MB"
+    if (size := path.stat().st_size) > MOST_RECORDING_BYTES:
+        found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_RECORDING_BYTES / 1e6:g} MB"
         raise InputError([InputProblem(name, None, None, found, allowed, "crop it")])
     raw = reader(path, name)
     # frames from start to end, of which either may be open
@@ -108,12 +113,16 @@ def read_motion(
         allowed = f"times from {raw.time_s[0]:g} to {raw.time_s[-1]:g} s"
         problem = InputProblem(name, None, None, found, allowed, "correct start_s and end_s")
         raise NoFrameError(problem, late=bool(start > raw.time_s[-1]))
-    names, renamed = without_subjects(raw.names, name)
+    names, shortened = without_subjects(raw.names)
+    unique, renamed = numbered(names)
+    # nothing is copied of a recording that is kept whole: it may be half of the memory
+    frames = slice(None) if kept.all() else kept
     return MarkerRecording(
-        names,
-        raw.time_s[kept],
-        raw.places[kept] @ turn.T,
-        raw.seen[kept],
-        (*raw.repaired, *renamed),
+        unique,
+        raw.time_s[frames],
+        raw.places[frames] @ turn.T,
+        raw.seen[frames],
+        (*raw.repaired, *shortened, *renamed),
         1 + int(np.argmax(kept)),
+        tuple(dict.fromkeys(name for name in names if names.count(name) > 1)),
     )

@@ -1,5 +1,7 @@
 """Motion as `.c3d`: unit and rate are the file's own; a negative residual says: not seen.
 
+Force plates and analog channels of the same files: `reading_plates`.
+
 Nothing that a file tells of its sizes is trusted: a parameter may claim gigabytes, a list may lead
 back to its beginning. Libraries for this form end the process then, or fill the memory.
 
@@ -17,6 +19,7 @@ By The C3D File Format, User Guide (2008). The file has blocks of 512 bytes, cou
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from math import prod
 from pathlib import Path
 
@@ -54,8 +57,11 @@ SLOWEST, FASTEST = 1.0, 100_000.0
 COUNT_ENDS = 65_535
 """Largest number of 16 bits. Longer recordings have it as number of frames, which tells nothing."""
 
-MORE_LABELS = ("LABELS", *(f"LABELS{k}" for k in range(2, 10)))
-"""A parameter holds 255 names; further ones follow in the next."""
+MOST_PARAMETERS = 10
+"""A parameter holds 255 elements; further ones follow in the next: LABELS, LABELS2, LABELS3 ..."""
+
+BELIEVED_SCALE = "header and POINT:SCALE differ in sign; the file's size fits {}"
+BELIEVED_FRAMES = "header and POINT:FRAMES differ by one frame; the file has room for {} frames"
 
 AGAIN = "export the motion again"
 
@@ -70,10 +76,11 @@ class C3dFile:
 
     Attributes
     ----------
-    data : all bytes. processor : see `INTEL`. parameters : see `Parameters`.
+    data : all bytes. processor : see `INTEL`. parameters : see `Parameters`. sizes : of the array
+        of each, the fastest first.
     behind : where the list of parameters ends, see `_parameters`; no frame begins before it.
     points, analog : in a frame, how many markers, and how many numbers of analog channels (samples
-        of all channels).
+        of all channels). samples : of each channel in a frame.
     first, last : of the first and the last frame, its number in the recording, from 1; by the
         header. start : where frames begin.
     header_scale : what whole numbers are multiplied by to be in POINT:UNITS; negative: frames are
@@ -83,22 +90,30 @@ class C3dFile:
     data: bytes
     processor: int
     parameters: Parameters
+    sizes: Mapping[tuple[str, str], tuple[int, ...]]
     behind: int
     points: int
     analog: int
+    samples: int
     first: int
     last: int
     start: int
     header_scale: float
     header_rate: float
 
-    def texts(self, name: str) -> list[str]:
-        """Texts of a parameter of POINT; none where there is none, or it has numbers."""
-        return [one for one in self.parameters.get(("POINT", name), ()) if isinstance(one, str)]
+    def values(self, group: str, name: str) -> Value:
+        """Elements of a parameter and of those that go on with it; none where there is none."""
+        further = (f"{name}{k}" for k in range(2, MOST_PARAMETERS))
+        keys = [key for one in (name, *further) if (key := (group, one)) in self.parameters]
+        return tuple(one for key in keys for one in self.parameters[key])  # type: ignore[return-value]
+
+    def texts(self, group: str, name: str) -> list[str]:
+        """Texts of a parameter; none where there is none, or it has numbers."""
+        return [one for one in self.values(group, name) if isinstance(one, str)]
 
     def numbers(self, group: str, name: str) -> list[float]:
         """Numbers of a parameter; none where there is none, or it has texts."""
-        return [one for one in self.parameters.get((group, name), ()) if not isinstance(one, str)]
+        return [one for one in self.values(group, name) if not isinstance(one, str)]
 
     def number(self, name: str) -> float | None:
         """The first number of a parameter of POINT; None where there is none."""
@@ -109,15 +124,34 @@ class C3dFile:
         """Frames a second; the header's where POINT tells none or 0."""
         return self.number("RATE") or self.header_rate
 
-    @property
+    @cached_property
     def scale(self) -> float:
-        """As `header_scale`; the header's where POINT tells none or 0."""
-        return self.number("SCALE") or self.header_scale
+        """As `header_scale`; the header's where POINT tells none or 0.
+
+        Where the two differ in sign, the one with which the frames that are told fill the file up
+        to less than a block; NaN where none or both do.
+        """
+        told = self.number("SCALE") or self.header_scale
+        if not told * self.header_scale < 0.0:
+            return told
+        fits = [
+            scale
+            for scale in (told, self.header_scale)
+            for frames in self.frames_told
+            if 0 <= self._left(scale) - frames * self.bytes_of_frame(scale) < BLOCK
+        ]
+        return fits[0] if len(fits) == 1 else np.nan
 
     @property
     def labels(self) -> list[str]:
-        """Names of markers."""
-        return [name for key in MORE_LABELS for name in self.texts(key)]
+        """Names of markers, empty where there is none."""
+        found = self.texts("POINT", "LABELS")[: self.points]
+        return found + [""] * (self.points - len(found))
+
+    @property
+    def unit_text(self) -> str:
+        """What the file says of the unit of lengths."""
+        return next(iter(self.texts("POINT", "UNITS")), "")
 
     @property
     def frames_told(self) -> set[int]:
@@ -127,10 +161,13 @@ class C3dFile:
         `COUNT_ENDS` is a full counter and tells nothing.
         """
         # TRIAL has two 16-bit words for each end, the lower first: enough for any recording
-        ends = (self.numbers("TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END"))
-        of_trial = [words[0] + 65_536.0 * words[1] for words in ends if len(words) == 2]
-        if len(of_trial) == 2:
-            return {int(of_trial[1] - of_trial[0] + 1)}
+        start, end = (self.numbers("TRIAL", f"ACTUAL_{end}_FIELD")[:2] for end in ("START", "END"))
+        if end and sum(end) > 0.0:
+            of_start, of_end = (
+                sum(word * 65_536.0**k for k, word in enumerate(words))
+                for words in (start or [float(max(self.first, 1))], end)
+            )
+            return {int(of_end - of_start + 1)}
         told = list[float]()
         if self.last < COUNT_ENDS:
             told.append(self.last - self.first + 1)
@@ -138,21 +175,65 @@ class C3dFile:
             told.append(frames)
         return {int(one) for one in told if 0 < one < COUNT_ENDS or one > COUNT_ENDS}
 
-    @property
+    def bytes_of_frame(self, scale: float) -> int:
+        """Bytes of a frame: four numbers a marker, and the analog channels."""
+        return (4 if scale < 0.0 else 2) * (4 * self.points + self.analog)
+
+    def _left(self, scale: float) -> int:
+        return len(self.data) - self.start if self.bytes_of_frame(scale) else 0
+
+    @cached_property
     def room(self) -> int:
         """Frames for which there are bytes; 0 where they would begin within the parameters."""
-        if self.start < self.behind or not self.points:
+        if self.start < self.behind or not self._left(self.scale):
             return 0
-        bytes_of_frame = (4 if self.scale < 0.0 else 2) * (4 * self.points + self.analog)
-        return (len(self.data) - self.start) // bytes_of_frame
+        return self._left(self.scale) // self.bytes_of_frame(self.scale)
 
-    @property
+    @cached_property
     def frames(self) -> int:
         """Number of frames, as told; where nothing tells it, as many as there is room for.
 
-        Of two numbers that contradict each other it is one of them: `read_c3d` refuses such files.
+        The last block of a file is filled up with noughts, which are no frames. Of two numbers
+        that contradict each other it is one of them: `contradictions` has such files.
         """
-        return next(iter(self.frames_told), self.room)
+        if told := self.frames_told:
+            return self.room if self.off_by_one else next(iter(told))
+        size = self.bytes_of_frame(self.scale)
+        padding = self.data[max(self.start, len(self.data) - BLOCK + 1) :]
+        filled = len(padding) - len(padding.rstrip(b"\0"))
+        empty = max(0, filled - (self._left(self.scale) - self.room * size)) // size if size else 0
+        return self.room - empty
+
+    @property
+    def off_by_one(self) -> bool:
+        """Whether header and parameters differ by one frame, of which the file's size has one."""
+        told = sorted(self.frames_told)
+        return len(told) == 2 and told[1] - told[0] == 1 and self.room in told
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the file contradicts itself in, and what was believed."""
+        found = list[str]()
+        if self.header_scale * (self.number("SCALE") or 0.0) < 0.0:
+            found.append(BELIEVED_SCALE.format("reals" if self.scale < 0.0 else "whole numbers"))
+        if self.off_by_one:
+            found.append(BELIEVED_FRAMES.format(self.frames))
+        return tuple(found)
+
+    def cells(self) -> NDArray[np.float32] | NDArray[np.int16]:
+        """(F, 4 K + A) all numbers of the frames as they stand there, whole numbers with a sign."""
+        number = self.frames * (4 * self.points + self.analog)
+        if self.scale < 0.0:
+            cells = reals(self.data, self.start, number, self.processor)
+        else:
+            cells = words(self.data, self.start, number, self.processor).view("i2")
+        return cells.reshape(self.frames, -1)
+
+    def time_s(self, samples: int = 1) -> NDArray[np.float64]:
+        """(F samples,) s, 0 at frame 1 of the recording; so many samples a frame."""
+        number = np.arange(self.frames * samples) / samples
+        found: NDArray[np.float64] = (max(self.first - 1, 0) + number) / self.rate
+        return found
 
 
 def read_c3d(path: Path, file: str) -> MarkerRecording:
@@ -169,32 +250,34 @@ def read_c3d(path: Path, file: str) -> MarkerRecording:
     InputError
         Where it cannot be read, tells neither unit nor rate, or contradicts itself.
     """
+    whole = open_c3d(path, file)
+    unit_m = unit_of(file, None, "POINT:UNITS", whole.unit_text)
+    # four numbers a marker: its place and a residual; then analog channels
+    points = whole.cells()[:, : 4 * whole.points].reshape(whole.frames, -1, 4)
+    places = points[..., :3].astype(np.float64)
+    places *= unit_m * (1.0 if whole.scale < 0.0 else whole.scale)
+    places[points[..., 3] < 0] = np.nan
+    return recording_from(tuple(whole.labels), whole.time_s(), places, whole.remarks)
+
+
+def open_c3d(path: Path, file: str, markers: bool = True) -> C3dFile:
+    """A `.c3d` whose header, parameters and size agree; whether markers must be in it.
+
+    Raises
+    ------
+    InputError
+        Where they do not.
+    """
     try:
         whole = parse_c3d(path.read_bytes())
     except FormError as error:
         raise InputError([InputProblem(file, None, None, str(error), "a .c3d", AGAIN)]) from error
-    problems = list(_contradictions(whole, file))
-    if problems:
+    if problems := list(_contradictions(whole, file, markers)):
         raise InputError(problems)
-    unit_m = unit_of(file, None, "POINT:UNITS", next(iter(whole.texts("UNITS")), ""))
-    # four numbers a marker: its place and a residual; then analog channels, which are left out
-    in_frame, scale = 4 * whole.points + whole.analog, whole.scale
-    number = whole.frames * in_frame
-    if scale < 0.0:
-        cells = reals(whole.data, whole.start, number, whole.processor)
-    else:
-        # with a sign: from 2^15 on they stand for negative numbers (two's complement)
-        unsigned = words(whole.data, whole.start, number, whole.processor)
-        cells = np.where(unsigned < 1 << 15, unsigned, unsigned - (1 << 16)).astype(np.float64)
-    rows = cells.reshape(whole.frames, in_frame)[:, : 4 * whole.points]
-    points = rows.reshape(whole.frames, -1, 4)
-    raw, residuals = points[..., :3] * (1.0 if scale < 0.0 else scale), points[..., 3]
-    places = np.where((residuals < 0.0)[..., None], np.nan, unit_m * raw)
-    time_s = (max(whole.first - 1, 0) + np.arange(len(raw))) / whole.rate
-    return recording_from(tuple(whole.labels[: whole.points]), time_s, places)
+    return whole
 
 
-def _contradictions(whole: C3dFile, file: str) -> Iterator[InputProblem]:
+def _contradictions(whole: C3dFile, file: str, markers: bool) -> Iterator[InputProblem]:
     """What the file tells that cannot be, or that header and parameters tell differently."""
 
     def problem(place: str, found: str, allowed: str) -> InputProblem:
@@ -205,17 +288,19 @@ def _contradictions(whole: C3dFile, file: str) -> Iterator[InputProblem]:
         yield problem("POINT:RATE", f"{whole.rate:g} frames a second", allowed)
     if not np.isfinite(whole.scale) or whole.scale == 0.0:
         found, allowed = f"a scale of {whole.scale:g}", "a finite number that is not zero"
+        if np.isfinite(told := whole.number("SCALE") or np.nan):
+            found = f"a scale of {told:g}, and {whole.header_scale:g} in the header"
+            allowed = "the same sign: below zero for reals, above it for whole numbers"
         yield problem("POINT:SCALE", found, allowed)
+        return
     used = whole.number("USED")
-    if not whole.points or (used is not None and used != whole.points):
+    if (markers and not whole.points) or (used is not None and used != whole.points):
         told = "" if used is None else f", {used:g} in its parameters"
         found = f"{whole.points} markers in the header{told}"
         yield problem("POINT:USED", found, "at least one, the same twice")
-    elif len(whole.labels) < whole.points:
-        found = f"{len(whole.labels)} names of {whole.points} markers"
-        yield problem("POINT:LABELS", found, "a name for each")
+        return
     frames = whole.frames_told
-    if len(frames) > 1:
+    if len(frames) > 1 and not whole.off_by_one:
         found = f"{' frames and '.join(map(str, sorted(frames)))} frames"
         yield problem("POINT:FRAMES", found, "the same in header and parameters")
     elif whole.first > whole.last:
@@ -245,48 +330,55 @@ def parse_c3d(data: bytes) -> C3dFile:
     processor = data[start + 3]
     if processor not in (INTEL, DEC, MIPS):
         raise FormError(f"numbers of a processor {processor}")
-    parameters, behind = _parameters(data, start + 4, processor)
+    # reading ends where frames begin, if that is behind the parameters, or else with the file
+    (block,) = words(data, 16, 1, processor).tolist()
+    end = (block - 1) * BLOCK if start < (block - 1) * BLOCK < len(data) else len(data)
+    parameters, sizes, behind = _parameters(data[:end], start + 4, processor)
     # the header, by bytes: four 16-bit words from 2, the scale at 12, first block of frames at 16,
     # the rate at 20
     points, analog, first, last = words(data, 2, 4, processor).tolist()
     (scale,), (rate,) = reals(data, 12, 1, processor), reals(data, 20, 1, processor)
-    (block,) = words(data, 16, 1, processor).tolist()
+    (samples,) = words(data, 18, 1, processor).tolist()
     start = (block - 1) * BLOCK
     return C3dFile(
-        *(data, processor, parameters, behind, points, analog, first, last),
+        *(data, processor, parameters, sizes, behind, points, analog, samples, first, last),
         start,
         float(scale),
         float(rate),
     )
 
 
-def words(data: bytes, at: int, number: int, processor: int) -> NDArray[np.int64]:
+def words(data: bytes, at: int, number: int, processor: int) -> NDArray[np.uint16]:
     """(number,) 16-bit numbers without a sign, from byte ``at`` on."""
-    form = ">u2" if processor == MIPS else "<u2"
-    return np.frombuffer(data, form, number, at).astype(np.int64)
+    found = np.frombuffer(data, "<u2", number, at)
+    return found.byteswap() if processor == MIPS else found
 
 
-def reals(data: bytes, at: int, number: int, processor: int) -> NDArray[np.float64]:
+def reals(data: bytes, at: int, number: int, processor: int) -> NDArray[np.float32]:
     """(number,) 32-bit reals, from byte ``at`` on.
 
     A DEC writes the two 16-bit halves in the other order, and the same bits, read as IEEE's, are
     four times its number.
     """
     if processor != DEC:
-        form = ">f4" if processor == MIPS else "<f4"
-        return np.frombuffer(data, form, number, at).astype(np.float64)
+        found = np.frombuffer(data, "<f4", number, at)
+        return found.byteswap() if processor == MIPS else found
     halves = np.frombuffer(data, "<u2", 2 * number, at).reshape(-1, 2)
-    return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel().astype(np.float64) / 4.0
+    return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel() / np.float32(4.0)
 
 
-def _parameters(data: bytes, at: int, processor: int) -> tuple[Parameters, int]:
-    """All parameters, and where the list ends: its last entry, or the empty one behind that.
+def _parameters(
+    data: bytes, at: int, processor: int
+) -> tuple[Parameters, dict[tuple[str, str], tuple[int, ...]], int]:
+    """All parameters, the sizes of their arrays, and where the list ends.
 
-    An entry: length of its name, number of its group, name, way to the next entry, and of a
-    parameter its value. Entries with a negative group number are the groups themselves.
+    That is its last entry, the empty one behind that, or the end of the section: programs of SGI
+    let the last entry lead beyond it. An entry: length of its name, number of its group, name, way
+    to the next entry, and of a parameter its value. Entries with a negative group number are the
+    groups themselves.
     """
     groups: dict[int, str] = {}
-    found: list[tuple[int, str, Value]] = []
+    found: list[tuple[int, str, tuple[int, ...], Value]] = []
     while at + 2 <= len(data):
         length, group = struct.unpack_from("<bb", data, at)  # length: negative if it is locked
         way_at = at + 2 + abs(length)
@@ -299,20 +391,20 @@ def _parameters(data: bytes, at: int, processor: int) -> tuple[Parameters, int]:
         if group < 0:
             groups[-group] = name
         else:
-            found.append((group, name, _value(data, way_at + 2, name, processor)))
+            found.append((group, name, *_value(data, way_at + 2, name, processor)))
         # counted from the way itself, which has 2 bytes; 0 at the last entry. Never backwards
         if way < 0 or (0 < way < 2):
             raise FormError(f"a parameter {name!a} that leads nowhere")
         if not way:
             break
         at = way_at + way
-    else:
-        raise FormError("parameters that have no end")
-    return {(groups.get(group, ""), name): value for group, name, value in found}, at
+    keys = [(groups.get(group, ""), name) for group, name, _, _ in found]
+    values, sizes = (dict(zip(keys, [one[k] for one in found], strict=True)) for k in (3, 2))
+    return values, sizes, min(at, len(data))
 
 
-def _value(data: bytes, at: int, name: str, processor: int) -> Value:
-    """The array of a parameter, flat, its first index changing fastest.
+def _value(data: bytes, at: int, name: str, processor: int) -> tuple[tuple[int, ...], Value]:
+    """Sizes of the array of a parameter, and the array, flat, its first index changing fastest.
 
     At ``at``: type, how many sizes, the sizes, the elements. Of characters the first size is the
     length of each text, and texts are the elements. Whole numbers are read without a sign.
@@ -329,11 +421,13 @@ def _value(data: bytes, at: int, name: str, processor: int) -> Value:
         longest = sizes[0] if sizes else size
         number = prod(sizes[1:]) if longest else 0
         pieces = (letters[k * longest : (k + 1) * longest] for k in range(number))
-        return tuple(piece.decode("utf-8", "replace").strip(" \0") for piece in pieces)
+        return tuple(sizes), tuple(
+            piece.decode("utf-8", "replace").strip(" \0") for piece in pieces
+        )
     if kind == BYTE:
-        return tuple(map(float, data[begin : begin + size]))
+        return tuple(sizes), tuple(map(float, data[begin : begin + size]))
     if kind == WORD:
-        return tuple(map(float, words(data, begin, prod(sizes), processor)))
+        return tuple(sizes), tuple(map(float, words(data, begin, prod(sizes), processor)))
     if kind == REAL:
-        return tuple(map(float, reals(data, begin, prod(sizes), processor)))
+        return tuple(sizes), tuple(map(float, reals(data, begin, prod(sizes), processor)))
     raise FormError(f"a parameter {name!a} of type {kind}")

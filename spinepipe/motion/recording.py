@@ -11,8 +11,23 @@ from spinepipe.problems import InputError, InputProblem
 
 WITHOUT_SUBJECT = "names of markers without what stands before the colon"
 
+WITH_NUMBERS = "names that are empty or stand more than once have a number, as in T1#2"
+
+UNNAMED, NUMBERED = "unnamed", "#"
+
+MOST_RECORDING_BYTES = 128_000_000
+"""Of a file of motion. 100 MB are read in less than 1 GB of memory."""
+
 M_PER = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Units in which motion is written."""
+
+WORDS = {
+    f"{word}{ending}": sign
+    for word, sign in (("milli", "mm"), ("centi", "cm"), ("", "m"))
+    for ending in ("meters", "metres")
+}
+SHORTEST_WORD = 4
+"""Letters of a word that some programs cut off: `mete`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +39,7 @@ class MarkerRecording:
     names : (K,). time_s : (F,). places : (F, K, 3) m, zero where not seen. seen : (F, K).
     repaired : what was read otherwise than it stands in the file, one sentence each.
     first : number of the first frame that was kept, counted from 1 in the file.
+    repeated : names that stand more than once in the file; they have a number in `names`.
     """
 
     names: tuple[str, ...]
@@ -32,6 +48,7 @@ class MarkerRecording:
     seen: NDArray[np.bool_]
     repaired: tuple[str, ...] = ()
     first: int = 1
+    repeated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.time_s, self.places, self.seen):
@@ -41,45 +58,50 @@ class MarkerRecording:
 def recording_from(
     names: tuple[str, ...], time_s: Array, raw: Array, repaired: tuple[str, ...] = ()
 ) -> MarkerRecording:
-    """From raw places (F, K, 3) m, NaN or all zero where a marker is not seen."""
+    """From raw places (F, K, 3) m, NaN or all zero where a marker is not seen; they are kept."""
     seen = np.isfinite(raw).all(axis=-1) & (raw != 0.0).any(axis=-1)
-    return MarkerRecording(names, time_s, np.where(seen[..., None], raw, 0.0), seen, repaired)
+    raw[~seen] = 0.0
+    return MarkerRecording(names, time_s, raw, seen, repaired)
 
 
 def unit_of(file: str, row: int | None, column: str, text: str) -> float:
-    """What one unit of a file is in m.
+    """What one unit of a file is in m: one of `M_PER`, or its word, which may be cut off.
 
     Raises
     ------
     InputError
-        Where it is none of `M_PER`.
+        Where it is none.
     """
     known = text.strip().lower()
+    if len(known) >= SHORTEST_WORD:
+        known = next((unit for word, unit in WORDS.items() if word.startswith(known)), known)
     if known not in M_PER:
         allowed = ", ".join(M_PER)
         raise InputError([InputProblem(file, row, column, repr(text), allowed, "correct the unit")])
     return M_PER[known]
 
 
-def without_subjects(names: tuple[str, ...], file: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def without_subjects(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names without their subject (`Anna:T1`) where that leaves each once, and what was done.
 
     What was done stands on pages, so it does not name the subject: people write names of persons.
-
-    Raises
-    ------
-    InputError
-        Of names that come twice.
     """
-    again = [name for name, count in Counter(names).items() if count > 1]
-    if again:
-        found = f"{', '.join(again)} more than once"
-        raise InputError(
-            [InputProblem(file, None, None, found, "each marker once", "rename one of them")]
-        )
-    short = [name.rpartition(":")[2].strip() for name in names]
-    counts = Counter(short)
-    chosen = tuple(
-        cut if cut and counts[cut] == 1 else name for name, cut in zip(names, short, strict=True)
-    )
+    short = {name: name.rpartition(":")[2].strip() for name in names}
+    counts = Counter(short.values())
+    chosen = tuple(cut if (cut := short[name]) and counts[cut] == 1 else name for name in names)
     return chosen, (WITHOUT_SUBJECT,) if chosen != names else ()
+
+
+def numbered(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names with a number behind those that stand more than once, and what was done."""
+    counts, so_far = Counter(names), Counter[str]()
+    found = []
+    for name in names:
+        if name and counts[name] == 1:
+            found.append(name)
+            continue
+        so_far[name] += 1
+        while (label := f"{name or UNNAMED}{NUMBERED}{so_far[name]}") in counts:
+            so_far[name] += 1
+        found.append(label)
+    return tuple(found), (WITH_NUMBERS,) if tuple(found) != names else ()

@@ -194,7 +194,7 @@ def test_tabs_at_the_end_of_a_line_may_be_missing_or_too_many(tmp_path: Path) ->
         (3, "50.0\t50.0", "inf\t50.0", 3, "DataRate", "'inf'"),
         (3, "50.0\t50.0", "0\t50.0", 3, "DataRate", "0"),
         (3, "50.0\t50.0", "50.6\t50.0", 3, "DataRate", "50.6 frames a second, and times 0.02 s"),
-        (3, "\t5\t3\t", "\t6\t3\t", 3, "NumFrames", "5 frames"),
+        (3, "\t3\tmm", "\t0\tmm", 3, "NumMarkers", "0"),
         (3, "\t5\t3\t", "\t5\t4\t", 4, None, "3 names"),
         (3, "\tmm\t", "\tyard\t", 3, "Units", "'yard'"),
         (8, "0.0200", "", 8, "Time", "nothing"),
@@ -238,9 +238,25 @@ def test_subjects_are_cut_off_names_where_each_stays_one(tmp_path: Path) -> None
     assert found.names == ("Anna:T1", "Ben:T1", "LPSI")
 
 
-def test_a_marker_that_comes_twice_is_refused(tmp_path: Path) -> None:
-    path = write_c3d(tmp_path / "m.c3d", places_mm(), ("T1", "T1", "L3"))
-    assert problem_of(path).found == "T1 more than once"
+@pytest.mark.parametrize(
+    ("names", "found", "repeated"),
+    [
+        (("T1", "T1", "L3"), ("T1#1", "T1#2", "L3"), ("T1",)),
+        (("T1", "Ann:T1", "Ann:T1"), ("T1", "Ann:T1#1", "Ann:T1#2"), ("Ann:T1",)),
+        (("T1", "", ""), ("T1", "unnamed#1", "unnamed#2"), ("",)),
+        (("T1#1", "T1", "T1"), ("T1#1", "T1#2", "T1#3"), ("T1",)),
+    ],
+)
+def test_markers_without_a_name_or_of_one_name_have_numbers(
+    tmp_path: Path, names: tuple[str, ...], found: tuple[str, ...], repeated: tuple[str, ...]
+) -> None:
+    """Model outputs are called like markers where a file has room for four letters."""
+    read = read_motion(write_c3d(tmp_path / "m.c3d", places_mm(), names))
+    assert (read.names, read.repeated) == (found, repeated)
+    assert read.repaired == (
+        "names that are empty or stand more than once have a number, as in T1#2",
+    )
+    np.testing.assert_allclose(1e3 * read.places, places_mm(), atol=1e-4)
 
 
 def test_what_is_no_file_of_motion_is_named(tmp_path: Path) -> None:
