@@ -27,6 +27,7 @@ from spinepipe.imports.imported import (
     rounded,
 )
 from spinepipe.motion.reading import axes_of, read_motion
+from spinepipe.motion.reading_plates import read_force_plates
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.report.words import count, listed
@@ -48,6 +49,8 @@ QUANTITIES: Mapping[str, tuple[str, float]] = {
 
 SIDES = {"force_plates": ("person", "plate"), "measured_moments": ("upper", "lower")}
 """On what loads of a table act: as ours do, and turned round."""
+
+VECTORS = ("f{}_n", "m{}_nm", "{}_mm")
 
 CELLS = re.compile(r"\s*[,;\t]\s*|\s+")
 """What separates numbers that have a decimal point."""
@@ -87,7 +90,8 @@ class Trial(BaseModel):
     start_s: float | None = Field(default=None, description="what is before is cut off")
     end_s: float | None = Field(default=None, description="what is after is cut off")
     shift_s: float = Field(
-        default=0.0, description="what is added to times of its tables to give those of the markers"
+        default=0.0,
+        description="what is added to times of its tables, but of a .c3d, to give the markers'",
     )
 
 
@@ -99,10 +103,11 @@ class RecordedTable(BaseModel):
     table: Literal["force_plates", "box", "measured_moments"] = Field(description="what it holds")
     file: str = Field(description="path, relative to this YAML, with `{specimen}` and `{trial}`")
     columns: tuple[str, ...] = Field(
+        default=(),
         strict=False,
         description="what each column is, in order: `time_s`, `fx_n`, `my_nm`, `z_m`, "
         "`inclination_rad` and the like, on the axes of the file; of a force plate after its name "
-        "and a point, `left.fx_n`; `-`: not read",
+        "and a point, `left.fx_n`; `-`: not read. Of a .c3d: none",
     )
     first_line: int = Field(default=1, ge=1, description="line of the first numbers")
     acts_on: Literal["person", "plate", "upper", "lower"] | None = Field(
@@ -110,6 +115,11 @@ class RecordedTable(BaseModel):
     )
     joint: str = Field(default="", description="joint of measured_moments")
     method: str = Field(default="", description="how measured_moments were obtained")
+
+    @property
+    def is_c3d(self) -> bool:
+        """Whether plates are in the recordings of markers, on their clock."""
+        return self.file.lower().endswith(".c3d")
 
 
 class MotionCaptureSettings(ImportSettings):
@@ -179,10 +189,11 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
             if not (folder / file).exists():
                 without[of.file].append(trial.trial)
                 continue
-            parts, faults = _read_table(folder / file, file, of, turn)
+            reader = _read_plates if of.is_c3d else _read_table
+            parts, faults = reader(folder / file, file, of, turn)
             problems += faults
             for part, values in parts.items():
-                values["time_s"] = values["time_s"] + trial.shift_s
+                values["time_s"] = values["time_s"] + (0.0 if of.is_c3d else trial.shift_s)
                 rows[of.table] += _rows(of, trial, part, values)
             for values in list(parts.values())[:1]:
                 shift = place(f"trials.{index}.shift_s")
@@ -245,7 +256,7 @@ def _misnamed_columns(place: Place, of: RecordedTable) -> Iterator[InputProblem]
         if name not in allowed or bool(part) > (of.table == "force_plates"):
             remedy = did_you_mean(name, allowed, "write `-` where a column is not read")
             yield InputProblem(*place, f"'{text}'", one_of(allowed), remedy)
-    if not {"time_s", "time_ms"} & set(of.columns):
+    if not {"time_s", "time_ms"} & set(of.columns) and not of.is_c3d:
         yield InputProblem(*place, "no column of time", "time_s or time_ms", "name it")
     if of.table in SIDES and of.acts_on not in SIDES[of.table]:
         found, remedy = f"loads that act on '{of.acts_on}'", "say on what: `acts_on:`"
@@ -283,7 +294,7 @@ def _read_table(
                 ours, per = QUANTITIES[name]
                 values[ours] = per * column
         reaction = of.acts_on in ("plate", "lower")
-        for form, side in (("f{}_n", reaction), ("m{}_nm", reaction), ("{}_mm", False)):
+        for form, side in zip(VECTORS, (reaction, reaction, False), strict=True):
             on_file = [values.pop(form.format(axis), None) for axis in "xyz"]
             for axis, row in zip("xyz", turn, strict=True):
                 # each of ground's axes is one of the file's, to one side or the other
@@ -291,6 +302,27 @@ def _read_table(
                 if (component := on_file[at]) is not None:
                     values[form.format(axis)] = (-row[at] if side else row[at]) * component
     return parts, problems
+
+
+def _read_plates(
+    path: Path, file: str, of: RecordedTable, turn: Array
+) -> tuple[Parts, list[InputProblem]]:
+    """Force plates of a `.c3d` as columns, by their number in it."""
+    try:
+        plates = read_force_plates(path, file=file)
+    except InputError as error:
+        return {}, list(error.problems)
+    side, parts = -1.0 if of.acts_on == "plate" else 1.0, Parts()
+    for number, plate in enumerate(plates, start=1):
+        loads = (side * plate.force, side * plate.free_moment, 1000.0 * plate.centre_of_pressure)
+        columns = {
+            form.format(axis): column
+            for form, load in zip(VECTORS, loads, strict=True)
+            for axis, column in zip("xyz", turn @ load.T, strict=True)
+        }
+        parts[str(number)] = {"time_s": plate.time_s, **columns}
+    lacking = InputProblem(file, None, None, "no force plates", "force plates", "take it out")
+    return parts, [] if parts else [lacking]
 
 
 def _rows(

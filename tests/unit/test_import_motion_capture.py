@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from ezc3d import c3d
 from sweeps import sweep
 
 from spinepipe import cohort as cohorts
@@ -152,6 +153,46 @@ def test_what_cannot_be_right_is_told_before_anything_is_written(
     with pytest.raises(InputError) as error:
         read(made(tmp_path, document))
     assert told in str(error.value)
+
+
+def test_plates_of_a_c3d_are_those_that_were_written(tmp_path: Path) -> None:
+    """z is up and y to the left; a plate of type 2 with the axes of the laboratory."""
+    force, at, free_nm = np.array([20.0, -30.0, 600.0]), np.array([0.04, -0.07, 0.0]), 3.0
+    moment_nm = np.cross(at, force) + np.array([0.0, 0.0, free_nm])
+    half, middle = 0.25, np.array([0.5, 0.2, 0.0])
+    corners = [middle + half * np.array([x, y, 0]) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    content = c3d()
+    point, analog = (content["parameters"][group] for group in ("POINT", "ANALOG"))
+    point["RATE"]["value"], point["LABELS"]["value"] = [50.0], ["A"]
+    point["UNITS"]["value"] = ["mm"]
+    content["data"]["points"] = np.full((4, 1, 5), 100.0)
+    analog["RATE"]["value"], analog["LABELS"]["value"] = [100.0], [f"c{k}" for k in range(6)]
+    analog["UNITS"]["value"] = ["N"] * 3 + ["Nmm"] * 3
+    values = np.concatenate([force, 1000.0 * moment_nm])
+    content["data"]["analogs"] = np.repeat(values[None, :, None], 10, axis=2)
+    for name, value in (
+        ("USED", [1]),
+        ("TYPE", [2]),
+        ("ZERO", [0, 0]),
+        ("CORNERS", 1000.0 * np.array(corners).T.reshape(3, 4, 1)),
+        ("ORIGIN", np.zeros((3, 1))),
+        ("CHANNEL", np.arange(1.0, 7.0).reshape(6, 1)),
+    ):
+        content.add_parameter("FORCE_PLATFORM", name, value)
+    content.write(str(tmp_path / "bend.c3d"))
+    document = laboratory(tmp_path)
+    trials, tables = document["trials"], document["tables"]
+    assert isinstance(trials, list)
+    assert isinstance(tables, list)
+    plates = {"table": "force_plates", "file": "{trial}.c3d", "acts_on": "person"}
+    document |= {"trials": [trials[1] | {"file": "bend.c3d"}], "tables": [plates], "axes": "x z -y"}
+    write(read(made(tmp_path, document)), tmp_path / "lab", replace=False)
+    found = pd.read_csv(tmp_path / "lab" / "force_plates.csv")
+    assert found["time_s"].to_numpy() == pytest.approx(np.arange(10) / 100.0)
+    forwards, left, up = force
+    told = [forwards, up, -left, 0.0, free_nm, 0.0, *(1000.0 * np.array([0.54, 0.0, -0.13]))]
+    columns = [f"f{a}_n" for a in "xyz"] + [f"m{a}_nm" for a in "xyz"] + [f"{a}_mm" for a in "xyz"]
+    assert found[columns].to_numpy() == pytest.approx(np.tile(told, (10, 1)), abs=1e-3)
 
 
 def test_recordings_with_one_name_and_with_that_of_a_table_are_told_apart(tmp_path: Path) -> None:
