@@ -23,15 +23,17 @@ from typing import Any
 from pydantic import BaseModel
 
 from spinepipe.cohort.cohort import CohortHeader
-from spinepipe.cohort.columns import TABLES
 from spinepipe.documents.form import TableForm
 from spinepipe.effects import Effect, Parameter, TriedValues, create, registered
+from spinepipe.imports.imported import all_forms
+from spinepipe.imports.landmarks import LandmarkSettings
+from spinepipe.imports.motion_capture import MotionCaptureSettings
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.reference.licences import licences
 from spinepipe.schema import Column, Table
 from spinepipe.studies.read import Selection
-from spinepipe.studies.registry import every_form, every_kind
+from spinepipe.studies.registry import every_kind
 from spinepipe.testing_machine.settings import MachineMapping
 
 _HEAD = ("parameter", "unit", "bounds", "off", "default", "prior SD", "meaning")
@@ -97,13 +99,12 @@ def generators() -> dict[str, Callable[[], str]]:
     """Every part that can be generated, by the name that pages use."""
     parts: dict[str, Callable[[], str]] = {"effects": effects, "licences": licence_table}
     kinds = every_kind()
-    parts |= {
-        f"cohort {name}": partial(cohort_table, form)
-        for name, form in (TABLES | {form.stem: form for form in every_form()}).items()
-    }
+    parts |= {f"cohort {name}": partial(cohort_table, form) for name, form in all_forms().items()}
     parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
     parts["keys config.yaml"] = partial(key_table, Selection)
     parts["keys import"] = partial(key_table, MachineMapping)
+    parts["keys import landmarks"] = partial(key_table, LandmarkSettings)
+    parts["keys import motion_capture"] = partial(key_table, MotionCaptureSettings)
     parts["keys model"] = partial(key_table, ModelFile)
     parts |= {f"keys {name}": partial(key_table, kind.settings) for name, kind in kinds.items()}
     return parts
