@@ -164,7 +164,7 @@ def checked(
         if rows
     }
     text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=110)
-    files = {COHORT_YAML: text, **texts, **copied}
+    files: dict[str, str | Path] = {COHORT_YAML: text, **texts, **copied}
     further = tuple(form for stem, form in forms.items() if stem not in TABLES)
     by_hand = {"specimens.csv": ""}
     cohort = ImportedCohort(

@@ -8,7 +8,7 @@ import csv
 import glob
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
@@ -145,7 +145,11 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     picked = [(who, *key, point) for who, points in found.items() for key, point in points.items()]
     sd = "" if settings.sd_mm is None else f"{settings.sd_mm:g}"
     rows = [(*key, *map(rounded, one.place), sd) for *key, one in picked if one.place is not None]
-    tables = {"specimens": [(who,) for who in found], "landmarks": rows, "surfaces": surfaces}
+    tables: dict[str, Sequence[Sequence[object]]] = {
+        "specimens": [(who,) for who in found],
+        "landmarks": rows,
+        "surfaces": surfaces,
+    }
     sentences = (*_sentences(found, unread), *told_of_surfaces, POSTURE)
     files = ", ".join(dict.fromkeys(point.file for *_, point in picked))
     origins = {"landmarks": [(point.file, point.line) for *_, point in picked]}
@@ -275,8 +279,9 @@ def _surfaces(
     Those that are near with another unit or other axes alone are added to the problems.
     """
     rows, told = list[tuple[str, ...]](), list[str]()
-    of = settings.surfaces
-    for specimen, vertebra in [(a, b) for a in found for b in settings.vertebrae if of]:
+    if (of := settings.surfaces) is None:
+        return rows, told
+    for specimen, vertebra in [(a, b) for a in found for b in settings.vertebrae]:
         file = of.file.replace("{specimen}", specimen).replace("{vertebra}", vertebra)
         rows.append((specimen, vertebra, file, of.unit, of.axes))
         data, faults = read_bytes(folder / file, file, MOST_CSV_BYTES)

@@ -180,8 +180,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
             problems += error.problems
             continue
         begin, end = markers.time_s[[0, -1]].tolist()
-        whole = markers.seen.all(axis=0)
-        gaps = [name for name, always in zip(markers.names, whole, strict=True) if not always]
+        gaps = [markers.names[k] for k in np.flatnonzero(~markers.seen.all(axis=0))]
         told = f"{trial.trial}: {count(len(markers.names), 'marker')} from {begin:g} to {end:g} s"
         sentences.append(f"{told}, with gaps: {listed(gaps)}." if gaps else f"{told}, no gaps.")
         for number, of in enumerate(settings.tables):
@@ -201,12 +200,12 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
             if of.table == "force_plates" and trial.kind == "stance":
                 problems += _other_weight(place(f"tables.{number}"), file, parts, trial, settings)
     for number, of in enumerate(settings.tables):
-        lacking = listed(without[of.file])
+        those = listed(without[of.file])
         if len(without[of.file]) == len(settings.trials):
             found, remedy = f"no file '{of.file}' of any trial", "correct the path"
             problems.append(InputProblem(*place(f"tables.{number}"), found, "files", remedy))
-        elif lacking:
-            sentences.append(f"{of.table}: no {of.file} of {lacking}.")
+        elif those:
+            sentences.append(f"{of.table}: no {of.file} of {those}.")
     if problems:
         raise InputError(problems)
     # recordings keep their names where these are no table's, and each another's
