@@ -1,6 +1,6 @@
 """The table in a machine's file: text, LabVIEW's .lvm, or a workbook (.xlsx), as rows of cells.
 
-What a file is, its first bytes say, not its name.
+What a file is, its first bytes say, not its name. All become text in UTF-8.
 """
 
 import csv
@@ -9,9 +9,9 @@ import re
 import zipfile
 from array import array
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
-from itertools import islice
+from itertools import islice, takewhile
 
 import numpy as np
 import openpyxl
@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 
 from spinepipe.problems import InputProblem, one_of
 from spinepipe.testing_machine.settings import FileForm
-
-Rows = Iterator[tuple[int, list[str]]]
 
 MOST_BYTES = 300_000_000
 """Of a recording, and of what a workbook holds when it is unpacked."""
@@ -35,22 +33,20 @@ LOOKED_AT = 1000
 AT_ONCE = 20_000
 MARKS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": r"\s+"}
 
-FOREIGN = (
-    (b"TDSm", "a .tdms file of LabVIEW"),
-    (b"\xd0\xcf\x11\xe0", "an old workbook (.xls) or another binary document"),
-    (b"MATLAB 5.0", "a .mat file of MATLAB"),
-    (b"\x89HDF", "an HDF5 file (.mat, .h5)"),
-    (b"\x02P", "a .c3d file of motion capture"),
-    (b"\x1f\x8b", "a compressed file"),
-    (b"%PDF", "a PDF"),
-)
-"""First bytes of files that are not read, and what they are."""
+FOREIGN = {
+    b"TDSm": "a .tdms file of LabVIEW",
+    b"\xd0\xcf\x11\xe0": "an old workbook (.xls) or another binary document",
+    b"MATLAB 5.0": "a .mat file of MATLAB",
+    b"\x89HDF": "an HDF5 file (.mat, .h5)",
+    b"\x02P": "a .c3d file of motion capture",
+    b"\x1f\x8b": "a compressed file",
+    b"%PDF": "a PDF",
+}
+"""What files are that are not read, by their first bytes."""
 
 READ = "text, a workbook (.xlsx) or LabVIEW's .lvm"
 EXPORT = "let the program that wrote it export text or .xlsx, see docs/import.md"
-
-# A header of an .lvm file: lines that begin with a word, the last one with the tag that ends it.
-_LVM_HEADER = re.compile(r"(?:^[A-Z][^\n]*\n){0,60}?^\*\*\*End_of_Header\*\*\*", re.MULTILINE)
+LVM_END = "***End_of_Header***"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,53 +57,52 @@ class RawTable:
     ----------
     form : the form of the YAML, with what the file itself says of it.
     names : of the columns, empty without. first : line of the first numbers.
-    rows : makes an iterator over line and cells of every row that has any.
-    text : what `rows` reads, in UTF-8; None of a workbook.
-    remarks : what the file itself said.
+    text : the file, in UTF-8. remarks : what the file itself said.
     """
 
     form: FileForm
     names: list[str]
     first: int
     width: int
-    rows: Callable[[], Rows]
-    text: bytes | None
+    text: bytes
     remarks: tuple[str, ...] = ()
 
+    def rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Line and cells of every row of numbers that has any."""
+        every = text_rows(self.form, self.text)
+        return (one for one in every if one[0] >= self.first and any(map(str.strip, one[1])))
+
     def columns(
-        self, places: Sequence[int], value: Sequence[Callable[[str], float]], plain: str | None
+        self, places: Sequence[int], values: Sequence[Callable[[str], float]], plain: bool
     ) -> tuple[NDArray[np.int64], list[NDArray[np.float64]]]:
         """(N,) line of each row, and (N,) numbers of each place, NaN where a cell has none.
 
         Parameters
         ----------
-        places : of the columns, from 0. value : reads a cell, by place.
-        plain : the decimal sign where all cells are plain numbers: then the bulk reader is tried.
+        places : of the columns, from 0. values : what reads a cell, by place.
+        plain : whether all are plain numbers, which the bulk reader can try.
         """
-        if plain is not None and (bulk := self._bulk(places, plain)) is not None:
+        if plain and (bulk := self._bulk(places)) is not None:
             return np.arange(self.first, self.first + len(bulk)), list(bulk.T)
         lines, columns = array("q"), [array("d") for _ in places]
         rows = self.rows()
         while chunk := list(islice(rows, AT_ONCE)):
             lines.extend(line for line, _ in chunk)
-            for place, read, column in zip(places, value, columns, strict=True):
-                column.extend(read(cell_at(row, place)) for _, row in chunk)
+            for place, value, column in zip(places, values, columns, strict=True):
+                column.extend(value(cell_at(row, place)) for _, row in chunk)
         return np.array(lines, dtype=np.int64), [np.array(one) for one in columns]
 
-    def _bulk(self, places: Sequence[int], decimal: str) -> NDArray[np.float64] | None:
-        """(N, C) by pandas' reader in C; None where a row or cell is not as plain as it takes it.
-
-        It knows no places of faults; and it reads True as 1.
-        """
+    def _bulk(self, places: Sequence[int]) -> NDArray[np.float64] | None:
+        """(N, C) by pandas' reader in C; None where it is not all plain, as it tells no places."""
         text = self.text
-        if text is None or any(one in text for one in (b'"', b"rue", b"RUE", b"alse", b"ALSE")):
+        if any(one in text for one in (b'"', b"rue", b"RUE", b"alse", b"ALSE")):  # True would be 1
             return None
         order = sorted(set(places))
         try:
             frame = pd.read_csv(
                 io.BytesIO(text.rstrip(b"\r\n")),
                 sep=MARKS[self.form.delimiter],
-                decimal=decimal,
+                decimal="," if self.form.decimal == "comma" else ".",
                 header=None,
                 index_col=False,
                 skiprows=self.first - 1,
@@ -118,10 +113,8 @@ class RawTable:
             )
         except ValueError:  # a cell is no number, a row too short
             return None
-        values = frame.to_numpy()
-        return (
-            values[:, [order.index(one) for one in places]] if np.isfinite(values).all() else None
-        )
+        values = frame.to_numpy()[:, [order.index(one) for one in places]]
+        return values if np.isfinite(values).all() else None
 
 
 def cell_at(row: Sequence[str], place: int) -> str:
@@ -129,65 +122,8 @@ def cell_at(row: Sequence[str], place: int) -> str:
     return row[place].strip() if place < len(row) else ""
 
 
-def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProblem:
-    """The table in a file's bytes, or why there is none."""
-    foreign = next((what for start, what in FOREIGN if data.startswith(start)), None)
-    if foreign is not None:
-        return InputProblem(file, None, None, foreign, READ, EXPORT)
-    if data.startswith(b"PK"):
-        return _workbook(data, file, form)
-    if form.sheet is not None:
-        remedy = "delete `form.sheet`, or name a workbook"
-        return InputProblem(file, None, None, "a text without sheets", "a workbook (.xlsx)", remedy)
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")) and form.encoding != "utf-16":
-        remedy = "set `form: {encoding: utf-16}`"
-        return InputProblem(
-            file, None, None, "letters in UTF-16", "the encoding of the YAML", remedy
-        )
-    try:
-        text = data.decode("utf-8-sig" if form.encoding == "utf-8" else form.encoding)
-    except UnicodeError:
-        remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
-        found = f"letters that are not {form.encoding}"
-        return InputProblem(file, None, None, found, "the encoding of the YAML", remedy)
-    if "\0" in text:
-        return InputProblem(file, None, None, "a binary file", READ, EXPORT)
-    remarks: tuple[str, ...] = ()
-    if text.startswith("LabVIEW Measurement") and "names_line" not in form.model_fields_set:
-        told = _labview(text, file, form)
-        if isinstance(told, InputProblem):
-            return told
-        form, remarks = told
-    plain = text.encode()
-    return _table(lambda: _text_rows(form, plain), file, form, plain, remarks)
-
-
-def _table(
-    every: Callable[[], Rows],
-    file: str,
-    form: FileForm,
-    text: bytes | None,
-    remarks: tuple[str, ...] = (),
-) -> RawTable | InputProblem:
-    """A table from all rows of a file, those above its numbers too."""
-    first = form.first_line or form.names_line + 1
-
-    def below() -> Rows:
-        return (one for one in every() if one[0] >= first and any(map(str.strip, one[1])))
-
-    head = list(islice(every(), form.names_line))
-    width = max((len(row) for _, row in islice(below(), LOOKED_AT)), default=0)
-    names = next(([c.strip() for c in row] for line, row in head if line == form.names_line), [])
-    while names and not names[-1]:
-        names.pop()
-    if form.names_line and not names:
-        allowed = f"names of columns in line {form.names_line}"
-        found = "no such line, or an empty one"
-        return InputProblem(file, None, None, found, allowed, "correct it")
-    return RawTable(form, names, first, max(width, len(names)), below, text, remarks)
-
-
-def _text_rows(form: FileForm, text: bytes) -> Rows:
+def text_rows(form: FileForm, text: bytes) -> Iterator[tuple[int, list[str]]]:
+    """Line and cells of every row of a file."""
     lines = io.TextIOWrapper(io.BytesIO(text), "utf-8", newline="")
     if form.delimiter == "space":
         yield from ((number, line.split()) for number, line in enumerate(lines, start=1))
@@ -199,40 +135,98 @@ def _text_rows(form: FileForm, text: bytes) -> Rows:
         line = reader.line_num + 1
 
 
-def _labview(
-    text: str, file: str, form: FileForm
-) -> tuple[FileForm, tuple[str, ...]] | InputProblem:
-    """The form that the header of an .lvm file tells.
+def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProblem:
+    """The table in a file's bytes, or why there is none.
+
+    Raises
+    ------
+    csv.Error
+        Where rows are no table.
+    """
+    remarks: tuple[str, ...] = ()
+    if data.startswith(b"PK"):
+        try:
+            text = _sheet(data, form)
+        except Exception as error:  # openpyxl raises whatever its parsers do
+            text = f"a workbook that is damaged ({type(error).__name__})", READ, "save it anew"
+        form = form.model_copy(update={"delimiter": "tab"})
+    else:
+        text = _decoded(data, form)
+    if isinstance(text, str) and text.startswith("LabVIEW Measurement"):
+        if "names_line" not in form.model_fields_set:
+            told = _labview(text)
+            if isinstance(told, tuple):
+                line, found = told
+                remedy = "give each segment its own file, with the file's header"
+                return InputProblem(file, line, None, found, "one segment", remedy)
+            form = form.model_copy(update=told)
+            remark = "its header tells the separator ({delimiter}) and a decimal {decimal}"
+            remarks = (remark.format(**told),)
+    if not isinstance(text, str):
+        return InputProblem(file, None, None, *text)
+    table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode(), remarks)
+    head = islice(text_rows(form, table.text), form.names_line)
+    names = next(([c.strip() for c in row] for line, row in head if line == form.names_line), [])
+    while names and not names[-1]:
+        names.pop()
+    if form.names_line and not names:
+        allowed = f"names of columns in line {form.names_line}"
+        found = "no such line, or an empty one"
+        return InputProblem(file, None, None, found, allowed, "correct it")
+    width = max([len(names), *(len(row) for _, row in islice(table.rows(), LOOKED_AT))])
+    return replace(table, names=names, width=width)
+
+
+def _decoded(data: bytes, form: FileForm) -> str | tuple[str, str, str]:
+    """The text of a file; else what was found, what is allowed, and what to do."""
+    foreign = next((what for start, what in FOREIGN.items() if data.startswith(start)), None)
+    if foreign is not None:
+        return foreign, READ, EXPORT
+    if form.sheet is not None:
+        return "a text without sheets", "a workbook (.xlsx)", "delete `form.sheet`, or name one"
+    of_yaml = "the encoding of the YAML"
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")) and form.encoding != "utf-16":
+        return "letters in UTF-16", of_yaml, "set `form: {encoding: utf-16}`"
+    try:
+        text = data.decode("utf-8-sig" if form.encoding == "utf-8" else form.encoding)
+    except UnicodeError:
+        remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
+        return f"letters that are not {form.encoding}", of_yaml, remedy
+    return ("a binary file", READ, EXPORT) if "\0" in text else text
+
+
+def _labview(text: str) -> dict[str, object] | tuple[int, str]:
+    """What the header of an .lvm file says of its form; line and words where it has segments.
 
     A header of the file, one of each segment, then the names of its columns (National
     Instruments, Specification for the LabVIEW Measurement File).
     """
-    headers = list(islice(_LVM_HEADER.finditer(text), 100))
-    starts = [text.count("\n", 0, one.start()) + 1 for one in headers]
-    if len(headers) != 2:
-        lines = ", ".join(map(str, starts[1:])) or "none"
-        found = f"{len(headers) - 1} segments, with headers in lines {lines}"
-        allowed, remedy = "one segment", "give each segment its own file, with the file's header"
-        return InputProblem(file, starts[2] if starts[2:] else None, None, found, allowed, remedy)
-    words = dict(re.findall(r"^(\w+)[\t,;](.*?)[\t,;]?\s*$", headers[0].group(), re.MULTILINE))
-    mark = "comma" if words.get("Separator") == "Comma" else "tab"
-    told = {"delimiter": mark, "names_line": text.count("\n", 0, headers[1].end()) + 2}
-    told["decimal"] = "comma" if words.get("Decimal_Separator") == "," else "point"
-    remark = f"its header tells the separator ({mark}) and a decimal {told['decimal']}"
-    return form.model_copy(update=told), (remark,)
+    ends = [one.start() for one in re.finditer(re.escape(LVM_END), text)]
+    if len(ends) != 2:
+        starts = []
+        for end in ends[1:3]:  # a header begins where lines that begin with a word do
+            above = reversed(text[:end].splitlines()[-60:])
+            size = len(list(takewhile(lambda one: one[:1].isalpha(), above)))
+            starts.append(text.count("\n", 0, end) + 1 - size)
+        found = f"{len(ends) - 1} segments, the first of which begin in lines {starts}"
+        return starts[-1] if starts else 1, found
+    words = dict(re.findall(r"^(\w+)[\t,](,|[^\t,\r\n]*)", text[: ends[0]], re.MULTILINE))
+    return {
+        "delimiter": "comma" if words.get("Separator") == "Comma" else "tab",
+        "decimal": "comma" if words.get("Decimal_Separator") == "," else "point",
+        "names_line": text.count("\n", 0, ends[1]) + 2,
+    }
 
 
-def _workbook(data: bytes, file: str, form: FileForm) -> RawTable | InputProblem:
-    """A sheet of a workbook; numbers in it are numbers, whatever the decimal sign on the screen."""
-    place = (file, None, None)
+def _sheet(data: bytes, form: FileForm) -> str | tuple[str, str, str]:
+    """A sheet of a workbook as text with tabs; numbers are numbers, however they look there."""
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         size = sum(one.file_size for one in packed.infolist())
         if "xl/workbook.xml" not in packed.namelist():
-            return InputProblem(*place, "a packed file that is no .xlsx", READ, EXPORT)
+            return "a packed file that is no .xlsx", READ, EXPORT
     if size > MOST_BYTES:  # before anything is unpacked
         found = f"a workbook of {size / 1e6:.0f} MB when unpacked"
-        allowed = f"at most {MOST_BYTES / 1e6:g} MB"
-        return InputProblem(*place, found, allowed, "export it as text, or split it")
+        return found, f"at most {MOST_BYTES / 1e6:g} MB", "export it as text, or split it"
     book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
     sheets = {one.title: one for one in book.worksheets}
     name = form.sheet
@@ -242,18 +236,15 @@ def _workbook(data: bytes, file: str, form: FileForm) -> RawTable | InputProblem
         (name,) = sheets
     if name not in sheets:
         found = "no sheet named" if form.sheet is None else f"no sheet {form.sheet!r}"
-        remedy = "add `sheet:` to `form`, in that of the file where files differ"
-        return InputProblem(*place, found, one_of(sheets), remedy)
-    sheet = sheets[name]
+        return found, one_of(sheets), "set `form: {sheet: …}`, for a file where they differ"
+    sheet, text = sheets[name], io.StringIO(newline="")
     sheet.reset_dimensions()  # programs write wrong ones
-
-    def rows() -> Rows:
-        cells = sheet.iter_rows(max_col=MOST_COLUMNS, max_row=MOST_ROWS, values_only=True)
-        for line, row in enumerate(cells, start=1):
-            used = next((n for n in range(len(row), 0, -1) if row[n - 1] is not None), 0)
-            yield line, [_cell_text(value, form.decimal) for value in row[:used]]
-
-    return _table(rows, file, form, None)
+    rows = sheet.iter_rows(max_col=MOST_COLUMNS, max_row=MOST_ROWS, values_only=True)
+    writer = csv.writer(text, delimiter="\t", lineterminator="\n")
+    for row in rows:
+        used = next((n for n in range(len(row), 0, -1) if row[n - 1] is not None), 0)
+        writer.writerow(_cell_text(value, form.decimal) for value in row[:used])
+    return text.getvalue()
 
 
 def _cell_text(value: object, decimal: str) -> str:
@@ -264,4 +255,4 @@ def _cell_text(value: object, decimal: str) -> str:
     if isinstance(value, timedelta):
         minutes, seconds = divmod(value.total_seconds(), 60)
         return f"{int(minutes // 60)}:{int(minutes % 60):02d}:{seconds:09.6f}"
-    return str(value)
+    return " ".join(str(value).split())  # one line each

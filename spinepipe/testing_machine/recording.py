@@ -188,7 +188,7 @@ def _numbers(
     """Lines, numbers by column, problems of cells that have none, and what is to be said."""
     clocks = [one.unit == "clock" for one, _ in there]
     places = [place for _, place in there]
-    plain = None if notation.thousands or any(clocks) else notation.decimal
+    plain = notation.thousands is None and not any(clocks)
     values = [clock_seconds if clock else notation.value for clock in clocks]
     lines, numbers = table.columns(places, values, plain)
     columns = {one.column: values for (one, _), values in zip(there, numbers, strict=True)}
