@@ -6,6 +6,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from glob import glob
 from itertools import islice
+from os.path import relpath
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -16,7 +17,8 @@ FIELDS = ("specimen", "test")
 MOST_LOOKED_AT = 5_000
 """Files among which the nearest names are sought."""
 
-_PARTS = re.compile(r"(\{\w*\}|\*\*/|\*|\?)")
+Fault = tuple[str, str, str]
+"""What was found, what is allowed, and what to do."""
 
 
 def with_files(
@@ -27,67 +29,57 @@ def with_files(
     Also the number of the item in the YAML for each of them, and problems: a pattern without a
     match, one that can be read in two ways, a file that two items name.
     """
+    entries = document.data.get("files")
+    if not isinstance(entries, list):
+        return document, (), []
     items: list[Any] = []
     numbers: list[int] = []
     problems: list[InputProblem] = []
-    of_file: dict[str, int] = {}
-    entries = document.data.get("files")
+    first: dict[str, int] = {}
     lines = {key: at for key, at in document.lines.items() if not key.startswith("files.")}
-    if not isinstance(entries, list):
-        return document, (), []
     for number, entry in enumerate(entries):
         key = f"files.{number}"
-        found: list[dict[str, str] | tuple[str, str, str]] = [{}]
-        if isinstance(entry, dict) and isinstance(pattern := entry.get("glob"), str):
-            told = [name for name in ("file", *FIELDS) if name in entry]
-            found = list(_matches(folder, pattern, told))
         own = [one for one in document.lines if one == key or one.startswith(f"{key}.")]
-        for one in found:
-            if isinstance(one, tuple):
-                place = (document.file, document.line_of(f"{key}.glob"), f"{key}.glob")
-                problems.append(InputProblem(*place, *one))
-                continue
-            if (file := one.get("file") or _file(entry)) in of_file and (
-                one or "glob" in entries[of_file[file]]
-            ):
-                place = (document.file, document.line_of(key), key)
-                what = f"{file}, which files.{of_file[file]} names too"
-                remedy = "narrow a pattern, or delete one of them"
-                problems.append(InputProblem(*place, what, "each file once", remedy))
-            of_file.setdefault(file, number)
+        made: list[Any] = [entry]
+        faults: list[Fault] = []
+        if isinstance(entry, dict) and isinstance(entry.get("glob"), str):
+            found = list(_matches(folder, entry["glob"], entry))
+            made = [{**entry, **one} for one in found if isinstance(one, dict)]
+            faults = [one for one in found if isinstance(one, tuple)]
+        for item in made:
+            file = item.get("file") if isinstance(item, dict) else None
+            other = first.setdefault(file, number) if isinstance(file, str) else number
+            if other != number and any("glob" in entries[one] for one in (other, number)):
+                found = f"{file}, which files.{other} names too"
+                faults.append((found, "each file once", "narrow a pattern, or delete one of them"))
             lines |= {f"files.{len(items)}{o[len(key) :]}": document.lines[o] for o in own}
-            items.append({**entry, **one} if one else entry)
+            items.append(item)
             numbers.append(number)
+        place = (document.file, document.line_of(f"{key}.glob"), key)
+        problems += [InputProblem(*place, *fault) for fault in faults]
     data = {**document.data, "files": items}
     return replace(document, data=data, lines=lines), tuple(numbers), problems
 
 
-def _file(entry: object) -> str:
-    return str(entry.get("file", "")) if isinstance(entry, dict) else ""
+def _matches(folder: Path, pattern: str, told: dict[str, Any]) -> Iterator[dict[str, str] | Fault]:
+    """`file` and what its name says, for each match in natural order.
 
-
-def _matches(
-    folder: Path, pattern: str, told: list[str]
-) -> Iterator[dict[str, str] | tuple[str, str, str]]:
-    """`file` and what its name says, for each match in natural order; else found, allowed, remedy.
-
-    ``told`` : keys that stand beside the pattern.
+    ``told`` : what stands beside the pattern.
     """
     fields = re.findall(r"\{(\w*)\}", pattern)
     for name in dict.fromkeys(fields):
         if name not in FIELDS:
             yield f"'{{{name}}}'", one_of(f"{{{one}}}" for one in FIELDS), "correct the pattern"
-    for name in told:
-        if name in ("file", *fields):
+    for name in ("file", *fields):
+        if name in told:
             yield f"`{name}` beside a pattern that tells it", "one of them", "delete one of them"
     star = re.sub(r"\{\w*\}", "*", pattern.replace("[", "[[]"))
     there = [PurePath(one).as_posix() for one in glob(star, root_dir=folder, recursive=True)]
     # each part as short, and as long as it can be: a name that gives both the same has one reading
-    shortest, longest = (_expression(pattern, lazy) for lazy in ("?", ""))
-    names = [one for one in there if (folder / one).is_file() and shortest.fullmatch(one)]
+    ways = [_expression(pattern, lazy) for lazy in ("?", "")]
+    names = [one for one in there if (folder / one).is_file() and ways[0].fullmatch(one)]
     for name in sorted(names, key=natural):
-        ways = [one.fullmatch(name) for one in (shortest, longest)]
-        read, other = (way.groupdict() if way else {} for way in ways)
+        read, other = (found.groupdict() for way in ways if (found := way.fullmatch(name)))
         if read != other:
             words = " or ".join(
                 ", ".join(f"{k} '{v}'" for k, v in one.items()) for one in (read, other)
@@ -98,13 +90,11 @@ def _matches(
     if not names:
         base = star.partition("*")[0].rpartition("/")[0]
         nearby = islice((folder / base).rglob("*"), MOST_LOOKED_AT)
-        files = [one.relative_to(folder).as_posix() for one in nearby if one.is_file()]
+        files = [PurePath(relpath(one, folder)).as_posix() for one in nearby if one.is_file()]
         near = get_close_matches(star, files, 3, 0.0)
-        allowed = f"the name of a file; nearest {one_of(near)}" if near else "the name of a file"
-        what = (
-            "correct the pattern" if near else f"no file is in '{base or folder.name}': look there"
-        )
-        yield "no file of this pattern", allowed, what
+        allowed = f"a file's name; the nearest are {', '.join(near)}" if near else "a file's name"
+        remedy = "correct the pattern" if near else f"no file is in '{base or folder.name}': look"
+        yield "no file of this pattern", allowed, remedy
 
 
 def natural(name: str) -> list[tuple[int, str]]:
@@ -114,14 +104,13 @@ def natural(name: str) -> list[tuple[int, str]]:
 
 
 def _expression(pattern: str, lazy: str) -> re.Pattern[str]:
+    known = {"*": f"[^/]*{lazy}", "?": "[^/]", "**/": f"(?:.*{lazy}/)?{lazy}"}
     text, met = "", set()
-    for part in _PARTS.split(pattern):
-        if part.startswith("{") and part.endswith("}"):
-            name = part[1:-1] or "_"
+    for part in re.split(r"(\{\w+\}|\*\*/|\*|\?)", pattern):
+        if re.fullmatch(r"\{\w+\}", part):
+            name = part[1:-1]
             text += f"(?P={name})" if name in met else f"(?P<{name}>[^/]+{lazy})"
             met.add(name)
-        elif part == "**/":
-            text += f"(?:.*/)?{lazy}"
         else:
-            text += {"*": f"[^/]*{lazy}", "?": "[^/]"}.get(part, re.escape(part))
+            text += known.get(part, re.escape(part))
     return re.compile(text)

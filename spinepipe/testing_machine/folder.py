@@ -14,7 +14,7 @@ from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.report.words import count
+from spinepipe.report.words import count, listed
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.file_patterns import with_files
 from spinepipe.testing_machine.load_steps import (
@@ -180,7 +180,8 @@ def _unit(one: Recording) -> str:
 
 def _header(tests: ImportedTests) -> str:
     mapping = tests.mapping
-    files = ", ".join(dict.fromkeys(of.file for of in mapping.files))
+    # a text of a YAML file has an end: of very many files the first
+    files = listed(dict.fromkeys(of.file for of in mapping.files), 50, None)
     rows = np.concatenate([cycle.rows for test in tests.tests for cycle in test.cycles])
     end = "" if mapping.source.rstrip().endswith(".") else "."
     source = (

@@ -6,6 +6,7 @@ What a file is, its first bytes say, not its name. All become text in UTF-8.
 import csv
 import io
 import re
+import warnings
 import zipfile
 from array import array
 from collections.abc import Callable, Iterator, Sequence
@@ -146,24 +147,25 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProble
     remarks: tuple[str, ...] = ()
     if data.startswith(b"PK"):
         try:
-            text = _sheet(data, form)
+            with warnings.catch_warnings(action="ignore"):  # of styles and the like
+                text = _sheet(data, form)
         except Exception as error:  # openpyxl raises whatever its parsers do
             text = f"a workbook that is damaged ({type(error).__name__})", READ, "save it anew"
         form = form.model_copy(update={"delimiter": "tab"})
     else:
         text = _decoded(data, form)
-    if isinstance(text, str) and text.startswith("LabVIEW Measurement"):
-        if "names_line" not in form.model_fields_set:
-            told = _labview(text)
-            if isinstance(told, tuple):
-                line, found = told
-                remedy = "give each segment its own file, with the file's header"
-                return InputProblem(file, line, None, found, "one segment", remedy)
-            form = form.model_copy(update=told)
-            remark = "its header tells the separator ({delimiter}) and a decimal {decimal}"
-            remarks = (remark.format(**told),)
     if not isinstance(text, str):
         return InputProblem(file, None, None, *text)
+    if text.startswith("LabVIEW Measurement") and "names_line" not in form.model_fields_set:
+        told = _labview(text)
+        if isinstance(told, tuple):
+            line, found = told
+            remedy = "give each segment its own file, with the file's header"
+            return InputProblem(file, line, None, found, "one segment", remedy)
+        form = form.model_copy(update=told)
+        remarks = (
+            f"the header tells the separator ({form.delimiter}) and a decimal {form.decimal}",
+        )
     table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode(), remarks)
     head = islice(text_rows(form, table.text), form.names_line)
     names = next(([c.strip() for c in row] for line, row in head if line == form.names_line), [])
@@ -187,12 +189,13 @@ def _decoded(data: bytes, form: FileForm) -> str | tuple[str, str, str]:
     of_yaml = "the encoding of the YAML"
     if data.startswith((b"\xff\xfe", b"\xfe\xff")) and form.encoding != "utf-16":
         return "letters in UTF-16", of_yaml, "set `form: {encoding: utf-16}`"
+    if form.encoding != "utf-16" and b"\0" in data:
+        return "a binary file", READ, EXPORT
     try:
-        text = data.decode("utf-8-sig" if form.encoding == "utf-8" else form.encoding)
+        return data.decode("utf-8-sig" if form.encoding == "utf-8" else form.encoding)
     except UnicodeError:
         remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
         return f"letters that are not {form.encoding}", of_yaml, remedy
-    return ("a binary file", READ, EXPORT) if "\0" in text else text
 
 
 def _labview(text: str) -> dict[str, object] | tuple[int, str]:

@@ -112,6 +112,13 @@ def _understood(
     placed = [_place(table, of.file, one.column, channels) for one in channels]
     problems = [one for one in placed if isinstance(one, InputProblem)]
     there = [(a, b) for a, b in zip(channels, placed, strict=True) if isinstance(b, int)]
+    for number, (channel, place) in enumerate(there):
+        if any(place == other for _, other in there[:number]):
+            found, allowed = f"column {place + 1}, which is told twice", "each column once"
+            remedy = "correct its name or number"
+            problems.append(
+                InputProblem(of.file, None, str(channel.column), found, allowed, remedy)
+            )
     notation = Notation(table.form.decimal, table.form.thousands)
     lines, numbers, faults, remarks = _numbers(table, of.file, there, notation, table.remarks)
     problems += faults
@@ -209,7 +216,7 @@ def _numbers(
     able = notations_of(cells())
     grouped = [one for one in able if one.decimal == notation.decimal and one.thousands]
     readings = [{one.value(cell) for one in able} for cell in first.values()]
-    if grouped != [notation] and grouped and all(len(one) == 1 for one in readings):
+    if grouped and notation.thousands is None and all(len(one) == 1 for one in readings):
         told = f"numbers have a {grouped[0].thousands} between thousands"
         return _numbers(table, file, there, grouped[0], (*remarks, told))
     problems = []

@@ -75,7 +75,9 @@ class TimeChannel(BaseModel):
     model_config = FORM
 
     column: _Column = Field(description="name or number of the column")
-    unit: TimeUnit = Field(description="unit of its numbers")
+    unit: TimeUnit = Field(
+        description="unit of its numbers; clock: times such as 12:34:56.7, with a date or without"
+    )
 
 
 class LoadChannel(BaseModel):

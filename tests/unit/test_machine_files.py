@@ -256,7 +256,7 @@ def test_labview_files_say_themselves_how_they_are_written(
 ) -> None:
     (found,) = read(tmp_path, labview(decimal, mark), time={"column": "X_Value", "unit": "s"})
     assert same(found)
-    assert "its header tells" in found.remarks[0]
+    assert "the header tells" in found.remarks[0]
 
 
 def test_labview_files_with_segments_are_refused_at_the_second(tmp_path: Path) -> None:
@@ -273,6 +273,11 @@ def test_a_name_that_stands_twice_is_refused_unless_by_number(tmp_path: Path) ->
     assert "the name 'Moment' in columns 2 and 3" in told
     assert "`column: 2` or 3" in told
     assert same(*read(tmp_path, twice, motion=motion, loads=[{**LOAD, "column": 2}]))
+
+
+def test_a_column_by_name_and_by_number_is_one_column(tmp_path: Path) -> None:
+    told = refused(tmp_path, text(), motion=[{**MOTION, "column": 2}])
+    assert "a.txt, 2: found column 2, which is told twice" in told
 
 
 @sweep(
@@ -419,7 +424,9 @@ def test_patterns_name_specimens_and_tests(tmp_path: Path) -> None:
     "files, says",
     [
         ([{"glob": "row/{specimen}_{test}.csv"}], "no file of this pattern"),
-        ([{"glob": "raw/{specimen}_{test}.cvs"}], "nearest one of raw/s0"),
+        ([{"glob": "/nowhere/{specimen}_{test}.csv"}], "no file is in '/nowhere': look"),
+        ([None, {"glob": 1}, 2, {"glob": "../{specimen}_{test}"}], "files.1.glob: found 1"),
+        ([{"glob": "raw/{specimen}_{test}.cvs"}], "the nearest are raw/s0"),
         ([{"glob": "raw/{specimen}_{test}.csv"}], "specimen 's01', test 'flexion_1' or specimen"),
         ([{"glob": "raw/{specimen}_*.csv"}], "files.0.test: found nothing: the key is missing"),
         ([{"glob": "raw/{name}_*.csv"}], "'{name}'; allowed: one of {specimen}, {test}"),
@@ -445,4 +452,4 @@ def test_faults_of_patterns(tmp_path: Path, files: list[dict[str, object]], says
     patterned(tmp_path, "s01_flexion_1.csv", "s02_flexion_1.csv")
     told = refused(tmp_path, text(), files=files)
     assert says in told
-    assert "files.2" not in told
+    assert "files.4" not in told
