@@ -50,8 +50,8 @@ def with_files(
             file = item.get("file") if isinstance(item, dict) else None
             other = first.setdefault(file, number) if isinstance(file, str) else number
             if other != number and any("glob" in entries[one] for one in (other, number)):
-                found = f"{file}, which files.{other} names too"
-                faults.append((found, "each file once", "narrow a pattern, or delete one of them"))
+                twice = f"{file}, which files.{other} names too"
+                faults.append((twice, "each file once", "narrow a pattern, or delete one of them"))
             lines |= {f"files.{len(items)}{o[len(key) :]}": document.lines[o] for o in own}
             items.append(item)
             numbers.append(number)

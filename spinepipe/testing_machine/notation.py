@@ -110,6 +110,8 @@ def remedy(cell: str, now: Notation, able: Sequence[Notation], time_unit: str) -
     if time_unit == "clock":
         is_number = any(one.pattern.fullmatch(cell) for one in NOTATIONS)
         return "set its `unit` to s, ms or min" if is_number else f"let the machine write {CLOCK}"
+    if now.pattern.fullmatch(cell):
+        return "correct it: no measured number is that large"
     if time_unit and not np.isnan(clock_seconds(cell)):
         return "set `time: {unit: clock}`: a clock time stands there"
     offered: Mapping[Notation, float] = {one: one.value(cell) for one in able if one != now}

@@ -162,10 +162,9 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProble
             line, found = told
             remedy = "give each segment its own file, with the file's header"
             return InputProblem(file, line, None, found, "one segment", remedy)
-        form = form.model_copy(update=told)
-        remarks = (
-            f"the header tells the separator ({form.delimiter}) and a decimal {form.decimal}",
-        )
+        own = form.model_fields_set  # what the YAML says counts more than a header that is wrong
+        form = form.model_copy(update={key: told[key] for key in told.keys() - own})
+        remarks = (f"its header is followed: separator {form.delimiter}, decimal {form.decimal}",)
     table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode(), remarks)
     head = islice(text_rows(form, table.text), form.names_line)
     names = next(([c.strip() for c in row] for line, row in head if line == form.names_line), [])

@@ -256,7 +256,14 @@ def test_labview_files_say_themselves_how_they_are_written(
 ) -> None:
     (found,) = read(tmp_path, labview(decimal, mark), time={"column": "X_Value", "unit": "s"})
     assert same(found)
-    assert "the header tells" in found.remarks[0]
+    assert "its header is followed" in found.remarks[0]
+
+
+def test_what_the_settings_say_counts_more_than_a_wrong_header(tmp_path: Path) -> None:
+    content = labview().replace("Decimal_Separator\t,", "Decimal_Separator\t.")
+    changes = {"time": {"column": "X_Value", "unit": "s"}}
+    assert "set `form: {decimal: comma}`" in refused(tmp_path, content, **changes)
+    assert same(*read(tmp_path, content, form={"decimal": "comma"}, **changes))
 
 
 def test_labview_files_with_segments_are_refused_at_the_second(tmp_path: Path) -> None:
@@ -319,6 +326,7 @@ def test_a_column_that_another_quantity_has_is_not_offered(tmp_path: Path) -> No
         ("NaN", {}, "'NaN' and 80 more such lines"),
         ("#N/A", {}, "no reading, and none is made up"),
         ("-", {}, "no reading, and none is made up"),
+        ("1e999", {}, "no measured number is that large"),
         ("1.5 N", {}, "take units out of the cells"),
         ("12,34", {"thousands": "comma"}, "set `form: {decimal: comma}`"),
     ],
