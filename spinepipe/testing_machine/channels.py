@@ -92,25 +92,24 @@ def mistyped(name: str, names: Iterable[str], otherwise: str) -> str:
     Words of three letters and numbers tell axes and sides (`LB`, `Mz`, `Force2`), and so do first
     and last letters: a name that differs there is another quantity, and is not offered.
     """
-    alike = [other for other in names if _slips(name, other)]
-    return f"did you mean '{alike[0]}'?" if len(alike) == 1 else otherwise
+    for other in names:
+        words = zip_longest(_words(name), _words(other), fillvalue="")
+        if all(
+            a == b
+            or (
+                min(len(a), len(b)) > 3
+                and (a[0], a[-1]) == (b[0], b[-1])
+                and SequenceMatcher(None, a, b).ratio() > 0.75
+            )
+            for a, b in words
+        ):
+            return f"did you mean '{other}'?"
+    return otherwise
 
 
-_WORD = re.compile(r"[^\W\d_]+|\d+")
-
-
-def _slips(name: str, other: str) -> bool:
-    pair = [_WORD.findall(re.sub("(?<=[a-z])(?=[A-Z])", " ", one)[:60]) for one in (name, other)]
-    words = [(a.lower(), b.lower()) for a, b in zip_longest(*pair, fillvalue="")]
-    return all(
-        a == b
-        or (
-            min(len(a), len(b)) > 3
-            and (a[0], a[-1]) == (b[0], b[-1])
-            and SequenceMatcher(None, a, b).ratio() > 0.75
-        )
-        for a, b in words
-    )
+def _words(name: str) -> list[str]:
+    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", name[:60])
+    return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", apart)]
 
 
 def factor_of(unit: str, positive: str) -> float:
