@@ -25,6 +25,7 @@ from benchmarks import (
     pages,
     parameters,
     real_geometry,
+    recordings,
     sensitivity,
     study,
     summary,
@@ -51,6 +52,7 @@ def main() -> None:
         "many_spines": many_spines_part,
         "memory": memory_part,
         "pages": lambda: print(*pages.opened(), sep="\n", flush=True),
+        "recordings": recordings_part,
         "sensitivity": sensitivity_parts,
         "real_geometry": lambda: real_geometry_part(options.cohort),
         "tracking": tracking_part,
@@ -273,6 +275,28 @@ def memory_part() -> None:
         lines.append(f"| {one.what} | {one.peak_mib:.0f} |")
         print(lines[-1], flush=True)
     _write("memory", lines, {"machine": about, "processes": rows})
+
+
+def recordings_part() -> None:
+    """Texts of a testing machine, from the start of the process to a recording."""
+    about = _about()
+    lines = _head("Reading a testing machine's text", about)
+    lines += [
+        "",
+        "The whole process, imports too. Goals: 10 s and 1 GB for 100 MB of plain numbers.",
+        "",
+        "| text | MB | rows | CPU s | wall s | MiB |",
+        "|---|---|---|---|---|---|",
+    ]
+    rows = []
+    for row in recordings.readings():
+        rows.append(asdict(row))
+        lines.append(
+            f"| {row.what} | {row.megabytes:.0f} | {row.rows:,} | {row.cpu_s:.1f} "
+            f"| {row.wall_s:.1f} | {row.peak_mib:.0f} |"
+        )
+        print(lines[-1], flush=True)
+    _write("recordings", lines, {"machine": about, "readings": rows})
 
 
 def sensitivity_parts() -> None:

@@ -56,6 +56,8 @@ def _problem(model: type[BaseModel], document: YamlDocument, detail: ErrorDetail
     allowed = _allowed(detail)
     expected = detail.get("ctx", {}).get("expected", "")
     remedy = f"correct it ({meaning})" if meaning else "correct it"
+    if detail["type"] == "string_type" and isinstance(detail["input"], int | float):
+        remedy = "put it in quotes, as it is written: without them YAML makes no text of it"
     if detail["type"] == "literal_error":
         remedy = did_you_mean(str(detail["input"]), _quoted(expected), remedy)
     return InputProblem(*place, _shown(detail["input"]), allowed, remedy)

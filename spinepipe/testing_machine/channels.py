@@ -4,8 +4,11 @@ Directions are told in the field's words. A moment or rotation towards flexion i
 about z, a force or translation to posterior a negative one along x: the axes of the cohort folder.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import SequenceMatcher
+from itertools import zip_longest
 from typing import Literal
 
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
@@ -15,7 +18,7 @@ LOAD_COLUMNS = ("fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm")
 
 LoadUnit = Literal["N", "kN", "N m", "N mm", "N cm", "Nm", "Nmm", "Ncm"]
 MotionUnit = Literal["deg", "rad", "mm", "um", "m"]
-TimeUnit = Literal["s", "ms", "min"]
+TimeUnit = Literal["s", "ms", "min", "clock"]
 
 Towards = Literal[
     "flexion",
@@ -32,7 +35,7 @@ Towards = Literal[
     "left",
 ]
 
-SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "min": 60.0}
+SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "min": 60.0, "clock": 1.0}
 
 FORCES: Mapping[str, float] = {"N": 1.0, "kN": 1e3}
 MOMENTS: Mapping[str, float] = {
@@ -81,6 +84,32 @@ DIRECTIONS: Mapping[str, Direction] = {
 def column_of(coordinate: str) -> str:
     """Column of ``motion.csv`` of a joint coordinate."""
     return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
+
+
+def mistyped(name: str, names: Iterable[str], otherwise: str) -> str:
+    """A remedy for an unknown column: the name that it is but for a slip of typing, if any.
+
+    Words of three letters and numbers tell axes and sides (`LB`, `Mz`, `Force2`), and so do first
+    and last letters: a name that differs there is another quantity, and is not offered.
+    """
+    for other in names:
+        words = zip_longest(_words(name), _words(other), fillvalue="")
+        if all(
+            a == b
+            or (
+                min(len(a), len(b)) > 3
+                and (a[0], a[-1]) == (b[0], b[-1])
+                and SequenceMatcher(None, a, b).ratio() > 0.75
+            )
+            for a, b in words
+        ):
+            return f"did you mean '{other}'?"
+    return otherwise
+
+
+def _words(name: str) -> list[str]:
+    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", name[:60])
+    return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", apart)]
 
 
 def factor_of(unit: str, positive: str) -> float:

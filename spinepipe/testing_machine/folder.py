@@ -1,7 +1,8 @@
 """A testing machine's files as the tables of a cohort, and in plain sentences what was done."""
 
+import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
-from spinepipe.problems import InputError
-from spinepipe.report.words import count
+from spinepipe.problems import InputError, InputProblem
+from spinepipe.report.words import count, listed
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
+from spinepipe.testing_machine.file_patterns import with_files
 from spinepipe.testing_machine.load_steps import (
     ReadingPrecision,
     ResampledTest,
@@ -69,10 +71,17 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
     InputError
         With every problem of the settings, else of all files, else of all tests.
     """
-    mapping, problems = validate(MachineMapping, document)
-    if mapping is not None:
-        problems += check_mapping(document, mapping)
-    if problems or mapping is None:
+    expanded, numbers, problems = with_files(folder, document)
+    mapping, faults = validate(MachineMapping, expanded)
+    if mapping is not None and not problems:
+        faults += check_mapping(expanded, mapping)
+    if problems or faults or mapping is None:
+        # items of `files` are told by their number in the YAML
+        for one in faults:
+            key = re.sub(
+                r"^files\.(\d+)", lambda at: f"files.{numbers[int(at[1])]}", one.column or ""
+            )
+            problems.append(replace(one, column=key or None))
         raise InputError(problems)
     recordings: dict[tuple[str, str], list[Recording]] = {}
     for of in mapping.files:
@@ -82,6 +91,10 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
             recordings.setdefault((of.specimen, of.test), []).append(recording)
     tests = []
     for group in recordings.values():
+        problems += _not_the_same(group)
+    if problems:
+        raise InputError(problems)
+    for group in recordings.values():
         test, faults = resample_test(group, mapping.steps, mapping.zeroed)
         problems += faults
         if test is not None:
@@ -90,6 +103,20 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
         raise InputError(problems)
     sures = [reading_precision(tests, unit, mapping.zeroed) for unit in ("_deg", "_mm")]
     return ImportedTests(mapping, tuple(tests), *sures)
+
+
+def _not_the_same(group: Sequence[Recording]) -> Iterator[InputProblem]:
+    """Repeats of a test with other quantities than the first of them."""
+    first, *others = (
+        [f"driven by {one.driving}", *one.loads, *(" ".join(place) for place in one.motion)]
+        + ["time"] * (one.time is not None)
+        for one in group
+    )
+    for one, names in zip(group[1:], others, strict=True):
+        if names != first:
+            allowed = f"{', '.join(first)}, as in {group[0].file}"
+            remedy = "give the test of this file another name, or correct its columns"
+            yield InputProblem(one.file, None, None, ", ".join(names), allowed, remedy)
 
 
 def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
@@ -136,6 +163,7 @@ def _of_test(test: ResampledTest) -> list[str]:
             f"runs from {found.low:.3g} to {found.high:.3g} {_unit(one)} and turns back "
             f"{count(found.reversals, 'time')}: {count(len(found.cycles), 'cycle')}, {kept} kept."
         )
+        lines += [f"  In this file, {remark}." for remark in one.remarks]
         lines += [f"  Cycle {number} is left out: {why}." for number, why in found.left_out]
     unit = _unit(test.recordings[0])
     lines.append(
@@ -152,7 +180,8 @@ def _unit(one: Recording) -> str:
 
 def _header(tests: ImportedTests) -> str:
     mapping = tests.mapping
-    files = ", ".join(dict.fromkeys(of.file for of in mapping.files))
+    # a text of a YAML file has an end: of very many files the first
+    files = listed(dict.fromkeys(of.file for of in mapping.files), 50, None)
     rows = np.concatenate([cycle.rows for test in tests.tests for cycle in test.cycles])
     end = "" if mapping.source.rstrip().endswith(".") else "."
     source = (

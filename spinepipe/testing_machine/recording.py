@@ -5,7 +5,6 @@ first of them, with how many more there are: a machine writes thousands of lines
 """
 
 import csv
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,21 +13,37 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import medfilt
 
-from spinepipe.documents.text import MOST_CSV_BYTES, NUMBER, read_bytes
-from spinepipe.problems import InputProblem, did_you_mean, one_of
+from spinepipe.documents.text import read_bytes
+from spinepipe.problems import InputProblem, one_of
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     SECONDS,
     column_of,
     factor_of,
+    mistyped,
 )
-from spinepipe.testing_machine.settings import FileForm, MachineMapping, TestFile
+from spinepipe.testing_machine.notation import (
+    Notation,
+    clock_seconds,
+    notations_of,
+    past_midnight,
+    remedy,
+)
+from spinepipe.testing_machine.raw_table import MOST_BYTES, RawTable, cell_at, open_table
+from spinepipe.testing_machine.settings import (
+    LoadChannel,
+    MachineMapping,
+    MotionChannel,
+    TestFile,
+    TimeChannel,
+)
 
 __all__ = ["Recording", "read_recording"]
 
 Array = NDArray[np.float64]
+Lines = NDArray[np.int64]
+Channel = TimeChannel | LoadChannel | MotionChannel
 
-MARKS = {"comma": ",", "semicolon": ";", "tab": "\t"}
 WINDOW = 5
 JUMP = 0.1
 """Share of the range of a column by which a row must jump away to be left out."""
@@ -50,6 +65,7 @@ class Recording:
     motion : (N,) by joint and column of ``motion.csv``.
     finest : smallest step between two readings of each motion, 0 where all are equal.
     spikes : rows left out, in which a reading jumps away from those before and behind.
+    remarks : what the file itself said of how it is written.
     """
 
     file: str
@@ -61,16 +77,7 @@ class Recording:
     motion: dict[tuple[str, str], Array]
     finest: dict[tuple[str, str], float]
     spikes: int
-
-
-@dataclass(frozen=True)
-class _Cells:
-    """Rows of text: ``names`` of the columns, empty without; ``lines`` of the rows."""
-
-    names: list[str]
-    lines: list[int]
-    rows: list[list[str]]
-    width: int
+    remarks: tuple[str, ...] = ()
 
 
 def read_recording(
@@ -81,164 +88,162 @@ def read_recording(
     if not path.is_file():
         allowed = "a file, told relative to the YAML"
         return None, [InputProblem(file, None, None, "no such file", allowed, "correct the path")]
-    data, problems = read_bytes(path, file, MOST_CSV_BYTES)
+    data, problems = read_bytes(path, file, MOST_BYTES)
     if problems:
         return None, problems
+    mapping = mapping.of_file(of)
     try:
-        encoding = mapping.form.encoding
-        text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
-    except UnicodeError:
-        remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
-        found = f"letters that are not {mapping.form.encoding}"
-        return None, [InputProblem(file, None, None, found, "the encoding of the YAML", remedy)]
-    try:
-        cells, problems = _cells(text, file, mapping.form)
+        table = open_table(data, file, mapping.form)
+        if isinstance(table, InputProblem):
+            return None, [table]
+        return _understood(table, of, mapping)
     except csv.Error as error:
-        found, allowed = f"no table ({error})", f"cells separated by a {mapping.form.delimiter}"
-        return None, [InputProblem(file, None, None, found, allowed, "look at `form.delimiter`")]
-    if cells is None:
-        return None, problems
-    return _understood(cells, of, mapping, problems)
-
-
-def _cells(text: str, file: str, form: FileForm) -> tuple[_Cells | None, list[InputProblem]]:
-    """Rows below the names; blank lines are skipped, empty cells at the end of a row too."""
-    first = form.first_line or form.names_line + 1
-    names: list[str] = []
-    lines, rows = [], []
-    for line, row in _rows(text, form):
-        while row and not row[-1]:
-            row.pop()
-        if line == form.names_line:
-            names = row
-        elif line >= first and row:
-            lines.append(line)
-            rows.append(row)
-    if form.names_line and not names:
-        allowed = f"names of columns in line {form.names_line}"
-        problem = InputProblem(
-            file, None, None, "no such line, or an empty one", allowed, "correct it"
-        )
-        return None, [problem]
-    if len(rows) < FEWEST_LINES:
-        found, allowed = f"{len(rows)} lines of numbers", f"at least {FEWEST_LINES}"
-        remedy = "look whether `form.first_line` is right"
-        return None, [InputProblem(file, first, None, found, allowed, remedy)]
-    return _Cells(names, lines, rows, max(map(len, rows))), []
-
-
-def _rows(text: str, form: FileForm) -> Iterator[tuple[int, list[str]]]:
-    if form.delimiter == "space":
-        yield from ((n, row.split()) for n, row in enumerate(text.splitlines(), start=1))
-        return
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=MARKS[form.delimiter])
-    line = 1
-    for row in reader:
-        yield line, [cell.strip() for cell in row]
-        line = reader.line_num + 1
+        found = f"no table ({error})"
+        remedy = "look at `form.delimiter`; open the file and save it anew"
+        return None, [InputProblem(file, None, None, found, "rows of cells", remedy)]
 
 
 def _understood(
-    cells: _Cells, of: TestFile, mapping: MachineMapping, problems: list[InputProblem]
+    table: RawTable, of: TestFile, mapping: MachineMapping
 ) -> tuple[Recording | None, list[InputProblem]]:
-    time = None
+    channels: list[Channel] = [*mapping.loads, *mapping.motion]
     if mapping.time is not None:
-        seconds = _column(cells, mapping.time.column, of.file, mapping.form, problems)
-        if seconds is not None:
-            time = (seconds - seconds[0]) * SECONDS[mapping.time.unit]
-            problems += _backwards(time, cells, of.file, str(mapping.time.column))
-    loads: dict[str, Array] = {}
-    for load in mapping.loads:
-        values = _column(cells, load.column, of.file, mapping.form, problems)
-        if values is not None:
-            factor = factor_of(load.unit, load.positive)
-            loads[DIRECTIONS[load.positive].load] = values * factor
-    motion: dict[tuple[str, str], Array] = {}
-    finest: dict[tuple[str, str], float] = {}
-    for channel in mapping.motion:
-        values = _column(cells, channel.column, of.file, mapping.form, problems)
-        if values is not None:
-            factor = factor_of(channel.unit, channel.positive)
-            place = (channel.joint, column_of(DIRECTIONS[channel.positive].coordinate))
-            motion[place] = values * factor
-            steps = np.diff(np.unique(motion[place]))  # between readings that differ
-            finest[place] = float(steps.min()) if steps.size else 0.0
+        channels.insert(0, mapping.time)
+    placed = [_place(table, of.file, one.column, channels) for one in channels]
+    problems = [one for one in placed if isinstance(one, InputProblem)]
+    there = [(a, b) for a, b in zip(channels, placed, strict=True) if isinstance(b, int)]
+    for number, (channel, place) in enumerate(there):
+        if any(place == other for _, other in there[:number]):
+            found, allowed = f"column {place + 1}, which is told twice", "each column once"
+            remedy = "correct its name or number"
+            problems.append(
+                InputProblem(of.file, None, str(channel.column), found, allowed, remedy)
+            )
+    notation = Notation(table.form.decimal, table.form.thousands)
+    lines, numbers, faults, remarks = _numbers(table, of.file, there, notation, table.remarks)
+    problems += faults
+    if len(lines) < FEWEST_LINES:
+        found, allowed = f"{len(lines)} lines of numbers", f"at least {FEWEST_LINES}"
+        remedy = "look whether `form.first_line` is right"
+        return None, [InputProblem(of.file, table.first, None, found, allowed, remedy)]
+    time = None
+    if mapping.time is not None and mapping.time.column in numbers:
+        time = numbers[mapping.time.column]
+        if mapping.time.unit == "clock":
+            time = past_midnight(time)
+        time = (time - time[0]) * SECONDS[mapping.time.unit]
+        problems = [*_backwards(time, lines, of.file, str(mapping.time.column)), *problems]
     if problems:
         return None, problems
-    driving = DIRECTIONS[mapping.driving(of).positive].load
+    loads = {
+        DIRECTIONS[one.positive].load: numbers[one.column] * factor_of(one.unit, one.positive)
+        for one in mapping.loads
+    }
+    motion = {
+        (one.joint, column_of(DIRECTIONS[one.positive].coordinate)): numbers[one.column]
+        * factor_of(one.unit, one.positive)
+        for one in mapping.motion
+    }
+    steps = {place: np.diff(np.unique(one)) for place, one in motion.items()}  # those that differ
     sound = ~np.any([_jumps(one) for one in (*loads.values(), *motion.values())], axis=0)
     whole = Recording(
         file=of.file,
         of=of,
-        lines=np.array(cells.lines)[sound],
+        lines=lines[sound],
         time=None if time is None else time[sound],
-        loads={name: values[sound] for name, values in loads.items()},
-        driving=driving,
-        motion={place: values[sound] for place, values in motion.items()},
-        finest=finest,
+        loads={name: values[sound] for name, values in sorted(loads.items())},
+        driving=DIRECTIONS[mapping.driving(of).positive].load,
+        motion={place: values[sound] for place, values in sorted(motion.items())},
+        finest={place: float(one.min()) if one.size else 0.0 for place, one in steps.items()},
         spikes=int(np.count_nonzero(~sound)),
+        remarks=remarks,
     )
     return whole, []
 
 
-def _column(
-    cells: _Cells, column: str | int, file: str, form: FileForm, problems: list[InputProblem]
-) -> Array | None:
-    """(N,) numbers of a column as written; None, with the problems added, where some are none."""
-    place = _place(cells, column)
-    if place is None:
-        known: Sequence[str] = cells.names or [str(n + 1) for n in range(cells.width)]
-        otherwise = "correct the name; look whether `form.names_line` is right"
-        if len(cells.names) == 1:
-            otherwise = f"is `form.delimiter` right? With {form.delimiter} the file has one column"
-        remedy = did_you_mean(str(column), known, otherwise)
-        line = form.names_line or None
-        problems.append(
-            InputProblem(file, line, str(column), "no such column", one_of(known), remedy)
+def _place(
+    table: RawTable, file: str, column: str | int, channels: Sequence[Channel]
+) -> int | InputProblem:
+    """Number from 0 of a column, or why there is none."""
+    line, names = table.form.names_line or None, table.names
+    if isinstance(column, int) and column <= table.width:
+        return column - 1
+    places = [number for number, name in enumerate(names, start=1) if name == column]
+    if len(places) == 1:
+        return places[0] - 1
+    if places:
+        numbers = " and ".join(map(str, places))
+        remedy = f"tell the number of the one that is meant: `column: {places[0]}` or {places[-1]}"
+        found = f"the name '{column}' in columns {numbers}"
+        return InputProblem(file, line, str(column), found, "each name once", remedy)
+    known: Sequence[str] = names or [str(n + 1) for n in range(table.width)]
+    remedy = "correct the name; look whether `form.names_line` is right"
+    if len(names) == 1:
+        remedy = f"is `form.delimiter` right? With {table.form.delimiter} the file has one column"
+    free = [name for name in names if name not in {one.column for one in channels}]
+    remedy = mistyped(str(column), free, remedy)
+    return InputProblem(file, line, str(column), "no such column", one_of(known), remedy)
+
+
+def _numbers(
+    table: RawTable,
+    file: str,
+    there: Sequence[tuple[Channel, int]],
+    notation: Notation,
+    remarks: tuple[str, ...] = (),
+) -> tuple[Lines, dict[str | int, Array], list[InputProblem], tuple[str, ...]]:
+    """Lines, numbers by column, problems of cells that have none, and what is to be said."""
+    clocks = [one.unit == "clock" for one, _ in there]
+    places = [place for _, place in there]
+    plain = notation.thousands is None and not any(clocks)
+    values = [clock_seconds if clock else notation.value for clock in clocks]
+    lines, numbers = table.columns(places, values, plain)
+    columns = {one.column: values for (one, _), values in zip(there, numbers, strict=True)}
+    bad = [np.flatnonzero(~np.isfinite(one)) for one in numbers]
+    if not any(one.size for one in bad):
+        return lines, columns, [], remarks
+    # once more through the rows: the first bad cell of each column, and how numbers are written
+    first = {(int(one[0]), at): "" for at, one in enumerate(bad) if one.size}
+
+    def cells() -> Iterator[str]:
+        for number, (_, row) in enumerate(table.rows()):
+            for at, place in enumerate(places):
+                if (number, at) in first:
+                    first[number, at] = cell_at(row, place)
+                if not clocks[at]:
+                    yield cell_at(row, place)
+
+    able = notations_of(cells())
+    grouped = [one for one in able if one.decimal == notation.decimal and one.thousands]
+    readings = [{one.value(cell) for one in able} for cell in first.values()]
+    if grouped and notation.thousands is None and all(len(one) == 1 for one in readings):
+        told = f"numbers have a {grouped[0].thousands} between thousands"
+        return _numbers(table, file, there, grouped[0], (*remarks, told))
+    problems = []
+    for (row, at), cell in first.items():
+        channel = there[at][0]
+        found = f"'{cell}'" if cell else "an empty cell"
+        if bad[at].size > 1:
+            found += f" and {bad[at].size - 1} more such lines"
+        allowed = f"a finite number with a decimal {notation.decimal} in every line"
+        if clocks[at]:
+            allowed = "a clock time in every line"
+        what = remedy(
+            cell, notation, able, channel.unit if isinstance(channel, TimeChannel) else ""
         )
-        return None
-    texts = [row[place] if place < len(row) else "" for row in cells.rows]
-    if form.decimal == "comma":
-        texts = [text.replace(",", ".") if "." not in text else "" for text in texts]
-    values = np.array([float(t) if NUMBER.fullmatch(t) else np.nan for t in texts])
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        problems.append(_no_numbers(cells, place, bad, file, str(column), form))
-        return None
-    return values
+        problems.append(
+            InputProblem(file, int(lines[row]), str(channel.column), found, allowed, what)
+        )
+    return lines, columns, problems, remarks
 
 
-def _place(cells: _Cells, column: str | int) -> int | None:
-    if isinstance(column, int):
-        return column - 1 if column <= cells.width else None
-    return cells.names.index(column) if column in cells.names else None
-
-
-def _no_numbers(
-    cells: _Cells, place: int, bad: NDArray[np.int64], file: str, column: str, form: FileForm
-) -> InputProblem:
-    row = cells.rows[int(bad[0])]
-    found = f"'{row[place]}'" if place < len(row) and row[place] else "an empty cell"
-    if bad.size > 1:
-        found += f" and {bad.size - 1} more such lines"
-    remedy = "correct the cells, or take the lines out"
-    if form.decimal == "point" and place < len(row) and "," in row[place]:
-        remedy = "set `form: {decimal: comma}` if the machine writes decimal commas"
-    elif form.decimal == "comma" and place < len(row) and "." in row[place]:
-        remedy = "set `form: {decimal: point}` if the machine writes decimal points"
-    allowed = f"a finite number with a decimal {form.decimal} in every line"
-    return InputProblem(file, cells.lines[int(bad[0])], column, found, allowed, remedy)
-
-
-def _backwards(time: Array, cells: _Cells, file: str, column: str) -> Iterator[InputProblem]:
+def _backwards(time: Array, lines: Lines, file: str, column: str) -> Iterator[InputProblem]:
     back = np.flatnonzero(np.diff(time) < 0)
     if back.size:
         more = f", {back.size} times in all" if back.size > 1 else ""
         found = f"a time before that of the line above{more}"
         remedy = "look for recordings put one below the other, and give each its own file"
-        yield InputProblem(
-            file, cells.lines[int(back[0]) + 1], column, found, "times that go on", remedy
-        )
+        yield InputProblem(file, int(lines[back[0] + 1]), column, found, "times that go on", remedy)
 
 
 def _jumps(values: Array) -> NDArray[np.bool_]:

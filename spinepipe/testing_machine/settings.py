@@ -1,7 +1,7 @@
 """The small YAML that says what the columns of a testing machine's files are."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
@@ -19,6 +19,7 @@ from spinepipe.testing_machine.channels import (
     MotionUnit,
     TimeUnit,
     Towards,
+    mistyped,
 )
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -40,12 +41,21 @@ class FileForm(BaseModel):
     decimal: Literal["point", "comma"] = Field(
         default="point", description="what separates whole numbers from decimals"
     )
+    thousands: Literal["point", "comma", "space", "apostrophe"] | None = Field(
+        default=None,
+        description="what stands between thousands; null: nothing, or what all numbers of a file "
+        "show beyond doubt",
+    )
+    sheet: _Column | None = Field(
+        default=None,
+        description="name or number of the sheet of a workbook; may be left out where it has one",
+    )
     names_line: int = Field(
         default=1,
         ge=0,
         le=10_000,
         description="line that holds the names of the columns, the first line is 1; 0: none does, "
-        "and columns are told by their number from 1",
+        "and columns are told by their number from 1; left out, an .lvm file tells it itself",
     )
     first_line: int | None = Field(
         default=None,
@@ -65,7 +75,9 @@ class TimeChannel(BaseModel):
     model_config = FORM
 
     column: _Column = Field(description="name or number of the column")
-    unit: TimeUnit = Field(description="unit of its numbers")
+    unit: TimeUnit = Field(
+        description="unit of its numbers; clock: times such as 12:34:56.7, with a date or without"
+    )
 
 
 class LoadChannel(BaseModel):
@@ -96,6 +108,11 @@ class TestFile(BaseModel):
     model_config = FORM
 
     file: _Text = Field(description="its path, relative to this YAML")
+    glob: _Text | None = Field(
+        default=None,
+        description="instead of `file`: a pattern of paths with *, ? and **/; {specimen} and "
+        "{test} in it tell these",
+    )
     specimen: _Text = Field(description="whose test it is")
     test: _Text = Field(description="name of the load case")
     driving: _Column | None = Field(
@@ -105,6 +122,14 @@ class TestFile(BaseModel):
     )
     preconditioning_cycles: int = Field(
         default=0, ge=0, le=1000, description="cycles at the beginning that are left out"
+    )
+    form: FileForm | None = Field(default=None, description="of this file, instead of the common")
+    time: TimeChannel | None = Field(default=None, description="instead of the common one")
+    loads: tuple[LoadChannel, ...] | None = Field(
+        default=None, strict=False, description="of this file, instead of all common ones"
+    )
+    motion: tuple[MotionChannel, ...] | None = Field(
+        default=None, strict=False, description="of this file, instead of all common ones"
     )
 
 
@@ -139,6 +164,10 @@ class LoadSteps(BaseModel):
         description="share of the range of the driving load by which it must turn back for a "
         "reversal to count",
     )
+
+
+OF_A_FILE = ("form", "time", "loads", "motion")
+"""Keys that a file may have of its own."""
 
 
 class MachineMapping(BaseModel):
@@ -176,8 +205,12 @@ class MachineMapping(BaseModel):
     )
     form: FileForm = Field(default_factory=FileForm, description="how the machine writes its files")
     time: TimeChannel | None = Field(default=None, description="the column of time")
-    loads: tuple[LoadChannel, ...] = Field(strict=False, description="columns of loads")
-    motion: tuple[MotionChannel, ...] = Field(strict=False, description="columns of motion")
+    loads: tuple[LoadChannel, ...] = Field(
+        default=(), strict=False, description="columns of loads; files may have their own"
+    )
+    motion: tuple[MotionChannel, ...] = Field(
+        default=(), strict=False, description="columns of motion; files may have their own"
+    )
     steps: LoadSteps = Field(default_factory=LoadSteps, description="load steps that are kept")
     files: tuple[TestFile, ...] = Field(strict=False, description="the files")
 
@@ -185,6 +218,11 @@ class MachineMapping(BaseModel):
     def loaded_vertebra(self) -> str:
         """Vertebra on which the load acts."""
         return self.loaded or self.vertebrae[-1]
+
+    def of_file(self, of: TestFile) -> "MachineMapping":
+        """The mapping with what a file says of itself in place of what is common."""
+        own = {key: getattr(of, key) for key in OF_A_FILE}
+        return self.model_copy(update={key: one for key, one in own.items() if one is not None})
 
     def driving(self, of: TestFile) -> LoadChannel:
         """The load that goes up and down in a file."""
@@ -197,13 +235,45 @@ def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
     """What is wrong with the keys taken together, each problem at its line."""
     yield from _fewest(document, mapping)
     yield from _names(document, mapping)
-    yield from _directions(document, mapping)
-    yield from _columns(document, mapping)
+    keys = {key: key for key in OF_A_FILE}
+    common = not mapping.files
+    for number, of in enumerate(mapping.files):
+        told = {key: f"files.{number}.{key}" for key in OF_A_FILE if getattr(of, key) is not None}
+        common |= not told
+        if told:
+            yield from _of_file(document, mapping.of_file(of), keys | told)
+    if common:
+        yield from _of_file(document, mapping, keys)
     yield from _driving(document, mapping)
+
+
+def _of_file(
+    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
+) -> Iterator[InputProblem]:
+    """What is wrong with form and columns of a file; `keys` tell where each of them stands."""
+    for key in ("loads", "motion"):
+        if not getattr(mapping, key):
+            yield _at(document, keys[key], "0 of them", "at least 1", "add what is missing")
+    joints = joint_names(mapping.vertebrae)
+    for number, channel in enumerate(mapping.motion):
+        if channel.joint not in joints:
+            remedy = did_you_mean(channel.joint, joints, "correct the joint or vertebrae")
+            key = f"{keys['motion']}.{number}.joint"
+            yield _at(document, key, f"'{channel.joint}'", one_of(joints), remedy)
+    forces = any(channel.unit in FORCES for channel in mapping.loads)
+    if forces and mapping.load_point_mm is None:
+        allowed = "a point, as there are forces and no masses that would tell one"
+        yield _at(document, "load_point_mm", "nothing", allowed, "add `load_point_mm: [x, y, z]`")
+    yield from _directions(document, mapping, keys)
+    yield from _columns(document, mapping, keys)
     form = mapping.form
     if form.first_line is not None and form.first_line <= form.names_line:
         allowed = f"a line below the names, which are in line {form.names_line}"
-        yield _at(document, "form.first_line", str(form.first_line), allowed, "correct one of them")
+        key = f"{keys['form']}.first_line"
+        yield _at(document, key, str(form.first_line), allowed, "correct one of them")
+    if form.thousands is not None and form.thousands in (form.decimal, form.delimiter):
+        key, allowed = f"{keys['form']}.thousands", "another sign than between decimals and cells"
+        yield _at(document, key, f"'{form.thousands}'", allowed, "correct one of them")
 
 
 def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str) -> InputProblem:
@@ -212,7 +282,7 @@ def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str)
 
 def _fewest(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """Lists that must not be empty (a rule of pydantic would speak up for their bad items too)."""
-    fewest = {"vertebrae": 2, "loads": 1, "motion": 1, "files": 1}
+    fewest = {"vertebrae": 2, "files": 1}
     for key, least in fewest.items():
         there = len(getattr(mapping, key))
         if there < least:
@@ -227,25 +297,17 @@ def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputPro
     if mapping.loaded is not None and mapping.loaded not in moving:
         remedy = did_you_mean(mapping.loaded, moving, "load a vertebra that moves")
         yield _at(document, "loaded", f"'{mapping.loaded}'", one_of(moving), remedy)
-    joints = joint_names(mapping.vertebrae)
-    for number, channel in enumerate(mapping.motion):
-        if channel.joint not in joints:
-            remedy = did_you_mean(channel.joint, joints, "correct the joint or vertebrae")
-            key = f"motion.{number}.joint"
-            yield _at(document, key, f"'{channel.joint}'", one_of(joints), remedy)
     for number, of in enumerate(mapping.files):
         if (fault := folder_fault(of.specimen)) is not None:
             key = f"files.{number}.specimen"
             yield _at(document, key, fault, ALLOWED_FOLDER, "rename the specimen")
         if (fault := name_fault(of.test)) is not None:
             yield _at(document, f"files.{number}.test", fault, ALLOWED, "rename the test")
-    forces = any(channel.unit in FORCES for channel in mapping.loads)
-    if forces and mapping.load_point_mm is None:
-        allowed = "a point, as there are forces and no masses that would tell one"
-        yield _at(document, "load_point_mm", "nothing", allowed, "add `load_point_mm: [x, y, z]`")
 
 
-def _directions(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+def _directions(
+    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
+) -> Iterator[InputProblem]:
     """A unit tells whether something turns or shifts; the direction must do so too."""
     sides: tuple[tuple[str, tuple[LoadChannel | MotionChannel, ...]], ...] = (
         ("loads", mapping.loads),
@@ -256,18 +318,21 @@ def _directions(document: YamlDocument, mapping: MachineMapping) -> Iterator[Inp
             turns = channel.unit in MOMENTS or channel.unit in ANGLES
             fit = tuple(word for word, one in DIRECTIONS.items() if one.turns == turns)
             if channel.positive not in fit:
-                key = f"{side}.{number}.positive"
+                key = f"{keys[side]}.{number}.positive"
                 found = f"'{channel.positive}' in {channel.unit}"
                 yield _at(document, key, found, one_of(fit), "correct the direction or the unit")
 
 
-def _columns(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+def _columns(
+    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
+) -> Iterator[InputProblem]:
     """Each column once, each quantity once; numbers only where there are no names."""
     named: list[tuple[str, _Text | int]] = []
     if mapping.time is not None:
-        named.append(("time.column", mapping.time.column))
-    named += [(f"loads.{n}.column", one.column) for n, one in enumerate(mapping.loads)]
-    named += [(f"motion.{n}.column", one.column) for n, one in enumerate(mapping.motion)]
+        named.append((f"{keys['time']}.column", mapping.time.column))
+    loads, motion = keys["loads"], keys["motion"]
+    named += [(f"{loads}.{n}.column", one.column) for n, one in enumerate(mapping.loads)]
+    named += [(f"{motion}.{n}.column", one.column) for n, one in enumerate(mapping.motion)]
     times = Counter(column for _, column in named)
     for key, column in named:
         if times[column] > 1:
@@ -276,11 +341,11 @@ def _columns(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputP
             allowed = "a number from 1, as names_line is 0"
             yield _at(document, key, f"'{column}'", allowed, "tell the column's number")
     meant: list[tuple[str, tuple[str, ...]]] = [
-        (f"loads.{n}.positive", (DIRECTIONS[one.positive].load,))
+        (f"{loads}.{n}.positive", (DIRECTIONS[one.positive].load,))
         for n, one in enumerate(mapping.loads)
     ]
     meant += [
-        (f"motion.{n}.positive", (one.joint, DIRECTIONS[one.positive].coordinate))
+        (f"{motion}.{n}.positive", (one.joint, DIRECTIONS[one.positive].coordinate))
         for n, one in enumerate(mapping.motion)
     ]
     again = Counter(quantity for _, quantity in meant)
@@ -291,8 +356,8 @@ def _columns(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputP
 
 
 def _driving(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
-    columns = [channel.column for channel in mapping.loads]
     for number, of in enumerate(mapping.files):
+        columns = [channel.column for channel in mapping.of_file(of).loads]
         key = f"files.{number}.driving"
         if of.driving is None and len(columns) > 1:
             remedy = "add `driving:`, the load that goes up and down"
@@ -300,5 +365,5 @@ def _driving(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputP
                 document, key, "nothing: the key is missing", one_of(map(str, columns)), remedy
             )
         elif of.driving is not None and of.driving not in columns:
-            remedy = did_you_mean(str(of.driving), map(str, columns), "name a column of loads")
+            remedy = mistyped(str(of.driving), map(str, columns), "name a column of loads")
             yield _at(document, key, f"'{of.driving}'", one_of(map(str, columns)), remedy)
