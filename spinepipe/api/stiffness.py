@@ -13,7 +13,7 @@ from spinepipe.api.study import NAME, Say, model_path, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, read_model
 from spinepipe.progress import silent
-from spinepipe.status import USABLE
+from spinepipe.status import NOT_FITTED, USABLE
 from spinepipe.studies.base_model import BUSHING
 from spinepipe.studies.cohort_stiffness.fit import fitted
 from spinepipe.studies.cohort_stiffness.left_out import predicted_by_others
@@ -32,11 +32,13 @@ from spinepipe.studies.cohort_stiffness.settings import (
     load_sets,
     tests_of,
 )
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, PREDICTED_STIFFNESS, STIFFNESS
 from spinepipe.units import STIFFNESS_COLUMNS
 
 Row = dict[str, Any]
 Rows = dict[str, list[Row]]
+
+_TABLES = (STIFFNESS, PREDICTED_STIFFNESS, FITS, ERRORS)
 
 Representation = Literal["per_specimen", "level_ratio", "per_joint", "partially_pooled"]
 
@@ -50,11 +52,13 @@ class Stiffness(Result):
     table : a row per specimen, joint and fitted coordinate: ``stiffness`` with ``low`` and ``high``
         (95 % region), ``identifiable``, ``at_bound``, ``status``. Fitted to all tests.
     quality : a row per specimen and what it was fitted to: readings, cost, optima, status.
-    stiffness, errors : all fits and predictions, as the tables of the same names of a run.
+    stiffness, predicted_stiffness, errors : all fits, what the others predict of each specimen, and
+        errors of both, as the tables of the same names of a run.
     model : the fitted model, of the specimens that have a fit.
     """
 
     stiffness: pd.DataFrame
+    predicted_stiffness: pd.DataFrame
     errors: pd.DataFrame
     model: ModelFile
     cohort: Cohort
@@ -127,16 +131,17 @@ def calibrate(
         study = study_of(CohortStiffness, cohort, asked)
         file = None if path is None else read_model(path)
     rows = _rows(study, cohort, stiffness, leave_out, file, say)
-    every = {one.name: frame(one, rows[one.name]) for one in (STIFFNESS, FITS, ERRORS)}
+    every = {one.name: frame(one, rows[one.name]) for one in _TABLES}
     label = joint_label(tests_of(study, cohort))
     own = every["stiffness"]
-    own = own[(own["fitted_to"] == label) & (own["source"] == "own")].reset_index(drop=True)
+    own = own[own["fitted_to"] == label].reset_index(drop=True)
     fits = every["fits"]
     return Stiffness(
         headline=_headline(own),
         table=own,
         quality=fits[fits["fitted_to"] == label].reset_index(drop=True),
         stiffness=every["stiffness"],
+        predicted_stiffness=every["predicted_stiffness"],
         errors=every["errors"],
         model=_model(study, cohort, stiffness, own, file),
         cohort=cohort,
@@ -155,11 +160,13 @@ def _rows(
     tests = tests_of(study, cohort)
     whole = joint_label(tests)
     labels = load_sets(study, tests) if leave_out == "test" else (whole,)
-    found: Rows = {one.name: [] for one in (STIFFNESS, FITS, ERRORS)}
+    found: Rows = {one.name: [] for one in _TABLES}
 
     def add(rows: Mapping[str, list[Row]], **where: str) -> None:
-        for table, own in found.items():
-            own += [{**where, **row} for row in rows.get(table, ())]
+        for table, own in rows.items():
+            for row in own if table in found else ():
+                others = table == STIFFNESS.name and row["source"] != "own"
+                found[PREDICTED_STIFFNESS.name if others else table].append({**where, **row})
 
     newcomers = cohort.specimen_names if leave_out == "specimen" else ()
     if name in POOLED:
@@ -221,6 +228,6 @@ def _model(
 
 def _headline(own: pd.DataFrame) -> str:
     """How many stiffnesses are identifiable, and of how many specimens."""
-    known, every = int(own["identifiable"].fillna(False).astype(bool).sum()), len(own)
+    known, every = int(own["identifiable"].eq(True).sum()), int((own["status"] != NOT_FITTED).sum())
     specimens = own["specimen"].nunique()
     return f"{known} of {every} stiffnesses of {specimens} specimens are identifiable."

@@ -65,7 +65,7 @@ def conclusions(
     stiffness, fits, signs = (table(name) for name in ("stiffness", "fits", "sign_checks"))
     values = joint_values(stiffness)
     scatter = _scatter(fits, values)
-    yield from stiffness_conclusions(values)
+    yield from stiffness_conclusions(values, study.free)
     yield from _trust(study, signs, values, scatter)
     needed = numbers_from("cohort: specimens", n=specimens, needed=FEWEST)
     words = {"specimens": count(specimens, "specimen")}

@@ -26,7 +26,7 @@ from spinepipe.experiment.loop import Loop, RotationErrors, reading_noise
 from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.status import USABLE, Status, joined
+from spinepipe.status import NOT_FITTED, USABLE, Status, joined
 from spinepipe.studies.cohort_stiffness.loop_rows import (
     TWO_ZEROS,
     LoopReading,
@@ -220,8 +220,9 @@ def _simulation(
     """The fitted model under all tests, or why there is none."""
     if representation is None or frame is None or not tests.tested:
         return None, NO_FIT
-    if not frame["status"].isin(USABLE).all() or frame["stiffness"].isna().any():
+    if not frame["status"].isin([*USABLE, NOT_FITTED]).all() or frame["stiffness"].isna().all():
         return None, joined("the fit has no stiffness", str(frame["message"].iloc[0]))
+    frame = frame[frame["stiffness"].notna()]  # others keep the value that fits start from
     start = start_stiffness(settings, cohort, representation)
     k, bound = _fitted(cohort, start, frame)
     motion = predict_motion(cohort, specimen, tests.frames, tests.tested, k, others)

@@ -1,10 +1,11 @@
 """The model of a specimen with its fitted stiffness, as `spinepipe export` writes it."""
 
+import pandas as pd
+
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
-from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError, one_of
-from spinepipe.status import USABLE
+from spinepipe.status import NOT_FITTED, USABLE
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
     base_of,
@@ -50,7 +51,10 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     k = start_stiffness(study, cohort, name)
     told = "start of the study" if wanted.start else f"fitted, {IN_WORDS[name]}{why}"
     if not wanted.start:
-        k = _fitted(study, cohort, wanted, name, k)
+        rows = _fitted(study, cohort, wanted, name)
+        k = with_stiffness(k, cohort.joint_names, rows.dropna(subset="stiffness"))
+        kept = int(rows["stiffness"].isna().sum())
+        told += f" ({kept} of {len(rows)} as published: no reading tells of them)" * bool(kept)
     if name in STIFFENING and not wanted.start:
         told += ", at rest: that it grows with motion is not in the file"
     others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
@@ -72,10 +76,8 @@ def _recommended(wanted: WantedFiles, known: tuple[str, ...]) -> tuple[str, str]
     return known[-1], ""
 
 
-def _fitted(
-    study: CohortStiffness, cohort: Cohort, wanted: WantedFiles, name: str, start: Array
-) -> Array:
-    """(J, 6) the specimen's own fit to all its load cases, not fitted coordinates as at the start.
+def _fitted(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles, name: str) -> pd.DataFrame:
+    """Rows of the specimen's own fit to all its load cases.
 
     Raises
     ------
@@ -91,10 +93,10 @@ def _fitted(
         & (rows["fitted_to"] == (ALL if len(tests) > 1 else tests[0]))
     ]
     fitted = own[own["status"].isin(USABLE) & own["stiffness"].notna()]
-    if fitted.empty or len(fitted) < len(own):
+    if fitted.empty or len(fitted) + (own["status"] == NOT_FITTED).sum() < len(own):
         messages = [str(text) for text in own["message"].unique() if text]
         why = f": {'; '.join(messages)}" if messages else ""
         found = f"no fit of {wanted.specimen} by {name}{why}"
         remedy = "choose another --representation, or add --start"
         raise InputError([problem("SPECIMEN", found, "a specimen that was fitted", remedy)])
-    return with_stiffness(start, cohort.joint_names, fitted)
+    return own
