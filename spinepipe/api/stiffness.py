@@ -5,18 +5,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
 
 from spinepipe.api.result import Result, frame
 from spinepipe.api.simulation import simulate
 from spinepipe.api.study import NAME, Say, model_path, study_of
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import joint_frames
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, read_model
 from spinepipe.progress import silent
 from spinepipe.status import NOT_FITTED, USABLE
 from spinepipe.studies.base_model import BUSHING
 from spinepipe.studies.cohort_stiffness.fit import fitted
 from spinepipe.studies.cohort_stiffness.left_out import predicted_by_others
+from spinepipe.studies.cohort_stiffness.point_matrix import Axes, matrix_table
 from spinepipe.studies.cohort_stiffness.pool import pooled
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
@@ -67,6 +70,35 @@ class Stiffness(Result):
     def predicted(self) -> pd.DataFrame:
         """Motion under all loads of the cohort, see `spinepipe.simulate`."""
         return simulate(self.model, self.cohort)
+
+    def stiffness_matrix(
+        self,
+        point_mm: Sequence[float] = (0.0, 0.0, 0.0),
+        joint: str | None = None,
+        axes: Axes = "joint",
+    ) -> pd.DataFrame:
+        """The 6 x 6 stiffness and compliance of joints about a point, an entry a row.
+
+        ``low`` and ``high`` end 95 % intervals; what is not known is NaN. At rest, without load.
+
+        Parameters
+        ----------
+        point_mm : from the joint's origin along its axes; with ``axes="ground"`` in ground.
+        joint : which one; None for all.
+        """
+        found = []
+        for specimen, rows in self.table.groupby("specimen", sort=False):
+            given = [one for one in self.model.effects[0].values if one.specimen == specimen]
+            if given:
+                k = np.array(
+                    [[one.parameters[name] for name in STIFFNESS_COLUMNS] for one in given]
+                )
+                frames = joint_frames(self.cohort, str(specimen))
+                names = self.cohort.joint_names
+                one = matrix_table(rows, k, names, frames, point_mm, axes)
+                found.append(one.assign(specimen=specimen))
+        every = pd.concat(found, ignore_index=True)
+        return every if joint is None else every[every["joint"] == joint].reset_index(drop=True)
 
     @property
     def left_out(self) -> pd.DataFrame:

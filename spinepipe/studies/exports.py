@@ -9,12 +9,18 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.kind import WantedFiles
 
 
-def refuse(wanted: WantedFiles, *, poses: bool = False, representations: bool = False) -> None:
+def refuse(
+    wanted: WantedFiles,
+    *,
+    poses: bool = False,
+    representations: bool = False,
+    matrices: bool = False,
+) -> None:
     """Refuse what a kind of study does not have.
 
     Parameters
     ----------
-    poses, representations : whether it has them.
+    poses, representations, matrices : whether it has them.
 
     Raises
     ------
@@ -22,6 +28,9 @@ def refuse(wanted: WantedFiles, *, poses: bool = False, representations: bool = 
         With every such option.
     """
     problems = list(_options(wanted, poses, representations))
+    if wanted.point_mm is not None and not matrices:
+        allowed = "none: only studies of kind cohort_stiffness tell the matrix of each joint"
+        problems.append(problem("--matrix", str(wanted.point_mm), allowed, "leave it out"))
     if problems:
         raise InputError(problems)
 

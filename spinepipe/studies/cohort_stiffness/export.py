@@ -6,6 +6,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
 from spinepipe.problems import InputError, one_of
 from spinepipe.status import NOT_FITTED, USABLE
+from spinepipe.studies.cohort_stiffness.point_matrix import matrix_table
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
     base_of,
@@ -20,6 +21,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     representations_of,
     tests_of,
 )
+from spinepipe.studies.cohort_stiffness.tables import STIFFNESS
 from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.tables import read_frame
@@ -29,7 +31,7 @@ CRITERIA = ("left_out_specimen", "left_out_case", "fitted")
 
 
 def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
-    """OpenSim's document of the model, and in words which stiffness it has.
+    """OpenSim's document of the model, or its matrices as CSV; in words which stiffness it has.
 
     Coordinates that were not fitted keep the published value.
 
@@ -38,7 +40,7 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     InputError
         Where the study has no such representation, no results, or no fit of the specimen.
     """
-    refuse(wanted, representations=True)
+    refuse(wanted, representations=True, matrices=True)
     every = representations_of(study, cohort.joint_names)
     known = tuple(one for one in every if one not in NUISANCE)  # the file has joints as stated
     name = wanted.representation
@@ -57,8 +59,13 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
         told += f" ({kept} of {len(rows)} as published: no reading tells of them)" * bool(kept)
     if name in STIFFENING and not wanted.start:
         told += ", at rest: that it grows with motion is not in the file"
-    others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
     frames = joint_frames(cohort, wanted.specimen)
+    if wanted.point_mm is not None:
+        rows = pd.DataFrame(columns=STIFFNESS.names) if wanted.start else rows
+        table = matrix_table(rows, k, cohort.joint_names, frames, wanted.point_mm, wanted.axes)
+        where = f"({', '.join(f'{one:g}' for one in wanted.point_mm)}) mm in {wanted.axes} axes"
+        return table.to_csv(index=False), f"6 x 6 stiffness of each joint about {where}, {told}"
+    others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)
     return opensim_document(model, f"the cohort's own joints, stiffness: {told}")
 

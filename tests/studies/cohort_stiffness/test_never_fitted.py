@@ -107,7 +107,7 @@ def test_the_rest_of_the_house_reads_the_empty_rows(tmp_path: Path) -> None:
     assert set(fit.predicted_stiffness["source"]) == {"others_median"}
     assert_empty(fit.predicted_stiffness, [MOMENT_OF[BENT][2]])
     (bushing,) = fit.model.effects
-    assert {one.model_extra["extension_nm_per_rad"] for one in bushing.values} == {51.0}
+    assert {one.parameters["extension_nm_per_rad"] for one in bushing.values} == {51.0}
 
 
 def test_no_table_of_fits_holds_where_they_start(project: Written) -> None:
