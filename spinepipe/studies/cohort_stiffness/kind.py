@@ -261,7 +261,8 @@ def _simulated_fit(expected: Any, place: Mapping[str, str]) -> list[str]:
     return [expected.of_part("stiffness", file) for file in files]
 
 
-_HELD_OUT = ("representations", "cross_validation", "covariates", "significance")
+_CURVES = ("neutral_zone", "neutral_zone_below_nm_per_deg")
+_HELD_OUT = ("representations", "cross_validation", "covariates", "significance", *_CURVES)
 _FITTING = ("seed", "steps", "cost", "measurement_sd", "bound_factor", "starts")
 """Settings by what they decide: what is held out and compared, and how stiffness is fitted."""
 

@@ -4,6 +4,8 @@ What would be caught: where fits start told as if it had been fitted, in whateve
 or page; a prediction that takes another value there than the published one.
 """
 
+from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +101,13 @@ def test_the_rest_of_the_house_reads_the_empty_rows(tmp_path: Path) -> None:
     document, words = exported(settings, cohort, wanted)
     assert "291" in document
     assert "6 of 9 as published" in words
+    csv, words = exported(settings, cohort, replace(wanted, point_mm=(0.0, 10.0, 0.0)))
+    told = pd.read_csv(StringIO(csv)).query("joint == 'L4L5' and row == column").set_index("row")
+    assert told["stiffness"].notna().to_dict() == {
+        **dict.fromkeys(("anterior", "superior", "right", "right_bending"), True),
+        **dict.fromkeys(("left_rotation", "extension"), False),
+    }
+    assert "about (0, 10, 0) mm in joint axes" in words
 
     fit = sp.calibrate(cohort, stiffness="per_joint", leave_out="specimen")
     assert fit.headline.startswith("9 of 9 stiffnesses")

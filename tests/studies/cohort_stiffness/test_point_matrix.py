@@ -175,12 +175,10 @@ def test_opensim_holds_a_bushing_so() -> None:
             system.realizeDynamics(state)
             told = bushing.getRecordValues(state)
             names = bushing.getRecordLabels()
-            print([names.get(n) for n in range(names.getSize())])
             at = [number for number in range(names.getSize()) if ".upper" in names.get(number)]
             values = np.array([told.get(number) for number in at])
-            force, moment = values[:3], values[3:6]  # on the body, at its origin, in ground
-            there = shift  # the body's origin in ground
-            wrenches.append(np.concatenate([force, moment + np.cross(there - point, force)]))
+            force, moment = values[:3], values[3:6]  # on the body, at its origin, in ground: shift
+            wrenches.append(np.concatenate([force, moment + np.cross(shift - point, force)]))
         found[:, column] = -(wrenches[0] - wrenches[1]) / (2.0 * step)
     rows = fitted({name: (k, k, k) for name, k in zip(COORDINATES, K, strict=True)})
     ours = matrix_table(rows, K[None], ["J"], [FRAME], POINT_MM, "ground")
