@@ -86,17 +86,14 @@ class Stiffness(Result):
         point_mm : from the joint's origin along its axes; with ``axes="ground"`` in ground.
         joint : which one; None for all.
         """
-        found = []
-        for specimen, rows in self.table.groupby("specimen", sort=False):
-            given = [one for one in self.model.effects[0].values if one.specimen == specimen]
-            if given:
-                k = np.array(
-                    [[one.parameters[name] for name in STIFFNESS_COLUMNS] for one in given]
-                )
-                frames = joint_frames(self.cohort, str(specimen))
-                names = self.cohort.joint_names
-                one = matrix_table(rows, k, names, frames, point_mm, axes)
-                found.append(one.assign(specimen=specimen))
+        found, names = [pd.DataFrame(columns=["joint"])], self.cohort.joint_names
+        for specimen in dict.fromkeys(one.specimen for one in self.model.effects[0].values):
+            rows = self.table[self.table["specimen"] == specimen]
+            given = (one for one in self.model.effects[0].values if one.specimen == specimen)
+            k = np.array([[one.parameters[c] for c in STIFFNESS_COLUMNS] for one in given])
+            frames = joint_frames(self.cohort, specimen)
+            one = matrix_table(rows, k, names, frames, point_mm, axes)
+            found.append(one.assign(specimen=specimen))
         every = pd.concat(found, ignore_index=True)
         return every if joint is None else every[every["joint"] == joint].reset_index(drop=True)
 

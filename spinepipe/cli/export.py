@@ -37,14 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs=3,
         metavar=("X", "Y", "Z"),
-        help="in place of the model, the 6 x 6 stiffness of each joint about this point (mm from "
-        "the joint's origin), as CSV",
-    )
-    parser.add_argument(
-        "--axes",
-        choices=("joint", "ground"),
-        default="joint",
-        help="of --matrix: axes of point, force and moment (default: each joint's own)",
+        help="as CSV the 6 x 6 stiffness of each joint about this point (mm, along its axes)",
     )
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="file to write"
@@ -72,7 +65,6 @@ def run(options: argparse.Namespace) -> int:
         start=options.start,
         representation=options.representation,
         point_mm=None if options.matrix is None else tuple(options.matrix),
-        axes=options.axes,
     )
     module, _, function = kind.exports.partition(":")
     exported = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)

@@ -8,7 +8,7 @@ digest of a job follows its own file alone.
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.form import TableForm
@@ -86,8 +86,7 @@ class WantedFiles:
     pose : number of a sampled joint pose; None for the cohort's own.
     start : whether with the stiffness where fits start, and not with a fitted one.
     representation : of stiffness, by name; None for the one that the study's results recommend.
-    point_mm, axes : where the stiffness matrix of each joint is told, and along which axes; None
-        for OpenSim's document.
+    point_mm : from each joint's origin, where its matrix is told; None for OpenSim's file.
     """
 
     root: Path
@@ -97,7 +96,6 @@ class WantedFiles:
     start: bool = False
     representation: str | None = None
     point_mm: tuple[float, float, float] | None = None
-    axes: Literal["joint", "ground"] = "joint"
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     InputError
         Where the study has no such representation, no results, or no fit of the specimen.
     """
-    refuse(wanted, representations=True, matrices=True)
+    refuse(wanted, "representation", "point_mm")
     every = representations_of(study, cohort.joint_names)
     known = tuple(one for one in every if one not in NUISANCE)  # the file has joints as stated
     name = wanted.representation
@@ -62,8 +62,8 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     frames = joint_frames(cohort, wanted.specimen)
     if wanted.point_mm is not None:
         rows = pd.DataFrame(columns=STIFFNESS.names) if wanted.start else rows
-        table = matrix_table(rows, k, cohort.joint_names, frames, wanted.point_mm, wanted.axes)
-        where = f"({', '.join(f'{one:g}' for one in wanted.point_mm)}) mm in {wanted.axes} axes"
+        table = matrix_table(rows, k, cohort.joint_names, frames, wanted.point_mm)
+        where = "({:g}, {:g}, {:g}) mm from its origin".format(*wanted.point_mm)
         return table.to_csv(index=False), f"6 x 6 stiffness of each joint about {where}, {told}"
     others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)

@@ -32,13 +32,7 @@ PREDICTED = "predicted_stiffness"
 """Stiffness of left-out specimens, of job files whose rows are those of ``stiffness``."""
 
 OF_JOBS = (
-    "stiffness",
-    PREDICTED,
-    "errors",
-    "fits",
-    "nuisances",
-    "sign_checks",
-    "pooling",
+    *("stiffness", PREDICTED, "errors", "fits", "nuisances", "sign_checks", "pooling"),
     *OF_EXPERIMENTS,
 )
 """Tables joined from job files."""
@@ -137,19 +131,10 @@ class CohortLayout(StudyFiles):
         pooled = ("pooling",) if self._pooled else ()
         nuisances = ("nuisances",) if self._with_nuisances else ()
         predicted = (PREDICTED,) if self._held_out else ()
-        own = (
-            "stiffness",
-            *predicted,
-            "fits",
-            "errors",
-            *nuisances,
-            "sign_checks",
-            *pooled,
-            *OF_EXPERIMENTS,
-        )
+        own = ("stiffness", "fits", "errors", *nuisances, "sign_checks", *pooled, *OF_EXPERIMENTS)
         lacking = set() if self.rebuilt else {"against_gould_2024b"}
         lacking |= set() if self.study.covariates else {"covariates"}
-        return (*own, *(job.name for job in _ANALYSES if job.name not in lacking))
+        return (*own, *predicted, *(job.name for job in _ANALYSES if job.name not in lacking))
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:

@@ -180,8 +180,9 @@ class PooledRows:
     def stiffness(self, specimen: str) -> list[Row]:
         """Rows of table ``stiffness`` for a fitted specimen or a newcomer."""
         joints, newcomer = self.cohort.joint_names, self._newcomer(specimen)
-        values = self._values(specimen)
+        values, silent = self._values(specimen), np.tile(self._silent, (len(joints), 1))
         if values is None:
+            silent = None
             none = np.zeros((len(joints), len(COORDINATES)), dtype=int)
             values = np.full(none.shape, np.nan), none + np.nan, none, none
         k, error, bound, decided = values
@@ -189,7 +190,7 @@ class PooledRows:
         rows = stiffness_rows(
             *(joints, self.study.free, k, error, self._freedom(specimen), known, bound),
             growth=self._growth(specimen),
-            silent=np.tile(self._silent, (len(joints), 1)),
+            silent=silent,
         )
         status, message = self._ended(specimen)
         for row in (one for one in rows if "status" not in one):

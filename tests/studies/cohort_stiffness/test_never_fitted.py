@@ -107,7 +107,7 @@ def test_the_rest_of_the_house_reads_the_empty_rows(tmp_path: Path) -> None:
         **dict.fromkeys(("anterior", "superior", "right", "right_bending"), True),
         **dict.fromkeys(("left_rotation", "extension"), False),
     }
-    assert "about (0, 10, 0) mm in joint axes" in words
+    assert "about (0, 10, 0) mm from its origin" in words
 
     fit = sp.calibrate(cohort, stiffness="per_joint", leave_out="specimen")
     assert fit.headline.startswith("9 of 9 stiffnesses")
