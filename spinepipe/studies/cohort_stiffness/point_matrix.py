@@ -30,6 +30,9 @@ NAMES = {
 }
 """What rows and columns are called."""
 
+_UNITS = ("N/m", "N/rad"), ("N m/m", "N m/rad")
+_INVERSE_UNITS = ("m/N", "m/(N m)"), ("rad/N", "rad/(N m)")
+
 _ROUNDING = 1e-12
 """A smaller share of a spring in an entry is none: the axes are turned in floating point."""
 
@@ -66,19 +69,19 @@ def matrix_table(
         x[:3, 3:] = np.cross(r, np.eye(3)).T  # the origin moves by u + r x theta
         x = x @ np.kron(np.eye(2), turn)
         k, low, high = (one[place, _ORDER] for one in every)
-        of_springs = np.einsum("ci,cj->cij", x, x)
         back = np.linalg.inv(x)
-        stiffness = _sum(of_springs, k, low, high)
-        compliance = _sum(np.einsum("ic,jc->cij", back, back), 1.0 / k, 1.0 / high, 1.0 / low)
+        parts = np.einsum("ci,cj->cij", x, x), np.einsum("ic,jc->cij", back, back)
+        stiffness = _sum(parts[0], k, low, high)
+        compliance = _sum(parts[1], 1.0 / k, 1.0 / high, 1.0 / low)
+        taken = (np.abs(parts) > _ROUNDING).any(axis=0)
         for i, j in product(range(6), repeat=2):
-            taken = [NAMES["joint"][c] for c in range(6) if abs(of_springs[c, i, j]) > _ROUNDING]
-            load, move = (("N", "m"), ("N m", "rad"))[i > 2], (("m", "N"), ("rad", "N m"))[j > 2]
+            names = [name for c, name in enumerate(NAMES["joint"]) if taken[c, i, j]]
             found.append(
                 {
                     **{"joint": joint, "row": NAMES[axes][i], "column": NAMES[axes][j]},
-                    **_cells("stiffness", stiffness[:, i, j], f"{load[0]}/{move[0]}"),
-                    **_cells("compliance", compliance[:, i, j], f"{load[1]}/({move[1]})"),
-                    "published": ", ".join(name for name in taken if name not in free),
+                    **_cells("stiffness", stiffness[:, i, j], _UNITS[i > 2][j > 2]),
+                    **_cells("compliance", compliance[:, i, j], _INVERSE_UNITS[i > 2][j > 2]),
+                    "published": ", ".join(name for name in names if name not in free),
                 }
             )
     return pd.DataFrame(found)

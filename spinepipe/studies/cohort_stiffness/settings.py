@@ -171,7 +171,7 @@ _ZONES = {
     "where two are no better (Smit et al. 2011, doi:10.1186/1471-2474-12-38)",
     "at_zero_load": "rotation at M = 0 on the way down less that at M = 0 on the way up "
     "(zero load method, doi:10.1002/jsp2.1088)",
-    "threshold": f"where dM/d(rotation) of {_SUM} is below {{}} N m/deg "
+    "threshold": f"where dM/d(rotation) is below {{:g}} N m/deg on the curve {_SUM} "
     "(stiffness threshold method, doi:10.1002/jsp2.1088)",
 }
 

@@ -276,7 +276,7 @@ def test_of_springs_fitted_to_their_readings_95_in_100_are_within_the_limit() ->
             "neutral_zone: threshold\nneutral_zone_below_nm_per_deg: 1.0\n",
             12.0 * np.sqrt(0.5),  # 2 (1 - tanh2) = 1 deg/(N m)
             3.0 * np.arctanh(np.sqrt(0.5)),
-            "below 1.0 N m/deg",
+            "below 1 N m/deg",
         ),
     ],
 )

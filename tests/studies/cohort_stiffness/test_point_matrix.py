@@ -94,6 +94,8 @@ def test_intervals_add_up_and_what_is_unknown_stays_empty() -> None:
     )
     assert (pressed["stiffness"], pressed["published"]) == (1.89e6, "superior")
     assert np.isnan([pressed["stiffness_low"], pressed["stiffness_high"]]).all()
+    aside = found[(found["row"] == "right") & (found["column"] == "right")]
+    assert aside["published"].item() == "right, right_bending"  # its compliance takes both
 
     rows = fitted({"anterior": (np.nan, np.nan, np.nan), "extension": (50.0, 45.0, 60.0)})
     found = matrix_table(rows, K[None], ["J"], [FRAME], [0.0, 30.0, 0.0], "joint")
