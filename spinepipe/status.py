@@ -18,6 +18,9 @@ class Status(StrEnum):
         return self in (Status.CONVERGED, Status.CONVERGED_AT_BOUND)
 
 
+NOT_FITTED = "not_fitted"
+"""Status of a stiffness that no reading of its fit depends on: there is no number of it."""
+
 USABLE = tuple(status.value for status in Status if status.usable)
 """Status of rows whose numbers are a solution, as tables have it."""
 

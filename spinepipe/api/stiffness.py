@@ -5,18 +5,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
 
 from spinepipe.api.result import Result, frame
 from spinepipe.api.simulation import simulate
 from spinepipe.api.study import NAME, Say, model_path, study_of
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.specimen import joint_frames
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, read_model
 from spinepipe.progress import silent
-from spinepipe.status import USABLE
+from spinepipe.status import NOT_FITTED, USABLE
 from spinepipe.studies.base_model import BUSHING
 from spinepipe.studies.cohort_stiffness.fit import fitted
 from spinepipe.studies.cohort_stiffness.left_out import predicted_by_others
+from spinepipe.studies.cohort_stiffness.point_matrix import Axes, matrix_table
 from spinepipe.studies.cohort_stiffness.pool import pooled
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
@@ -32,11 +35,13 @@ from spinepipe.studies.cohort_stiffness.settings import (
     load_sets,
     tests_of,
 )
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, PREDICTED_STIFFNESS, STIFFNESS
 from spinepipe.units import STIFFNESS_COLUMNS
 
 Row = dict[str, Any]
 Rows = dict[str, list[Row]]
+
+_TABLES = (STIFFNESS, PREDICTED_STIFFNESS, FITS, ERRORS)
 
 Representation = Literal["per_specimen", "level_ratio", "per_joint", "partially_pooled"]
 
@@ -50,11 +55,13 @@ class Stiffness(Result):
     table : a row per specimen, joint and fitted coordinate: ``stiffness`` with ``low`` and ``high``
         (95 % region), ``identifiable``, ``at_bound``, ``status``. Fitted to all tests.
     quality : a row per specimen and what it was fitted to: readings, cost, optima, status.
-    stiffness, errors : all fits and predictions, as the tables of the same names of a run.
+    stiffness, predicted_stiffness, errors : all fits, what the others predict of each specimen, and
+        errors of both, as the tables of the same names of a run.
     model : the fitted model, of the specimens that have a fit.
     """
 
     stiffness: pd.DataFrame
+    predicted_stiffness: pd.DataFrame
     errors: pd.DataFrame
     model: ModelFile
     cohort: Cohort
@@ -63,6 +70,32 @@ class Stiffness(Result):
     def predicted(self) -> pd.DataFrame:
         """Motion under all loads of the cohort, see `spinepipe.simulate`."""
         return simulate(self.model, self.cohort)
+
+    def stiffness_matrix(
+        self,
+        point_mm: Sequence[float] = (0.0, 0.0, 0.0),
+        joint: str | None = None,
+        axes: Axes = "joint",
+    ) -> pd.DataFrame:
+        """The 6 x 6 stiffness and compliance of joints about a point, an entry a row.
+
+        ``low`` and ``high`` end 95 % intervals; what is not known is NaN. At rest, without load.
+
+        Parameters
+        ----------
+        point_mm : from the joint's origin along its axes; with ``axes="ground"`` in ground.
+        joint : which one; None for all.
+        """
+        found, names = [pd.DataFrame(columns=["joint"])], self.cohort.joint_names
+        for specimen in dict.fromkeys(one.specimen for one in self.model.effects[0].values):
+            rows = self.table[self.table["specimen"] == specimen]
+            given = (one for one in self.model.effects[0].values if one.specimen == specimen)
+            k = np.array([[one.parameters[c] for c in STIFFNESS_COLUMNS] for one in given])
+            frames = joint_frames(self.cohort, specimen)
+            one = matrix_table(rows, k, names, frames, point_mm, axes)
+            found.append(one.assign(specimen=specimen))
+        every = pd.concat(found, ignore_index=True)
+        return every if joint is None else every[every["joint"] == joint].reset_index(drop=True)
 
     @property
     def left_out(self) -> pd.DataFrame:
@@ -127,16 +160,17 @@ def calibrate(
         study = study_of(CohortStiffness, cohort, asked)
         file = None if path is None else read_model(path)
     rows = _rows(study, cohort, stiffness, leave_out, file, say)
-    every = {one.name: frame(one, rows[one.name]) for one in (STIFFNESS, FITS, ERRORS)}
+    every = {one.name: frame(one, rows[one.name]) for one in _TABLES}
     label = joint_label(tests_of(study, cohort))
     own = every["stiffness"]
-    own = own[(own["fitted_to"] == label) & (own["source"] == "own")].reset_index(drop=True)
+    own = own[own["fitted_to"] == label].reset_index(drop=True)
     fits = every["fits"]
     return Stiffness(
         headline=_headline(own),
         table=own,
         quality=fits[fits["fitted_to"] == label].reset_index(drop=True),
         stiffness=every["stiffness"],
+        predicted_stiffness=every["predicted_stiffness"],
         errors=every["errors"],
         model=_model(study, cohort, stiffness, own, file),
         cohort=cohort,
@@ -155,11 +189,13 @@ def _rows(
     tests = tests_of(study, cohort)
     whole = joint_label(tests)
     labels = load_sets(study, tests) if leave_out == "test" else (whole,)
-    found: Rows = {one.name: [] for one in (STIFFNESS, FITS, ERRORS)}
+    found: Rows = {one.name: [] for one in _TABLES}
 
     def add(rows: Mapping[str, list[Row]], **where: str) -> None:
-        for table, own in found.items():
-            own += [{**where, **row} for row in rows.get(table, ())]
+        for table, own in rows.items():
+            for row in own if table in found else ():
+                others = table == STIFFNESS.name and row["source"] != "own"
+                found[PREDICTED_STIFFNESS.name if others else table].append({**where, **row})
 
     newcomers = cohort.specimen_names if leave_out == "specimen" else ()
     if name in POOLED:
@@ -221,6 +257,6 @@ def _model(
 
 def _headline(own: pd.DataFrame) -> str:
     """How many stiffnesses are identifiable, and of how many specimens."""
-    known, every = int(own["identifiable"].fillna(False).astype(bool).sum()), len(own)
+    known, every = int(own["identifiable"].eq(True).sum()), int((own["status"] != NOT_FITTED).sum())
     specimens = own["specimen"].nunique()
     return f"{known} of {every} stiffnesses of {specimens} specimens are identifiable."

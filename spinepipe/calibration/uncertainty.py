@@ -30,12 +30,15 @@ class Uncertainty:
     degrees_of_freedom : readings and priors less unknowns; the scatter comes from them.
     held_by_priors : how many unknowns the priors decide about: what these hold of the fit (their
         leverage). The others are decided by readings.
+    silent : (m,) bool, unknowns on which no reading depends: what the fit has of them is where it
+        started.
     """
 
     covariance: Array
     standard_error: Array
     identifiable: NDArray[np.bool_]
     degrees_of_freedom: int
+    silent: NDArray[np.bool_]
     held_by_priors: float = 0.0
 
 
@@ -85,7 +88,7 @@ def uncertainty(
     infinite = np.full((m, m), np.inf)
     nothing = np.zeros(m, dtype=bool)
     if evaluation.residual is None or evaluation.jacobian is None:
-        return Uncertainty(infinite, np.full(m, np.inf), nothing, 0)
+        return Uncertainty(infinite, np.full(m, np.inf), nothing, 0, nothing)
     inside = at_bound == 0
     freedom = len(evaluation.residual) - int(inside.sum())
     covariance, error = infinite, np.full(m, np.inf)
@@ -101,7 +104,10 @@ def uncertainty(
     if of_priors.any():
         left, _, _ = _visible(evaluation.jacobian[:, inside])
         by_priors = float(np.sum(left[of_priors] ** 2))
-    return Uncertainty(covariance, error, known, freedom, by_priors)
+    moved = evaluation.jacobian[~of_priors] * problem.scale
+    size = np.linalg.norm(moved, axis=0)
+    silent = size <= RANK_TOLERANCE * size.max(initial=0.0)
+    return Uncertainty(covariance, error, known, freedom, silent, by_priors)
 
 
 def _deviation(

@@ -33,14 +33,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="representation of stiffness, of a cohort study (default: best on held-out motion)",
     )
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FILE.osim", help="file to write"
+        "--matrix",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="as CSV the 6 x 6 stiffness of each joint about this point (mm, along its axes)",
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE", help="file to write"
     )
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the file and say which frames and which stiffness are in it."""
-    if options.output.suffix != ".osim":
-        raise InputError([_problem("-o", options.output.name, "FILE.osim", "rename it")])
+    ending = ".osim" if options.matrix is None else ".csv"
+    if options.output.suffix != ending:
+        raise InputError([_problem("-o", options.output.name, f"FILE{ending}", "rename it")])
     if options.study not in study_names(options.root):
         raise InputError([unknown("study", options.study, study_names(options.root))])
     study, cohort = studies.check(options.root, options.study)
@@ -56,6 +64,7 @@ def run(options: argparse.Namespace) -> int:
         pose=options.pose,
         start=options.start,
         representation=options.representation,
+        point_mm=None if options.matrix is None else tuple(options.matrix),
     )
     module, _, function = kind.exports.partition(":")
     exported = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)

@@ -71,6 +71,7 @@ class Zone(StrEnum):
     NOT_MEANINGFUL = "not_meaningful"
     TOO_FEW = "too_few"
     ONE_SIDE = "one_side"
+    ONE_WAY = "one_way"
     NOT_READ = "not_read"
 
 
@@ -112,7 +113,7 @@ class SigmoidCurve:
 
 
 def neutral_zone(
-    load: Array, rotation: Array, sd: float | None
+    load: Array, rotation: Array, sd: float | None, below: float | None = None
 ) -> tuple[FittedNeutralZone | None, Zone, str]:
     """The neutral zone of a curve of N points, or why there is none, in a word and in words.
 
@@ -120,6 +121,7 @@ def neutral_zone(
     ----------
     load : (N,) N m. rotation : (N,) rad, whose weights the measures have.
     sd : rad, of one reading; None takes the noise from what the curve leaves.
+    below : N m/rad, stiffness that the zone is softer than; None: it is between the bends.
     """
     loads = _distinct(load)
     if loads < FEWEST_POINTS:
@@ -131,9 +133,12 @@ def neutral_zone(
     if curve is None:
         why = "no neutral zone: an S-shaped curve fits no better than a straight line"
         return None, Zone.NOT_MEANINGFUL, why
-    places = _zone(curve)
+    level = None if below is None else curve.load_unit / (curve.rotation_unit * below)
+    places = _zone(curve) if level is None else _softer(curve, level)
     if places is None:
         why = "no neutral zone: compliance does not rise and fall between the largest loads"
+        if level is not None:
+            why = "no neutral zone: softer than the threshold nowhere, or up to the largest loads"
         return None, Zone.NOT_MEANINGFUL, why
     # Where noise does not explain what the curve leaves, its bends are not the joint's: a zone
     # narrower than the steps of load bends faster than any sigmoid that they allow.
@@ -145,7 +150,7 @@ def neutral_zone(
             f"are noisy by {np.rad2deg(sd):.2g}: no neutral zone from these loads, read more"
         )
         return None, Zone.NOT_DESCRIBED, why
-    return _measured(curve, places), Zone.FOUND, ""
+    return _measured(curve, places, level), Zone.FOUND, ""
 
 
 def _distinct(load: Array) -> int:
@@ -289,13 +294,34 @@ def _zone(curve: SigmoidCurve) -> Array | None:
     return np.array([brentq(slope, x[one - 1], x[one + 1]) for one in at])
 
 
-def _measured(curve: SigmoidCurve, places: Array) -> FittedNeutralZone:
+def _softer(curve: SigmoidCurve, level: float) -> Array | None:
+    """(2,) ends, about the place of largest compliance, of where compliance is above a level.
+
+    None where it is so nowhere, or as far as an end.
+    """
+    x = np.linspace(*(end / curve.load_unit for end in curve.ends), _GRID)
+
+    def above(place: Array | float) -> Array:
+        return _value(curve.theta, np.asarray(place), 1) - level
+
+    most = int(np.argmax(above(x)))
+    stiff = np.flatnonzero(above(x) <= 0.0)
+    left, right = stiff[stiff < most], stiff[stiff > most]
+    if above(x[most]) <= 0.0 or not len(left) or not len(right):
+        return None
+    return np.array([brentq(above, x[at], x[at + 1]) for at in (left[-1], right[0] - 1)])
+
+
+def _measured(curve: SigmoidCurve, places: Array, level: float | None) -> FittedNeutralZone:
     """Size and compliance with their weights, to first order."""
-    ahead, behind = (_value(curve.theta, places + step, 3) for step in (_STEP, -_STEP))
-    fourth = (ahead - behind) / (2.0 * _STEP)
+    # ends are roots: of the third derivative, or of the first less the level
+    order, root = (3, 0.0) if level is None else (1, level)
+    ahead, behind = (_value(curve.theta, places + step, order) for step in (_STEP, -_STEP))
+    slope = (ahead - behind) / (2.0 * _STEP)
 
     def both(theta: Array) -> Array:
-        there = places - _value(theta, places, 3) / fourth  # Newton, exact to first order
+        # Newton, exact to first order
+        there = places - (_value(theta, places, order) - root) / slope
         low, high = _value(theta, there)
         size = curve.rotation_unit * (high - low)
         return np.array([size, size / (curve.load_unit * (there[1] - there[0]))])

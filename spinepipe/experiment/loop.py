@@ -199,6 +199,25 @@ class Loop:
             return (np.arange(len(self.load)),)
         return tuple(one for one in (self.branch(1), self.branch(-1)) if len(one))
 
+    def gap(self) -> Measure | None:
+        """Rotation where the load passes zero on its way down less that on its way up.
+
+        None where it was not read on both ways.
+        """
+        up, down = (self.branch(side) for side in (1, -1))
+        if not (self.two_sided and self.unloaded and len(up) and len(down)):
+            return None
+        return self._measure(self._passing_zero(-1, down) - self._passing_zero(1, up))
+
+    def _passing_zero(self, side: int, places: Places) -> Array:
+        """(T,) weights of the rotation where a branch passes zero, on a line between readings."""
+        load, weights = side * self.load[places], np.zeros(len(self.load))
+        # the first that counts as zero or beyond: of a closed loop its end, and not its beginning
+        at = int(np.argmax(load >= -SAME_LOAD * self.span))
+        share = max(load[at], 0.0) / (load[at] - load[at - 1])
+        weights[places[[at - 1, at]]] = share, 1.0 - share
+        return weights
+
     def loading(self, side: int) -> Places:
         """Places of a side while its load grows, from nothing to the peak."""
         # Back from the peak, round the end of a closed loop, until the load leaves that side.

@@ -1,6 +1,5 @@
 """What kinds share in writing a specimen's model for OpenSim: what is refused, and the file."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from spinepipe.model import SpineModel
@@ -8,31 +7,37 @@ from spinepipe.model.osim import expressible, osim
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.kind import WantedFiles
 
+_OPTIONS = {
+    "pose": ("--pose", "none: this kind of study exports no sampled joints"),
+    "representation": (
+        "--representation",
+        "none: stiffness of this kind of study has one representation",
+    ),
+    "point_mm": ("--matrix", "none: this kind of study tells no stiffness matrix"),
+}
+"""What some kinds do not have, by its name in `WantedFiles`."""
 
-def refuse(wanted: WantedFiles, *, poses: bool = False, representations: bool = False) -> None:
+
+def refuse(wanted: WantedFiles, *has: str) -> None:
     """Refuse what a kind of study does not have.
 
     Parameters
     ----------
-    poses, representations : whether it has them.
+    has : of `_OPTIONS`, what it has.
 
     Raises
     ------
     InputError
         With every such option.
     """
-    problems = list(_options(wanted, poses, representations))
+    asked = {name: getattr(wanted, name) for name in _OPTIONS if name not in has}
+    problems = [
+        problem(_OPTIONS[name][0], f"{value}", _OPTIONS[name][1], "leave it out")
+        for name, value in asked.items()
+        if value is not None
+    ]
     if problems:
         raise InputError(problems)
-
-
-def _options(wanted: WantedFiles, poses: bool, representations: bool) -> Iterator[InputProblem]:
-    if wanted.pose is not None and not poses:
-        allowed = "none: this kind of study exports no sampled joints"
-        yield problem("--pose", f"pose {wanted.pose}", allowed, "leave it out")
-    if wanted.representation is not None and not representations:
-        allowed = "none: stiffness of this kind of study has one representation"
-        yield problem("--representation", wanted.representation, allowed, "leave it out")
 
 
 def opensim_document(model: SpineModel, words: str) -> tuple[str, str]:

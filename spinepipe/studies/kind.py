@@ -86,6 +86,7 @@ class WantedFiles:
     pose : number of a sampled joint pose; None for the cohort's own.
     start : whether with the stiffness where fits start, and not with a fitted one.
     representation : of stiffness, by name; None for the one that the study's results recommend.
+    point_mm : from each joint's origin, where its matrix is told; None for OpenSim's file.
     """
 
     root: Path
@@ -94,6 +95,7 @@ class WantedFiles:
     pose: int | None = None
     start: bool = False
     representation: str | None = None
+    point_mm: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -335,6 +335,17 @@ CASES: dict[str, tuple[Case, str]] = {
         Case(tables=curves(neutral_zone="not_described", neutral_zone_deg=nan)),
         "zones soft_shapeless",
     ),
+    "zones by another definition": (
+        Case(settings={"neutral_zone": "at_zero_load"}), "zones named, methods_more neutral_zone",
+    ),
+    "no zone by it": (
+        Case(tables=curves(neutral_zone="not_meaningful", neutral_zone_deg=nan),
+             settings={"neutral_zone": "threshold", "neutral_zone_below_nm_per_deg": 1.0}),
+        "zones named_none",
+    ),
+    "a direction that no reading depends on": (
+        Case(tables=own({"a": 1.0, "b": 1.0, "c": 1.0})), "open not_fitted",
+    ),
     "no loops": (
         Case(tables=curves(neutral_zone="one_side", hysteresis_area_j=nan)),
         "zones check, hysteresis check",

@@ -278,6 +278,7 @@ def _curves(size: Size) -> Iterator[Row]:
         measured = key["source"] == "measured"
         row = {**key, "coordinate": DRIVES.get(key["test"], "extension"), "readings": 41}
         row |= {"least_load_nm": -7.5, "largest_load_nm": 7.5, "elastic_zone": "upper_half"}
+        row |= {"neutral_zone_definition": "double_sigmoid", "neutral_zone_formula": "bends"}
         if not size.solved and not measured:
             yield row | _ended(size) | {"neutral_zone": "not_read", "elastic_zone": "none"}
             continue

@@ -261,3 +261,42 @@ def test_work_of_a_lagging_joint_is_the_integral_of_moment_over_rotation() -> No
     rotation = 0.1 * np.sin(phase - 0.3) + 0.02 * np.sin(phase - 0.3) ** 3
     work = integrate.simpson(load * np.gradient(rotation, phase), x=phase)
     assert Loop(load, rotation).area().value == pytest.approx(work, rel=1e-4)
+
+
+def test_the_gap_at_zero_load_is_that_of_the_branches() -> None:
+    """Up by 6 tanh((M - 0.5) / 3) deg, down half a N m earlier: 12 tanh(1 / 6) = 1.982 deg."""
+    up = np.linspace(-7.3, 7.3, 27)  # no reading at zero
+    load = np.concatenate([up[13:], up[-2::-1], up[1:14]])
+    way = np.concatenate([np.full(14, -1.0), np.ones(26), np.full(13, -1.0)])
+    turned = np.deg2rad(6.0) * np.tanh((load + 0.5 * way) / 3.0)
+    gap = Loop(load, turned).gap()
+    assert np.rad2deg(gap.value) == pytest.approx(12.0 * np.tanh(1.0 / 6.0), rel=2e-3)
+    assert gap.weights @ turned == pytest.approx(gap.value)
+    # where zero was read twice on the way up the later one counts: the first was never loaded
+    load = np.concatenate([[0.0, 4.0, 7.0], [3.0, 0.0, -3.0, -7.0], [-4.0, 0.0]])
+    turned = np.array([0.0, 4.0, 5.0, 4.0, 2.0, -1.0, -5.0, -4.0, -1.5])
+    assert Loop(load, turned).gap().value == pytest.approx(3.5)
+    assert Loop(load[:7], turned[:7]).gap() is None, "up once, and not from the other side"
+    assert Loop(np.abs(load), turned).gap() is None
+
+
+def test_a_threshold_of_stiffness_ends_the_zone_where_the_slope_is() -> None:
+    """q = A tanh(M / w): dq/dM = A / w (1 - tanh2), so 1 - tanh2 = w / (A k) at the ends."""
+    load = np.linspace(-7.5, 7.5, 31)
+    a, w = np.deg2rad(6.0), 3.0
+    for k in (40.0, 60.0):
+        zone, found, _ = neutral_zone(load, a * np.tanh(load / w), 1e-6, below=k)
+        assert found is Zone.FOUND
+        end = np.sqrt(1.0 - w / (a * k))
+        assert zone.size.value == pytest.approx(2.0 * a * end, rel=1e-3)
+        assert zone.ends == pytest.approx((-w * np.arctanh(end), w * np.arctanh(end)), rel=1e-3)
+        # its weights are its derivative: by differences, one reading after the other
+        for place in (3, 15, 22):
+            sizes = []
+            for step in (1e-6, -1e-6):
+                moved = a * np.tanh(load / w) + step * (np.arange(31) == place)
+                sizes.append(neutral_zone(load, moved, 1e-4, below=k)[0].size.value)
+            slope = (sizes[0] - sizes[1]) / 2e-6
+            assert zone.size.weights[place] == pytest.approx(slope, abs=2e-2)
+    for k in (20.0, 2000.0):  # stiffer everywhere, softer up to the ends
+        assert neutral_zone(load, a * np.tanh(load / w), 1e-6, below=k)[1] is Zone.NOT_MEANINGFUL

@@ -54,6 +54,7 @@ def test_stiffness_is_that_of_a_run(eight: Project) -> None:
         source = "others_median" if name == "per_joint" else "others_pooled"
         whole = {"representation": name, "source": source, "fitted_to": "all"}
         same(by_specimen.errors, run["errors"], **whole)
+        same(by_specimen.predicted_stiffness, run["predicted_stiffness"], **whole)
         assert set(by_specimen.left_out["stage"]) == {"left_out_specimen"}
 
 

@@ -9,7 +9,7 @@ from statsmodels.stats.anova import AnovaRM
 
 from spinepipe.statistics import mean_of
 from spinepipe.statistics.outcome import SAME
-from spinepipe.status import Status, joined
+from spinepipe.status import USABLE, joined
 from spinepipe.studies.cohort_stiffness.claims import (
     BY_SIZE,
     NO_SUCH_FITS,
@@ -222,7 +222,7 @@ def _pooled_spread(pooling: pd.DataFrame | None, label: str, coordinate: str, wh
     here = (pooling["fitted_to"] == label) & (pooling["without"] == NOBODY)
     here &= pooling["representation"] == POOLED[0]
     rows = pooling[here & (pooling["coordinate"] == coordinate)]
-    usable = rows["status"].map(lambda name: Status(name).usable).astype(bool)
+    usable = rows["status"].isin(USABLE)
     if not usable.all():
         return joined("no pooled fit", *rows.loc[~usable, "message"])
     found = rows[f"between_{what}"].dropna()

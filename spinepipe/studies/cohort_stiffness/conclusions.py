@@ -35,6 +35,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     label_of_others,
     load_cases,
     representations_of,
+    zone_formula,
 )
 from spinepipe.studies.cohort_stiffness.stages import joint_label_of
 from spinepipe.studies.cohort_stiffness.tables import MEASURED, WHOLE
@@ -65,7 +66,7 @@ def conclusions(
     stiffness, fits, signs = (table(name) for name in ("stiffness", "fits", "sign_checks"))
     values = joint_values(stiffness)
     scatter = _scatter(fits, values)
-    yield from stiffness_conclusions(values)
+    yield from stiffness_conclusions(values, study.free)
     yield from _trust(study, signs, values, scatter)
     needed = numbers_from("cohort: specimens", n=specimens, needed=FEWEST)
     words = {"specimens": count(specimens, "specimen")}
@@ -88,7 +89,7 @@ def conclusions(
     if set(study.representations) - set(representations_of(study, cohort.joint_names)):
         yield Conclusion("ratios", "check")
     yield from _priors(table("nuisances"))
-    yield from _experiments(table("load_displacement"), table("helical_axes"))
+    yield from _experiments(study, table("load_displacement"), table("helical_axes"))
     yield from _methods(study, stiffness, specimens)
 
 
@@ -231,11 +232,13 @@ def _priors(rows: pd.DataFrame) -> Iterator[Conclusion]:
         yield Conclusion("priors", "check" if far else "ok", values)
 
 
-def _experiments(curves: pd.DataFrame, axes: pd.DataFrame) -> Iterator[Conclusion]:
+def _experiments(
+    study: CohortStiffness, curves: pd.DataFrame, axes: pd.DataFrame
+) -> Iterator[Conclusion]:
     """What laboratories report of the tests: measured, and by the fitted model."""
     if len(curves):
         yield from ranges(paired_curves(curves, "range_of_motion", "deg"))
-        yield from _zones(curves)
+        yield from _zones(curves, study.neutral_zone)
         loops = paired_curves(curves, "hysteresis_area", "j").dropna(subset=["measured"])
         sure = int((loops["measured"] - loops["measured_way"] > 0.0).sum())
         values = numbers_from("load_displacement: hysteresis area", n=len(loops), sure=sure)
@@ -279,7 +282,7 @@ def ranges(pairs: pd.DataFrame) -> Iterator[Conclusion]:
     yield Conclusion("ranges", verdict, values | numbers_from(source, **counts))
 
 
-def _zones(rows: pd.DataFrame) -> Iterator[Conclusion]:
+def _zones(rows: pd.DataFrame, definition: str) -> Iterator[Conclusion]:
     """How many curves are softer in the middle: a sigmoid fits better than a line, beyond noise."""
     bent = (Zone.FOUND.value, Zone.NOT_DESCRIBED.value)
     measured, model = (rows[(rows["source"] == MEASURED) == own] for own in (True, False))
@@ -292,6 +295,9 @@ def _zones(rows: pd.DataFrame) -> Iterator[Conclusion]:
         middle = float(zone.median())
         values["zone"] = Value(middle, "°", n=len(zone), source="load_displacement: median")
     verdict = "straight" if soft.empty else "soft" if len(zone) else "soft_shapeless"
+    if definition != "double_sigmoid":
+        values |= numbers_from("load_displacement: neutral_zone", soft=len(zone))
+        verdict = "named" if len(zone) else "named_none"
     yield Conclusion("zones", verdict if len(asked) else "check", values)
 
 
@@ -300,6 +306,7 @@ def _methods(study: CohortStiffness, stiffness: pd.DataFrame, n: int) -> Iterato
     words = {"directions": directions(study.free), "tests": count(len(tests), "load case")}
     verdict = "published" if study.cost == "published" else "noise"
     yield Conclusion("methods", verdict, numbers_from("cohort: specimens", n=n), words)
+    yield Conclusion("methods_more", "neutral_zone", names={"formula": zone_formula(study)})
     if set(study.representations) & set(POOLED):
         yield Conclusion("methods_more", "pooled")
     if n >= FEWEST:

@@ -106,8 +106,8 @@ def directions(coordinates: Sequence[str]) -> str:
     return listed([direction(name) for name in COORDINATES if name in coordinates], most=6)
 
 
-def stiffness_conclusions(values: pd.DataFrame) -> Iterator[Conclusion]:
-    """The answer, key numbers, and directions that readings do not bound."""
+def stiffness_conclusions(values: pd.DataFrame, free: Sequence[str]) -> Iterator[Conclusion]:
+    """The answer, key numbers, and directions of ``free`` that readings do not bound or tell of."""
     found = typical_by(values)
     told = {name: value for name, value in found.items() if value is not None}
     names = {"rest": " at rest" if values["growth"].notna().any() else ""}
@@ -121,6 +121,9 @@ def stiffness_conclusions(values: pd.DataFrame) -> Iterator[Conclusion]:
         n = numbers_from(value.source, n=value.n or 0)
         yield Conclusion("direction", kind_of(rows), {"value": value, **n}, more)
     yield from _open(values, [name for name in found if name not in told])
+    untold = [name for name in free if name not in found]
+    if untold and found:
+        yield Conclusion("open", "not_fitted", names={"directions": directions(untold)})
 
 
 def _answer(values: pd.DataFrame, told: dict[str, Value], names: dict[str, str]) -> Conclusion:

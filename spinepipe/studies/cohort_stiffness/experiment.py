@@ -17,7 +17,6 @@ from spinepipe.calibration import Evaluator, Problem
 from spinepipe.calibration.solvers import AtRest
 from spinepipe.calibration.uncertainty import uncertainty
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.cohort.load_tests import DRIVEN, moments
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.decomposition import eigh
@@ -26,7 +25,7 @@ from spinepipe.experiment.loop import Loop, RotationErrors, reading_noise
 from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.status import USABLE, Status, joined
+from spinepipe.status import NOT_FITTED, USABLE, Status, joined
 from spinepipe.studies.cohort_stiffness.loop_rows import (
     TWO_ZEROS,
     LoopReading,
@@ -45,7 +44,11 @@ from spinepipe.studies.cohort_stiffness.problem import (
     start_stiffness,
 )
 from spinepipe.studies.cohort_stiffness.representations import finest
-from spinepipe.studies.cohort_stiffness.settings import CohortStiffness, representations_of
+from spinepipe.studies.cohort_stiffness.settings import (
+    CohortStiffness,
+    representations_of,
+    zone_formula,
+)
 from spinepipe.studies.cohort_stiffness.tables import (
     HELICAL_AXES,
     LOAD_DISPLACEMENT,
@@ -193,15 +196,18 @@ def run(
     name = finest(representations_of(settings, cohort.joint_names))
     frame = read_frame(fitted[0]) if fitted else None
     model, why = _simulation(settings, cohort, specimen, tests, others, name, frame)
-    sd = settings.measurement_sd or cohort.measurement_sd
+    definition = {
+        "neutral_zone_definition": settings.neutral_zone,
+        "neutral_zone_formula": zone_formula(settings),
+    }
     # Rows of each curve and, where the joint turns, of its axis: measured first, then simulated.
     curves: list[Row] = []
     axes: list[Row] = []
     for cycle in loading_loops(tests.tested):
         for joint, label in enumerate(cohort.joint_names):
             key = {"joint": label, "test": cycle.test, "cycle": cycle.number}
-            for curve, axis in _of_joint(cycle, joint, sd, cohort.zeroed_at_step_0, model, why):
-                curves.append({**curve, **key})
+            for curve, axis in _of_joint(settings, cycle, joint, cohort, model, why):
+                curves.append({**curve, **key, **definition})
                 axes += [{**axis, **key}] if axis else []
     made = origin("experiment", root, settings, cohort, [specimen], [mark_of(p) for p in fitted])
     write(from_rows(LOAD_DISPLACEMENT.without("specimen"), curves), load_displacement, made)
@@ -220,8 +226,9 @@ def _simulation(
     """The fitted model under all tests, or why there is none."""
     if representation is None or frame is None or not tests.tested:
         return None, NO_FIT
-    if not frame["status"].isin(USABLE).all() or frame["stiffness"].isna().any():
+    if not frame["status"].isin([*USABLE, NOT_FITTED]).all() or frame["stiffness"].isna().all():
         return None, joined("the fit has no stiffness", str(frame["message"].iloc[0]))
+    frame = frame[frame["stiffness"].notna()]  # others keep the value that fits start from
     start = start_stiffness(settings, cohort, representation)
     k, bound = _fitted(cohort, start, frame)
     motion = predict_motion(cohort, specimen, tests.frames, tests.tested, k, others)
@@ -273,14 +280,15 @@ def _covariance(
 
 
 def _of_joint(
+    settings: CohortStiffness,
     cycle: LoadingLoop,
     joint: int,
-    sd: MeasurementSd | None,
-    zeroed: bool,
+    cohort: Cohort,
     model: Simulation | None,
     why: str,
 ) -> Iterator[tuple[Row, Row | None]]:
     """Rows of the curve and of the axis, measured and simulated, of a joint that was read."""
+    sd, zeroed = settings.measurement_sd or cohort.measurement_sd, cohort.zeroed_at_step_0
     measured = cycle.measured[:, joint]
     if cycle.coordinate is None:
         if np.isfinite(measured).any():
@@ -296,7 +304,9 @@ def _of_joint(
         yield _refused(MEASURED, "", cycle.coordinate, told, Status.REFUSED), None
         return
     noise = None if sd is None else reading_noise(cycle.parts, 1.0, zeroed)
-    read = _Read(cycle, place, known, None if sd is None else sd.rotation_deg / DEG_PER_RAD)
+    read = _Read(
+        cycle, place, known, None if sd is None else sd.rotation_deg / DEG_PER_RAD, settings
+    )
     spread = None
     if noise is not None and read.sd is not None:
         spread = replace(noise, root=read.sd * noise.root).at(known)
@@ -335,12 +345,14 @@ class _Read:
     Attributes
     ----------
     place : of the coordinate. known : (T,). sd : rad, of one reading, if it is declared.
+    settings : for the definition of the neutral zone.
     """
 
     cycle: LoadingLoop
     place: int
     known: NDArray[np.bool_]
     sd: float | None
+    settings: CohortStiffness
 
     def loop(self, motion: Array) -> Loop:
         """Moment and rotation of motion (T, 6) at the steps that were read."""
@@ -354,7 +366,9 @@ class _Read:
 
     def curve(self, motion: Array, spread: RotationErrors | None) -> Row:
         """Row of the curve of motion (T, 6), without its source."""
-        row = displacement_row(LoopReading(self.loop(motion), spread, self.sd))
+        name, below = self.settings.neutral_zone, self.settings.neutral_zone_below_nm_per_deg
+        below = None if below is None else below * DEG_PER_RAD
+        row = displacement_row(LoopReading(self.loop(motion), spread, self.sd, name, below))
         return row | {"coordinate": self.cycle.coordinate}
 
     def axis(

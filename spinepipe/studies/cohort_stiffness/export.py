@@ -1,10 +1,12 @@
 """The model of a specimen with its fitted stiffness, as `spinepipe export` writes it."""
 
+import pandas as pd
+
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames
-from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError, one_of
-from spinepipe.status import USABLE
+from spinepipe.status import NOT_FITTED, USABLE
+from spinepipe.studies.cohort_stiffness.point_matrix import matrix_table
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
     base_of,
@@ -19,6 +21,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     representations_of,
     tests_of,
 )
+from spinepipe.studies.cohort_stiffness.tables import STIFFNESS
 from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.tables import read_frame
@@ -28,7 +31,7 @@ CRITERIA = ("left_out_specimen", "left_out_case", "fitted")
 
 
 def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
-    """OpenSim's document of the model, and in words which stiffness it has.
+    """OpenSim's document of the model, or its matrices as CSV; in words which stiffness it has.
 
     Coordinates that were not fitted keep the published value.
 
@@ -37,7 +40,7 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     InputError
         Where the study has no such representation, no results, or no fit of the specimen.
     """
-    refuse(wanted, representations=True)
+    refuse(wanted, "representation", "point_mm")
     every = representations_of(study, cohort.joint_names)
     known = tuple(one for one in every if one not in NUISANCE)  # the file has joints as stated
     name = wanted.representation
@@ -50,11 +53,19 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     k = start_stiffness(study, cohort, name)
     told = "start of the study" if wanted.start else f"fitted, {IN_WORDS[name]}{why}"
     if not wanted.start:
-        k = _fitted(study, cohort, wanted, name, k)
+        rows = _fitted(study, cohort, wanted, name)
+        k = with_stiffness(k, cohort.joint_names, rows.dropna(subset="stiffness"))
+        kept = int(rows["stiffness"].isna().sum())
+        told += f" ({kept} of {len(rows)} as published: no reading tells of them)" * bool(kept)
     if name in STIFFENING and not wanted.start:
         told += ", at rest: that it grows with motion is not in the file"
-    others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
     frames = joint_frames(cohort, wanted.specimen)
+    if wanted.point_mm is not None:
+        rows = pd.DataFrame(columns=STIFFNESS.names) if wanted.start else rows
+        table = matrix_table(rows, k, cohort.joint_names, frames, wanted.point_mm)
+        where = "({:g}, {:g}, {:g}) mm from its origin".format(*wanted.point_mm)
+        return table.to_csv(index=False), f"6 x 6 stiffness of each joint about {where}, {told}"
+    others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)
     return opensim_document(model, f"the cohort's own joints, stiffness: {told}")
 
@@ -72,10 +83,8 @@ def _recommended(wanted: WantedFiles, known: tuple[str, ...]) -> tuple[str, str]
     return known[-1], ""
 
 
-def _fitted(
-    study: CohortStiffness, cohort: Cohort, wanted: WantedFiles, name: str, start: Array
-) -> Array:
-    """(J, 6) the specimen's own fit to all its load cases, not fitted coordinates as at the start.
+def _fitted(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles, name: str) -> pd.DataFrame:
+    """Rows of the specimen's own fit to all its load cases.
 
     Raises
     ------
@@ -91,10 +100,10 @@ def _fitted(
         & (rows["fitted_to"] == (ALL if len(tests) > 1 else tests[0]))
     ]
     fitted = own[own["status"].isin(USABLE) & own["stiffness"].notna()]
-    if fitted.empty or len(fitted) < len(own):
+    if fitted.empty or len(fitted) + (own["status"] == NOT_FITTED).sum() < len(own):
         messages = [str(text) for text in own["message"].unique() if text]
         why = f": {'; '.join(messages)}" if messages else ""
         found = f"no fit of {wanted.specimen} by {name}{why}"
         remedy = "choose another --representation, or add --start"
         raise InputError([problem("SPECIMEN", found, "a specimen that was fitted", remedy)])
-    return with_stiffness(start, cohort.joint_names, fitted)
+    return own

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from spinepipe.calibration import Fit, Problem, fit
-from spinepipe.calibration.profile import RegionEnds
 from spinepipe.cohort import Cohort
 from spinepipe.designs import specimen_seed
 from spinepipe.effects.contract import Array
@@ -50,9 +49,6 @@ from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES
 
 Row = dict[str, Any]
-
-OPEN = RegionEnds(None, None, open_below=True, open_above=True)
-"""Of a stiffness that was held as no reading tells of it."""
 
 
 def run(
@@ -118,7 +114,7 @@ def fitted(
             predicted = error_rows(cohort, specimen, tests, k, acting)
     ended = {"status": status.value, "message": refusal if found is None else found.message}
     by = {"source": "own"}
-    rows = [{**row, **by, **ended} for row in values]
+    rows = [{**ended, **row, **by} for row in values]
     seen = [{**row, **by, "stage": tests.stage(row["test"], fitted_to)} for row in predicted]
     return {STIFFNESS.name: rows, FITS.name: [record], ERRORS.name: seen, NUISANCES.name: told}
 
@@ -165,34 +161,32 @@ def _stiffness(
     found: Fit,
     growth: Growth | None,
 ) -> tuple[Array, list[Row]]:
-    """Fitted stiffness (J, 6), NaN where the fit has none, and its rows."""
+    """Stiffness (J, 6) for predictions, NaN where the fit has none, and the rows of what it has."""
     usable = found.status.usable
     model = with_parameters(problem.model, problem.free, found.x)
-    k = model.effects[BUSHING].values
+    k = problem.model.effects[BUSHING].values.copy()  # of what no reading depends on
     error = np.full(k.shape, np.inf)
     known, bound = np.zeros(k.shape, dtype=bool), np.zeros(k.shape, dtype=int)
-    fitted = [COORDINATES.index(name) for name in settings.free]
-    # Open until a region was found; where the fit looked for none, the interval stands.
-    reaches = {(row, at): OPEN for row in range(len(k)) for at in fitted}
+    silent = np.full(k.shape, usable)
+    reaches = {}  # where the fit looked for no region, the interval stands
     for index, unknown in enumerate(problem.free):
-        if unknown.effect != BUSHING:
-            continue  # of a law that stiffens, or a nuisance
+        if unknown.effect != BUSHING or found.uncertainty.silent[index]:
+            continue  # of a law that stiffens, or a nuisance; or of no reading
         at = (list(unknown.rows), unknown.column)
+        k[at], silent[at] = model.effects[BUSHING].values[at], False
         error[at] = found.uncertainty.standard_error[index]
         known[at] = found.identifiable(index)
         bound[at] = found.at_bound[index]
         for row in unknown.rows:
             one = row, unknown.column
             reach = found.reach(index, k[one])
-            if reach is None:
-                del reaches[one]
-            else:
+            if reach is not None:
                 reaches[one] = reach
     values = k if usable else np.full(k.shape, np.nan)
     freedom = found.uncertainty.degrees_of_freedom
     return values, stiffness_rows(
         *(cohort.joint_names, settings.free, values, error, freedom, known, bound, reaches),
-        growth if usable else None,
+        *(growth if usable else None, silent),
     )
 
 

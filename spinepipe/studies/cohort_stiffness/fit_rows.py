@@ -16,6 +16,7 @@ from scipy import stats
 from spinepipe.calibration import Problem
 from spinepipe.calibration.profile import RegionEnds
 from spinepipe.effects.contract import Array
+from spinepipe.status import NOT_FITTED
 from spinepipe.studies.cohort_stiffness.stiffening import AT_BOUND, LINEAR, Growth
 from spinepipe.units import COORDINATES, STIFFNESS_UNITS
 
@@ -28,6 +29,14 @@ _OPEN = ("open_below", "open_above")
 """Whether the data allow the bound of the fit on that side; only a region tells."""
 
 
+NO_ROW: Row = {
+    **dict.fromkeys(("stiffness", "standard_error", "low", "high", *_OPEN, "identifiable")),
+    **{"at_bound": AT_BOUND[0], **LINEAR, "status": NOT_FITTED},
+    "message": "not fitted: no reading depends on it; predictions take the value fits start from",
+}
+"""Cells of a stiffness that was never fitted."""
+
+
 def stiffness_rows(
     joints: Sequence[str],
     free: Sequence[str],
@@ -38,6 +47,7 @@ def stiffness_rows(
     at_bound: NDArray[np.int64],
     reaches: Mapping[tuple[int, int], RegionEnds] | None = None,
     growth: Growth | None = None,
+    silent: NDArray[np.bool_] | None = None,
 ) -> list[Row]:
     """One row per joint and free coordinate.
 
@@ -53,12 +63,18 @@ def stiffness_rows(
     reaches : regions by profile likelihood, by joint's row and coordinate's column; not to be
         confused with the reach of `interval`.
     growth : of laws that stiffen; None for linear ones.
+    silent : (J, 6) which no reading depends on. Those rows have no number, and a status of their
+        own; callers add that of the fit to all others.
     """
     reach = float(stats.t.ppf(LEVEL, degrees_of_freedom)) if degrees_of_freedom > 0 else np.inf
     rows = []
     for row, joint in enumerate(joints):
         for name in free:
             at = row, COORDINATES.index(name)
+            if silent is not None and silent[at]:
+                place = {"joint": joint, "coordinate": name, "unit": STIFFNESS_UNITS[name]}
+                rows.append(NO_ROW | place)
+                continue
             told = (reaches or {}).get(at)
             # A region brings ends (low, high) and flags, and its ends replace those of the interval
             # below. Where no region was looked for the interval stands.

@@ -28,7 +28,13 @@ from spinepipe.studies.study_files import Figure, StudyFiles
 OF_EXPERIMENTS = ("load_displacement", "helical_axes")
 """What laboratories report, one job per specimen."""
 
-OF_JOBS = ("stiffness", "errors", "fits", "nuisances", "sign_checks", "pooling", *OF_EXPERIMENTS)
+PREDICTED = "predicted_stiffness"
+"""Stiffness of left-out specimens, of job files whose rows are those of ``stiffness``."""
+
+OF_JOBS = (
+    *("stiffness", PREDICTED, "errors", "fits", "nuisances", "sign_checks", "pooling"),
+    *OF_EXPERIMENTS,
+)
 """Tables joined from job files."""
 
 _ANALYSES = (
@@ -124,10 +130,11 @@ class CohortLayout(StudyFiles):
         """The tables that this study has."""
         pooled = ("pooling",) if self._pooled else ()
         nuisances = ("nuisances",) if self._with_nuisances else ()
+        predicted = (PREDICTED,) if self._held_out else ()
         own = ("stiffness", "fits", "errors", *nuisances, "sign_checks", *pooled, *OF_EXPERIMENTS)
         lacking = set() if self.rebuilt else {"against_gould_2024b"}
         lacking |= set() if self.study.covariates else {"covariates"}
-        return (*own, *(job.name for job in _ANALYSES if job.name not in lacking))
+        return (*own, *predicted, *(job.name for job in _ANALYSES if job.name not in lacking))
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -145,7 +152,7 @@ class CohortLayout(StudyFiles):
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per specimen, and one of the pooled fits."""
-        nobody = table == "pooling" or (table == "fits" and not self._single)
+        nobody = table == "pooling" or (table in ("fits", PREDICTED) and not self._single)
         own = [] if nobody else [(name, _SINGLE_BLOCK) for name in self.specimens]
         alone = table in ("nuisances", "sign_checks", *OF_EXPERIMENTS)
         pooled = [] if alone or not self._pooled else [(EVERYONE, POOLED_BLOCK)]
@@ -155,8 +162,8 @@ class CohortLayout(StudyFiles):
         """The job files of which a block is made."""
         own = f"specimen={specimen}"
         if block == POOLED_BLOCK:
-            folds = [(label, NOBODY) for label in self.load_sets]
-            if self._held_out:
+            folds = [(label, NOBODY) for label in self.load_sets if table != PREDICTED]
+            if self._held_out and table != "stiffness":
                 folds += product(self._without_case_folds, self.specimens)
             places = [
                 f"pooled/representation={representation}/fitted_to={label}/without={one}"
@@ -168,11 +175,12 @@ class CohortLayout(StudyFiles):
         elif table == "nuisances":
             places = _fitted(f"fits/{own}", self._with_nuisances, self.load_sets)
         else:
-            places = [f"literature/{own}"] if table != "fits" else []
-            if table != "sign_checks":
+            places = [f"literature/{own}"] if table not in ("fits", PREDICTED) else []
+            if table not in ("sign_checks", PREDICTED):
                 places += _fitted(f"fits/{own}", self._single, self.load_sets)
-            if table in ("stiffness", "errors") and self._held_out:
+            if table in (PREDICTED, "errors") and self._held_out:
                 places += _fitted(f"left_out/{own}", self._single, self._without_case_folds)
+        table = "stiffness" if table == PREDICTED else table
         return [f"{self.folder}/{place}/{table}.parquet" for place in places]
 
     def fits_of_others(self, specimen: str, representation: str, fitted_to: str) -> list[str]:
@@ -238,7 +246,8 @@ def _simulated_fit(expected: Any, place: Mapping[str, str]) -> list[str]:
     return [expected.of_part("stiffness", file) for file in files]
 
 
-_HELD_OUT = ("representations", "cross_validation", "covariates", "significance")
+_CURVES = ("neutral_zone", "neutral_zone_below_nm_per_deg")
+_HELD_OUT = ("representations", "cross_validation", "covariates", "significance", *_CURVES)
 _FITTING = ("seed", "steps", "cost", "measurement_sd", "bound_factor", "starts")
 """Settings by what they decide: what is held out and compared, and how stiffness is fitted."""
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.digest import mark_of
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import ScopedEffect
@@ -26,6 +26,7 @@ from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stiffening import Growth, laws, median_growth
 from spinepipe.studies.cohort_stiffness.tables import ERRORS, IN_FOLDERS, STIFFNESS
 from spinepipe.tables import from_rows, read_frame, write
+from spinepipe.units import COORDINATES
 
 SOURCE = "others_median"
 
@@ -75,9 +76,10 @@ def predicted_by_others(
     tests = specimen_tests(settings, cohort, specimen)
     k, growth, used = _median(settings, cohort, representation, others)
     rows = _stiffness(settings, cohort, k, growth, used, len(others), note)
+    known = used.max(initial=0) > 0
     within = {one.case.test for one in tests.fitted_to(fitted_to)}
     effects = (*laws(settings, growth), *beside)
-    seen = [] if not used else error_rows(cohort, specimen, tests, k, effects)
+    seen = [] if not known else error_rows(cohort, specimen, tests, k, effects)
     labelled = [
         {**row, "source": SOURCE, "stage": "left_out_specimen"}
         for row in seen
@@ -88,22 +90,25 @@ def predicted_by_others(
 
 def _median(
     settings: CohortStiffness, cohort: Cohort, representation: str, others: list[pd.DataFrame]
-) -> tuple[Array, Array | None, int]:
-    """(J, 6) median over the others that have a stiffness, that of growth, and how many they are.
+) -> tuple[Array, Array | None, Indices]:
+    """(J, 6) median over the others that have a stiffness, that of growth, and (J, 6) how many.
 
     Growth is None where the representation is linear, or nobody has any.
     """
     k = start_stiffness(settings, cohort, representation)
-    fitted = [frame for frame in others if frame["stiffness"].notna().all()]
-    if not fitted:
-        return k, None, 0
+    used = np.zeros(k.shape, dtype=np.int64)
+    fitted = [frame[frame["stiffness"].notna()] for frame in others]
+    if not any(map(len, fitted)):
+        return k, None, used
     # Coordinates that are not fitted keep the published value.
     keys, values = ["joint", "coordinate"], ["stiffness", "growth"]
     rows = pd.concat(fitted).astype(dict.fromkeys(values, float))
     median = rows.groupby(keys, as_index=False)[values].median()
     k = with_stiffness(k, cohort.joint_names, median)
     growth = median_growth(settings, cohort.joint_names, representation, median)
-    return k, growth, len(fitted)
+    for (joint, coordinate), n in rows.groupby(keys).size().items():
+        used[cohort.joint_names.index(joint), COORDINATES.index(coordinate)] = n
+    return k, growth, used
 
 
 def _stiffness(
@@ -111,20 +116,25 @@ def _stiffness(
     cohort: Cohort,
     k: Array,
     growth: Array | None,
-    used: int,
+    used: Indices,
     others: int,
     note: str,
 ) -> list[dict[str, Any]]:
-    whole = f"median of {used} specimen{'s' if used != 1 else ''}"
-    part = f"{others - used} of {others} have no stiffness" if used < others else ""
-    status, message = Status.CONVERGED, joined(whole, part, note)
-    if not used:
-        status, message = Status.REFUSED, "no other specimen has a stiffness"
-    values = k if used else np.full(k.shape, np.nan)
+    known = used.max(initial=0) > 0
+    values = k if known else np.full(k.shape, np.nan)
     none = np.zeros(k.shape, dtype=int)
     rows = stiffness_rows(
         *(cohort.joint_names, settings.free, values, np.full(k.shape, np.inf), 0.0, None, none),
         growth=None if growth is None else Growth.of(growth),
+        silent=(used == 0) & known,
     )
-    ended = {"source": SOURCE, "status": status.value, "message": message}
-    return [{**row, **ended} for row in rows]
+    told = []
+    for row in rows:
+        n = used[cohort.joint_names.index(row["joint"]), COORDINATES.index(row["coordinate"])]
+        status, message = Status.REFUSED, "no other specimen has a stiffness"
+        if n:
+            part = f"{others - n} of {others} have no stiffness" if n < others else ""
+            whole = f"median of {n} specimen{'s' if n != 1 else ''}"
+            status, message = Status.CONVERGED, joined(whole, part, note)
+        told.append({"status": status.value, "message": message, **row, "source": SOURCE})
+    return told

@@ -41,6 +41,7 @@ SIDES = {1: "positive", -1: "negative"}
 NO_UNLOADING = "no unloading was read: no hysteresis area"
 NOT_CLOSED = "the loop is not closed: no hysteresis area"
 ONE_SIDE = "loaded to one side: no neutral zone"
+ONE_WAY = "the load passes zero in one direction only: no gap there"
 TWO_ZEROS = "two tests, each with its own zero, joined there"
 MANY = "the load goes up and down several times in this cycle: number its cycles in loads.csv"
 NO_ELASTIC = "fewer than two loads in the elastic zone of the {side} side"
@@ -60,11 +61,14 @@ class LoopReading:
     ----------
     sd : rad, of one reading, for the question whether a curve is bent; None where not declared.
     spread : for intervals; None where nothing is known.
+    definition : of the neutral zone. below : N m/rad, the stiffness of ``threshold``.
     """
 
     loop: Loop
     spread: RotationErrors | None
     sd: float | None
+    definition: str = "double_sigmoid"
+    below: float | None = None
 
 
 def displacement_row(seen: LoopReading) -> Row:
@@ -82,6 +86,11 @@ def displacement_row(seen: LoopReading) -> Row:
         return row | {"status": Status.REFUSED.value, "message": MANY}
     row |= _cells(seen, "range_of_motion", "deg", loop.range_of_motion(), DEG_PER_RAD)
     zones, found, why = _zones(seen)
+    gap = loop.gap() if seen.definition == "at_zero_load" and found is not Zone.ONE_SIDE else None
+    if gap is not None:  # of no load, so that elastic zones do not begin at its ends
+        zones, found, why = [], Zone.FOUND, ""
+        row |= _cells(seen, "neutral_zone", "deg", gap, DEG_PER_RAD)
+        row |= {"neutral_zone_from_nm": 0.0, "neutral_zone_to_nm": 0.0}
     row["neutral_zone"] = found.value
     row |= _zone_cells(seen, zones)
     elastic, lost = _elastic_cells(seen, zones)
@@ -119,9 +128,13 @@ def _zones(seen: LoopReading) -> tuple[list[FittedNeutralZone], Zone, str]:
     loop = seen.loop
     if not loop.two_sided:
         return [], Zone.ONE_SIDE, ONE_SIDE
+    if seen.definition == "at_zero_load":
+        return [], Zone.ONE_WAY, ONE_WAY
     zones, words = [], []
     for places in loop.curves():
-        zone, found, why = neutral_zone(loop.load[places], loop.rotation[places], seen.sd)
+        zone, found, why = neutral_zone(
+            loop.load[places], loop.rotation[places], seen.sd, seen.below
+        )
         words.append((found, why))
         if zone is not None:
             zones.append(_of_loop(zone, places, len(loop.load)))

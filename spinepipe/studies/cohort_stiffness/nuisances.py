@@ -93,7 +93,7 @@ def start_from_plain(problem: Problem, plain: Fit) -> tuple[Problem, str]:
     known = plain.uncertainty.identifiable | (plain.at_bound != 0)
     stiffness = [index for index in range(len(problem.free)) if not problem.has_prior(index)]
     x = np.zeros(len(problem.free))  # nuisances start at none
-    x[stiffness] = plain.x
+    x[stiffness] = np.where(plain.uncertainty.silent, 0.0, plain.x)
     held = [index for index, told in zip(stiffness, known, strict=True) if not told]
     kept = np.setdiff1d(np.arange(len(x)), held)
     assert problem.prior_sd is not None

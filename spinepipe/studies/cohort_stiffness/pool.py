@@ -2,19 +2,23 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from spinepipe.calibration import Pooled, PooledSpecimen, Problem, pool
+from spinepipe.calibration.hierarchy import MEAN_SD
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import RefusedModel, ScopedEffect
-from spinepipe.status import Status, joined
+from spinepipe.status import NOT_FITTED, Status, joined
 from spinepipe.studies.cohort_stiffness.fit_rows import (
     LEVEL,
+    NO_ROW,
     criteria,
     independent,
     no_fit,
@@ -46,6 +50,9 @@ from spinepipe.units import COORDINATES, STIFFNESS_COLUMNS, STIFFNESS_UNITS
 
 Row = dict[str, Any]
 NOBODY_FITTED = "no specimen has motion to fit"
+
+UNTOLD_SD = 0.999 * MEAN_SD
+"""Of a mean of which hardly more is known than its prior: no reading of the cohort tells of it."""
 
 DECIDED = 0.5
 """Share of a newcomer's variance below which a specimen's own readings decide."""
@@ -173,8 +180,9 @@ class PooledRows:
     def stiffness(self, specimen: str) -> list[Row]:
         """Rows of table ``stiffness`` for a fitted specimen or a newcomer."""
         joints, newcomer = self.cohort.joint_names, self._newcomer(specimen)
-        values = self._values(specimen)
+        values, silent = self._values(specimen), np.tile(self._silent, (len(joints), 1))
         if values is None:
+            silent = None
             none = np.zeros((len(joints), len(COORDINATES)), dtype=int)
             values = np.full(none.shape, np.nan), none + np.nan, none, none
         k, error, bound, decided = values
@@ -182,14 +190,15 @@ class PooledRows:
         rows = stiffness_rows(
             *(joints, self.study.free, k, error, self._freedom(specimen), known, bound),
             growth=self._growth(specimen),
+            silent=silent,
         )
         status, message = self._ended(specimen)
-        for row in rows:
+        for row in (one for one in rows if "status" not in one):
             at = joints.index(row["joint"]), COORDINATES.index(row["coordinate"])
             of_cohort = not newcomer and np.isfinite(error[at]) and not decided[at]
             note = joined(message, NOT_DECIDED if of_cohort else "")
-            row |= {"specimen": specimen, "status": status.value, "message": note}
-        return rows
+            row |= {"status": status.value, "message": note}
+        return [row | {"specimen": specimen} for row in rows]
 
     def errors(self, specimen: str) -> list[Row]:
         """Rows of table ``errors``: all tests of a fitted specimen, those fitted of a newcomer."""
@@ -252,7 +261,9 @@ class PooledRows:
                 **dict.fromkeys(_OF_SPREADS),
             }
             spread = spreads.get(STIFFNESS_COLUMNS[place])
-            if self.found is not None and spread is not None:
+            if self._silent[place]:
+                row |= {"status": NOT_FITTED, "message": NO_ROW["message"]}
+            elif self.found is not None and spread is not None:
                 row |= {
                     "centre": float(start[place]) * float(np.exp(spread.mean)),
                     "between_levels": spread.level or None,  # zero: not told from the rest
@@ -268,6 +279,16 @@ class PooledRows:
                 }
             rows.append(row)
         return rows
+
+    @cached_property
+    def _silent(self) -> NDArray[np.bool_]:
+        """(6,) coordinates that no reading of any specimen depends on."""
+        silent = np.zeros(len(COORDINATES), dtype=bool)
+        if self.found is not None and self.found.status.usable:
+            for spread in self.found.spreads:
+                if not spread.effect:
+                    silent[spread.column] = spread.mean_se > UNTOLD_SD
+        return silent
 
     def _own(self, specimen: str) -> PooledSpecimen | None:
         if self.found is None or specimen not in self.problems:
@@ -301,8 +322,8 @@ class PooledRows:
         bound = np.zeros(k.shape, dtype=int)
         decided = np.zeros(k.shape, dtype=int)
         for index, unknown in enumerate(unknowns.free):
-            if unknown.effect:
-                continue  # of a law that stiffens
+            if unknown.effect or self._silent[unknown.column]:
+                continue  # of a law that stiffens; or of no reading
             at = unknown.rows[0], unknown.column
             k[at] *= np.exp(unknowns.x[index])
             bound[at] = unknowns.at_bound[index]

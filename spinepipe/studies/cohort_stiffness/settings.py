@@ -146,6 +146,15 @@ class CohortStiffness(Study):
     cross_validation: CrossValidation = Field(
         default_factory=CrossValidation, description="what is held out"
     )
+    neutral_zone: Literal["double_sigmoid", "at_zero_load", "threshold"] = Field(
+        default="double_sigmoid",
+        description="what the neutral zone of a curve is; double_sigmoid: between the bends of the "
+        "fitted curve; at_zero_load: between its two ways, where the moment is zero; threshold: "
+        "where the fitted curve is softer than neutral_zone_below_nm_per_deg",
+    )
+    neutral_zone_below_nm_per_deg: float | None = Field(
+        default=None, gt=0, le=1e4, description="stiffness of threshold, N m/deg; null: none"
+    )
     covariates: EachOnce[Covariate] | None = Field(
         default=None,
         description="columns of specimens.csv that stiffness is regressed on, all together; k of "
@@ -154,6 +163,22 @@ class CohortStiffness(Study):
     significance: float = Field(
         default=0.05, gt=0, lt=1, description="p-values below this are called significant"
     )
+
+
+_SUM = "rotation = c1/(1 + exp(-(a1 + b1 M))) + c2/(1 + exp(-(a2 + b2 M))) + d"
+_ZONES = {
+    "double_sigmoid": f"from the largest to the least second derivative of {_SUM}, one sigmoid "
+    "where two are no better (Smit et al. 2011, doi:10.1186/1471-2474-12-38)",
+    "at_zero_load": "rotation at M = 0 on the way down less that at M = 0 on the way up "
+    "(zero load method, doi:10.1002/jsp2.1088)",
+    "threshold": f"where dM/d(rotation) is below {{:g}} N m/deg on the curve {_SUM} "
+    "(stiffness threshold method, doi:10.1002/jsp2.1088)",
+}
+
+
+def zone_formula(study: CohortStiffness) -> str:
+    """What the neutral zone of a curve is, of its moment M."""
+    return _ZONES[study.neutral_zone].format(study.neutral_zone_below_nm_per_deg)
 
 
 def representations_of(study: CohortStiffness, joints: Sequence[str]) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from spinepipe.schema import declared
 
 STIFFNESS = declared(__file__, "stiffness")
+PREDICTED_STIFFNESS = declared(__file__, "predicted_stiffness")
 FITS = declared(__file__, "fits")
 ERRORS = declared(__file__, "errors")
 POOLING = declared(__file__, "pooling")

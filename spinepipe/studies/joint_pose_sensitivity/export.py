@@ -34,7 +34,7 @@ def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -
     InputError
         Where there is no such pose, or no stiffness that fits it.
     """
-    refuse(wanted, poses=True)
+    refuse(wanted, "pose")
     specimen, pose = wanted.specimen, wanted.pose
     if pose is None:
         frames, name = joint_frames(cohort, specimen), "nominal"

@@ -265,3 +265,42 @@ def test_of_springs_fitted_to_their_readings_95_in_100_are_within_the_limit() ->
     _, agree, known = within(rows)
     assert known == 2000
     assert agree / 2000 == pytest.approx(0.95, abs=4.0 * np.sqrt(0.05 * 0.95 / 2000))
+
+
+@pytest.mark.parametrize(
+    ("setting", "zone_deg", "from_nm", "formula"),
+    [
+        ("", 12.0 / np.sqrt(3.0), 1.975, "(Smit et al. 2011"),
+        ("neutral_zone: at_zero_load\n", 12.0 * np.tanh(1.0 / 6.0), 0.0, "rotation at M = 0"),
+        (
+            "neutral_zone: threshold\nneutral_zone_below_nm_per_deg: 1.0\n",
+            12.0 * np.sqrt(0.5),  # 2 (1 - tanh2) = 1 deg/(N m)
+            3.0 * np.arctanh(np.sqrt(0.5)),
+            "below 1 N m/deg",
+        ),
+    ],
+)
+def test_the_definition_that_is_named_makes_the_zone_and_is_told(
+    setting: str, zone_deg: float, from_nm: float, formula: str, tmp_path: Path
+) -> None:
+    """Up by 6 tanh((M - 0.5) / 3) deg, down by 6 tanh((M + 0.5) / 3) deg, to 7.5 N m."""
+    up = np.linspace(0.0, 7.5, 16)
+    moment = np.concatenate([up, up[-2::-1], -up[1:], -up[-2::-1]])
+    way = np.concatenate([-np.ones(16), np.ones(30), -np.ones(15)])
+    turned = 6.0 * np.tanh((moment + 0.5 * way) / 3.0)
+    found = looped(Chains({"a": A}, ["flexion"], study=setting), moment, turned).write(tmp_path)
+    tables = found.experiment("a")
+    row = curve(tables, "L4L5", "flexion")
+    assert row["neutral_zone"] == "found"
+    assert row["neutral_zone_deg"] == pytest.approx(zone_deg, rel=5e-3)
+    assert row["neutral_zone_low_deg"] < row["neutral_zone_deg"] < row["neutral_zone_high_deg"]
+    assert -row["neutral_zone_from_nm"] == pytest.approx(from_nm, abs=0.02)
+    at_zero = "at_zero_load" in setting
+    assert row["elastic_zone"] == ("upper_half" if at_zero else "beyond_neutral_zone")
+    rows = tables["load_displacement"]
+    assert rows["neutral_zone_formula"].str.contains(formula, regex=False).all()
+    named = setting.partition("\n")[0].removeprefix("neutral_zone: ") or "double_sigmoid"
+    assert set(rows["neutral_zone_definition"]) == {named}
+    model = curve(tables, "L4L5", "flexion", "simulated")
+    if at_zero:  # a linear joint comes back the way it went
+        assert model["neutral_zone_deg"] == pytest.approx(0.0, abs=1e-9)

@@ -31,20 +31,27 @@ def test_rows_are_those_that_were_asked_for(eight: Project) -> None:
     assert stiffness["source"].value_counts().to_dict() == {
         "literature": 3 * 2 * of_one,
         "own": 3 * 2 * 3 * of_one,
+    }
+    predicted = table(eight, "predicted_stiffness")
+    assert predicted["source"].value_counts().to_dict() == {
         "others_median": 3 * 3 * of_one,
         "others_pooled": 3 * 3 * of_one,
     }
+    # both tests are pure moments: none tells of axial rotation
+    for rows in (stiffness[stiffness["source"] == "own"], predicted):
+        untold = rows["coordinate"] == "left_rotation"
+        assert set(rows.loc[untold, "status"]) == {"not_fitted"}
+        assert rows.loc[untold, "stiffness"].isna().all()
     assert len(table(eight, "sign_checks")) == 3 * 2 * len(JOINTS)
     assert set(table(eight, "pooling")["without"]) == {"nobody", *SPECIMENS}
 
 
 def test_specimens_keep_their_stiffness_through_the_joins(eight: Project) -> None:
-    rows = table(eight, "stiffness").query(
-        "representation == 'per_joint' and fitted_to == 'flexion' and coordinate == 'extension'"
-    )
-    own = rows[rows["source"] == "own"].groupby("specimen")["stiffness"].mean()
+    asked = "representation == 'per_joint' and fitted_to == 'flexion' and coordinate == 'extension'"
+    own = table(eight, "stiffness").query(asked).groupby("specimen")["stiffness"].mean()
     assert own.to_dict() == pytest.approx(SPECIMENS, rel=1e-3)
-    others = rows[rows["source"] == "others_median"].groupby("specimen")["stiffness"].mean()
+    predicted = table(eight, "predicted_stiffness").query(asked)
+    others = predicted.groupby("specimen")["stiffness"].mean()
     assert others.to_dict() == pytest.approx({"a": 55.0, "b": 60.0, "c": 45.0}, rel=1e-3)
 
 
