@@ -12,6 +12,7 @@ TESTING_MACHINE = "testing_machine"
 
 KINDS: Mapping[str, str] = {
     TESTING_MACHINE: "spinepipe.testing_machine.folder",
+    "opensim_model": "spinepipe.imports.opensim_model.folder",
 }
 """Module by kind. Its `imported(folder, document)` returns an `ImportedCohort`, or raises
 `InputError` with every problem; `folder` is where the settings file is."""
