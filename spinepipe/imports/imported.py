@@ -9,17 +9,29 @@ from dataclasses import replace as with_values
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
+
 from spinepipe.cohort.columns import TABLES
 from spinepipe.documents.form import TableForm
+from spinepipe.frames import Pose, zxy_angles
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
+from spinepipe.units import MM_PER_M
 
 _UNITS = {
     **{"mm": "mm", "deg": "deg", "n": "N", "nm": "N m", "s": "s"},
     **{"kg": "kg", "m": "m", "m2": "kg m2", "years": "years"},
 }
 """Units as names of columns end with them."""
+
+Rows = list[Sequence[object]]
+
+POINT = ("x_mm", "y_mm", "z_mm")
+FRAME = (*POINT, "extension_deg", "right_bending_deg", "left_rotation_deg")
+
+Made = tuple[dict[str, Rows], list[str]]
+"""Rows of tables by file, and sentences."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +115,16 @@ def csv_text(rows: Iterable[Sequence[object]]) -> str:
 def rounded(value: float) -> str:
     """A number of a table: six decimals at most, no minus before zero."""
     return f"{round(float(value), 6) + 0.0:.10g}"
+
+
+def cells(values: Iterable[float], decimals: int = 9) -> list[str]:
+    """Numbers of a row, so that nothing of a model is lost."""
+    return [f"{round(float(value), decimals) + 0.0:.15g}" for value in values]
+
+
+def pose_cells(pose: Pose) -> list[str]:
+    """A frame in ground, columns `FRAME`."""
+    return cells([*pose.origin * MM_PER_M, *np.degrees(zxy_angles(pose.rotation))])
 
 
 def _descriptor(imported: ImportedCohort, folder: Path) -> str:

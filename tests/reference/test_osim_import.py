@@ -10,6 +10,7 @@ import numpy as np
 import opensim
 import pandas as pd
 import pytest
+from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort.specimen import bodies, joint_frames, spine_model
@@ -282,3 +283,111 @@ def test_a_model_of_opensims_own_making(tmp_path: Path) -> None:
         "1 on arm",
     ):
         assert words in said
+
+
+OLD_BODY = """
+<Body name="{name}"><mass>{mass}</mass><mass_center>0.01 0.02 -0.01</mass_center>
+<inertia_xx>0.02</inertia_xx><inertia_yy>0.03</inertia_yy><inertia_zz>0.04</inertia_zz>
+<inertia_xy>0.001</inertia_xy><inertia_xz>0</inertia_xz><inertia_yz>-0.002</inertia_yz>
+<Joint>{joint}</Joint></Body>"""
+
+OLD_WELD = """
+<WeldJoint name="base"><parent_body>ground</parent_body>
+<location_in_parent>0.1 0.9 0</location_in_parent>
+<orientation_in_parent>0 0 0.2</orientation_in_parent>
+<location>0.01 0 0</location><orientation>0.1 0 0</orientation></WeldJoint>"""
+
+OLD_JOINT = """
+<CustomJoint name="L5_S1"><parent_body>sacrum</parent_body>
+<location_in_parent>-0.01 0.06 0</location_in_parent>
+<orientation_in_parent>0.1 -0.2 -0.3</orientation_in_parent>
+<location>0 -0.01 0</location><orientation>0 0 0.1</orientation>
+<CoordinateSet><objects>
+<Coordinate name="bend"><default_value>0.2</default_value></Coordinate>
+<Coordinate name="turn"><default_value>0.1</default_value></Coordinate>
+</objects></CoordinateSet>
+<SpatialTransform>
+<TransformAxis name="rotation1"><function><MultiplierFunction><function><LinearFunction>
+<coefficients>0.5 0.01</coefficients></LinearFunction></function><scale>0.8</scale>
+</MultiplierFunction></function><coordinates>bend</coordinates><axis>0 0 1</axis></TransformAxis>
+<TransformAxis name="rotation2"><function><SimmSpline><x>-1 1</x><y>-0.3 0.5</y></SimmSpline>
+</function><coordinates>turn</coordinates><axis>1 0 0</axis></TransformAxis>
+<TransformAxis name="rotation3"><function><SimmSpline><x>-1 0.2 1 2</x><y>-1 0.3 0.4 0.1</y>
+</SimmSpline></function><coordinates>bend</coordinates><axis>0 1 0</axis></TransformAxis>
+<TransformAxis name="translation1"><function><Constant><value>0.003</value></Constant></function>
+<axis>1 0 0</axis></TransformAxis>
+<TransformAxis name="translation2"><function><Constant><value>0.04</value></Constant></function>
+<axis>0 1 0</axis></TransformAxis>
+<TransformAxis name="translation3"><function><Constant><value>0</value></Constant></function>
+<axis>0 0 1</axis></TransformAxis>
+</SpatialTransform></CustomJoint>"""
+
+OLD_BUSHING = """
+<BushingForce name="disc"><body_1>sacrum</body_1><body_2>L5</body_2>
+<location_body_1>{at}</location_body_1><orientation_body_1>{turned}</orientation_body_1>
+<location_body_2>0 -0.01 0</location_body_2><orientation_body_2>0 0 0.1</orientation_body_2>
+<rotational_stiffness>20 30 40</rotational_stiffness>
+<translational_stiffness>1000 2000 0</translational_stiffness></BushingForce>"""
+
+
+def old(version: int, bushing: str = "") -> str:
+    bodies = "".join(
+        (
+            '<Body name="ground"><mass>0</mass><mass_center>0 0 0</mass_center></Body>',
+            OLD_BODY.format(name="sacrum", mass=3, joint=OLD_WELD),
+            OLD_BODY.format(name="L5", mass=2, joint=OLD_JOINT),
+        )
+    )
+    marker = '<Marker name="m"><body>L5</body><location>-0.05 0.02 0.01</location></Marker>'
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<OpenSimDocument Version="{version}"><Model name="old"><gravity>0 -9.81 0</gravity>
+<BodySet><objects>{bodies}</objects></BodySet>
+<ForceSet><objects>{bushing}</objects></ForceSet>
+<MarkerSet><objects>{marker}</objects></MarkerSet>
+</Model></OpenSimDocument>"""
+
+
+@sweep("version", [20302, 30000])
+def test_a_model_of_version_2_or_3(tmp_path: Path, version: int) -> None:
+    (tmp_path / "model.osim").write_text(old(version), encoding="utf-8")
+    model = opensim.Model(str(tmp_path / "model.osim"))
+    state = model.initSystem()
+    model.realizePosition(state)
+    cohort, _ = imported(tmp_path)
+    (frame,) = joint_frames(cohort, "old")
+    theirs = transform(model.getJointSet().get("L5_S1").getChildFrame().getTransformInGround(state))
+    near(frame.origin, theirs.origin, 1e-9)
+    near(frame.rotation, theirs.rotation, 1e-9)
+    (body,) = bodies(cohort, "old")
+    l5 = model.getBodySet().get("L5")
+    placed = transform(l5.getTransformInGround(state))
+    near(body.com, placed.apply(l5.getMassCenter().to_numpy()), 1e-9)
+    own = np.array([[0.02, 0.001, 0], [0.001, 0.03, -0.002], [0, -0.002, 0.04]])
+    near(body.inertia, placed.rotation @ own @ placed.rotation.T, 1e-9)
+    marker = pd.read_csv(tmp_path / "osim" / "marker_set.csv")
+    at = frame.apply(marker[["x_mm", "y_mm", "z_mm"]].to_numpy(float)[0] / 1e3)
+    near(at, model.getMarkerSet().get(0).getLocationInGround(state).to_numpy(), 1e-9)
+
+
+def test_a_bushing_of_version_3_in_the_frame_of_a_joint(tmp_path: Path) -> None:
+    """Its frame on the sacrum is where OpenSim has that of L5; elsewhere it is told and left out."""
+    (tmp_path / "model.osim").write_text(old(30000), encoding="utf-8")
+    model = opensim.Model(str(tmp_path / "model.osim"))
+    state = model.initSystem()
+    frame = model.getJointSet().get("L5_S1").getChildFrame()
+    here = frame.findTransformBetween(state, model.getBodySet().get("sacrum"))
+    at, turned = here.p().to_numpy(), here.R().convertRotationToBodyFixedXYZ().to_numpy()
+    for away in (0.0, 0.01):
+        place = " ".join(map(repr, (at + [away, 0, 0]).tolist()))
+        bushing = OLD_BUSHING.format(at=place, turned=" ".join(map(repr, turned.tolist())))
+        (tmp_path / "model.osim").write_text(old(30000, bushing), encoding="utf-8")
+        (tmp_path / "osim" / "model.yaml").unlink(missing_ok=True)
+        _, told = imported(tmp_path)
+        assert any("BushingForce left out" in one for one in told) == (away > 0.0)
+        assert (tmp_path / "osim" / "model.yaml").exists() == (away == 0.0)
+        if away == 0.0:
+            (law,) = effects_for(read_model(tmp_path / "osim" / "model.yaml"), "old", ("L5S1",))
+            # no stiffness to the right: the least that a bushing has
+            near(law.values, [[1000, 2000, 1, 40, 20, 30]], 1e-9)
+            said = " ".join(told)
+            assert "end of the range" in said and "small rotations" in said

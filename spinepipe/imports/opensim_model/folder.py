@@ -14,25 +14,31 @@ from spinepipe.documents.settings import validate
 from spinepipe.documents.xml_text import read_xml
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.frames import Pose
-from spinepipe.imports.imported import ImportedCohort, csv_text
-from spinepipe.imports.opensim_model.bushings import NAME, bushing_model
-from spinepipe.imports.opensim_model.document import ORIGIN, OsimDocument
-from spinepipe.imports.opensim_model.muscles import MUSCLE, muscle_tables
-from spinepipe.imports.opensim_model.settings import OsimSettings
-from spinepipe.imports.opensim_model.spine import OsimSpine
-from spinepipe.imports.opensim_model.tables import (
+from spinepipe.imports.imported import (
     FRAME,
     POINT,
+    ImportedCohort,
+    Made,
     Rows,
     cells,
-    point_cells,
+    csv_text,
     pose_cells,
 )
+from spinepipe.imports.opensim_model.document import ORIGIN, OsimDocument
+from spinepipe.imports.opensim_model.forces import (
+    BUSHING_FORCE,
+    MUSCLE,
+    bushing_model,
+    muscle_tables,
+)
+from spinepipe.imports.opensim_model.settings import OsimSettings
+from spinepipe.imports.opensim_model.spine import OsimSpine
 from spinepipe.model import Body, RefusedModel
 from spinepipe.model.osim_parts import SIX
 from spinepipe.problems import InputError
 from spinepipe.report.words import count, listed
 from spinepipe.studies.registry import every_form
+from spinepipe.units import MM_PER_M
 
 BY_HAND = {
     "specimens.csv": "specimens.csv has the name alone. Put in sex, age, height and mass if a "
@@ -43,9 +49,6 @@ _INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 _BODY = ("mass_kg", *(f"com_{one}" for one in POINT), *(f"i{one}_kg_m2" for one in _INERTIA))
 
 _NO_WEIGHT_M_S2 = 1e-3
-
-Made = tuple[dict[str, Rows], list[str]]
-"""Rows of tables by file, and sentences."""
 
 
 def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
@@ -81,12 +84,14 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         tables |= made
         told += sentences
     model, sentences = bushing_model(spine, settings.cohort)
+    weighed = {row[1] for row in tables.get("bodies.csv", ())}
+    gravity = _pulls(spine) and all(name in weighed for name in [*spine.bodies][1:])
     header = {
         "cohort": settings.cohort,
         "title": settings.title,
         "source": f"{settings.source.rstrip('. ')}. Made by `spinepipe import` of {settings.file}.",
         "vertebrae": list(spine.bodies),
-        "gravity": _has_weight(spine, len(tables.get("bodies.csv", ()))),
+        "gravity": gravity,
     }
     if osim.problems:
         raise InputError(osim.problems)
@@ -96,20 +101,20 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         title=settings.title,
         files={COHORT_YAML: text, **{n: csv_text(rows) for n, rows in tables.items()}, **model},
         by_hand=BY_HAND,
-        sentences=(*told, *sentences, *_not_read(osim)),
+        sentences=(*told, *sentences, f"gravity: {str(gravity).lower()}.", *_not_read(osim)),
         forms=every_form(),
     )
 
 
-def _has_weight(spine: OsimSpine, n_rows: int) -> bool:
-    """Whether there is weight: it must pull down, and on every vertebra that moves."""
+def _pulls(spine: OsimSpine) -> bool:
+    """Whether there is weight, which must pull down."""
     osim = spine.document
     pull = spine.turn @ osim.numbers(osim.model, "gravity", (0.0, -9.80665, 0.0))
     if np.hypot(pull[0], pull[2]) + max(pull[1], 0.0) > _NO_WEIGHT_M_S2:
         found = f"{' '.join(cells(pull))}, forwards, up and to the right"
         remedy = "say `axes:` in the YAML, as in `x z -y` where z is up"
         osim.fault(osim.model, "gravity", found, "weight that pulls down", remedy)
-    return bool(np.linalg.norm(pull) > _NO_WEIGHT_M_S2) and n_rows >= len(spine.bodies)
+    return bool(np.linalg.norm(pull) > _NO_WEIGHT_M_S2)
 
 
 def _joints(spine: OsimSpine, specimen: str) -> Made:
@@ -157,7 +162,7 @@ def _bodies(spine: OsimSpine, specimen: str) -> Made:
         for one in parts[name]:
             off = one.com - com
             inertia += one.inertia + one.mass * (off @ off * np.eye(3) - np.outer(off, off))
-        rows.append((specimen, name, *cells([mass]), *point_cells(com), *cells(inertia[SIX], 15)))
+        rows.append((specimen, name, *cells([mass, *com * MM_PER_M]), *cells(inertia[SIX], 15)))
     told = [f"Inertia left out, none that a body can have: {listed(odd)}."] if odd else []
     if loose:
         masses = listed(f"{kg:.3g} kg by {name}" for name, kg in loose.items())
@@ -195,7 +200,7 @@ def _markers(spine: OsimSpine, specimen: str) -> Made:
             continue
         at = spine.turn @ on[1].apply(osim.numbers(marker, "location", ORIGIN))
         at = frames[carrier].inverse().apply(spine.ground(on[0]).apply(at))
-        rows.append((specimen, marker.get("name", ""), carrier, *point_cells(at)))
+        rows.append((specimen, marker.get("name", ""), carrier, *cells(at * MM_PER_M)))
     told = [f"{count(len(rows), 'marker')} on vertebrae and pelvis."] if rows else []
     if elsewhere:
         bodies = listed(f"{number} on {body}" for body, number in elsewhere.items())
@@ -214,7 +219,7 @@ def _not_read(osim: OsimDocument) -> Iterator[str]:
         for group in sets
         if group.tag not in ("BodySet", "JointSet", "MarkerSet")
         for one in group.iterfind("objects/*")
-        if not one.tag.endswith((MUSCLE, NAME))
+        if not one.tag.endswith((MUSCLE, BUSHING_FORCE))
     )
     used = {one.findtext("wrap_object", "").strip() for one in osim.model.iter("PathWrap")}
     wraps = osim.model.iterfind(".//WrapObjectSet/objects/*")

@@ -1,18 +1,18 @@
 """Which bodies of an OpenSim model are vertebrae, what moves with them, and where, in our axes."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
+from spinepipe.cohort.checks import check_header
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.imports.opensim_model.document import GROUND, OsimDocument
 from spinepipe.imports.opensim_model.settings import OsimSettings
-from spinepipe.model import MOST_JOINTS
 from spinepipe.motion.reading import axes_of
-from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
+from spinepipe.problems import InputError, InputProblem, one_of
 
 _BASES = ("s1", "sacrum", "pelvis")
 """Names of the body below L5: the first that there is."""
@@ -46,33 +46,26 @@ class OsimSpine:
         InputError
             Where there are none, or they are no chain.
         """
-        chosen = settings.vertebrae or _by_name(document)
-        place, placed = (told.file, told.line_of("vertebrae"), "vertebrae"), document.placed
-        strangers = [body for body in chosen.values() if body not in placed]
-        allowed, remedy = (
-            one_of(placed),
-            did_you_mean(strangers[0], placed, "name one of these") if strangers else "",
-        )
-        found = [
-            f"'{body}', which the model has not, or not in a place that can be read"
-            for body in strangers
+        chosen, placed = settings.vertebrae or _by_name(document), document.placed
+        place = (told.file, told.line_of("vertebrae"), "vertebrae")
+        named = "name them under `vertebrae:`, such as {S1: pelvis, L5: lumbar5}"
+        problems = [
+            InputProblem(*place, f"'{body}'", f"a placed body: {one_of(placed)}", named)
+            for body in chosen.values()
+            if body not in placed
         ]
-        if not strangers:
-            unsorted = cls(document, chosen, axes_of(settings.axes))
-            order = sorted(chosen, key=lambda name: len(unsorted.down(chosen[name])))
-            spine = cls(document, {name: chosen[name] for name in order}, unsorted.turn)
-            allowed = f"2 to {MOST_JOINTS + 1} vertebrae, each joined to the one below it"
-            remedy = "name them under `vertebrae:`, such as {S1: pelvis, L5: lumbar5}"
-            if not 2 <= len(order) <= MOST_JOINTS + 1:
-                found = [f"{len(order)} by names of {len(placed)} bodies: {', '.join(order)}"]
-            found += [
-                f"{upper} ('{chosen[upper]}'), which does not stand on {lower}"
-                for lower, upper in pairwise(order)
-                if chosen[lower] not in spine.down(chosen[upper])
-            ]
-        if found:
-            raise InputError(InputProblem(*place, one, allowed, remedy) for one in found)
-        return spine
+        spine = cls(document, chosen, axes_of(settings.axes))
+        order = sorted(chosen, key=lambda name: len(spine.down(chosen[name])))
+        if not problems:
+            header = YamlDocument(told.file, {"vertebrae": order}, told.lines)
+            problems = [replace(one, remedy=named) for one in check_header(header, "")]
+        for lower, upper in pairwise(order):
+            if not problems and chosen[lower] not in spine.down(chosen[upper]):
+                found, allowed = f"{upper} that does not stand on {lower}", "a chain of bodies"
+                problems.append(InputProblem(*place, found, allowed, named))
+        if problems:
+            raise InputError(problems)
+        return replace(spine, bodies={name: chosen[name] for name in order})
 
     def down(self, body: str) -> list[str]:
         """The body and all between it and ground."""
@@ -113,7 +106,7 @@ class OsimSpine:
 
 
 def _by_name(document: OsimDocument) -> dict[str, str]:
-    """Bodies called like vertebrae; ground where a joint, as we name them, says what it stands for."""
+    """Bodies called like vertebrae, and ground where the name of a joint says which it is."""
     bodies = {body.lower(): body for body in document.placed}
     found = {
         match[1][0].upper() + match[2].lstrip("0"): bodies[name]
