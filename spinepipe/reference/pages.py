@@ -26,6 +26,7 @@ from spinepipe.cohort.cohort import CohortHeader
 from spinepipe.cohort.columns import TABLES
 from spinepipe.documents.form import TableForm
 from spinepipe.effects import Effect, Parameter, TriedValues, create, registered
+from spinepipe.imports.opensim_model.settings import OsimSettings
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.reference.licences import licences
@@ -104,6 +105,7 @@ def generators() -> dict[str, Callable[[], str]]:
     parts["keys cohort.yaml"] = partial(key_table, CohortHeader)
     parts["keys config.yaml"] = partial(key_table, Selection)
     parts["keys import"] = partial(key_table, MachineMapping)
+    parts["keys import opensim_model"] = partial(key_table, OsimSettings)
     parts["keys model"] = partial(key_table, ModelFile)
     parts |= {f"keys {name}": partial(key_table, kind.settings) for name, kind in kinds.items()}
     return parts

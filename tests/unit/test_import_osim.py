@@ -40,7 +40,11 @@ MODEL = f"""<Model name="m"><gravity>0 -9.81 0</gravity>
 <WeldJoint name="side"><socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
  <socket_child_frame>/bodyset/other</socket_child_frame></WeldJoint>
 </objects></JointSet>
-<ForceSet><objects><CoordinateActuator name="x"/><CoordinateActuator name="y"/></objects></ForceSet>
+<ForceSet><objects><CoordinateActuator name="x"/><CoordinateActuator name="y"/>
+<BushingForce name="off"><appliesForce>false</appliesForce>
+ <socket_frame1>/bodyset/L5</socket_frame1></BushingForce></objects></ForceSet>
+<MarkerSet><objects><Marker name="SACR"><socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+</Marker></objects></MarkerSet>
 <ConstraintSet><objects><CoordinateCouplerConstraint name="couple">
  <coupled_coordinates_function><LinearFunction><coefficients>1 0.2</coefficients></LinearFunction>
  </coupled_coordinates_function>
@@ -70,8 +74,8 @@ def changed(old: str, new: str) -> str:
 def test_what_is_not_read_is_counted(tmp_path: Path) -> None:
     told = imported(tmp_path).sentences
     assert "2 vertebrae: S1 is pelvis, L5 is L5." in told
-    counts = "2 CoordinateActuator, 1 CoordinateCouplerConstraint, 1 WrapCylinder that no path uses"
-    assert f"Not read: {counts}." in told
+    counts = "1 BushingForce, 2 CoordinateActuator, 1 CoordinateCouplerConstraint"
+    assert f"Not read: {counts}, 1 WrapCylinder that no path uses." in told
     assert "couple does not hold in the default pose: OpenSim takes another." in told
     assert "Masses left out, carried on joints of their own: 3 kg by L5." in told
 
@@ -137,6 +141,7 @@ REFUSED: dict[str, tuple[str, dict[str, object], str]] = {
         GOOD, {"vertebrae": "{S1: pelvis, L5: L6}"},
         "found 'L6'; allowed: a placed body: one of ground, pelvis, L5, rib, other",
     ),
+    "a marker's name": (changed("SACR", "a/b"), {}, "Marker a/b, name: found 'a/b' with '/'"),
     "upside down": (GOOD, {"vertebrae": "{L5: L5, S1: rib, L4: pelvis}"}, "caudal to cranial"),
     "no chain": (GOOD, {"vertebrae": "{S1: pelvis, L5: L5, L4: other}"}, "does not stand on"),
     "weight forwards": (changed("0 -9.81 0", "-9.81 0 0"), {}, "say `axes:`"),

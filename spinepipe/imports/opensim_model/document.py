@@ -6,13 +6,14 @@ has OpenSim's own default. Constraints are not solved.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from posixpath import join, normpath
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from spinepipe.documents.names import ALLOWED, name_fault
 from spinepipe.documents.text import NUMBER
 from spinepipe.documents.xml_text import LINE
 from spinepipe.effects.contract import Array
@@ -36,16 +37,16 @@ Placement = tuple[str, Pose]
 """A body, and the pose of a frame in it."""
 
 
-@dataclass(frozen=True)
-class OsimJoint:
-    """A joint between two bodies.
+def is_on(element: Element) -> bool:
+    """Whether a force or constraint acts; older files say whether it does not."""
+    words = (element.findtext("appliesForce", "true"), element.findtext("isEnforced", "true"))
+    off = element.findtext("isDisabled", "false").strip() == "true"
+    return not off and all(word.strip() != "false" for word in words)
 
-    Attributes
-    ----------
-    parent, child : bodies, and the joint's frame in each.
-    motion : child's frame in that of the parent, default pose; None: of a form that is not read.
-    moves : whether it has a coordinate that is not locked.
-    """
+
+class OsimJoint(NamedTuple):
+    """A joint: its frames on two bodies, the child's in the parent's in the default pose (None: of
+    a form that is not read), and whether it has a coordinate that is not locked."""
 
     name: str
     parent: Placement
@@ -97,8 +98,16 @@ class OsimDocument:
             pass
 
     def objects(self, group: str, kind: str) -> Iterator[Element]:
-        """Objects of a set of the model whose names end so."""
-        return (one for one in self.model.iterfind(f"{group}/objects/*") if one.tag.endswith(kind))
+        """Objects of a set of the model that end so and are not switched off."""
+        every = self.model.iterfind(f"{group}/objects/*")
+        return (one for one in every if one.tag.endswith(kind) and is_on(one))
+
+    def name(self, at: Element) -> str:
+        """Of an element, which must be one that a table may have."""
+        name = at.get("name", "")
+        if (fault := name_fault(name)) is not None:
+            self.fault(at, "name", fault, ALLOWED, "rename it in OpenSim")
+        return name
 
     def fault(self, at: Element, key: str, found: str, allowed: str, remedy: str) -> None:
         """Note a fault of an element."""
@@ -173,18 +182,14 @@ class OsimDocument:
             self._find_frames(child, child.get(_PATH, "").rstrip("/"))
 
     def _joints(self) -> Iterator[OsimJoint]:
-        found = [(joint, None) for joint in self.objects("JointSet", "Joint")]
-        found += [
-            (joint, body) for body in self.bodies for joint in self.bodies[body].iterfind("Joint/*")
-        ]
+        every = [(joint, "") for joint in self.objects("JointSet", "Joint")]
+        for body, element in self.bodies.items():
+            every += [(joint, body) for joint in element.iterfind("Joint/*")]
         at = ("location_in_parent", "orientation_in_parent")
-        for joint, body in found:
+        for joint, body in every:
             parent = self.side(joint, "socket_parent_frame", "parent_body", *at)
-            child = (
-                self.frame(joint, "socket_child_frame")
-                if body is None
-                else (body, self._pose(joint, "location", "orientation"))
-            )
+            own = (body, self._pose(joint, "location", "orientation"))
+            child = own if body else self.frame(joint, "socket_child_frame")
             if parent is not None and child is not None:
                 locked = [one.findtext("locked", "").strip() for one in joint.iter("Coordinate")]
                 moves = any(one != "true" for one in locked)

@@ -24,13 +24,8 @@ from spinepipe.imports.imported import (
     csv_text,
     pose_cells,
 )
-from spinepipe.imports.opensim_model.document import ORIGIN, OsimDocument
-from spinepipe.imports.opensim_model.forces import (
-    BUSHING_FORCE,
-    MUSCLE,
-    bushing_model,
-    muscle_tables,
-)
+from spinepipe.imports.opensim_model.document import ORIGIN, OsimDocument, is_on
+from spinepipe.imports.opensim_model.forces import FORCES, bushing_model, muscle_tables
 from spinepipe.imports.opensim_model.settings import OsimSettings
 from spinepipe.imports.opensim_model.spine import OsimSpine
 from spinepipe.model import Body, RefusedModel
@@ -69,7 +64,8 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     if osim.problems:
         raise InputError(osim.problems)
     spine = OsimSpine.of(osim, settings, document)
-    specimen = settings.specimen or osim.model.get("name", "")
+    own_name = osim.model.get("name", "")
+    specimen = settings.specimen or own_name
     if (fault := folder_fault(specimen)) is not None:
         osim.fault(osim.model, "name", fault, ALLOWED_FOLDER, "say `specimen:` in the YAML")
     named = ", ".join(f"{name} is {body}" for name, body in spine.bodies.items())
@@ -119,9 +115,9 @@ def _pulls(spine: OsimSpine) -> bool:
 
 def _joints(spine: OsimSpine, specimen: str) -> Made:
     rows: Rows = [("specimen", "joint", *FRAME)]
-    posed, between = [], []
+    posed = []
     for lower, upper in pairwise(spine.bodies):
-        frame, (joint, under) = spine.joint_frame(upper), spine.document.below[spine.bodies[upper]]
+        frame, joint = spine.joint_frame(upper), spine.document.below[spine.bodies[upper]][0]
         rows.append((specimen, upper + lower, *pose_cells(frame)))
         if min(np.diag(frame.rotation)) <= 0.0:
             found, allowed = "axes that point back, down or left", "x forwards, y up, z right"
@@ -129,21 +125,19 @@ def _joints(spine: OsimSpine, specimen: str) -> Made:
             spine.document.fault(at, f"joint {joint.name}", found, allowed, "say `axes:`")
         if joint.motion is not None and not np.allclose(joint.motion.rotation, np.eye(3)):
             posed.append(upper + lower)
-        if under != spine.bodies[lower]:
-            between.append(f"{upper}{lower} ({under})")
     told = ["Neutral is the model's default pose. Each joint has six coordinates here."]
     if posed:
-        told.append(
-            f"Turned by default, so that frames are as the upper side has them: {listed(posed)}."
-        )
-    if between:
-        told.append(f"Another body between, frames are next to the upper side: {listed(between)}.")
+        told.append(f"Turned by default, frames as the upper side has them: {listed(posed)}.")
     return {"joints.csv": rows}, told
 
 
 def _bodies(spine: OsimSpine, specimen: str) -> Made:
     """Vertebrae with all that is fixed to them; what moves in joints of its own is told."""
-    parts, loose, odd = defaultdict[str, list[Body]](list), Counter[str](), list[str]()
+    parts, loose, odd = (
+        defaultdict[str, list[Body]](list),
+        defaultdict[str, float](float),
+        list[str](),
+    )
     for name in spine.document.placed:
         carrier = spine.carrier(name)
         body, is_possible = _body(spine, name)
@@ -200,7 +194,7 @@ def _markers(spine: OsimSpine, specimen: str) -> Made:
             continue
         at = spine.turn @ on[1].apply(osim.numbers(marker, "location", ORIGIN))
         at = frames[carrier].inverse().apply(spine.ground(on[0]).apply(at))
-        rows.append((specimen, marker.get("name", ""), carrier, *cells(at * MM_PER_M)))
+        rows.append((specimen, osim.name(marker), carrier, *cells(at * MM_PER_M)))
     told = [f"{count(len(rows), 'marker')} on vertebrae and pelvis."] if rows else []
     if elsewhere:
         bodies = listed(f"{number} on {body}" for body, number in elsewhere.items())
@@ -219,7 +213,7 @@ def _not_read(osim: OsimDocument) -> Iterator[str]:
         for group in sets
         if group.tag not in ("BodySet", "JointSet", "MarkerSet")
         for one in group.iterfind("objects/*")
-        if not one.tag.endswith((MUSCLE, BUSHING_FORCE))
+        if not (one.tag.endswith(FORCES) and is_on(one))
     )
     used = {one.findtext("wrap_object", "").strip() for one in osim.model.iter("PathWrap")}
     wraps = osim.model.iterfind(".//WrapObjectSet/objects/*")

@@ -28,8 +28,8 @@ from spinepipe.muscles.trunk import SIDES
 from spinepipe.report.words import count, listed
 from spinepipe.units import MM_PER_M
 
-MUSCLE = "Muscle"
-"""End of the names of OpenSim's muscles: Thelen2003Muscle, Millard2012EquilibriumMuscle, ..."""
+FORCES = MUSCLE, BUSHING_FORCE = "Muscle", "BushingForce"
+"""Ends of the names of OpenSim's forces that are read, such as Thelen2003Muscle."""
 
 _KINDS = ("PathPoint", "ConditionalPathPoint")
 _SIDE = re.compile(r".*[_.-](r|l|right|left)", re.IGNORECASE)
@@ -46,7 +46,7 @@ def muscle_tables(spine: OsimSpine, specimen: str, own_groups: Mapping[str, str]
     parameters: Rows = [("muscle", "group", "side", *_PARAMETERS)]
     out, used, conditional, wrapped = defaultdict[str, list[str]](list), dict[str, None](), 0, 0
     for muscle in osim.objects("ForceSet", MUSCLE):
-        name = muscle.get("name", "")
+        name = osim.name(muscle)
         path = muscle.findall("GeometryPath/PathPointSet/objects/*")
         on = [osim.side(point, "socket_parent_frame", "body") for point in path]
         carriers = {None if one is None else spine.carrier(one[0]) for one in on}
@@ -109,8 +109,6 @@ def _side(spine: OsimSpine, name: str, places: list[tuple[str, Array]]) -> str:
 NEAR = 1e-6
 """m, and sine of an angle, within which a bushing lies in a frame."""
 
-BUSHING_FORCE = "BushingForce"
-
 
 def bushing_model(spine: OsimSpine, cohort: str) -> tuple[dict[str, str], list[str]]:
     """Text of a model file by its name, none where no bushing can be carried; and sentences."""
@@ -128,20 +126,18 @@ def bushing_model(spine: OsimSpine, cohort: str) -> tuple[dict[str, str], list[s
     if not total:
         return {}, told
     parameters = create(BUSHING).parameters
-    inside = {
-        joint: [min(max(k, p.low), p.high) for k, p in zip(every.tolist(), parameters, strict=True)]
-        for joint, every in total.items()
-    }
+    low, high = np.array([(one.low, one.high) for one in parameters]).T
+    inside = {joint: np.clip(k, low, high) for joint, k in total.items()}
+    names = [one.name for one in parameters]
     values = [
-        {"joint": joint, **{p.name: k for p, k in zip(parameters, every, strict=True)}}
-        for joint, every in inside.items()
+        {"joint": joint, **dict(zip(names, k.tolist(), strict=True))} for joint, k in inside.items()
     ]
     entry = {"effect": BUSHING, "scope": {"joints": list(total)}, "values": values}
     model = ModelFile.model_validate({"model": cohort, "cohort": cohort, "effects": [entry]})
     told.append(
         f"model.yaml: stiffness of {listed(total)} from {BUSHING_FORCE}; damping is left out."
     )
-    if any(every != total[joint].tolist() for joint, every in inside.items()):
+    if any((k != total[joint]).any() for joint, k in inside.items()):
         told.append("Stiffness out of the range of a bushing here stands as the end of the range.")
     if not exact:
         told.append("Bushings there have another order of angles: small rotations alone agree.")
