@@ -289,6 +289,33 @@ def test_a_model_of_opensims_own_making(tmp_path: Path) -> None:
         assert words in said
 
 
+SIMPLE_JOINTS = ("Pin", "Slider", "Universal", "Ball", "Gimbal", "Planar", "Free", "Weld")
+
+
+@sweep("kind", SIMPLE_JOINTS)
+def test_every_simple_joint(tmp_path: Path, kind: str) -> None:
+    model = opensim.Model()
+    body = opensim.Body("b", 1.0, opensim.Vec3(0), opensim.Inertia(1, 1, 1))
+    model.addBody(body)
+    places = (opensim.Vec3(0.1, 0.2, 0.3), opensim.Vec3(0.3, -0.2, 0.4), body, opensim.Vec3(0.05))
+    turned = opensim.Vec3(0.1, 0.2, -0.3)
+    joint = getattr(opensim, f"{kind}Joint")("j", model.getGround(), *places, turned)
+    for number in range(joint.numCoordinates()):
+        joint.get_coordinates(number).setDefaultValue(0.2 + 0.1 * number)
+    model.addJoint(joint)
+    model.finalizeConnections()
+    path = tmp_path / f"{kind}.osim"
+    model.printToXML(str(path))
+    state = model.initSystem()
+    model.realizePosition(state)
+    theirs = transform(model.getBodySet().get("b").getTransformInGround(state))
+    root, _ = read_xml(path, path.name)
+    assert root is not None
+    ours = OsimDocument(root, path.name).placed["b"]
+    near(ours.origin, theirs.origin, 1e-12)
+    near(ours.rotation, theirs.rotation, 1e-12)
+
+
 OLD_BODY = """
 <Body name="{name}"><mass>{mass}</mass><mass_center>0.01 0.02 -0.01</mass_center>
 <inertia_xx>0.02</inertia_xx><inertia_yy>0.03</inertia_yy><inertia_zz>0.04</inertia_zz>

@@ -101,6 +101,55 @@ def test_a_model_whose_z_is_up(tmp_path: Path) -> None:
         np.testing.assert_allclose(one.inertia, other.inertia, rtol=0, atol=1e-12)
 
 
+def test_a_body_between_two_vertebrae_is_told(tmp_path: Path) -> None:
+    found = imported(tmp_path, vertebrae="{S1: pelvis, T1: rib}")
+    words = "Bodies lie between vertebrae, the joint is the upper one: T1S1 (L5)."
+    assert words in found.sentences
+
+
+def muscle(name: str, *points: str, more: str = "") -> str:
+    listed = "".join(points)
+    path = f"<GeometryPath><PathPointSet><objects>{listed}</objects></PathPointSet></GeometryPath>"
+    return f'<Thelen2003Muscle name="{name}">{path}{more}</Thelen2003Muscle>'
+
+
+def point(body: str, at: str, kind: str = "PathPoint") -> str:
+    on = f"<socket_parent_frame>/bodyset/{body}</socket_parent_frame>"
+    return f"<{kind}>{on}<location>{at}</location></{kind}>"
+
+
+def test_muscles_that_count_and_those_that_do_not(tmp_path: Path) -> None:
+    low, high = point("pelvis", "0 0 -.02"), point("rib", "0 .1 -.03", "ConditionalPathPoint")
+    made = (
+        muscle("RA1", low, high, more="<max_isometric_force>50</max_isometric_force>"),
+        muscle("glut_r", low, point("other", "0 0 0")),
+        muscle("slide_r", low, point("L5", "0 0 0", "MovingPathPoint")),
+        muscle("weak_r", low, high, more="<max_isometric_force>0</max_isometric_force>"),
+    )
+    text = changed('<CoordinateActuator name="x"/>', "".join(made))
+    found = imported(tmp_path, text, muscle_groups="{RA: rectus_abdominis}")
+    assert found.files["muscle_parameters.csv"] == (
+        "muscle,group,side,max_isometric_force_n,optimal_fibre_length_mm,wrap_objects\n"
+        "RA1,rectus_abdominis,left,50,100,\n"
+    )
+    assert found.files["muscles.csv"] == (
+        "muscle,point,body,x_mm,y_mm,z_mm\nRA1,0,S1,0,0,-20\nRA1,1,rib,0,100,-30\n"
+    )
+    assert found.files["body_frames.csv"] == (
+        "specimen,body,carried_by,x_mm,y_mm,z_mm,extension_deg,right_bending_deg,left_rotation_deg\n"
+        "m,S1,S1,0,0,0,0,0,0\nm,rib,L5,10,100,0,0,0,0\n"
+    )
+    for words in (
+        "1 muscle for trunk_loads; its study must say source_stress_mpa.",
+        "1 ConditionalPathPoint taken as there in every posture.",
+        "Left out: 1 muscle across no joint between vertebrae: glut_r.",
+        "Left out: 1 muscle with a point that moves or has no place: slide_r.",
+        "Left out: 1 muscle without force: weak_r.",
+        "Moved with a vertebra, though on joints of their own: rib.",
+    ):
+        assert words in found.sentences
+
+
 def test_an_inertia_that_no_body_has_is_left_out_and_told(tmp_path: Path) -> None:
     found = imported(tmp_path, changed(".01 .02 .025 0 0 0", ".01 .02 .05 0 0 0"))
     assert "Inertia left out, none that a body can have: L5." in found.sentences

@@ -115,9 +115,10 @@ def _pulls(spine: OsimSpine) -> bool:
 
 def _joints(spine: OsimSpine, specimen: str) -> Made:
     rows: Rows = [("specimen", "joint", *FRAME)]
-    posed = []
+    posed, between = [], []
     for lower, upper in pairwise(spine.bodies):
-        frame, joint = spine.joint_frame(upper), spine.document.below[spine.bodies[upper]][0]
+        frame, (joint, under) = spine.joint_frame(upper), spine.document.below[spine.bodies[upper]]
+        between += [] if under == spine.bodies[lower] else [f"{upper}{lower} ({under})"]
         rows.append((specimen, upper + lower, *pose_cells(frame)))
         if min(np.diag(frame.rotation)) <= 0.0:
             found, allowed = "axes that point back, down or left", "x forwards, y up, z right"
@@ -128,6 +129,8 @@ def _joints(spine: OsimSpine, specimen: str) -> Made:
     told = ["Neutral is the model's default pose. Each joint has six coordinates here."]
     if posed:
         told.append(f"Turned by default, frames as the upper side has them: {listed(posed)}.")
+    if between:
+        told.append(f"Bodies lie between vertebrae, the joint is the upper one: {listed(between)}.")
     return {"joints.csv": rows}, told
 
 

@@ -52,11 +52,11 @@ def muscle_tables(spine: OsimSpine, specimen: str, own_groups: Mapping[str, str]
         carriers = {None if one is None else spine.carrier(one[0]) for one in on}
         force = float(osim.numbers(muscle, "max_isometric_force", (1000.0,))[0])
         if None in carriers or len(path) < 2 or any(point.tag not in _KINDS for point in path):
-            out["with a point that moves or could not be placed"].append(name)
+            out["with a point that moves or has no place"].append(name)
         elif force <= 0.0:
             out["without force"].append(name)
         elif len(carriers) == 1 and all(one and one[0] != SHEATH for one in on):
-            out["that cross no joint between vertebrae"].append(name)
+            out["across no joint between vertebrae"].append(name)
         else:
             places = [
                 (body, spine.turn @ pose.apply(osim.numbers(point, "location", ORIGIN)))
@@ -76,7 +76,7 @@ def muscle_tables(spine: OsimSpine, specimen: str, own_groups: Mapping[str, str]
             parameters.append(
                 (name, group, _side(spine, name, places), *cells((force, fibre)), wraps)
             )
-    told = [f"Left out: {count(len(n), MUSCLE)} {why}: {listed(n)}." for why, n in out.items()]
+    told = [f"Left out: {count(len(n), 'muscle')} {why}: {listed(n)}." for why, n in out.items()]
     if not used:
         return {}, told
     frames: Rows = [("specimen", "body", "carried_by", *FRAME)]
