@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Annotated
 
+import numpy as np
 import yaml
 from pydantic import BaseModel, Field, StringConstraints
 
@@ -20,11 +21,13 @@ from spinepipe.cohort import Reader
 from spinepipe.cohort.cohort import FORM, VertebraName
 from spinepipe.cohort.columns import COHORT_YAML, TABLES
 from spinepipe.documents.form import TableForm, read_forms
+from spinepipe.frames import Pose, zxy_angles
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.plausibility import refusals
 from spinepipe.studies.registry import every_form
+from spinepipe.units import MM_PER_M
 
 CARRIED = read_forms(Path(__file__).with_name("forms.yaml"))
 """Tables that an import writes and that no study reads yet, by stem."""
@@ -59,6 +62,14 @@ _UNITS = {
     **{"kg": "kg", "m": "m", "m2": "kg m2", "years": "years"},
 }
 """Units as names of columns end with them."""
+
+Rows = list[Sequence[object]]
+
+POINT = ("x_mm", "y_mm", "z_mm")
+FRAME = (*POINT, "extension_deg", "right_bending_deg", "left_rotation_deg")
+
+Made = tuple[dict[str, Rows], list[str]]
+"""Rows of tables by file, and sentences."""
 
 
 @dataclass(frozen=True)
@@ -197,6 +208,16 @@ def csv_text(rows: Iterable[Sequence[object]]) -> str:
 def rounded(value: float) -> str:
     """A number of a table: six decimals at most, no minus before zero."""
     return f"{round(float(value), 6) + 0.0:.10g}"
+
+
+def cells(values: Iterable[float], decimals: int = 9) -> list[str]:
+    """Numbers of a row, so that nothing of a model is lost."""
+    return [f"{round(float(value), decimals) + 0.0:.15g}" for value in values]
+
+
+def pose_cells(pose: Pose) -> list[str]:
+    """A frame in ground, columns `FRAME`."""
+    return cells([*pose.origin * MM_PER_M, *np.degrees(zxy_angles(pose.rotation))])
 
 
 def _descriptor(imported: ImportedCohort, folder: Path) -> str:

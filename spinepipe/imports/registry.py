@@ -14,6 +14,7 @@ KINDS: Mapping[str, str] = {
     TESTING_MACHINE: "spinepipe.testing_machine.folder",
     "landmarks": "spinepipe.imports.landmarks",
     "motion_capture": "spinepipe.imports.motion_capture",
+    "opensim_model": "spinepipe.imports.opensim_model.folder",
 }
 """Module by kind. Its `imported(folder, document)` returns an `ImportedCohort`, or raises
 `InputError` with every problem; `folder` is where the settings file is."""

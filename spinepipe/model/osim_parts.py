@@ -23,6 +23,10 @@ AXES = (
 """OpenSim's transform axes: rotations first, each about an axis the one before it has moved."""
 
 
+SIX = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
+"""Places of xx, yy, zz, xy, xz, yz in a (3, 3) inertia."""
+
+
 def document() -> Element:
     """The root of a document."""
     return Element("OpenSimDocument", Version="40000")
@@ -56,7 +60,7 @@ def body(name: str, mass: float, com: Array, inertia: Array) -> Element:
     element = Element("Body", name=name)
     told(element, "mass", repr(float(mass)))
     told(element, "mass_center", numbers(com))
-    told(element, "inertia", numbers(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]))
+    told(element, "inertia", numbers(inertia[SIX]))
     return element
 
 

@@ -63,7 +63,7 @@ _FILES = {
 STRESS_PA = number(__name__, "force_over_area")
 """Maximum force over cross-section in the source."""
 
-_GROUPS = {
+GROUPS = {
     "Ps": "psoas",
     "rect_abd": "rectus_abdominis",
     "IL_L": "iliocostalis_lumborum",
@@ -257,7 +257,7 @@ def _fascicles(roots: Mapping[str, ET.Element], placed: _GroundPlaces) -> Iterat
         thorax = BODIES.index("T12") if _NAMED_FOR_T12.search(name) else THORAX
         yield Fascicle(
             name=name,
-            group=next(group for start, group in _GROUPS.items() if name.startswith(start)),
+            group=next(group for start, group in GROUPS.items() if name.startswith(start)),
             side="right" if name.endswith("_r") else "left",
             pcsa=forces[called] / STRESS_PA,
             fibre=0.0,

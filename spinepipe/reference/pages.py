@@ -28,6 +28,7 @@ from spinepipe.effects import Effect, Parameter, TriedValues, create, registered
 from spinepipe.imports.imported import all_forms
 from spinepipe.imports.landmarks import LandmarkSettings
 from spinepipe.imports.motion_capture import MotionCaptureSettings
+from spinepipe.imports.opensim_model.settings import OsimSettings
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.reference.licences import licences
@@ -105,6 +106,7 @@ def generators() -> dict[str, Callable[[], str]]:
     parts["keys import"] = partial(key_table, MachineMapping)
     parts["keys import landmarks"] = partial(key_table, LandmarkSettings)
     parts["keys import motion_capture"] = partial(key_table, MotionCaptureSettings)
+    parts["keys import opensim_model"] = partial(key_table, OsimSettings)
     parts["keys model"] = partial(key_table, ModelFile)
     parts |= {f"keys {name}": partial(key_table, kind.settings) for name, kind in kinds.items()}
     return parts

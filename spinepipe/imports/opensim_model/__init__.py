@@ -1,0 +1,1 @@
+"""An OpenSim model (`.osim`) as a cohort folder, read without OpenSim."""
