@@ -92,7 +92,7 @@ def mistyped(name: str, names: Iterable[str], otherwise: str) -> str:
     Words of three letters and numbers tell axes and sides (`LB`, `Mz`, `Force2`), and so do first
     and last letters: a name that differs there is another quantity, and is not offered.
     """
-    for other in names:
+    for other in names if _words(name) else ():
         words = zip_longest(_words(name), _words(other), fillvalue="")
         if all(
             a == b
