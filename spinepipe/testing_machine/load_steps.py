@@ -352,11 +352,14 @@ def _resample(
 
 
 def _times(regressed: Array, planned: Sequence[Step], cycle: Cycle, time: Array) -> Array:
-    """(T,) s from step 0: at turns that of the turn, for a load may creep up to it; never back."""
+    """(T,) s from step 0: at turns that of the turn, for a load may creep up to it, but of a hold
+    its mean, as at other levels; never back.
+    """
     told = regressed.copy()
     for place in range(1, len(planned)):
-        if planned[place].branch > planned[place - 1].branch:
-            told[place - 1] = time[cycle.branches[planned[place - 1].branch].last]
+        before = cycle.branches[planned[place - 1].branch]
+        if planned[place].branch > planned[place - 1].branch and not before.held:
+            told[place - 1] = time[before.last]
     told = np.maximum.accumulate(told)
     return told - told[0]
 
