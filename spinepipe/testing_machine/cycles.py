@@ -26,6 +26,11 @@ their median.
 """
 
 
+STARTS = 0.1
+"""Share of the smallest reversal by which a cycle may begin beyond the reference: what is read
+there would be extrapolated, and be subtracted from all its readings.
+"""
+
 HOLD_BANDS = (0.5, 0.25, 0.125)
 """Shares of the smallest reversal: bands at a turn in which a hold is looked for, the widest first,
 for a load may overshoot and settle.
@@ -72,14 +77,14 @@ class Cycle:
     branches : two for a load on one side (out, back), three for a load on both sides (out, across
         to the other side, back); fewer where the recording ends on the way. The last branch of a
         load on both sides goes on past the reference, as the first one of the next cycle.
-    start : row where it leaves the reference.
+    late : whether the recording begins after it has left the reference.
     peaks : load (N or N m, as recorded) at the end of the way out and, of a load on both sides, of
         the way across.
     complete : whether it comes back to the reference, to within half of the smallest reversal.
     """
 
     branches: tuple[Branch, ...]
-    start: int
+    late: bool
     peaks: tuple[float, ...]
     complete: bool
 
@@ -218,9 +223,7 @@ def _cycles(
     for number, branch in enumerate(branches):
         if branch.way != way or way * (branch.end - reference) < least:
             continue
-        # it starts at the last row of the branch that is not yet beyond the reference
-        inside = np.flatnonzero(out[branch.rows] <= 0.0)
-        start = branch.first + (int(inside[-1]) if inside.size else 0)
+        late = bool(out[branch.rows].min() > STARTS * least)
         of_cycle = branches[number : number + (3 if both else 2)]
         # back at the reference, to within half a reversal: from above on one side (the second
         # branch), from below after the other side (the third)
@@ -230,7 +233,7 @@ def _cycles(
             last = of_cycle[-1]
             complete = len(of_cycle) == 3 and bool(out[last.rows].max() > -least / 2)
         peaks = tuple(one.end for one in of_cycle[: 2 if both else 1])
-        found.append(Cycle(tuple(of_cycle), start, peaks, complete))
+        found.append(Cycle(tuple(of_cycle), late, peaks, complete))
     return found
 
 
@@ -240,7 +243,8 @@ def _left_out(
     """Numbers of the cycles that are left out, from 1, and why.
 
     Left out are the first ones, for preconditioning; of the later ones those that are not complete
-    and those that reach too little (`REACHES`). If no later one is complete, all of them are kept.
+    and those that reach too little (`REACHES`). If no later one is complete, all of them are kept
+    but those that begin late.
     """
     later = list(enumerate(cycles, start=1))[preconditioning:]
     for number in range(1, min(preconditioning, len(cycles)) + 1):
@@ -252,7 +256,9 @@ def _left_out(
         axis=0,
     )
     for number, cycle in later:
-        if some_complete and not cycle.complete:
+        if cycle.late:
+            yield number, "the recording begins after it has left the reference"
+        elif some_complete and not cycle.complete:
             yield number, "the recording ends before it is back"
         elif some_complete and any(
             abs(peak - reference) < REACHES * size

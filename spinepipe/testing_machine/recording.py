@@ -16,12 +16,14 @@ from scipy.signal import medfilt
 
 from spinepipe.documents.text import MOST_CSV_BYTES, NUMBER, read_bytes
 from spinepipe.problems import InputProblem, did_you_mean, one_of
+from spinepipe.report.words import count
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     SECONDS,
     column_of,
     factor_of,
 )
+from spinepipe.testing_machine.instruments import SYNC
 from spinepipe.testing_machine.settings import FileForm, MachineMapping, TestFile
 
 __all__ = ["Recording", "read_recording"]
@@ -50,6 +52,7 @@ class Recording:
     motion : (N,) by joint and column of ``motion.csv``.
     finest : smallest step between two readings of each motion, 0 where all are equal.
     spikes : rows left out, in which a reading jumps away from those before and behind.
+    notes : what else is to be said of it.
     """
 
     file: str
@@ -61,6 +64,7 @@ class Recording:
     motion: dict[tuple[str, str], Array]
     finest: dict[tuple[str, str], float]
     spikes: int
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -155,19 +159,27 @@ def _understood(
             loads[DIRECTIONS[load.positive].load] = values * factor
     motion: dict[tuple[str, str], Array] = {}
     finest: dict[tuple[str, str], float] = {}
+    gaps = mapping.form.empty_cells == "left_out"
     for channel in mapping.motion:
-        values = _column(cells, channel.column, of.file, mapping.form, problems)
+        values = _column(cells, channel.column, of.file, mapping.form, problems, gaps)
         if values is not None:
             factor = factor_of(channel.unit, channel.positive)
             place = (channel.joint, column_of(DIRECTIONS[channel.positive].coordinate))
             motion[place] = values * factor
-            steps = np.diff(np.unique(motion[place]))  # between readings that differ
+            there = motion[place][np.isfinite(values)]
+            steps = np.diff(np.unique(there))  # between readings that differ
             finest[place] = float(steps.min()) if steps.size else 0.0
     if problems:
         return None, problems
-    driving = DIRECTIONS[mapping.driving(of).positive].load
-    sound = ~np.any([_jumps(one) for one in (*loads.values(), *motion.values())], axis=0)
-    whole = Recording(
+    driving = DIRECTIONS[mapping.driving(of).positive].load if mapping.loads else ""
+    whole = np.all([np.isfinite(one) for one in (*loads.values(), *motion.values())], axis=0)
+    empty = int(np.count_nonzero(~whole))
+    notes = (f"{count(empty, 'row')} with an empty cell left out",) if empty else ()
+    sound = whole.copy()
+    # a signal by which clocks are compared jumps and may
+    read = [*loads.values(), *(one for (joint, _), one in motion.items() if joint != SYNC)]
+    sound[whole] = ~np.any([_jumps(one[whole]) for one in read], axis=0)
+    recording = Recording(
         file=of.file,
         of=of,
         lines=np.array(cells.lines)[sound],
@@ -176,15 +188,24 @@ def _understood(
         driving=driving,
         motion={place: values[sound] for place, values in motion.items()},
         finest=finest,
-        spikes=int(np.count_nonzero(~sound)),
+        spikes=int(np.count_nonzero(whole & ~sound)),
+        notes=notes,
     )
-    return whole, []
+    return recording, []
 
 
 def _column(
-    cells: _Cells, column: str | int, file: str, form: FileForm, problems: list[InputProblem]
+    cells: _Cells,
+    column: str | int,
+    file: str,
+    form: FileForm,
+    problems: list[InputProblem],
+    gaps: bool = False,
 ) -> Array | None:
-    """(N,) numbers of a column as written; None, with the problems added, where some are none."""
+    """(N,) numbers of a column as written; None, with the problems added, where some are none.
+
+    ``gaps``: whether empty cells may stand in it, as NaN.
+    """
     place = _place(cells, column)
     if place is None:
         known: Sequence[str] = cells.names or [str(n + 1) for n in range(cells.width)]
@@ -201,7 +222,7 @@ def _column(
     if form.decimal == "comma":
         texts = [text.replace(",", ".") if "." not in text else "" for text in texts]
     values = np.array([float(t) if NUMBER.fullmatch(t) else np.nan for t in texts])
-    bad = np.flatnonzero(~np.isfinite(values))
+    bad = np.flatnonzero(~np.isfinite(values) & ~(gaps & (np.array(texts) == "")))
     if bad.size:
         problems.append(_no_numbers(cells, place, bad, file, str(column), form))
         return None

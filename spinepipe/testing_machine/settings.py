@@ -20,12 +20,19 @@ from spinepipe.testing_machine.channels import (
     TimeUnit,
     Towards,
 )
+from spinepipe.testing_machine.instruments import (
+    AccuracyKey,
+    LoadCell,
+    Markers,
+    MotionPoint,
+    Point,
+    Rotations,
+)
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 _Text = Annotated[str, StringConstraints(min_length=1)]
 _Column = _Text | Annotated[int, Field(ge=1)]
-_Millimetres = Annotated[float, Field(ge=-10_000, le=10_000)]
 _Size = Annotated[float, Field(gt=0, le=20_000)]
 
 
@@ -56,6 +63,11 @@ class FileForm(BaseModel):
     )
     encoding: Literal["utf-8", "latin-1", "utf-16"] = Field(
         default="utf-8", description="how letters are written"
+    )
+    empty_cells: Literal["refused", "left_out"] = Field(
+        default="refused",
+        description="left_out: rows in which a motion has an empty cell are left out, as where a "
+        "camera loses a marker; how many is said",
     )
 
 
@@ -89,6 +101,35 @@ class MotionChannel(BaseModel):
     positive: Towards = Field(description="where a positive number moves the upper vertebra")
 
 
+class Sync(BaseModel):
+    """A signal that both files have, as of a trigger."""
+
+    model_config = FORM
+
+    load: _Column = Field(description="its column in the file with the loads")
+    motion: _Column = Field(description="its column in the file with the motion")
+
+
+class MotionFiles(BaseModel):
+    """Files of a camera beside those with the loads: `motion_file` of `files` names them."""
+
+    model_config = FORM
+
+    form: FileForm = Field(default_factory=FileForm, description="how it writes its files")
+    time: TimeChannel | None = Field(default=None, description="its column of time")
+    rate_hz: float | None = Field(
+        default=None, gt=0, le=100_000, description="or frames a second, each in a line"
+    )
+    sync: Sync | None = Field(
+        default=None,
+        description="signal in both files by which clocks are compared; null: `shift_s`, else the "
+        "rates of load and motion",
+    )
+    markers: Markers | None = Field(
+        default=None, description="markers whose motion is wanted, in the place of `motion`"
+    )
+
+
 class TestFile(BaseModel):
     """One file: one test of one specimen, with one or more cycles."""
 
@@ -105,6 +146,20 @@ class TestFile(BaseModel):
     )
     preconditioning_cycles: int = Field(
         default=0, ge=0, le=1000, description="cycles at the beginning that are left out"
+    )
+    motion_file: _Text | None = Field(
+        default=None,
+        description="file of its motion, if another; {stem} is the name of `file` without its end",
+    )
+    shift_s: float | None = Field(
+        default=None,
+        ge=-100_000,
+        le=100_000,
+        description="seconds from the first row of the motion's file to that of this one; null: "
+        "found from the rows",
+    )
+    load_point_mm: Point | None = Field(
+        default=None, description="where forces act in this file, if elsewhere"
     )
 
 
@@ -161,14 +216,12 @@ class MachineMapping(BaseModel):
     loaded: str | None = Field(
         default=None, description="vertebra on which the load acts; null: the most cranial"
     )
-    load_point_mm: tuple[_Millimetres, ...] | None = Field(
+    load_point_mm: Point | None = Field(
         default=None,
-        strict=False,
-        min_length=3,
-        max_length=3,
         description="where forces act on it: anterior, superior, to the right in ground, neutral "
         "pose; needed with forces",
     )
+    load_cell: LoadCell | None = Field(default=None, description="what reads the loads")
     zeroed: bool = Field(
         default=True,
         description="true: the reading of step 0 is subtracted in every cycle, as machines count "
@@ -177,7 +230,25 @@ class MachineMapping(BaseModel):
     form: FileForm = Field(default_factory=FileForm, description="how the machine writes its files")
     time: TimeChannel | None = Field(default=None, description="the column of time")
     loads: tuple[LoadChannel, ...] = Field(strict=False, description="columns of loads")
-    motion: tuple[MotionChannel, ...] = Field(strict=False, description="columns of motion")
+    motion: tuple[MotionChannel, ...] = Field(
+        default=(), strict=False, description="columns of motion; needed where there are no markers"
+    )
+    motion_files: MotionFiles | None = Field(
+        default=None, description="files with the motion alone, on a clock of their own"
+    )
+    rotations: Rotations | None = Field(
+        default=None,
+        description="order of three rotations; null: z, x', y'' (extension, right "
+        "bending, left rotation, each about axes that those before have turned)",
+    )
+    motion_points: tuple[MotionPoint, ...] = Field(
+        default=(), strict=False, description="joints whose translations are not of their origin"
+    )
+    accuracy: dict[AccuracyKey, Annotated[float, Field(gt=0, le=50)]] = Field(
+        default_factory=dict,
+        description="how far the instrument may be off, as an SD, in all rotations and translations"
+        " or in one, which counts for it; the larger of this and measurement_sd is the noise",
+    )
     steps: LoadSteps = Field(default_factory=LoadSteps, description="load steps that are kept")
     files: tuple[TestFile, ...] = Field(strict=False, description="the files")
 
@@ -185,6 +256,10 @@ class MachineMapping(BaseModel):
     def loaded_vertebra(self) -> str:
         """Vertebra on which the load acts."""
         return self.loaded or self.vertebrae[-1]
+
+    def load_point(self, of: TestFile) -> tuple[float, ...] | None:
+        """Where forces act in a file, mm."""
+        return of.load_point_mm or self.load_point_mm
 
     def driving(self, of: TestFile) -> LoadChannel:
         """The load that goes up and down in a file."""
@@ -200,6 +275,7 @@ def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
     yield from _directions(document, mapping)
     yield from _columns(document, mapping)
     yield from _driving(document, mapping)
+    yield from _motion_files(document, mapping)
     form = mapping.form
     if form.first_line is not None and form.first_line <= form.names_line:
         allowed = f"a line below the names, which are in line {form.names_line}"
@@ -213,6 +289,8 @@ def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str)
 def _fewest(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """Lists that must not be empty (a rule of pydantic would speak up for their bad items too)."""
     fewest = {"vertebrae": 2, "loads": 1, "motion": 1, "files": 1}
+    if mapping.motion_files is not None and mapping.motion_files.markers is not None:
+        fewest["motion"] = 0
     for key, least in fewest.items():
         there = len(getattr(mapping, key))
         if there < least:
@@ -240,9 +318,38 @@ def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputPro
         if (fault := name_fault(of.test)) is not None:
             yield _at(document, f"files.{number}.test", fault, ALLOWED, "rename the test")
     forces = any(channel.unit in FORCES for channel in mapping.loads)
-    if forces and mapping.load_point_mm is None:
+    if forces and any(mapping.load_point(of) is None for of in mapping.files):
         allowed = "a point, as there are forces and no masses that would tell one"
         yield _at(document, "load_point_mm", "nothing", allowed, "add `load_point_mm: [x, y, z]`")
+
+
+def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+    """What the keys about two files of one test lack."""
+    beside = mapping.motion_files
+    for number, of in enumerate(mapping.files):
+        key = f"files.{number}"
+        if (of.motion_file is None) != (beside is None):
+            found = "nothing" if of.motion_file is None else "a file, and no `motion_files`"
+            allowed = "`motion_files`, and such a file of each test, or neither"
+            yield _at(document, f"{key}.motion_file", found, allowed, "add what is missing")
+        if of.shift_s is not None and (beside is None or beside.sync is not None):
+            allowed = "two files, and one way to compare their clocks"
+            yield _at(document, f"{key}.shift_s", f"{of.shift_s:g}", allowed, "delete it or `sync`")
+    if beside is None:
+        return
+    if mapping.time is None:
+        yield _at(document, "time", "nothing", "the column of time of the loads", "add `time:`")
+    if (beside.time is None) == (beside.rate_hz is None):
+        found = "neither" if beside.time is None else "both"
+        yield _at(document, "motion_files", found, "one of time and rate_hz", "correct it")
+    if beside.markers is not None:
+        wrong = set(mapping.vertebrae[1:]) ^ set(beside.markers.clusters) - {mapping.vertebrae[0]}
+        if wrong:
+            key, found = "motion_files.markers.clusters", ", ".join(sorted(wrong))
+            allowed = f"each of {', '.join(mapping.vertebrae)} (the first may be left out)"
+            yield _at(document, key, f"{found} wrong or missing", allowed, "correct the names")
+        if mapping.motion:
+            yield _at(document, "motion", "columns and markers", "one of them", "delete one")
 
 
 def _directions(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
