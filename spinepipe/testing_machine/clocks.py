@@ -43,44 +43,52 @@ def read_test(
     if beside is None or of.motion_file is None:
         return read_recording(folder / of.file, of, mapping)
     other = of.model_copy(update={"file": of.motion_file.replace("{stem}", Path(of.file).stem)})
-    wanted, signals = mapping.motion, [(), ()]
+    wanted = list(mapping.motion)
+    signals: list[list[MotionChannel]] = [[], []]
     if (markers := beside.markers) is not None:
-        wanted = tuple(
-            _length(markers.columns.format(marker=name, axis=axis), name, way, markers.unit)
+        wanted = [
+            _length(markers.columns.replace("{marker}", name).replace("{axis}", axis), name, *way)
             for names in markers.clusters.values()
             for name in names
-            for axis, way in zip("xyz", (markers.x, markers.y, markers.z), strict=True)
-        )
-    if beside.sync is not None:
-        columns = beside.sync.load, beside.sync.motion
-        signals = [(_length(column, SYNC, "anterior", "mm"),) for column in columns]
-    only_loads = {"motion": signals[0]}
-    only_motion = {"loads": (), "form": beside.form, "time": beside.time}
-    only_motion |= {"motion": (*wanted, *signals[1])}
-    loads, problems = read_recording(folder / of.file, of, mapping.model_copy(update=only_loads))
+            for axis, *way in (
+                ("x", markers.x, markers.unit),
+                ("y", markers.y, markers.unit),
+                ("z", markers.z, markers.unit),
+            )
+        ]
+    if (sync := beside.sync) is not None:
+        signals = [[_length(name, SYNC, "anterior", "mm")] for name in (sync.load, sync.motion)]
+    of_loads = {"motion": tuple(signals[0])}
+    of_motion = {"loads": (), "form": beside.form, "time": beside.time}
+    of_motion |= {"motion": (*wanted, *signals[1])}
+    loads, problems = read_recording(folder / of.file, of, mapping.model_copy(update=of_loads))
     motion, faults = read_recording(
-        folder / other.file, other, mapping.model_copy(update=only_motion)
+        folder / other.file, other, mapping.model_copy(update=of_motion)
     )
     if loads is None or motion is None:
         return None, [*problems, *faults]
+    time, seen = loads.time, motion.time
     if beside.rate_hz is not None:
         first = beside.form.first_line or beside.form.names_line + 1
-        motion = replace(motion, time=(motion.lines - first) / beside.rate_hz)
+        seen = (motion.lines - first) / beside.rate_hz
+    assert time is not None
+    assert seen is not None
     jumps = [one.motion.pop((SYNC, SHIFTS[0]), None) for one in (loads, motion)]
     if markers is not None:
         motion, problems = joint_rotations(motion, markers, mapping.vertebrae)
-    if problems:
-        return None, problems
+        if problems:
+            return None, problems
+    clocks = [(loads, time), (motion, seen)]
     if of.shift_s is not None:
-        return _together(loads, motion, of.shift_s, "as told")
+        return _together(*clocks, of.shift_s, "as told")
     # what the load drives goes its way; other motion may go either way
     driven = {column_of(d.coordinate) for d in DIRECTIONS.values() if d.load == loads.driving}
-    moved = [(one, place[1] not in driven) for place, one in motion.motion.items()]
-    pairs = [(loads.loads[loads.driving], *pair) for pair in moved if not pair[1]]
-    pairs = pairs or [(loads.loads[loads.driving], *pair) for pair in moved]
+    moved = [(one, name not in driven) for (_, name), one in motion.motion.items()]
+    moved = [pair for pair in moved if not pair[1]] or moved
+    load = loads.loads[loads.driving]
     if jumps[0] is not None and jumps[1] is not None:
-        pairs = [(*jumps, False)]
-    found = [best_shift(loads.time, a, motion.time, b, either) for a, b, either in pairs]
+        load, moved = jumps[0], [(jumps[1], False)]
+    found = [best_shift(time, load, seen, one, either) for one, either in moved]
     seconds, likeness, next_best, width = max(found, key=lambda one: one[1])
     told = (
         f"found by rates of {'the signal' if beside.sync else 'load and motion'}, which correlate "
@@ -92,23 +100,23 @@ def read_test(
         remedy = "add `shift_s` to the file, or `sync` to `motion_files`"
         words = (f"a shift of {seconds:.3f} s, {told}", allowed, remedy)
         return None, [InputProblem(of.file, None, "shift_s", *words)]
-    return _together(loads, motion, seconds, told)
+    return _together(*clocks, seconds, told)
 
 
 def _length(column: str | int, of: str, way: str, unit: str) -> MotionChannel:
     """A column that is no joint's."""
-    return MotionChannel.model_validate(
-        {"column": column, "unit": unit, "joint": of, "positive": way}
-    )
+    told = {"column": column, "unit": unit, "joint": of, "positive": way}
+    return MotionChannel.model_validate(told)
 
 
 def _together(
-    loads: Recording, motion: Recording, shift: float, told: str
+    of_loads: tuple[Recording, Array], of_motion: tuple[Recording, Array], shift: float, told: str
 ) -> tuple[Recording | None, list[InputProblem]]:
     """Both on the rows of what was read more often, and on the clock of the motion."""
-    clock = {loads: loads.time + shift, motion: motion.time}
-    slow, fast = sorted(clock, key=lambda one: -np.median(np.diff(clock[one])))
-    at, on = clock[slow], clock[fast]
+    (loads, time), (motion, seen) = of_loads, of_motion
+    both = [(time + shift, loads), (seen, motion)]
+    both.sort(key=lambda one: -float(np.median(np.diff(one[0]))))
+    (at, slow), (on, fast) = both
     after = np.clip(np.searchsorted(at, on), 1, len(at) - 1)
     gaps = np.diff(at)
     known = (on >= at[0]) & (on <= at[-1]) & (gaps[after - 1] <= GAP * np.median(gaps))
@@ -120,7 +128,7 @@ def _together(
         return None, [InputProblem(loads.file, None, "shift_s", found, allowed, remedy)]
 
     def put(one: Recording, values: Array) -> Array:
-        return values[known] if one is fast else np.interp(on[known], at, values)
+        return values[known] if one is fast else np.asarray(np.interp(on[known], at, values))
 
     note = (
         f"{motion.file} begins {shift:.3f} s before it ({told}); {slow.file} is put on the rows of "

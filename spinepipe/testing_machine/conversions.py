@@ -38,7 +38,7 @@ def converted(one: Recording, mapping: MachineMapping) -> tuple[Recording, list[
         one = _in_our_order(one, mapping)
         if mapping.load_cell is not None:
             one = _applied(one, mapping.load_cell, point)
-    return one, [InputProblem(one.file, None, key, *words) for key, *words in lacks]
+    return one, [InputProblem(one.file, None, *lack) for lack in lacks]
 
 
 def _lacking_motion(one: Recording, mapping: MachineMapping) -> Iterator[tuple[str, str, str, str]]:
@@ -54,6 +54,8 @@ def _lacking_motion(one: Recording, mapping: MachineMapping) -> Iterator[tuple[s
             elif there and mapping.zeroed and mapping.rotations.zero is None:
                 yield from _zero_unclear(joint, _told(one, joint), mapping.rotations)
     for point in mapping.motion_points:
+        if sum(other.joint == point.joint for other in mapping.motion_points) > 1:
+            yield "motion_points", f"{point.joint} twice", "each joint once", "delete one of them"
         missing = [name for name in COORDINATE_COLUMNS if (point.joint, name) not in one.motion]
         if missing:
             found = f"no column of {point.joint} for {', '.join(missing)}"
@@ -135,7 +137,7 @@ def joint_rotations(
         u, _, v = np.linalg.svd(seen[0].T @ seen)
         u[..., -1] *= np.linalg.det(u @ v)[:, None]  # no mirror image
         turned[vertebra] = (u @ v).swapaxes(1, 2)
-    motion = {}
+    motion: dict[tuple[str, str], Array] = {}
     for lower, upper in pairwise(vertebrae):
         below = turned.get(lower, np.eye(3)[None])
         angles = np.degrees(zxy_angles(below.swapaxes(1, 2) @ turned[upper]))

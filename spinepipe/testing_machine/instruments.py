@@ -4,19 +4,24 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from spinepipe.testing_machine.channels import Towards
-
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 Point = Annotated[
     tuple[Annotated[float, Field(ge=-10_000, le=10_000)], ...],
     Field(min_length=3, max_length=3, strict=False),
 ]
+_Shift = Literal["anterior", "posterior", "superior", "inferior", "right", "left"]
 SYNC = "signal of both clocks"
 """In the place of a joint: a column by which clocks are compared."""
 
 AccuracyKey = Literal[
-    *("rotation_deg", "translation_mm", "anterior_mm", "superior_mm", "right_mm"),
-    *("extension_deg", "right_bending_deg", "left_rotation_deg"),
+    "rotation_deg",
+    "translation_mm",
+    "anterior_mm",
+    "superior_mm",
+    "right_mm",
+    "extension_deg",
+    "right_bending_deg",
+    "left_rotation_deg",
 ]
 
 
@@ -92,9 +97,9 @@ class Markers(BaseModel):
         "out if it stays"
     )
     columns: str = Field(
-        default="{marker} {axis}", description="name of a column; {axis} is x, y or z"
+        default="{marker} {axis}", description="names of columns; {axis}: x, y or z"
     )
     unit: Literal["mm", "um", "m"] = Field(default="mm", description="unit of its numbers")
-    x: Towards = Field(default="anterior", description="where the camera's x goes")
-    y: Towards = Field(default="superior", description="where its y goes")
-    z: Towards = Field(default="right", description="where its z goes")
+    x: _Shift = Field(default="anterior", description="where the camera's x goes")
+    y: _Shift = Field(default="superior", description="where its y goes")
+    z: _Shift = Field(default="right", description="where its z goes")

@@ -246,8 +246,9 @@ class MachineMapping(BaseModel):
     )
     accuracy: dict[AccuracyKey, Annotated[float, Field(gt=0, le=50)]] = Field(
         default_factory=dict,
-        description="how far the instrument may be off, as an SD, in all rotations and translations"
-        " or in one, which counts for it; the larger of this and measurement_sd is the noise",
+        description="how far the instrument may be off, as an SD: rotation_deg, translation_mm, or "
+        "a column of motion.csv, which counts for that alone; the larger of it and measurement_sd "
+        "is the noise",
     )
     steps: LoadSteps = Field(default_factory=LoadSteps, description="load steps that are kept")
     files: tuple[TestFile, ...] = Field(strict=False, description="the files")
@@ -342,12 +343,16 @@ def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
     if (beside.time is None) == (beside.rate_hz is None):
         found = "neither" if beside.time is None else "both"
         yield _at(document, "motion_files", found, "one of time and rate_hz", "correct it")
-    if beside.markers is not None:
-        wrong = set(mapping.vertebrae[1:]) ^ set(beside.markers.clusters) - {mapping.vertebrae[0]}
+    if (marks := beside.markers) is not None:
+        wrong = set(mapping.vertebrae[1:]) ^ set(marks.clusters) - {mapping.vertebrae[0]}
         if wrong:
             key, found = "motion_files.markers.clusters", ", ".join(sorted(wrong))
             allowed = f"each of {', '.join(mapping.vertebrae)} (the first may be left out)"
             yield _at(document, key, f"{found} wrong or missing", allowed, "correct the names")
+        ways = [DIRECTIONS[way].coordinate for way in (marks.x, marks.y, marks.z)]
+        if len(set(ways)) < len(ways):
+            allowed = "an axis forwards, one upwards and one sidewards, each of either sign"
+            yield _at(document, "motion_files.markers", "an axis twice", allowed, "correct x, y, z")
         if mapping.motion:
             yield _at(document, "motion", "columns and markers", "one of them", "delete one")
 
