@@ -78,7 +78,7 @@ def read_test(
         motion, problems = joint_rotations(motion, markers, mapping.vertebrae)
         if problems:
             return None, problems
-    clocks = [(loads, time), (motion, seen)]
+    clocks = (loads, time), (motion, seen)
     if of.shift_s is not None:
         return _together(*clocks, of.shift_s, "as told")
     # what the load drives goes its way; other motion may go either way

@@ -36,9 +36,10 @@ HOLD_BANDS = (0.5, 0.25, 0.125)
 for a load may overshoot and settle.
 """
 
-FLAT = 0.12
-"""SD of the load of a hold over the width of its band. A load that turns at once has 0.29 of any
-band, be the turn a corner or round; noise of an SD of 0.12 hardly ever spans the band.
+FLAT = 0.1
+"""Median distance of the load from its median, over the width of a band, that a hold may have: most
+rows are held. A load that turns at once has 0.25 in any band, be the turn a corner or round; noise
+of 0.1, an SD of 0.15, hardly ever spans the band.
 """
 
 HELD_ROWS = 8
@@ -200,9 +201,11 @@ def _hold(load: Array, turn: int, least: float) -> tuple[int, int]:
         first = int(outside[place - 1]) + 1 if place else 0
         last = int(outside[place]) - 1 if place < len(outside) else len(load) - 1
         rows = load[first : last + 1]
-        if len(rows) >= HELD_ROWS and float(rows.std()) < FLAT * band:
-            # without the rows on the way to the hold and from it
-            near = np.flatnonzero(np.abs(rows - np.median(rows)) < band / 2)
+        apart = np.abs(rows - np.median(rows))
+        usual = float(np.median(apart))
+        if len(rows) >= HELD_ROWS and usual < FLAT * band:
+            # four SDs of the hold: without rows on the way there and back
+            near = np.flatnonzero(apart <= 6 * usual)
             return first + int(near[0]), first + int(near[-1])
     return turn, turn
 
