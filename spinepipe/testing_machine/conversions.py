@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from spinepipe.decomposition import svd
 from spinepipe.frames import zxy_angles
 from spinepipe.problems import InputProblem
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
@@ -128,13 +129,13 @@ def joint_rotations(
         seen = np.array([[one.motion[name, axis] for axis in SHIFTS] for name in names])
         seen = seen.transpose(2, 0, 1)  # (N, markers, 3)
         seen = seen - seen.mean(axis=1, keepdims=True)
-        thin = float(np.linalg.svd(seen[0], compute_uv=False)[1]) / np.sqrt(len(names))
+        thin = float(svd(seen[0])[1][1]) / np.sqrt(len(names))
         if thin < THINNEST_MM:
             found = f"markers of {vertebra} that lie on a line to {thin:.2g} mm"
             remedy = "name another marker of it that is off the line"
             allowed = f"at least {THINNEST_MM:g} mm"
             problems.append(InputProblem(one.file, None, None, found, allowed, remedy))
-        u, _, v = np.linalg.svd(seen[0].T @ seen)
+        u, _, v = svd(seen[0].T @ seen)
         u[..., -1] *= np.linalg.det(u @ v)[:, None]  # no mirror image
         turned[vertebra] = (u @ v).swapaxes(1, 2)
     motion: dict[tuple[str, str], Array] = {}
