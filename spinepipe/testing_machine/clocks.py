@@ -44,23 +44,21 @@ def read_test(
         return read_recording(folder / of.file, of, mapping)
     other = of.model_copy(update={"file": of.motion_file.replace("{stem}", Path(of.file).stem)})
     wanted = list(mapping.motion)
-    signals: list[list[MotionChannel]] = [[], []]
     if (markers := beside.markers) is not None:
         wanted = [
-            _length(markers.columns.replace("{marker}", name).replace("{axis}", axis), name, *way)
+            _length(
+                markers.columns.replace("{marker}", name).replace("{axis}", axis),
+                *(name, way, markers.unit),
+            )
             for names in markers.clusters.values()
             for name in names
-            for axis, *way in (
-                ("x", markers.x, markers.unit),
-                ("y", markers.y, markers.unit),
-                ("z", markers.z, markers.unit),
-            )
+            for axis, way in zip("xyz", markers.axes, strict=True)
         ]
-    if (sync := beside.sync) is not None:
-        signals = [[_length(name, SYNC, "anterior", "mm")] for name in (sync.load, sync.motion)]
-    of_loads = {"motion": tuple(signals[0])}
+    sync = beside.sync
+    signal = [_length(name, SYNC) for name in (sync.load, sync.motion)] if sync else []
+    of_loads = {"motion": tuple(signal[:1])}
     of_motion = {"loads": (), "form": beside.form, "time": beside.time}
-    of_motion |= {"motion": (*wanted, *signals[1])}
+    of_motion |= {"motion": (*wanted, *signal[1:])}
     loads, problems = read_recording(folder / of.file, of, mapping.model_copy(update=of_loads))
     motion, faults = read_recording(
         folder / other.file, other, mapping.model_copy(update=of_motion)
@@ -103,7 +101,7 @@ def read_test(
     return _together(*clocks, seconds, told)
 
 
-def _length(column: str | int, of: str, way: str, unit: str) -> MotionChannel:
+def _length(column: str | int, of: str, way: str = "anterior", unit: str = "mm") -> MotionChannel:
     """A column that is no joint's."""
     told = {"column": column, "unit": unit, "joint": of, "positive": way}
     return MotionChannel.model_validate(told)
@@ -131,8 +129,8 @@ def _together(
         return values[known] if one is fast else np.asarray(np.interp(on[known], at, values))
 
     note = (
-        f"{motion.file} begins {shift:.3f} s before it ({told}); {slow.file} is put on the rows of "
-        f"{fast.file}"
+        f"{motion.file} begins {abs(shift):.3f} s {'before' if shift >= 0 else 'after'} it ({told}); "
+        f"{slow.file} is put on the rows of {fast.file}"
     )
     return replace(
         loads,

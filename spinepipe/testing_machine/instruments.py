@@ -13,16 +13,9 @@ _Shift = Literal["anterior", "posterior", "superior", "inferior", "right", "left
 SYNC = "signal of both clocks"
 """In the place of a joint: a column by which clocks are compared."""
 
-AccuracyKey = Literal[
-    "rotation_deg",
-    "translation_mm",
-    "anterior_mm",
-    "superior_mm",
-    "right_mm",
-    "extension_deg",
-    "right_bending_deg",
-    "left_rotation_deg",
-]
+_Length = Literal["translation_mm", "anterior_mm", "superior_mm", "right_mm"]
+_Angle = Literal["rotation_deg", "extension_deg", "right_bending_deg", "left_rotation_deg"]
+AccuracyKey = _Length | _Angle
 
 
 class Rotations(BaseModel):
@@ -99,7 +92,7 @@ class Markers(BaseModel):
     columns: str = Field(
         default="{marker} {axis}", description="names of columns; {axis}: x, y or z"
     )
-    unit: Literal["mm", "um", "m"] = Field(default="mm", description="unit of its numbers")
-    x: _Shift = Field(default="anterior", description="where the camera's x goes")
-    y: _Shift = Field(default="superior", description="where its y goes")
-    z: _Shift = Field(default="right", description="where its z goes")
+    unit: Literal["mm", "m"] = Field(default="mm", description="unit of its numbers")
+    axes: Annotated[tuple[_Shift, ...], Field(min_length=3, max_length=3, strict=False)] = Field(
+        default=("anterior", "superior", "right"), description="where its x, y and z go"
+    )

@@ -349,10 +349,10 @@ def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
             key, found = "motion_files.markers.clusters", ", ".join(sorted(wrong))
             allowed = f"each of {', '.join(mapping.vertebrae)} (the first may be left out)"
             yield _at(document, key, f"{found} wrong or missing", allowed, "correct the names")
-        ways = [DIRECTIONS[way].coordinate for way in (marks.x, marks.y, marks.z)]
+        ways = [DIRECTIONS[way].coordinate for way in marks.axes]
         if len(set(ways)) < len(ways):
             allowed = "an axis forwards, one upwards and one sidewards, each of either sign"
-            yield _at(document, "motion_files.markers", "an axis twice", allowed, "correct x, y, z")
+            yield _at(document, "motion_files.markers", "an axis twice", allowed, "correct `axes`")
         if mapping.motion:
             yield _at(document, "motion", "columns and markers", "one of them", "delete one")
 

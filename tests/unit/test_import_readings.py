@@ -335,7 +335,7 @@ def test_clusters_of_markers_turn_joints(tmp_path: Path) -> None:
     markers = {
         "clusters": {"L5": ["a0", "a1", "a2"], "L4": ["b0", "b1", "b2"]},
         "columns": "{marker}_{axis}",
-        **{"x": "right", "y": "superior", "z": "posterior"},
+        "axes": ["right", "superior", "posterior"],
     }
     tests = read(
         tmp_path,
@@ -442,7 +442,10 @@ MARKERS = {"clusters": {"L4": ["a", "b", "c"]}}
         ({"motion_files": {}, "files": [SEEN]}, "found neither; allowed: one of time and rate_hz"),
         ({"files": [{**SEEN, "shift_s": 1}]}, "one way to compare their clocks"),
         ({"motion_files": {"markers": MARKERS}, "files": [SEEN]}, "found columns and markers"),
-        ({"motion_files": {"markers": {**MARKERS, "x": "right"}}}, "found an axis twice"),
+        (
+            {"motion_files": {"markers": {**MARKERS, "axes": ["right", "left", "superior"]}}},
+            "found an axis twice",
+        ),
         ({"motion_files": {"markers": {"clusters": {}}}}, "L4 wrong or missing"),
         ({"motion_files": {"rate_hz": 9}, "time": None, "files": [SEEN]}, "the column of time of"),
         ({"accuracy": {"flexion_deg": 1.0}}, "accuracy"),
