@@ -128,9 +128,10 @@ def _together(
     def put(one: Recording, values: Array) -> Array:
         return values[known] if one is fast else np.asarray(np.interp(on[known], at, values))
 
+    side = "before" if shift >= 0 else "after"
     note = (
-        f"{motion.file} begins {abs(shift):.3f} s {'before' if shift >= 0 else 'after'} it ({told}); "
-        f"{slow.file} is put on the rows of {fast.file}"
+        f"{motion.file} begins {abs(shift):.3f} s {side} it ({told}); {slow.file} is put on the "
+        f"rows of {fast.file}"
     )
     return replace(
         loads,

@@ -147,6 +147,7 @@ def _of_test(test: ResampledTest) -> list[str]:
         lines += [f"  {note}." for note in one.notes]
         lines += [f"  Cycle {number} is left out: {why}." for number, why in found.left_out]
     unit = _unit(test.recordings[0])
+    each = "each" if len({len(cycle.motion) for cycle in test.cycles}) == 1 else "at most"
     # without a turn there is one way; with one, a cycle that is cut off ends on the way back
     ways = "there and back"
     if not all(cycle.complete for cycle in test.cycles):
@@ -154,7 +155,7 @@ def _of_test(test: ResampledTest) -> list[str]:
         ways = "and not all the way back" if turned else "one way"
     lines.append(
         f"  {test.specimen}, {test.test}: {count(len(test.cycles), 'cycle')} of "
-        f"{count(len(test.levels), 'load step')} each, from {min(test.levels):.3g} to "
+        f"{count(len(test.levels), 'load step')} {each}, from {min(test.levels):.3g} to "
         f"{max(test.levels):.3g} {unit}, {ways}."
     )
     return lines

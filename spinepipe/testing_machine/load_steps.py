@@ -244,9 +244,10 @@ def resample_test(
     sides = common_levels(cuts[0], cycles, steps.per_side, steps.levels)
     first = recordings[0]
     places = tuple(first.motion)
-    done = []
+    done, longest = [], list[Step]()
     for one, cycle in kept:
         planned = plan(cuts[0], sides, cycle, one.loads[one.driving])
+        longest = max(longest, planned, key=len)
         result = _resample(one, cycle, planned, zeroed)
         if isinstance(result, InputProblem):
             problems.append(result)
@@ -254,7 +255,7 @@ def resample_test(
             done.append(result)
     if problems:
         return None, problems
-    levels = tuple(step.level for step in planned)
+    levels = tuple(step.level for step in longest)
     of = first.of
     made = ResampledTest(
         of.specimen, of.test, first.driving, places, levels, tuple(done),

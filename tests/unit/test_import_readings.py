@@ -99,6 +99,20 @@ def test_a_turning_level_is_the_mean_over_its_hold(tmp_path: Path) -> None:
     assert time[3] == pytest.approx(3 * held, abs=2.0)  # from the middle of one to that of another
 
 
+@sweep("held", [1.5, 10.0])
+def test_a_hold_after_a_slow_ramp_is_found(held: float) -> None:
+    """Its median is the turn, not the extreme of its noise, and both ways have all of it."""
+    corners = np.cumsum([0.0, 5.0, held, 10.0, held, 5.0])
+    time = np.arange(0.0, corners[-1], 0.05)
+    load = np.interp(time, corners, [0, 7.5, 7.5, -7.5, -7.5, 0])
+    load += np.random.default_rng(1).normal(0.0, 0.03, len(load))
+    (cycle,) = segment(load, 0.2, 0).cycles
+    assert [branch.held for branch in cycle.branches] == [True, True, False]
+    np.testing.assert_allclose(cycle.peaks, [7.5, -7.5], atol=0.025)
+    out, across, _ = cycle.branches
+    assert (out.last - across.first) * 0.05 == pytest.approx(held, abs=0.25)
+
+
 @sweep("shape", [lambda x: 2 / np.pi * np.arcsin(np.sin(x)), np.sin])
 def test_a_load_that_turns_at_once_is_no_hold(shape: object) -> None:
     load = 10.0 * shape(np.linspace(0.0, 4 * np.pi, 2001))  # type: ignore[operator]
