@@ -248,7 +248,8 @@ def _cohort(
     forms: Mapping[str, TableForm],
 ) -> Cohort:
     final = {stem: _final(table) for stem, table in tables.items() if stem in TABLES}
-    motion, zeroed = common_zeroing(_numbered(final.get("motion")), header.zeroed_at_step_0)
+    numbered = _numbered(final.get("motion"))
+    motion, zeroed = common_zeroing(numbered, header.zeroed_at_step_0, header.measurement_sd)
     return Cohort(
         name=header.cohort,
         title=header.title,

@@ -3,12 +3,17 @@
 All that is done with a cohort asks one question of it: were readings zeroed at step 0? Where tests
 differ, those that keep their step-0 reading are zeroed as they are read. Motion from step 0 on is
 told alike then; how far the spine had moved before step 0 is no longer asked of any test.
+
+Some rigs subtract the mean of several readings, which leaves something at step 0. It is subtracted
+as well: the error of step 0 is then that of one reading, as the noise of zeroed readings has it.
 """
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import pandas as pd
 
+from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.cohort.draft import Draft
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem, Spelling
@@ -16,6 +21,11 @@ from spinepipe.units import COORDINATE_COLUMNS
 
 KEY = "zeroed_at_step_0"
 _PLACE = ["specimen", "test", "cycle", "joint"]
+
+MOST_LEFT = 4.0
+"""SDs of one reading at step 0 that zeroing by a mean leaves at most: a reading less the mean of n
+has an SD of sqrt(1 - 1 / n) of one.
+"""
 
 
 def check_zeroing(draft: Draft, document: YamlDocument | None) -> Iterator[InputProblem]:
@@ -55,20 +65,27 @@ def _without_start(motion: pd.DataFrame, named: Sequence[str]) -> Iterator[tuple
 
 
 def common_zeroing(
-    motion: pd.DataFrame | None, zeroed: bool | Sequence[str]
+    motion: pd.DataFrame | None, zeroed: bool | Sequence[str], sd: MeasurementSd | None = None
 ) -> tuple[pd.DataFrame | None, bool]:
-    """Motion whose tests are all zeroed or none, and which.
+    """Motion whose tests are all zeroed or none, and which; what a mean left is subtracted.
 
     Parameters
     ----------
     motion : rows of the format, cycles numbered. zeroed : all tests or none, or the names of some.
+    sd : of one reading; without it nothing is taken for what a mean left.
     """
-    if motion is None or isinstance(zeroed, bool):
-        return motion, bool(zeroed)
-    kept = ~motion["test"].isin(zeroed)
-    if kept.all():
+    if motion is None or zeroed is False:
+        return motion, False
+    named = motion["test"].isin(motion["test"] if zeroed is True else zeroed)
+    if len(motion) and not named.any():
         return motion, False
     values = motion[list(COORDINATE_COLUMNS)]
     at_start = values.where(motion["step"] == 0)
     start = at_start.groupby([motion[name] for name in _PLACE]).transform("first")
-    return motion.assign(**(values - start.where(kept, 0.0))), True
+    # of a zeroed test only what a mean leaves: more than that is for the plausibility checks
+    sds = [
+        0.0 if sd is None else sd.rotation_deg if name.endswith("_deg") else sd.translation_mm
+        for name in COORDINATE_COLUMNS
+    ]
+    left = start.where(start.abs() <= MOST_LEFT * np.array(sds), 0.0)
+    return motion.assign(**(values - start.where(~named, left))), True

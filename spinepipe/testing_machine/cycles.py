@@ -6,10 +6,13 @@ where the load leaves the reference: zero, or, if the load never comes near zero
 range at which it starts; or a size that the user gives. So a load that swings to both sides is cut
 where it passes the reference in the direction of the first swing, and one that stays on one side is
 cut at its reversals near the reference. The way out is from the reference to the first peak.
+
+Where a machine holds the load at a turn, both branches have all rows of the hold, and its median is
+the peak: within the hold the extreme is where noise puts it.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -23,19 +26,42 @@ their median.
 """
 
 
+STARTS = 0.1
+"""Share of the smallest reversal by which a cycle may begin beyond the reference: what is read
+there would be extrapolated, and be subtracted from all its readings.
+"""
+
+HOLD_BANDS = (0.5, 0.25, 0.125)
+"""Shares of the smallest reversal: bands at a turn in which a hold is looked for, the widest first,
+for a load may overshoot and settle.
+"""
+
+FLAT = 0.1
+"""Median distance of the load from its median, over the width of a band, that a hold may have: most
+rows are held. A load that turns at once has 0.25 in any band, be the turn a corner or round; noise
+of 0.1, an SD of 0.15, hardly ever spans the band.
+"""
+
+HELD_ROWS = 8
+
+
 @dataclass(frozen=True)
 class Branch:
     """Rows of a recording between two reversals: the load goes one way.
 
     Attributes
     ----------
-    first, last : numbers of rows from 0, both included; neighbouring branches share a row.
+    first, last : numbers of rows from 0, both included; neighbouring branches share the row of a
+        turn, or all rows of a hold.
     way : 1 where the load rises, -1 where it falls.
+    end : load at its end. held : whether it ends in a hold.
     """
 
     first: int
     last: int
     way: int
+    end: float
+    held: bool
 
     @property
     def rows(self) -> slice:
@@ -52,14 +78,14 @@ class Cycle:
     branches : two for a load on one side (out, back), three for a load on both sides (out, across
         to the other side, back); fewer where the recording ends on the way. The last branch of a
         load on both sides goes on past the reference, as the first one of the next cycle.
-    start : row where it leaves the reference.
+    late : whether the recording begins after it has left the reference.
     peaks : load (N or N m, as recorded) at the end of the way out and, of a load on both sides, of
         the way across.
     complete : whether it comes back to the reference, to within half of the smallest reversal.
     """
 
     branches: tuple[Branch, ...]
-    start: int
+    late: bool
     peaks: tuple[float, ...]
     complete: bool
 
@@ -125,10 +151,8 @@ def segment(
     both = min(high - reference, reference - low) > least
     goes_up = load[turns[1]] > reference if both else high - reference > reference - low
     way = 1 if goes_up else -1
-    branches = _branches(turns, load)
-    cycles = _cycles(branches, way * (load - reference), way, both, least)
-    # peaks back from loads beyond the reference, positive on the way out, to loads as recorded
-    cycles = [replace(c, peaks=tuple(reference + way * p for p in c.peaks)) for c in cycles]
+    branches = _branches(turns, load, least)
+    cycles = _cycles(branches, way * (load - reference), reference, way, both, least)
     dropped = tuple(_left_out(cycles, reference, preconditioning))
     return Segmentation(reference, way, low, high, both, len(turns) - 2, tuple(cycles), dropped)
 
@@ -155,31 +179,54 @@ def reversals(load: Array, least: float) -> list[int]:
     return [*turns, len(load) - 1]
 
 
-def _branches(turns: list[int], load: Array) -> list[Branch]:
-    """What lies between one turn and the next."""
+def _branches(turns: list[int], load: Array, least: float) -> list[Branch]:
+    """What lies between one turn and the next, with the holds at both."""
+    inner = [_hold(load, turn, least) for turn in turns[1:-1]]
+    ends = [(turns[0], turns[0]), *inner, (turns[-1], turns[-1])]
     return [
-        Branch(first, last, 1 if load[last] > load[first] else -1)
-        for first, last in pairwise(turns)
+        Branch(
+            *(here[0], there[1], 1 if load[last] > load[first] else -1),
+            *(float(np.median(load[there[0] : there[1] + 1])), there[0] < there[1]),
+        )
+        for (first, last), (here, there) in zip(pairwise(turns), pairwise(ends), strict=True)
     ]
 
 
-def _cycles(branches: list[Branch], out: Array, way: int, both: bool, least: float) -> list[Cycle]:
+def _hold(load: Array, turn: int, least: float) -> tuple[int, int]:
+    """First and last row of the hold around a turn; the turn twice where the load is not held."""
+    away = np.abs(load - load[turn])
+    for band in (share * least for share in HOLD_BANDS):
+        outside = np.flatnonzero(away > band)
+        place = np.searchsorted(outside, turn)
+        first = int(outside[place - 1]) + 1 if place else 0
+        last = int(outside[place]) - 1 if place < len(outside) else len(load) - 1
+        rows = load[first : last + 1]
+        apart = np.abs(rows - np.median(rows))
+        usual = float(np.median(apart))
+        if len(rows) >= HELD_ROWS and usual < FLAT * band:
+            # four SDs of the hold: without rows on the way there and back
+            near = np.flatnonzero(apart <= 6 * usual)
+            return first + int(near[0]), first + int(near[-1])
+    return turn, turn
+
+
+def _cycles(
+    branches: list[Branch], out: Array, reference: float, way: int, both: bool, least: float
+) -> list[Cycle]:
     """Cycles: one begins with each branch that goes out and ends at least ``least`` beyond the
-    reference. Their peaks are values of ``out``.
+    reference.
 
     Parameters
     ----------
     out : (N,) load less the reference, positive on the side to which cycles go first.
-    way, both : as in `Segmentation`.
+    reference, way, both : as in `Segmentation`.
     least : smallest reversal, in the unit of the load.
     """
     found = []
     for number, branch in enumerate(branches):
-        if branch.way != way or out[branch.last] < least:
+        if branch.way != way or way * (branch.end - reference) < least:
             continue
-        # it starts at the last row of the branch that is not yet beyond the reference
-        inside = np.flatnonzero(out[branch.rows] <= 0.0)
-        start = branch.first + (int(inside[-1]) if inside.size else 0)
+        late = bool(out[branch.rows].min() > STARTS * least)
         of_cycle = branches[number : number + (3 if both else 2)]
         # back at the reference, to within half a reversal: from above on one side (the second
         # branch), from below after the other side (the third)
@@ -188,8 +235,8 @@ def _cycles(branches: list[Branch], out: Array, way: int, both: bool, least: flo
         else:
             last = of_cycle[-1]
             complete = len(of_cycle) == 3 and bool(out[last.rows].max() > -least / 2)
-        peaks = tuple(float(out[one.last]) for one in of_cycle[: 2 if both else 1])
-        found.append(Cycle(tuple(of_cycle), start, peaks, complete))
+        peaks = tuple(one.end for one in of_cycle[: 2 if both else 1])
+        found.append(Cycle(tuple(of_cycle), late, peaks, complete))
     return found
 
 
@@ -199,7 +246,8 @@ def _left_out(
     """Numbers of the cycles that are left out, from 1, and why.
 
     Left out are the first ones, for preconditioning; of the later ones those that are not complete
-    and those that reach too little (`REACHES`). If no later one is complete, all of them are kept.
+    and those that reach too little (`REACHES`). If no later one is complete, all of them are kept
+    but those that begin late.
     """
     later = list(enumerate(cycles, start=1))[preconditioning:]
     for number in range(1, min(preconditioning, len(cycles)) + 1):
@@ -211,7 +259,9 @@ def _left_out(
         axis=0,
     )
     for number, cycle in later:
-        if some_complete and not cycle.complete:
+        if cycle.late:
+            yield number, "the recording begins after it has left the reference"
+        elif some_complete and not cycle.complete:
             yield number, "the recording ends before it is back"
         elif some_complete and any(
             abs(peak - reference) < REACHES * size

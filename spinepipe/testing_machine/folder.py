@@ -16,6 +16,10 @@ from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
+from spinepipe.testing_machine.check_settings import check_mapping
+from spinepipe.testing_machine.clocks import read_test
+from spinepipe.testing_machine.conversions import converted
+from spinepipe.testing_machine.conversions import sentences as of_conversions
 from spinepipe.testing_machine.file_patterns import with_files
 from spinepipe.testing_machine.load_steps import (
     ReadingPrecision,
@@ -23,8 +27,8 @@ from spinepipe.testing_machine.load_steps import (
     reading_precision,
     resample_test,
 )
-from spinepipe.testing_machine.recording import Recording, read_recording
-from spinepipe.testing_machine.settings import MachineMapping, check_mapping
+from spinepipe.testing_machine.recording import Recording
+from spinepipe.testing_machine.settings import MachineMapping
 from spinepipe.units import COORDINATE_COLUMNS
 
 BY_HAND = {
@@ -85,9 +89,11 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
         raise InputError(problems)
     recordings: dict[tuple[str, str], list[Recording]] = {}
     for of in mapping.files:
-        recording, faults = read_recording(folder / of.file, of, mapping)
-        problems += faults
+        recording, faults = read_test(folder, of, mapping)
         if recording is not None:
+            recording, faults = converted(recording, mapping)
+        problems += faults
+        if recording is not None and not faults:
             recordings.setdefault((of.specimen, of.test), []).append(recording)
     tests = []
     for group in recordings.values():
@@ -142,8 +148,11 @@ def _sentences(tests: ImportedTests) -> Iterator[str]:
     """What was done with each file, and what the readings are worth."""
     for test in tests.tests:
         yield from _of_test(test)
+    mapping = tests.mapping
+    yield from of_conversions({place for test in tests.tests for place in test.places}, mapping)
+    yield from _of_accuracy(tests)
     yield f"SD of a reading: {sd_sentence(tests)}"
-    if tests.mapping.zeroed:
+    if mapping.zeroed:
         yield "Readings count from those of step 0 of their cycle (zeroed_at_step_0: true)."
     else:
         yield "Readings stay as they are: their zero must be the neutral pose."
@@ -163,13 +172,19 @@ def _of_test(test: ResampledTest) -> list[str]:
             f"runs from {found.low:.3g} to {found.high:.3g} {_unit(one)} and turns back "
             f"{count(found.reversals, 'time')}: {count(len(found.cycles), 'cycle')}, {kept} kept."
         )
-        lines += [f"  In this file, {remark}." for remark in one.remarks]
+        lines += [f"  {note}." for note in one.notes]
         lines += [f"  Cycle {number} is left out: {why}." for number, why in found.left_out]
     unit = _unit(test.recordings[0])
+    each = "each" if len({len(cycle.motion) for cycle in test.cycles}) == 1 else "at most"
+    # without a turn there is one way; with one, a cycle that is cut off ends on the way back
+    ways = "there and back"
+    if not all(cycle.complete for cycle in test.cycles):
+        turned = any(found.reversals for found in test.cuts)
+        ways = "and not all the way back" if turned else "one way"
     lines.append(
         f"  {test.specimen}, {test.test}: {count(len(test.cycles), 'cycle')} of "
-        f"{count(len(test.levels), 'load step')} each, from {min(test.levels):.3g} to "
-        f"{max(test.levels):.3g} {unit}, there and back."
+        f"{count(len(test.levels), 'load step')} {each}, from {min(test.levels):.3g} to "
+        f"{max(test.levels):.3g} {unit}, {ways}."
     )
     return lines
 
@@ -202,6 +217,8 @@ def _header(tests: ImportedTests) -> str:
             "translation_mm": _declared(tests.translation, "mm"),
         },
     }
+    if mapping.accuracy:
+        document["accuracy"] = dict(mapping.accuracy)
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)
 
 
@@ -235,6 +252,18 @@ def sd_sentence(tests: ImportedTests) -> str:
     return " ".join(words)
 
 
+def _of_accuracy(tests: ImportedTests) -> Iterator[str]:
+    """Which is larger, what repeats show or what the instrument may be off."""
+    for name, off in tests.mapping.accuracy.items():
+        unit = name.rpartition("_")[2]
+        sd = _declared(tests.rotation if unit == "deg" else tests.translation, unit)
+        which = "larger than" if off > sd else "not larger than"
+        yield (
+            f"Accuracy of the instrument, {name.rpartition('_')[0].replace('_', ' ')}: {off:g} "
+            f"{unit}, {which} the SD of a reading, {sd:g} {unit}: {max(off, sd):g} counts as noise."
+        )
+
+
 def _specimens(tests: ImportedTests) -> list[str]:
     return list(dict.fromkeys(test.specimen for test in tests.tests))
 
@@ -242,21 +271,23 @@ def _specimens(tests: ImportedTests) -> list[str]:
 def _joints(tests: ImportedTests) -> Rows:
     """A template: joints above each other, axes of ground."""
     joints = joint_names(tests.mapping.vertebrae)
+    origins = {one.joint: one.origin_mm for one in tests.mapping.motion_points}
     rows: Rows = [("specimen", "joint", *_FRAME)]
     for specimen in _specimens(tests):
         for number, joint in enumerate(joints):
-            rows.append((specimen, joint, 0, f"{number * LEVEL_APART_MM:g}", 0, 0, 0, 0))
+            origin = origins.get(joint, (0, number * LEVEL_APART_MM, 0))
+            rows.append((specimen, joint, *(f"{value:g}" for value in origin), 0, 0, 0))
     return rows
 
 
 def _loads(tests: ImportedTests) -> Rows:
-    point = tests.mapping.load_point_mm or ("", "", "")
     vertebra = tests.mapping.loaded_vertebra
     rows: Rows = [
         ("specimen", "test", "cycle", "step", "vertebra", *LOAD_COLUMNS, *_POINT, "time_s")
     ]
     for test in tests.tests:
         for number, cycle in enumerate(test.cycles, start=1):
+            point = tests.mapping.of_file(cycle.of).load_point_mm or ("", "", "")
             for step, loads in enumerate(cycle.loads):
                 time = "" if cycle.time is None else rounded(cycle.time[step])
                 values = [rounded(value) for value in loads]

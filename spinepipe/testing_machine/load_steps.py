@@ -17,7 +17,7 @@ from spinepipe.problems import InputProblem
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.cycles import Branch, Cycle, Segmentation, segment
 from spinepipe.testing_machine.recording import Recording
-from spinepipe.testing_machine.settings import LoadSteps
+from spinepipe.testing_machine.settings import LoadSteps, TestFile
 
 Array = NDArray[np.float64]
 Place = tuple[str, str]
@@ -43,11 +43,14 @@ class ResampledCycle:
 
     Attributes
     ----------
+    of : what the YAML says of its file. complete : whether the load comes back.
     loads : (T, 6) N and N m. time : (T,) s from step 0, None where no time was mapped.
     motion, sds, raw : (T, C) reading, its SD, and the SD of a single row.
     rows : (T,) rows of the recording near each step.
     """
 
+    of: TestFile
+    complete: bool
     loads: Array
     time: Array | None
     motion: Array
@@ -139,7 +142,7 @@ def plan(
 ) -> list[Step]:
     """The load steps of a cycle in the order in which it passes them, the reference first.
 
-    A cycle that the recording cuts off has those that it passes.
+    It has those that it passes: a recording may end on the way back, or short of the reference.
     """
     steps = [Step(cut.reference, 0)]
     for turn, levels in enumerate(sides):
@@ -148,8 +151,6 @@ def plan(
         steps += [Step(level, turn) for level in levels]
         steps += [Step(level, turn + 1) for level in levels[-2::-1]]
     steps.append(Step(cut.reference, len(sides)))
-    if cycle.complete:
-        return steps
     kept: list[Step] = []
     for step in steps:
         if step.branch >= len(cycle.branches) or not _passed(cut, cycle, step, load):
@@ -243,9 +244,10 @@ def resample_test(
     sides = common_levels(cuts[0], cycles, steps.per_side, steps.levels)
     first = recordings[0]
     places = tuple(first.motion)
-    done = []
+    done, longest = [], list[Step]()
     for one, cycle in kept:
         planned = plan(cuts[0], sides, cycle, one.loads[one.driving])
+        longest = max(longest, planned, key=len)
         result = _resample(one, cycle, planned, zeroed)
         if isinstance(result, InputProblem):
             problems.append(result)
@@ -253,7 +255,7 @@ def resample_test(
             done.append(result)
     if problems:
         return None, problems
-    levels = tuple(step.level for step in planned)
+    levels = tuple(step.level for step in longest)
     of = first.of
     made = ResampledTest(
         of.specimen, of.test, first.driving, places, levels, tuple(done),
@@ -288,6 +290,7 @@ def _cut_problems(
 ) -> Iterator[InputProblem]:
     if not found.kept:
         told = f"{len(found.cycles)} cycles, of which none is kept"
+        told += "".join(f"; {number}: {why}" for number, why in found.left_out[:1])
         remedy = "lower `preconditioning_cycles` or `steps.smallest_reversal`, or look at the file"
         yield InputProblem(one.file, None, one.driving, told, "at least one cycle", remedy)
     elif (found.way, found.both_sides) != (first.way, first.both_sides):
@@ -342,6 +345,8 @@ def _resample(
         loads[:, LOAD_COLUMNS.index(name)] = values[:, n + place]
     motion = values[:, :n] - values[0, :n] if zeroed else values[:, :n]
     return ResampledCycle(
+        of=one.of,
+        complete=cycle.complete,
         loads=loads,
         time=None if one.time is None else _times(values[:, -1], planned, cycle, one.time),
         motion=motion,
@@ -352,11 +357,14 @@ def _resample(
 
 
 def _times(regressed: Array, planned: Sequence[Step], cycle: Cycle, time: Array) -> Array:
-    """(T,) s from step 0: at turns that of the turn, for a load may creep up to it; never back."""
+    """(T,) s from step 0: at turns that of the turn, for a load may creep up to it, but of a hold
+    its mean, as at other levels; never back.
+    """
     told = regressed.copy()
     for place in range(1, len(planned)):
-        if planned[place].branch > planned[place - 1].branch:
-            told[place - 1] = time[cycle.branches[planned[place - 1].branch].last]
+        before = cycle.branches[planned[place - 1].branch]
+        if planned[place].branch > planned[place - 1].branch and not before.held:
+            told[place - 1] = time[before.last]
     told = np.maximum.accumulate(told)
     return told - told[0]
 

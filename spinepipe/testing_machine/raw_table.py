@@ -58,7 +58,7 @@ class RawTable:
     ----------
     form : the form of the YAML, with what the file itself says of it.
     names : of the columns, empty without. first : line of the first numbers.
-    text : the file, in UTF-8. remarks : what the file itself said.
+    text : the file, in UTF-8. notes : what the file itself said.
     """
 
     form: FileForm
@@ -66,7 +66,7 @@ class RawTable:
     first: int
     width: int
     text: bytes
-    remarks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Line and cells of every row of numbers that has any."""
@@ -144,7 +144,7 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProble
     csv.Error
         Where rows are no table.
     """
-    remarks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     if data.startswith(b"PK"):
         try:
             with warnings.catch_warnings(action="ignore"):  # of styles and the like
@@ -164,8 +164,8 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProble
             return InputProblem(file, line, None, found, "one segment", remedy)
         own = form.model_fields_set  # what the YAML says counts more than a header that is wrong
         form = form.model_copy(update={key: told[key] for key in told.keys() - own})
-        remarks = (f"its header is followed: separator {form.delimiter}, decimal {form.decimal}",)
-    table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode(), remarks)
+        notes = (f"its header is followed: separator {form.delimiter}, decimal {form.decimal}",)
+    table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode(), notes)
     head = islice(text_rows(form, table.text), form.names_line)
     names = next(([c.strip() for c in row] for line, row in head if line == form.names_line), [])
     while names and not names[-1]:

@@ -15,6 +15,7 @@ from scipy.signal import medfilt
 
 from spinepipe.documents.text import read_bytes
 from spinepipe.problems import InputProblem, one_of
+from spinepipe.report.words import count
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     SECONDS,
@@ -22,6 +23,7 @@ from spinepipe.testing_machine.channels import (
     factor_of,
     mistyped,
 )
+from spinepipe.testing_machine.instruments import SYNC
 from spinepipe.testing_machine.notation import (
     Notation,
     clock_seconds,
@@ -65,7 +67,7 @@ class Recording:
     motion : (N,) by joint and column of ``motion.csv``.
     finest : smallest step between two readings of each motion, 0 where all are equal.
     spikes : rows left out, in which a reading jumps away from those before and behind.
-    remarks : what the file itself said of how it is written.
+    notes : what else is to be said of it.
     """
 
     file: str
@@ -77,7 +79,7 @@ class Recording:
     motion: dict[tuple[str, str], Array]
     finest: dict[tuple[str, str], float]
     spikes: int
-    remarks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def read_recording(
@@ -120,7 +122,7 @@ def _understood(
                 InputProblem(of.file, None, str(channel.column), found, allowed, remedy)
             )
     notation = Notation(table.form.decimal, table.form.thousands)
-    lines, numbers, faults, remarks = _numbers(table, of.file, there, notation, table.remarks)
+    lines, numbers, faults, notes = _numbers(table, of.file, there, notation, table.notes)
     problems += faults
     if len(lines) < FEWEST_LINES:
         found, allowed = f"{len(lines)} lines of numbers", f"at least {FEWEST_LINES}"
@@ -144,21 +146,30 @@ def _understood(
         * factor_of(one.unit, one.positive)
         for one in mapping.motion
     }
-    steps = {place: np.diff(np.unique(one)) for place, one in motion.items()}  # those that differ
-    sound = ~np.any([_jumps(one) for one in (*loads.values(), *motion.values())], axis=0)
-    whole = Recording(
+    every = [*loads.values(), *motion.values()]
+    whole = np.all([np.isfinite(one) for one in every], axis=0)
+    if empty := int(np.count_nonzero(~whole)):
+        notes = (*notes, f"{count(empty, 'row')} with an empty cell left out")
+    sound = whole.copy()
+    # a signal by which clocks are compared jumps and may
+    read = [*loads.values(), *(one for (joint, _), one in motion.items() if joint != SYNC)]
+    sound[whole] = ~np.any([_jumps(one[whole]) for one in read], axis=0)
+    steps = {  # between readings that differ
+        place: np.diff(np.unique(one[whole])) for place, one in motion.items()
+    }
+    recording = Recording(
         file=of.file,
         of=of,
         lines=lines[sound],
         time=None if time is None else time[sound],
         loads={name: values[sound] for name, values in sorted(loads.items())},
-        driving=DIRECTIONS[mapping.driving(of).positive].load,
+        driving=DIRECTIONS[mapping.driving(of).positive].load if mapping.loads else "",
         motion={place: values[sound] for place, values in sorted(motion.items())},
         finest={place: float(one.min()) if one.size else 0.0 for place, one in steps.items()},
-        spikes=int(np.count_nonzero(~sound)),
-        remarks=remarks,
+        spikes=int(np.count_nonzero(whole & ~sound)),
+        notes=notes,
     )
-    return whole, []
+    return recording, []
 
 
 def _place(
@@ -190,7 +201,7 @@ def _numbers(
     file: str,
     there: Sequence[tuple[Channel, int]],
     notation: Notation,
-    remarks: tuple[str, ...] = (),
+    notes: tuple[str, ...] = (),
 ) -> tuple[Lines, dict[str | int, Array], list[InputProblem], tuple[str, ...]]:
     """Lines, numbers by column, problems of cells that have none, and what is to be said."""
     clocks = [one.unit == "clock" for one, _ in there]
@@ -200,8 +211,17 @@ def _numbers(
     lines, numbers = table.columns(places, values, plain)
     columns = {one.column: values for (one, _), values in zip(there, numbers, strict=True)}
     bad = [np.flatnonzero(~np.isfinite(one)) for one in numbers]
+    if table.form.empty_cells == "left_out":
+        gaps = [at for at, (one, _) in enumerate(there) if isinstance(one, MotionChannel)]
+        empty = {at: list[int]() for at in gaps if bad[at].size}
+        for number, (_, row) in enumerate(table.rows() if empty else ()):
+            for at, found_at in empty.items():
+                if not cell_at(row, places[at]):
+                    found_at.append(number)
+        for at, found_at in empty.items():
+            bad[at] = np.setdiff1d(bad[at], found_at)
     if not any(one.size for one in bad):
-        return lines, columns, [], remarks
+        return lines, columns, [], notes
     # once more through the rows: the first bad cell of each column, and how numbers are written
     first = {(int(one[0]), at): "" for at, one in enumerate(bad) if one.size}
 
@@ -218,7 +238,7 @@ def _numbers(
     readings = [{one.value(cell) for one in able} for cell in first.values()]
     if grouped and notation.thousands is None and all(len(one) == 1 for one in readings):
         told = f"numbers have a {grouped[0].thousands} between thousands"
-        return _numbers(table, file, there, grouped[0], (*remarks, told))
+        return _numbers(table, file, there, grouped[0], (*notes, told))
     problems = []
     for (row, at), cell in first.items():
         channel = there[at][0]
@@ -234,7 +254,7 @@ def _numbers(
         problems.append(
             InputProblem(file, int(lines[row]), str(channel.column), found, allowed, what)
         )
-    return lines, columns, problems, remarks
+    return lines, columns, problems, notes
 
 
 def _backwards(time: Array, lines: Lines, file: str, column: str) -> Iterator[InputProblem]:

@@ -1,32 +1,29 @@
 """The small YAML that says what the columns of a testing machine's files are."""
 
-from collections import Counter
-from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from spinepipe.cohort.cohort import VertebraName, joint_names
-from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
-from spinepipe.documents.yaml_text import YamlDocument
-from spinepipe.problems import InputProblem, did_you_mean, one_of
+from spinepipe.cohort.cohort import VertebraName
 from spinepipe.testing_machine.channels import (
-    ANGLES,
-    DIRECTIONS,
-    FORCES,
-    MOMENTS,
     LoadUnit,
     MotionUnit,
     TimeUnit,
     Towards,
-    mistyped,
+)
+from spinepipe.testing_machine.instruments import (
+    AccuracyKey,
+    LoadCell,
+    Markers,
+    MotionPoint,
+    Point,
+    Rotations,
 )
 
 FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 _Text = Annotated[str, StringConstraints(min_length=1)]
 _Column = _Text | Annotated[int, Field(ge=1)]
-_Millimetres = Annotated[float, Field(ge=-10_000, le=10_000)]
 _Size = Annotated[float, Field(gt=0, le=20_000)]
 
 
@@ -67,6 +64,11 @@ class FileForm(BaseModel):
     encoding: Literal["utf-8", "latin-1", "utf-16"] = Field(
         default="utf-8", description="how letters are written"
     )
+    empty_cells: Literal["refused", "left_out"] = Field(
+        default="refused",
+        description="left_out: rows in which a motion has an empty cell are left out, as where a "
+        "camera loses a marker; how many is said",
+    )
 
 
 class TimeChannel(BaseModel):
@@ -101,6 +103,35 @@ class MotionChannel(BaseModel):
     positive: Towards = Field(description="where a positive number moves the upper vertebra")
 
 
+class Sync(BaseModel):
+    """A signal that both files have, as of a trigger."""
+
+    model_config = FORM
+
+    load: _Column = Field(description="its column in the file with the loads")
+    motion: _Column = Field(description="its column in the file with the motion")
+
+
+class MotionFiles(BaseModel):
+    """Files of a camera beside those with the loads: `motion_file` of `files` names them."""
+
+    model_config = FORM
+
+    form: FileForm = Field(default_factory=FileForm, description="how it writes its files")
+    time: TimeChannel | None = Field(default=None, description="its column of time")
+    rate_hz: float | None = Field(
+        default=None, gt=0, le=100_000, description="or frames a second, each in a line"
+    )
+    sync: Sync | None = Field(
+        default=None,
+        description="signal in both files by which clocks are compared; null: `shift_s`, else the "
+        "rates of load and motion",
+    )
+    markers: Markers | None = Field(
+        default=None, description="markers whose motion is wanted, in the place of `motion`"
+    )
+
+
 class TestFile(BaseModel):
     """One file: one test of one specimen, with one or more cycles."""
 
@@ -130,6 +161,20 @@ class TestFile(BaseModel):
     )
     motion: tuple[MotionChannel, ...] | None = Field(
         default=None, strict=False, description="of this file, instead of all common ones"
+    )
+    motion_file: _Text | None = Field(
+        default=None,
+        description="file of its motion, if another; {stem} is the name of `file` without its end",
+    )
+    shift_s: float | None = Field(
+        default=None,
+        ge=-100_000,
+        le=100_000,
+        description="seconds from the first row of the motion's file to that of this one; null: "
+        "found from the rows",
+    )
+    load_point_mm: Point | None = Field(
+        default=None, description="where forces act in this file, if elsewhere"
     )
 
 
@@ -166,7 +211,7 @@ class LoadSteps(BaseModel):
     )
 
 
-OF_A_FILE = ("form", "time", "loads", "motion")
+OF_A_FILE = ("form", "time", "loads", "motion", "load_point_mm")
 """Keys that a file may have of its own."""
 
 
@@ -190,14 +235,12 @@ class MachineMapping(BaseModel):
     loaded: str | None = Field(
         default=None, description="vertebra on which the load acts; null: the most cranial"
     )
-    load_point_mm: tuple[_Millimetres, ...] | None = Field(
+    load_point_mm: Point | None = Field(
         default=None,
-        strict=False,
-        min_length=3,
-        max_length=3,
         description="where forces act on it: anterior, superior, to the right in ground, neutral "
         "pose; needed with forces",
     )
+    load_cell: LoadCell | None = Field(default=None, description="what reads the loads")
     zeroed: bool = Field(
         default=True,
         description="true: the reading of step 0 is subtracted in every cycle, as machines count "
@@ -209,7 +252,26 @@ class MachineMapping(BaseModel):
         default=(), strict=False, description="columns of loads; files may have their own"
     )
     motion: tuple[MotionChannel, ...] = Field(
-        default=(), strict=False, description="columns of motion; files may have their own"
+        default=(),
+        strict=False,
+        description="columns of motion; files may have their own, and with markers there are none",
+    )
+    motion_files: MotionFiles | None = Field(
+        default=None, description="files with the motion alone, on a clock of their own"
+    )
+    rotations: Rotations | None = Field(
+        default=None,
+        description="order of three rotations; null: z, x', y'' (extension, right "
+        "bending, left rotation, each about axes that those before have turned)",
+    )
+    motion_points: tuple[MotionPoint, ...] = Field(
+        default=(), strict=False, description="joints whose translations are not of their origin"
+    )
+    accuracy: dict[AccuracyKey, Annotated[float, Field(gt=0, le=50)]] = Field(
+        default_factory=dict,
+        description="how far the instrument may be off, as an SD: rotation_deg, translation_mm, or "
+        "a column of motion.csv, which counts for that alone; the larger of it and measurement_sd "
+        "is the noise",
     )
     steps: LoadSteps = Field(default_factory=LoadSteps, description="load steps that are kept")
     files: tuple[TestFile, ...] = Field(strict=False, description="the files")
@@ -229,141 +291,3 @@ class MachineMapping(BaseModel):
         if of.driving is None:
             return self.loads[0]
         return next(channel for channel in self.loads if channel.column == of.driving)
-
-
-def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
-    """What is wrong with the keys taken together, each problem at its line."""
-    yield from _fewest(document, mapping)
-    yield from _names(document, mapping)
-    keys = {key: key for key in OF_A_FILE}
-    common = not mapping.files
-    for number, of in enumerate(mapping.files):
-        told = {key: f"files.{number}.{key}" for key in OF_A_FILE if getattr(of, key) is not None}
-        common |= not told
-        if told:
-            yield from _of_file(document, mapping.of_file(of), keys | told)
-    if common:
-        yield from _of_file(document, mapping, keys)
-    yield from _driving(document, mapping)
-
-
-def _of_file(
-    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
-) -> Iterator[InputProblem]:
-    """What is wrong with form and columns of a file; `keys` tell where each of them stands."""
-    for key in ("loads", "motion"):
-        if not getattr(mapping, key):
-            yield _at(document, keys[key], "0 of them", "at least 1", "add what is missing")
-    joints = joint_names(mapping.vertebrae)
-    for number, channel in enumerate(mapping.motion):
-        if channel.joint not in joints:
-            remedy = did_you_mean(channel.joint, joints, "correct the joint or vertebrae")
-            key = f"{keys['motion']}.{number}.joint"
-            yield _at(document, key, f"'{channel.joint}'", one_of(joints), remedy)
-    forces = any(channel.unit in FORCES for channel in mapping.loads)
-    if forces and mapping.load_point_mm is None:
-        allowed = "a point, as there are forces and no masses that would tell one"
-        yield _at(document, "load_point_mm", "nothing", allowed, "add `load_point_mm: [x, y, z]`")
-    yield from _directions(document, mapping, keys)
-    yield from _columns(document, mapping, keys)
-    form = mapping.form
-    if form.first_line is not None and form.first_line <= form.names_line:
-        allowed = f"a line below the names, which are in line {form.names_line}"
-        key = f"{keys['form']}.first_line"
-        yield _at(document, key, str(form.first_line), allowed, "correct one of them")
-    if form.thousands is not None and form.thousands in (form.decimal, form.delimiter):
-        key, allowed = f"{keys['form']}.thousands", "another sign than between decimals and cells"
-        yield _at(document, key, f"'{form.thousands}'", allowed, "correct one of them")
-
-
-def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str) -> InputProblem:
-    return InputProblem(document.file, document.line_of(key), key, found, allowed, remedy)
-
-
-def _fewest(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
-    """Lists that must not be empty (a rule of pydantic would speak up for their bad items too)."""
-    fewest = {"vertebrae": 2, "files": 1}
-    for key, least in fewest.items():
-        there = len(getattr(mapping, key))
-        if there < least:
-            yield _at(document, key, f"{there} of them", f"at least {least}", "add what is missing")
-    if mapping.steps.levels is not None and not mapping.steps.levels:
-        remedy = "name levels, or delete the key"
-        yield _at(document, "steps.levels", "an empty list", "at least 1", remedy)
-
-
-def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
-    moving = mapping.vertebrae[1:]
-    if mapping.loaded is not None and mapping.loaded not in moving:
-        remedy = did_you_mean(mapping.loaded, moving, "load a vertebra that moves")
-        yield _at(document, "loaded", f"'{mapping.loaded}'", one_of(moving), remedy)
-    for number, of in enumerate(mapping.files):
-        if (fault := folder_fault(of.specimen)) is not None:
-            key = f"files.{number}.specimen"
-            yield _at(document, key, fault, ALLOWED_FOLDER, "rename the specimen")
-        if (fault := name_fault(of.test)) is not None:
-            yield _at(document, f"files.{number}.test", fault, ALLOWED, "rename the test")
-
-
-def _directions(
-    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
-) -> Iterator[InputProblem]:
-    """A unit tells whether something turns or shifts; the direction must do so too."""
-    sides: tuple[tuple[str, tuple[LoadChannel | MotionChannel, ...]], ...] = (
-        ("loads", mapping.loads),
-        ("motion", mapping.motion),
-    )
-    for side, channels in sides:
-        for number, channel in enumerate(channels):
-            turns = channel.unit in MOMENTS or channel.unit in ANGLES
-            fit = tuple(word for word, one in DIRECTIONS.items() if one.turns == turns)
-            if channel.positive not in fit:
-                key = f"{keys[side]}.{number}.positive"
-                found = f"'{channel.positive}' in {channel.unit}"
-                yield _at(document, key, found, one_of(fit), "correct the direction or the unit")
-
-
-def _columns(
-    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
-) -> Iterator[InputProblem]:
-    """Each column once, each quantity once; numbers only where there are no names."""
-    named: list[tuple[str, _Text | int]] = []
-    if mapping.time is not None:
-        named.append((f"{keys['time']}.column", mapping.time.column))
-    loads, motion = keys["loads"], keys["motion"]
-    named += [(f"{loads}.{n}.column", one.column) for n, one in enumerate(mapping.loads)]
-    named += [(f"{motion}.{n}.column", one.column) for n, one in enumerate(mapping.motion)]
-    times = Counter(column for _, column in named)
-    for key, column in named:
-        if times[column] > 1:
-            yield _at(document, key, f"column {column!r} twice", "each column once", "correct one")
-        if mapping.form.names_line == 0 and isinstance(column, str):
-            allowed = "a number from 1, as names_line is 0"
-            yield _at(document, key, f"'{column}'", allowed, "tell the column's number")
-    meant: list[tuple[str, tuple[str, ...]]] = [
-        (f"{loads}.{n}.positive", (DIRECTIONS[one.positive].load,))
-        for n, one in enumerate(mapping.loads)
-    ]
-    meant += [
-        (f"{motion}.{n}.positive", (one.joint, DIRECTIONS[one.positive].coordinate))
-        for n, one in enumerate(mapping.motion)
-    ]
-    again = Counter(quantity for _, quantity in meant)
-    for key, quantity in meant:
-        if again[quantity] > 1:
-            found, allowed = f"{' '.join(quantity)} from two columns", "one column for each"
-            yield _at(document, key, found, allowed, "delete one of them or correct its direction")
-
-
-def _driving(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
-    for number, of in enumerate(mapping.files):
-        columns = [channel.column for channel in mapping.of_file(of).loads]
-        key = f"files.{number}.driving"
-        if of.driving is None and len(columns) > 1:
-            remedy = "add `driving:`, the load that goes up and down"
-            yield _at(
-                document, key, "nothing: the key is missing", one_of(map(str, columns)), remedy
-            )
-        elif of.driving is not None and of.driving not in columns:
-            remedy = mistyped(str(of.driving), map(str, columns), "name a column of loads")
-            yield _at(document, key, f"'{of.driving}'", one_of(map(str, columns)), remedy)

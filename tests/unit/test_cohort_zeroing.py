@@ -12,6 +12,7 @@ from cohort_cases import Change, swap, text, write
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.cohort.zeroing import common_zeroing
 from spinepipe.problems import InputError, InputProblem
 
@@ -105,3 +106,19 @@ def test_a_number_is_no_list_of_tests(tmp_path: Path) -> None:
     (problem,) = refused(tmp_path, zeroed("3"))
     assert problem.column == "zeroed_at_step_0"
     assert problem.allowed == "true, false, or a list of tests"
+
+
+@pytest.mark.parametrize(("sd", "first"), [(0.01, [0.0, 2.0]), (0.003, [0.015, 2.015])])
+def test_what_a_mean_of_readings_leaves_is_subtracted(sd: float, first: list[float]) -> None:
+    """0.015 deg is within 4 SD of one reading or not; then it is left for the checks to refuse."""
+    rows = {"specimen": "a", "test": "x", "joint": "L3L4", "step": [0, 1], "cycle": 1}
+    blank = dict.fromkeys(cohorts.columns.TABLES["motion"].names[5:], np.nan)
+    motion = pd.DataFrame(rows | blank | {"extension_deg": [0.015, 2.015]})
+    declared = MeasurementSd(rotation_deg=sd, translation_mm=1.0)
+    found, together = common_zeroing(motion, True, declared)
+    assert found is not None
+    assert together is True
+    assert found["extension_deg"].tolist() == pytest.approx(first)
+    alone, _ = common_zeroing(motion, True)
+    assert alone is not None
+    assert alone["extension_deg"].tolist() == [0.015, 2.015]

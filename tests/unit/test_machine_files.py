@@ -256,7 +256,7 @@ def test_labview_files_say_themselves_how_they_are_written(
 ) -> None:
     (found,) = read(tmp_path, labview(decimal, mark), time={"column": "X_Value", "unit": "s"})
     assert same(found)
-    assert "its header is followed" in found.remarks[0]
+    assert "its header is followed" in found.notes[0]
 
 
 def test_what_the_settings_say_counts_more_than_a_wrong_header(tmp_path: Path) -> None:
@@ -353,7 +353,7 @@ def test_thousands_beyond_doubt_are_read_and_told(tmp_path: Path) -> None:
     loads = [{**LOAD, "unit": "N mm"}]
     (found,) = read(tmp_path, "\n".join(["t,Moment,Angle", *rows]), loads=loads)
     assert same(found)
-    assert "a comma between thousands" in found.remarks[0]
+    assert "a comma between thousands" in found.notes[0]
 
 
 @sweep(

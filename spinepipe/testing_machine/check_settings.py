@@ -1,0 +1,196 @@
+"""What is wrong with the settings of a testing machine's files taken together."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+from spinepipe.cohort.cohort import joint_names
+from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
+from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.problems import InputProblem, did_you_mean, one_of
+from spinepipe.testing_machine.channels import ANGLES, DIRECTIONS, FORCES, MOMENTS, mistyped
+from spinepipe.testing_machine.settings import (
+    OF_A_FILE,
+    LoadChannel,
+    MachineMapping,
+    MotionChannel,
+)
+
+
+def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+    """What is wrong with the keys taken together, each problem at its line."""
+    yield from _fewest(document, mapping)
+    yield from _names(document, mapping)
+    keys = {key: key for key in OF_A_FILE}
+    common = not mapping.files
+    for number, of in enumerate(mapping.files):
+        told = {key: f"files.{number}.{key}" for key in OF_A_FILE if getattr(of, key) is not None}
+        common |= not told
+        if told:
+            yield from _of_file(document, mapping.of_file(of), keys | told)
+    if common:
+        yield from _of_file(document, mapping, keys)
+    yield from _driving(document, mapping)
+    yield from _motion_files(document, mapping)
+
+
+def _of_file(
+    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
+) -> Iterator[InputProblem]:
+    """What is wrong with form and columns of a file; `keys` tell where each of them stands."""
+    beside = mapping.motion_files
+    marked = beside is not None and beside.markers is not None
+    for key in ("loads",) if marked else ("loads", "motion"):
+        if not getattr(mapping, key):
+            yield _at(document, keys[key], "0 of them", "at least 1", "add what is missing")
+    joints = joint_names(mapping.vertebrae)
+    for number, channel in enumerate(mapping.motion):
+        if channel.joint not in joints:
+            remedy = did_you_mean(channel.joint, joints, "correct the joint or vertebrae")
+            key = f"{keys['motion']}.{number}.joint"
+            yield _at(document, key, f"'{channel.joint}'", one_of(joints), remedy)
+    forces = any(channel.unit in FORCES for channel in mapping.loads)
+    if forces and mapping.load_point_mm is None:
+        allowed = "a point, as there are forces and no masses that would tell one"
+        yield _at(
+            document, keys["load_point_mm"], "nothing", allowed, "add `load_point_mm: [x, y, z]`"
+        )
+    yield from _directions(document, mapping, keys)
+    yield from _columns(document, mapping, keys)
+    form = mapping.form
+    if form.first_line is not None and form.first_line <= form.names_line:
+        allowed = f"a line below the names, which are in line {form.names_line}"
+        key = f"{keys['form']}.first_line"
+        yield _at(document, key, str(form.first_line), allowed, "correct one of them")
+    if form.thousands is not None and form.thousands in (form.decimal, form.delimiter):
+        key, allowed = f"{keys['form']}.thousands", "another sign than between decimals and cells"
+        yield _at(document, key, f"'{form.thousands}'", allowed, "correct one of them")
+
+
+def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str) -> InputProblem:
+    return InputProblem(document.file, document.line_of(key), key, found, allowed, remedy)
+
+
+def _fewest(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+    """Lists that must not be empty (a rule of pydantic would speak up for their bad items too)."""
+    fewest = {"vertebrae": 2, "files": 1}
+    for key, least in fewest.items():
+        there = len(getattr(mapping, key))
+        if there < least:
+            yield _at(document, key, f"{there} of them", f"at least {least}", "add what is missing")
+    if mapping.steps.levels is not None and not mapping.steps.levels:
+        remedy = "name levels, or delete the key"
+        yield _at(document, "steps.levels", "an empty list", "at least 1", remedy)
+
+
+def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+    moving = mapping.vertebrae[1:]
+    if mapping.loaded is not None and mapping.loaded not in moving:
+        remedy = did_you_mean(mapping.loaded, moving, "load a vertebra that moves")
+        yield _at(document, "loaded", f"'{mapping.loaded}'", one_of(moving), remedy)
+    for number, of in enumerate(mapping.files):
+        if (fault := folder_fault(of.specimen)) is not None:
+            key = f"files.{number}.specimen"
+            yield _at(document, key, fault, ALLOWED_FOLDER, "rename the specimen")
+        if (fault := name_fault(of.test)) is not None:
+            yield _at(document, f"files.{number}.test", fault, ALLOWED, "rename the test")
+
+
+def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+    """What the keys about two files of one test lack."""
+    beside = mapping.motion_files
+    for number, of in enumerate(mapping.files):
+        key = f"files.{number}"
+        if (of.motion_file is None) != (beside is None):
+            found = "nothing" if of.motion_file is None else "a file, and no `motion_files`"
+            allowed = "`motion_files`, and such a file of each test, or neither"
+            yield _at(document, f"{key}.motion_file", found, allowed, "add what is missing")
+        if of.shift_s is not None and (beside is None or beside.sync is not None):
+            allowed = "two files, and one way to compare their clocks"
+            yield _at(document, f"{key}.shift_s", f"{of.shift_s:g}", allowed, "delete it or `sync`")
+    if beside is None:
+        return
+    if mapping.time is None:
+        yield _at(document, "time", "nothing", "the column of time of the loads", "add `time:`")
+    if (beside.time is None) == (beside.rate_hz is None):
+        found = "neither" if beside.time is None else "both"
+        yield _at(document, "motion_files", found, "one of time and rate_hz", "correct it")
+    if (marks := beside.markers) is not None:
+        wrong = set(mapping.vertebrae[1:]) ^ set(marks.clusters) - {mapping.vertebrae[0]}
+        if wrong:
+            key, found = "motion_files.markers.clusters", ", ".join(sorted(wrong))
+            allowed = f"each of {', '.join(mapping.vertebrae)} (the first may be left out)"
+            yield _at(document, key, f"{found} wrong or missing", allowed, "correct the names")
+        ways = [DIRECTIONS[way].coordinate for way in marks.axes]
+        if len(set(ways)) < len(ways):
+            allowed = "an axis forwards, one upwards and one sidewards, each of either sign"
+            yield _at(document, "motion_files.markers", "an axis twice", allowed, "correct `axes`")
+        if mapping.motion:
+            yield _at(document, "motion", "columns and markers", "one of them", "delete one")
+
+
+def _directions(
+    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
+) -> Iterator[InputProblem]:
+    """A unit tells whether something turns or shifts; the direction must do so too."""
+    sides: tuple[tuple[str, tuple[LoadChannel | MotionChannel, ...]], ...] = (
+        ("loads", mapping.loads),
+        ("motion", mapping.motion),
+    )
+    for side, channels in sides:
+        for number, channel in enumerate(channels):
+            turns = channel.unit in MOMENTS or channel.unit in ANGLES
+            fit = tuple(word for word, one in DIRECTIONS.items() if one.turns == turns)
+            if channel.positive not in fit:
+                key = f"{keys[side]}.{number}.positive"
+                found = f"'{channel.positive}' in {channel.unit}"
+                yield _at(document, key, found, one_of(fit), "correct the direction or the unit")
+
+
+def _columns(
+    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
+) -> Iterator[InputProblem]:
+    """Each column once, each quantity once; numbers only where there are no names."""
+    loads, motion, beside = keys["loads"], keys["motion"], mapping.motion_files
+    of_loads = [(f"{loads}.{n}.column", one.column) for n, one in enumerate(mapping.loads)]
+    of_motion = [(f"{motion}.{n}.column", one.column) for n, one in enumerate(mapping.motion)]
+    if mapping.time is not None:
+        of_loads.insert(0, (f"{keys['time']}.column", mapping.time.column))
+    files = [(mapping.form, of_loads + of_motion)]
+    if beside is not None:
+        files = [(mapping.form, of_loads), (beside.form, of_motion)]
+    for form, named in files:
+        times = Counter(column for _, column in named)
+        for key, column in named:
+            if times[column] > 1:
+                found = f"column {column!r} twice"
+                yield _at(document, key, found, "each column once", "correct one")
+            if form.names_line == 0 and isinstance(column, str):
+                allowed = "a number from 1, as names_line is 0"
+                yield _at(document, key, f"'{column}'", allowed, "tell the column's number")
+    meant: list[tuple[str, tuple[str, ...]]] = [
+        (f"{loads}.{n}.positive", (DIRECTIONS[one.positive].load,))
+        for n, one in enumerate(mapping.loads)
+    ]
+    meant += [
+        (f"{motion}.{n}.positive", (one.joint, DIRECTIONS[one.positive].coordinate))
+        for n, one in enumerate(mapping.motion)
+    ]
+    again = Counter(quantity for _, quantity in meant)
+    for key, quantity in meant:
+        if again[quantity] > 1:
+            found, allowed = f"{' '.join(quantity)} from two columns", "one column for each"
+            yield _at(document, key, found, allowed, "delete one of them or correct its direction")
+
+
+def _driving(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+    for number, of in enumerate(mapping.files):
+        columns = [channel.column for channel in mapping.of_file(of).loads]
+        key = f"files.{number}.driving"
+        if of.driving is None and len(columns) > 1:
+            remedy = "add `driving:`, the load that goes up and down"
+            yield _at(
+                document, key, "nothing: the key is missing", one_of(map(str, columns)), remedy
+            )
+        elif of.driving is not None and of.driving not in columns:
+            remedy = mistyped(str(of.driving), map(str, columns), "name a column of loads")
+            yield _at(document, key, f"'{of.driving}'", one_of(map(str, columns)), remedy)

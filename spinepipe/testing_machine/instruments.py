@@ -1,0 +1,98 @@
+"""Keys of the YAML that say what an instrument reads: a camera, encoders, a load cell."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+Point = Annotated[
+    tuple[Annotated[float, Field(ge=-10_000, le=10_000)], ...],
+    Field(min_length=3, max_length=3, strict=False),
+]
+_Shift = Literal["anterior", "posterior", "superior", "inferior", "right", "left"]
+SYNC = "signal of both clocks"
+"""In the place of a joint: a column by which clocks are compared."""
+
+_Length = Literal["translation_mm", "anterior_mm", "superior_mm", "right_mm"]
+_Angle = Literal["rotation_deg", "extension_deg", "right_bending_deg", "left_rotation_deg"]
+AccuracyKey = _Length | _Angle
+
+
+class Rotations(BaseModel):
+    """How three angles of a joint make one rotation."""
+
+    model_config = FORM
+
+    order: Literal["xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "helical"] = Field(
+        description="axes in the order in which they are turned about: x anterior, y superior, z "
+        "to the right; helical: columns are the components of angle times axis"
+    )
+    axes: Literal["body", "space"] = Field(
+        default="body",
+        description="body: about axes that the rotations before have turned (Euler, Cardan); "
+        "space: about axes that stay",
+    )
+    zero: Literal["neutral", "each_angle", "pose"] | None = Field(
+        default=None,
+        description="where rotations count from; neutral: as read; each_angle: each angle from its "
+        "first row (encoders); pose: from the pose of the first row (markers); null: as read, "
+        "refused where that makes a difference of 0.1 deg",
+    )
+
+
+class MotionPoint(BaseModel):
+    """A joint whose translations were read at another point than its origin."""
+
+    model_config = FORM
+
+    joint: str = Field(min_length=1, description="which joint")
+    read_at_mm: Point = Field(
+        description="point of the upper vertebra whose translations were read: anterior, superior, "
+        "to the right in ground, neutral pose"
+    )
+    origin_mm: Point = Field(description="the joint's origin, in the same way")
+
+
+class LoadCell(BaseModel):
+    """A cell that reads the loads, along its own axes and about its own centre."""
+
+    model_config = FORM
+
+    reads: Literal["action", "reaction"] = Field(
+        description="action: what acts on the loaded vertebra; reaction: what answers it, as the "
+        "base below the segment does: all signs turn"
+    )
+    point_mm: Point | None = Field(
+        default=None,
+        description="its centre: anterior, superior, to the right in ground, neutral pose; moments "
+        "are moved from there to `load_point_mm`; null: not moved",
+    )
+    axes_deg: Point = Field(
+        default=(0.0, 0.0, 0.0),
+        description="extension, right bending, left rotation (z, x', y'') by which its axes are "
+        "turned against ground",
+    )
+    tare_s: float | None = Field(
+        default=None, gt=0, le=3600, description="the mean of the first so many seconds is no load"
+    )
+    tare_line: int | None = Field(
+        default=None, ge=1, description="instead: the readings in this line of a file are no load"
+    )
+
+
+class Markers(BaseModel):
+    """Markers of a camera, in clusters on the vertebrae."""
+
+    model_config = FORM
+
+    clusters: dict[str, Annotated[tuple[str, ...], Field(min_length=3, strict=False)]] = Field(
+        description="names of the three or more markers of each vertebra; the lowest may be left "
+        "out if it stays"
+    )
+    columns: str = Field(
+        default="{marker} {axis}", description="names of columns; {axis}: x, y or z"
+    )
+    unit: Literal["mm", "m"] = Field(default="mm", description="unit of its numbers")
+    axes: Annotated[tuple[_Shift, ...], Field(min_length=3, max_length=3, strict=False)] = Field(
+        default=("anterior", "superior", "right"), description="where its x, y and z go"
+    )
