@@ -25,6 +25,7 @@ from benchmarks import (
     pages,
     parameters,
     real_geometry,
+    recordings,
     sensitivity,
     study,
     summary,
@@ -53,6 +54,7 @@ def main() -> None:
         "pages": lambda: print(*pages.opened(), sep="\n", flush=True),
         "sensitivity": sensitivity_parts,
         "real_geometry": lambda: real_geometry_part(options.cohort),
+        "recordings": recordings_part,
         "tracking": tracking_part,
         "trunk": trunk_part,
         "summary": lambda: summary.write(RESULTS),
@@ -396,6 +398,26 @@ def trunk_part() -> None:
         "beside": asdict(beside),
     }
     _write("trunk", lines, {"machine": about, **data})
+
+
+def recordings_part() -> None:
+    """Recordings of motion of 100 MB."""
+    about = _about()
+    lines = _head("Recordings of 100 MB", about)
+    lines += [
+        "",
+        f"Goals: {recordings.GOAL_S:g} s and {recordings.GOAL_MIB:g} MiB a file. Memory is that of "
+        "the whole process.",
+        "",
+        "| file | MB | CPU s | peak MiB |",
+        "|---|---|---|---|",
+    ]
+    rows = []
+    for row in recordings.reads():
+        rows.append(asdict(row))
+        lines.append(f"| {row.what} | {row.mb:.0f} | {row.seconds:.1f} | {row.peak_mib:.0f} |")
+        print(lines[-1], flush=True)
+    _write("recordings", lines, {"machine": about, "rows": rows})
 
 
 def tracking_part() -> None:
