@@ -304,8 +304,8 @@ def _contradictions(whole: C3dFile, file: str, markers: bool) -> Iterator[InputP
         yield problem("POINT:RATE", f"{whole.rate:g} frames a second", allowed)
     if not np.isfinite(whole.scale) or whole.scale == 0.0:
         found, allowed = f"a scale of {whole.scale:g}", "a finite number that is not zero"
-        if np.isfinite(told := whole.number("SCALE") or np.nan):
-            found = f"a scale of {told:g}, and {whole.header_scale:g} in the header"
+        if np.isfinite(scale := whole.number("SCALE") or np.nan):
+            found = f"a scale of {scale:g}, and {whole.header_scale:g} in the header"
             allowed = "the same sign: below zero for reals, above it for whole numbers"
         yield problem("POINT:SCALE", found, allowed)
         return
@@ -385,7 +385,7 @@ def reals(data: bytes, at: int, number: int, processor: int) -> NDArray[np.float
         found = np.frombuffer(data, "<f4", number, at)
         return found.byteswap() if processor == MIPS else found
     halves = np.frombuffer(data, "<u2", 2 * number, at).reshape(-1, 2)
-    return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel() / np.float32(4.0)
+    return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel() * np.float32(0.25)
 
 
 def _parameters(
@@ -419,9 +419,9 @@ def _parameters(
         if not way:
             break
         at = way_at + way
-    keys = [(groups.get(group, ""), name) for group, name, _, _ in found]
-    values, sizes = (dict(zip(keys, [one[k] for one in found], strict=True)) for k in (3, 2))
-    return values, sizes, min(at, len(data))
+    named = [((groups.get(group, ""), name), size, value) for group, name, size, value in found]
+    values = {key: value for key, _, value in named}
+    return values, {key: size for key, size, _ in named}, min(at, len(data))
 
 
 def _value(data: bytes, at: int, name: str, processor: int) -> tuple[tuple[int, ...], Value]:

@@ -43,19 +43,6 @@ class StorageTable:
     header: Mapping[str, str]
     repaired: tuple[str, ...] = ()
 
-    def column(self, name: str) -> Array:
-        """(F,) of a name.
-
-        Raises
-        ------
-        KeyError
-            Where there is no such column.
-        """
-        if name not in self.names:
-            raise KeyError(name)
-        column: Array = self.values[:, self.names.index(name)]
-        return column
-
 
 def read_storage(path: Path, file: str | None = None) -> StorageTable:
     """A `.sto` or `.mot`.
@@ -89,7 +76,7 @@ def read_storage(path: Path, file: str | None = None) -> StorageTable:
     before = len(rest) - len(rest.lstrip("\r\n\t "))
     line = 1 + head.count("\n") + rest[:before].count("\n")
     labels, _, body = rest[before:].partition("\n")
-    names = cells_of(labels)
+    names = [label.strip('"') for label in cells_of(labels)]
     while names and not names[-1]:
         names.pop()
     if not names or names[0].lower() != "time":
