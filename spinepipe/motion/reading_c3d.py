@@ -61,6 +61,7 @@ MOST_PARAMETERS = 10
 """A parameter holds 255 elements; further ones follow in the next: LABELS, LABELS2, LABELS3 ..."""
 
 BELIEVED_SCALE = "header and POINT:SCALE differ in sign; the file's size fits {}"
+BELIEVED_ANALOG = "header and ANALOG:USED differ; the file's size fits ANALOG:USED"
 BELIEVED_FRAMES = "header and POINT:FRAMES differ by one frame; the file has room for {} frames"
 
 AGAIN = "export the motion again"
@@ -79,8 +80,8 @@ class C3dFile:
     data : all bytes. processor : see `INTEL`. parameters : see `Parameters`. sizes : of the array
         of each, the fastest first.
     behind : where the list of parameters ends, see `_parameters`; no frame begins before it.
-    points, analog : in a frame, how many markers, and how many numbers of analog channels (samples
-        of all channels). samples : of each channel in a frame.
+    points, header_analog : in a frame, how many markers, and how many numbers of analog channels
+        (samples of all channels). samples : of each channel in a frame.
     first, last : of the first and the last frame, its number in the recording, from 1; by the
         header. start : where frames begin.
     header_scale : what whole numbers are multiplied by to be in POINT:UNITS; negative: frames are
@@ -93,7 +94,7 @@ class C3dFile:
     sizes: Mapping[tuple[str, str], tuple[int, ...]]
     behind: int
     points: int
-    analog: int
+    header_analog: int
     samples: int
     first: int
     last: int
@@ -132,15 +133,28 @@ class C3dFile:
         to less than a block; NaN where none or both do.
         """
         told = self.number("SCALE") or self.header_scale
-        if not told * self.header_scale < 0.0:
+        if not -np.inf < told * self.header_scale < 0.0:
             return told
-        fits = [
-            scale
-            for scale in (told, self.header_scale)
-            for frames in self.frames_told
-            if 0 <= self._left(scale) - frames * self.bytes_of_frame(scale) < BLOCK
-        ]
+        both = (told, self.header_scale)
+        fits = [scale for scale in both if self._fills(self.bytes_of_frame(scale))]
         return fits[0] if len(fits) == 1 else np.nan
+
+    @cached_property
+    def analog(self) -> int:
+        """As `header_analog`, or channels times samples where these fill the file; -1: neither."""
+        used = self.numbers("ANALOG", "USED")
+        told = int(used[0]) * max(self.samples, 1) if used else self.header_analog
+        if told == self.header_analog:
+            return told
+        width = 4 if (self.number("SCALE") or self.header_scale) < 0.0 else 2
+        both = (self.header_analog, told)
+        fits = [one for one in both if self._fills(width * (4 * self.points + one))]
+        return fits[0] if len(fits) == 1 else -1
+
+    def _fills(self, bytes_of_frame: int) -> bool:
+        """Whether the frames that are told, so large, fill the file up to less than a block."""
+        left = len(self.data) - self.start
+        return any(0 <= left - one * bytes_of_frame < BLOCK for one in self.frames_told)
 
     @property
     def labels(self) -> list[str]:
@@ -216,6 +230,8 @@ class C3dFile:
         found = list[str]()
         if self.header_scale * (self.number("SCALE") or 0.0) < 0.0:
             found.append(BELIEVED_SCALE.format("reals" if self.scale < 0.0 else "whole numbers"))
+        if self.analog != self.header_analog:
+            found.append(BELIEVED_ANALOG)
         if self.off_by_one:
             found.append(BELIEVED_FRAMES.format(self.frames))
         return tuple(found)
@@ -288,10 +304,15 @@ def _contradictions(whole: C3dFile, file: str, markers: bool) -> Iterator[InputP
         yield problem("POINT:RATE", f"{whole.rate:g} frames a second", allowed)
     if not np.isfinite(whole.scale) or whole.scale == 0.0:
         found, allowed = f"a scale of {whole.scale:g}", "a finite number that is not zero"
-        if np.isfinite(told := whole.number("SCALE") or np.nan):
-            found = f"a scale of {told:g}, and {whole.header_scale:g} in the header"
+        if np.isfinite(scale := whole.number("SCALE") or np.nan):
+            found = f"a scale of {scale:g}, and {whole.header_scale:g} in the header"
             allowed = "the same sign: below zero for reals, above it for whole numbers"
         yield problem("POINT:SCALE", found, allowed)
+        return
+    if whole.analog < 0:
+        found = f"{whole.header_analog} analog numbers a frame in the header"
+        allowed = "channels times samples a frame, as the parameters tell"
+        yield problem("ANALOG:USED", found, allowed)
         return
     used = whole.number("USED")
     if (markers and not whole.points) or (used is not None and used != whole.points):
@@ -364,7 +385,7 @@ def reals(data: bytes, at: int, number: int, processor: int) -> NDArray[np.float
         found = np.frombuffer(data, "<f4", number, at)
         return found.byteswap() if processor == MIPS else found
     halves = np.frombuffer(data, "<u2", 2 * number, at).reshape(-1, 2)
-    return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel() / np.float32(4.0)
+    return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel() * np.float32(0.25)
 
 
 def _parameters(
@@ -398,9 +419,9 @@ def _parameters(
         if not way:
             break
         at = way_at + way
-    keys = [(groups.get(group, ""), name) for group, name, _, _ in found]
-    values, sizes = (dict(zip(keys, [one[k] for one in found], strict=True)) for k in (3, 2))
-    return values, sizes, min(at, len(data))
+    named = [((groups.get(group, ""), name), size, value) for group, name, size, value in found]
+    values = {key: value for key, _, value in named}
+    return values, {key: size for key, size, _ in named}, min(at, len(data))
 
 
 def _value(data: bytes, at: int, name: str, processor: int) -> tuple[tuple[int, ...], Value]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.reading_text import NumberBlock, fault, is_number, text_of
+from spinepipe.motion.reading_text import NumberBlock, cells_of, fault, is_number, text_of
 from spinepipe.motion.recording import MOST_RECORDING_BYTES, numbered
 
 END = "endheader"
@@ -43,19 +43,6 @@ class StorageTable:
     header: Mapping[str, str]
     repaired: tuple[str, ...] = ()
 
-    def column(self, name: str) -> Array:
-        """(F,) of a name.
-
-        Raises
-        ------
-        KeyError
-            Where there is no such column.
-        """
-        if name not in self.names:
-            raise KeyError(name)
-        column: Array = self.values[:, self.names.index(name)]
-        return column
-
 
 def read_storage(path: Path, file: str | None = None) -> StorageTable:
     """A `.sto` or `.mot`.
@@ -77,6 +64,7 @@ def read_storage(path: Path, file: str | None = None) -> StorageTable:
         allowed = f"at most {MOST_RECORDING_BYTES / 1e6:g} MB"
         raise fault(name, None, None, found, allowed, "leave columns or rows out")
     head, _, rest = text_of(path, name).partition(END)
+    rest = rest[rest.find("\n") :] if "\n" in rest else ""  # spreadsheets write cells behind it
     if not rest:
         allowed = f"a header that ends with '{END}', then names of columns and numbers"
         raise fault(name, 1, None, "no header of a .sto or .mot", allowed, "export it again")
@@ -88,7 +76,7 @@ def read_storage(path: Path, file: str | None = None) -> StorageTable:
     before = len(rest) - len(rest.lstrip("\r\n\t "))
     line = 1 + head.count("\n") + rest[:before].count("\n")
     labels, _, body = rest[before:].partition("\n")
-    names = [label.strip() for label in labels.split("\t" if "\t" in labels else None)]
+    names = [label.strip('"') for label in cells_of(labels)]
     while names and not names[-1]:
         names.pop()
     if not names or names[0].lower() != "time":

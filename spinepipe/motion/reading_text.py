@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from math import isfinite, nan
 from pathlib import Path
 
@@ -26,7 +27,7 @@ from spinepipe.problems import InputError, InputProblem
 TIME = "time_s"
 COLUMN = re.compile(rf"(?P<marker>.+)_(?P<axis>[xyz])_(?P<unit>{'|'.join(M_PER)})")
 
-EMPTY = ("", "nan", "NaN", "NAN", "Nan")
+EMPTY = ("", *map("".join, product("nN", "aA", "nN")))
 """What says that nothing was measured."""
 
 MOST_CELLS = 20_000_000

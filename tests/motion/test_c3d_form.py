@@ -41,6 +41,8 @@ class Made:
     frames: int = 3
     labels: tuple[str, ...] = ("T1", "L3")
     locked: bool = False
+    data_scale: float | None = None
+    padding: int = 0
     trial: tuple[tuple[int, int], tuple[int, int]] | None = None
 
     def text(self) -> bytes:
@@ -49,9 +51,11 @@ class Made:
         block[:2] = 2, 0x50
         for at, name in ((2, "points"), (4, "analog"), (6, "first"), (8, "last"), (16, "block")):
             block[at : at + 2] = word(head[name], self.processor)
-        block[12:16] = real(self.numbers.get("SCALE", self.scale), self.processor)
+        block[12:16] = real(self.scale, self.processor)
         block[20:24] = real(self.numbers.get("RATE", 50.0), self.processor)
-        return bytes(block) + self._parameters().ljust(512, b"\0") + self._data()
+        return (
+            bytes(block) + self._parameters().ljust(512, b"\0") + self._data() + bytes(self.padding)
+        )
 
     def _parameters(self) -> bytes:
         told = {"RATE": 50.0, "SCALE": self.scale} | self.numbers
@@ -87,7 +91,7 @@ class Made:
                 lost = (frame, marker) == (1, 1)
                 cells += [*PLACES_MM[frame % 3, marker].tolist(), -1 if lost else 0]
             cells.append(999)
-        if self.scale < 0.0:
+        if (self.data_scale or self.scale) < 0.0:
             return b"".join(real(one, self.processor) for one in cells)
         return b"".join(word(one, self.processor) for one in cells)
 
@@ -247,3 +251,42 @@ def test_frames_that_a_trial_counts_beyond_16_bits_are_all_read(tmp_path: Path) 
     """From frame 1 to 65,537: the second word counts 65,536."""
     made = Made(header={"first": 1, "last": 65_535}, trial=((1, 0), (1, 1)), frames=65_537)
     assert len(read_motion(written(tmp_path, made)).time_s) == 65_537
+
+
+@pytest.mark.parametrize("scale", [-1.0, 1.0])
+def test_of_two_signs_of_the_scale_the_file_s_size_tells_the_right_one(
+    tmp_path: Path, scale: float
+) -> None:
+    """Whole numbers take half the room of reals: 300 frames tell them apart, 3 do not."""
+    signs = {"scale": -scale, "numbers": {"SCALE": scale}, "data_scale": scale}
+    made = Made(header={"first": 1, "last": 300}, frames=300, padding=100, **signs)
+    found = read_motion(written(tmp_path, made))
+    np.testing.assert_allclose(
+        1e3 * found.places[:3][found.seen[:3]], PLACES_MM.reshape(-1, 3)[[0, 1, 2, 4, 5]]
+    )
+    assert "header and POINT:SCALE differ in sign" in found.repaired[0]
+    few = problem_of(tmp_path, Made(padding=300, **signs))
+    assert (few.column, few.found) == (
+        "POINT:SCALE",
+        f"a scale of {scale:g}, and {-scale:g} in the header",
+    )
+
+
+def test_a_count_that_is_off_by_one_is_told(tmp_path: Path) -> None:
+    found = read_motion(written(tmp_path, Made(numbers={"FRAMES": 4.0})))
+    assert len(found.time_s) == 3
+    assert "the file has room for 3 frames" in found.repaired[0]
+
+
+def test_padding_of_the_last_block_is_no_frame(tmp_path: Path) -> None:
+    """36 bytes a frame: 14 would fit into the padding."""
+    full = {"header": {"first": 1, "last": 65_535}, "frames": 70_000, "padding": 511}
+    assert len(read_motion(written(tmp_path, Made(**full))).time_s) == 70_000
+    made = Made(**full, trial=((1, 0), (4464, 1)))
+    assert len(read_motion(written(tmp_path, made)).time_s) == 70_000
+
+
+def test_reading_of_parameters_ends_with_their_section() -> None:
+    """The last entry of some leads into the frames, or beyond the file."""
+    for way in (530, 5000):
+        assert parse_c3d(entry_of(1, (1,), b"\x07", way)).parameters == {("", "A"): (7.0,)}

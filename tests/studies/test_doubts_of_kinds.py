@@ -82,6 +82,11 @@ def radians(table: pd.DataFrame) -> None:
     table[turns] *= np.pi / 180.0
 
 
+def in_bone(table: pd.DataFrame) -> None:
+    """Two of many markers, as a camera's program puts them on the vertebra."""
+    table.loc[table["marker"].isin(["T5", "L3"]), "x_mm"] = -10.0
+
+
 MISTAKES = [
     (AIS, FILMS, times(CENTRE[:2], 0.1), "y_mm", "in cm and not mm (0.1); multiply y_mm, z_mm"),
     (AIS, FILMS, times(CENTRE[:2], 1e-3), "y_mm", "in m and not mm"),
@@ -107,6 +112,7 @@ MISTAKES = [
     (TRACKED, MARKERS, times(["x_mm", "y_mm", "z_mm"], 0.1), "x_mm", "cm and not mm"),
     (TRACKED, MARKERS, times(["x_mm", "y_mm", "z_mm"], 1e-3), "x_mm", "m and not mm"),
     (TRACKED, MARKERS, times(["x_mm"], -1.0), "x_mm", "sign of x_mm"),
+    (TRACKED, MARKERS, in_bone, "x_mm", "points of the bone"),
 ]
 
 

@@ -237,5 +237,8 @@ def _missing_markers(
     listed = ", ".join(spare[:LISTED]) + (" ..." if len(spare) > LISTED else "") or "none"
     allowed = f"all markers of {MARKER_SET.file}; further ones are {listed}"
     for name in markers.names:
-        if name not in read.names:
+        if name in read.repeated:
+            found, remedy = "more than one marker of this name", "rename all but one in the file"
+            yield InputProblem(file, None, name, found, "each marker once", remedy)
+        elif name not in read.names:
             yield InputProblem(file, None, name, "no such marker", allowed, spelling.remedy(name))

@@ -37,6 +37,13 @@ APART_M = 0.01
 LANDED = 0.25
 """Two markers are exchanged that land so near each other's former places, over how far they go."""
 
+STILL_M = 1e-5
+"""A marker that is measured goes farther from frame to frame, by noise alone: 0.1 mm and more."""
+
+MOVES_M = 0.01
+NEIGHBOURS = 3
+"""A marker is frozen where most of so many neighbours go so far while it stands still."""
+
 JUMP_M = 0.01
 FASTEST_M_PER_S = 10.0
 
@@ -96,6 +103,7 @@ class LoadedTrial:
 def marker_problems(look: LoadedTrial) -> Iterator[InputProblem]:
     """Everything that is wrong with markers of a trial whose unit and axes are sound."""
     yield from _gaps(look)
+    yield from _frozen(look)
     sides = list(_sides(look))
     yield from sides
     if not sides:
@@ -120,6 +128,27 @@ def _gaps(look: LoadedTrial) -> Iterator[InputProblem]:
             if times[end] - times[begin] + step > LONGEST_GAP_S:
                 found = f"not in sight in {look.frames(begin, end)}"
                 remedy = "fill the gap where it was recorded, or crop the trial"
+                yield look.in_motion(name, found, allowed, remedy)
+
+
+def _frozen(look: LoadedTrial) -> Iterator[InputProblem]:
+    """Markers that stand still while their neighbours move: gaps filled with the last place."""
+    times, places, seen = look.trial.time_s, look.trial.places, look.trial.seen
+    apart = np.linalg.norm(look.neutral[:, None] - look.neutral[None, :], axis=-1)
+    near = np.argsort(apart, axis=1, kind="stable")[:, 1 : NEIGHBOURS + 1]
+    still = np.linalg.norm(np.diff(places, axis=0), axis=-1) < STILL_M
+    still &= seen[1:] & seen[:-1]
+    for k, name in enumerate(look.markers.names):
+        for begin, last in runs(still[:, k]):
+            frames = slice(begin, last + 2)
+            lasts = times[last + 1] - times[begin] + np.median(np.diff(times))
+            went = np.linalg.norm(places[frames, near[k]] - places[begin, near[k]], axis=-1)
+            far = (went * (seen[frames, near[k]] & seen[begin, near[k]])).max(axis=0)
+            if lasts > LONGEST_GAP_S and np.median(far) > MOVES_M:
+                found = f"stands still in {look.frames(begin, last + 1)}, {lasts:.2f} s"
+                found += f", while {', '.join(look.markers.names[one] for one in near[k])} move"
+                allowed = f"places that were measured; gaps of at most {LONGEST_GAP_S:g} s"
+                remedy = "leave the cells empty where the marker was not seen, or crop the trial"
                 yield look.in_motion(name, found, allowed, remedy)
 
 

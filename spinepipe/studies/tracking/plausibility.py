@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
 from spinepipe.plausibility.score import suspect, usual
@@ -27,7 +28,7 @@ def doubts(cohort: Cohort) -> Iterator[PlausibilityWarning]:
 
 
 def _markers(cohort: Cohort, table: pd.DataFrame) -> Iterator[PlausibilityWarning]:
-    """Marker sets in another unit, or in front of the body."""
+    """Marker sets in another unit, in front of the body, or in the bone."""
     names = ["x_mm", "y_mm", "z_mm"]
     for specimen, rows in table.groupby("specimen", sort=False):
         points = rows[names].to_numpy(float)
@@ -40,6 +41,17 @@ def _markers(cohort: Cohort, table: pd.DataFrame) -> Iterator[PlausibilityWarnin
             yield warn(cohort, "markers_away", place, remedy=remedy, whose=[specimen], away=away)
         elif len(on_spine) and np.median(on_spine[:, 0]) > 0.0:
             yield warn(cohort, "markers_in_front", place, whose=[specimen])
+        elif (inside := on_bone(rows, cohort.vertebrae[0])).any():
+            place = TableCell(MARKER_SET.stem, rows.index[inside][0], names[0])
+            markers = ", ".join(rows["marker"][inside])
+            yield warn(cohort, "marker_in_bone", place, whose=[specimen], markers=markers)
+
+
+def on_bone(rows: pd.DataFrame, lowest: str) -> NDArray[np.bool_]:
+    """(K,) which markers of vertebrae above the lowest lie where only bone is."""
+    aside = np.hypot(rows["x_mm"].to_numpy(float), rows["z_mm"].to_numpy(float))
+    inside: NDArray[np.bool_] = ~np.array([usual("marker_in_bone").holds(one) for one in aside])
+    return inside & (rows["vertebra"] != lowest).to_numpy()
 
 
 def _times(cohort: Cohort) -> Iterator[PlausibilityWarning]:

@@ -242,9 +242,24 @@ def swayed(marker: str, mm: float) -> Spoil:
     return on("flexion_extension", sway)
 
 
+def frozen(marker: str, begin: int, end: int) -> Spoil:
+    """The last place is held, as recorders fill gaps."""
+
+    def freeze(motion: Motion) -> None:
+        motion.of(marker)[begin - 1 : end] = motion.of(marker)[begin - 1]
+
+    return on("flexion_extension", freeze)
+
+
 # about, what is done, the marker that must be named, what is found, and a piece of the remedy
 MOTIONS: list[tuple[str, Spoil, str | None, str] | tuple[str, Spoil, str | None, str, str]] = [
     ("gap", lost("T5", 11, 25), "T5", "frames 11 to 25 (0.500 to 1.200 s)", "fill"),
+    (
+        "frozen",
+        frozen("T5", 11, 30),
+        *("T5", "stands still in frames 11 to 30 (0.500 to 1.450 s), 1.00 s, while", "empty"),
+    ),
+    ("twice", renamed("T12", "T9"), "T9", "more than one marker of this name", "rename"),
     ("never", lost("T9", 1, 41), "T9", "never in sight", "crop"),
     ("lacking", renamed("T12", "T12x"), "T12", "no such marker", "mean 'T12x'"),
     ("front", exchanged("LASI", "RASI"), "LASI and RASI", "swapped in frames 1 to 41"),
@@ -284,6 +299,23 @@ def test_faults_of_markers_are_named(case: tuple[Any, ...], tmp_path: Path) -> N
     assert {p.file for p in problems} == {f"{NAME}/flexion_extension.trc"}
     named = [p for p in problems if p.column == marker]
     assert any(found in p.found and "".join(remedy) in p.remedy for p in named), problems
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        frozen("T5", 11, 20),
+        on(
+            "flexion_extension",
+            lambda motion: motion.places.__setitem__(slice(10, 30), motion.places[10]),
+        ),
+    ],
+    ids=["half a second", "all stand still"],
+)
+def test_what_stands_still_for_a_moment_or_with_all_is_not_frozen(
+    spoil: Spoil, tmp_path: Path
+) -> None:
+    assert not any("stands still" in problem.found for problem in told(tmp_path, spoilt=(spoil,)))
 
 
 @pytest.mark.parametrize(
