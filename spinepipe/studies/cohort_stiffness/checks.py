@@ -48,8 +48,8 @@ def check_cohort_stiffness(
     below = study.neutral_zone_below_nm_per_deg
     if (below is None) == (study.neutral_zone == "threshold"):
         allowed = "a stiffness in N m/deg with neutral_zone: threshold, and null without"
-        place = at(document, "neutral_zone_below_nm_per_deg")
-        yield InputProblem(*place, f"{below}", allowed, "give it, or choose another definition")
+        key = at(document, "neutral_zone_below_nm_per_deg")
+        yield InputProblem(*key, f"{below}", allowed, "give it, or choose another definition")
 
 
 def _tests(
