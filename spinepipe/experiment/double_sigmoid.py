@@ -299,15 +299,16 @@ def _softer(curve: SigmoidCurve, level: float) -> Array | None:
 
     None where it is so nowhere, or as far as an end.
     """
-    x = np.linspace(*(end / curve.load_unit for end in curve.ends), _GRID)
+    low, high = (end / curve.load_unit for end in curve.ends)
+    x = np.linspace(low, high, _GRID)
 
-    def above(place: Array | float) -> Array:
-        return _value(curve.theta, np.asarray(place), 1) - level
+    def above(place: float) -> float:
+        return float(_value(curve.theta, np.asarray(place), 1)) - level
 
-    most = int(np.argmax(above(x)))
-    stiff = np.flatnonzero(above(x) <= 0.0)
+    compliance = _value(curve.theta, x, 1)
+    most, stiff = int(np.argmax(compliance)), np.flatnonzero(compliance <= level)
     left, right = stiff[stiff < most], stiff[stiff > most]
-    if above(x[most]) <= 0.0 or not len(left) or not len(right):
+    if compliance[most] <= level or not len(left) or not len(right):
         return None
     return np.array([brentq(above, x[at], x[at + 1]) for at in (left[-1], right[0] - 1)])
 

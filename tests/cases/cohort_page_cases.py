@@ -344,7 +344,7 @@ CASES: dict[str, tuple[Case, str]] = {
         "zones named_none",
     ),
     "a direction that no reading depends on": (
-        Case(tables=own({"a": 1.0, "b": 1.0, "c": 1.0})), "open not_fitted",
+        Case(tables=own({"a": 1.0, "b": 1.0, "c": 1.0})), "not_fitted directions",
     ),
     "no loops": (
         Case(tables=curves(neutral_zone="one_side", hysteresis_area_j=nan)),

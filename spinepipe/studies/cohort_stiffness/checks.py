@@ -47,9 +47,12 @@ def check_cohort_stiffness(
     yield from _nuisances(document, study)
     below = study.neutral_zone_below_nm_per_deg
     if (below is None) == (study.neutral_zone == "threshold"):
-        allowed = "a stiffness in N m/deg with neutral_zone: threshold, and null without"
-        place = at(document, "neutral_zone_below_nm_per_deg")
-        yield InputProblem(*place, f"{below}", allowed, "give it, or choose another definition")
+        lacks = below is None
+        name = "neutral_zone_below_nm_per_deg"
+        found = f"threshold without {name}" if lacks else f"{below:g}, and no threshold asked for"
+        allowed = f"both, neutral_zone: threshold and {name}, or neither"
+        key = at(document, "neutral_zone" if lacks else name)
+        yield InputProblem(*key, found, allowed, "give both, or choose another definition")
 
 
 def _tests(

@@ -123,7 +123,7 @@ def stiffness_conclusions(values: pd.DataFrame, free: Sequence[str]) -> Iterator
     yield from _open(values, [name for name in found if name not in told])
     untold = [name for name in free if name not in found]
     if untold and found:
-        yield Conclusion("open", "not_fitted", names={"directions": directions(untold)})
+        yield Conclusion("not_fitted", "directions", names={"directions": directions(untold)})
 
 
 def _answer(values: pd.DataFrame, told: dict[str, Value], names: dict[str, str]) -> Conclusion:

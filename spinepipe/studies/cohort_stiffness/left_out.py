@@ -106,8 +106,8 @@ def _median(
     median = rows.groupby(keys, as_index=False)[values].median()
     k = with_stiffness(k, cohort.joint_names, median)
     growth = median_growth(settings, cohort.joint_names, representation, median)
-    for (joint, coordinate), n in rows.groupby(keys).size().items():
-        used[cohort.joint_names.index(joint), COORDINATES.index(coordinate)] = n
+    places = [cohort.joint_names.index(joint) for joint in rows["joint"]]
+    np.add.at(used, (places, [COORDINATES.index(name) for name in rows["coordinate"]]), 1)
     return k, growth, used
 
 

@@ -73,7 +73,7 @@ def matrix_table(
         parts = np.einsum("ci,cj->cij", x, x), np.einsum("ic,jc->cij", back, back)
         stiffness = _sum(parts[0], k, low, high)
         compliance = _sum(parts[1], 1.0 / k, 1.0 / high, 1.0 / low)
-        taken = (np.abs(parts) > _ROUNDING).any(axis=0)
+        taken = np.any(np.abs(np.stack(parts)) > _ROUNDING, axis=0)
         for i, j in product(range(6), repeat=2):
             names = [name for c, name in enumerate(NAMES["joint"]) if taken[c, i, j]]
             found.append(

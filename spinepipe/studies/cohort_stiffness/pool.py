@@ -182,7 +182,7 @@ class PooledRows:
         joints, newcomer = self.cohort.joint_names, self._newcomer(specimen)
         values, silent = self._values(specimen), np.tile(self._silent, (len(joints), 1))
         if values is None:
-            silent = None
+            silent = np.zeros_like(silent)
             none = np.zeros((len(joints), len(COORDINATES)), dtype=int)
             values = np.full(none.shape, np.nan), none + np.nan, none, none
         k, error, bound, decided = values

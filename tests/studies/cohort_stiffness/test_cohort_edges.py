@@ -57,13 +57,15 @@ def test_without_a_test_its_fit_is_refused(fitted_to: str, says: str, tmp_path: 
 def test_without_a_test_medians_and_pools_say_who_is_in(tmp_path: Path) -> None:
     project = without_a_test(tmp_path)
     median = project.left_out(["a", "c"], "b", "per_joint", "flexion")["stiffness"]
-    assert set(median["message"]) == {"median of 1 specimen; 1 of 2 have no stiffness"}
+    driven = median[median["coordinate"] == "extension"]
+    assert set(driven["message"]) == {"median of 1 specimen; 1 of 2 have no stiffness"}
     np.testing.assert_allclose(by_joint(median)["extension"], 1.5 * A[:, 0], rtol=0.05)
     pooled = project.pool("flexion")
     own = pooled["stiffness"].set_index("specimen")
     assert own.loc["a", "stiffness"].isna().all()
     assert set(own.loc["a", "message"]) == {"a: no motion to fit for flexion"}
-    assert own.loc[["b", "c"], "stiffness"].notna().all()
+    others = own.loc[["b", "c"]]
+    assert (others["stiffness"].notna() == (others["coordinate"] == "extension")).all()
     assert pooled["fits"].set_index("specimen")["status"].tolist() == [
         "refused",
         *["converged"] * 2,
@@ -75,7 +77,8 @@ def test_without_a_test_medians_and_pools_say_who_is_in(tmp_path: Path) -> None:
 def test_left_out_of_a_test_it_never_had(tmp_path: Path) -> None:
     found = without_a_test(tmp_path).pool("flexion", without="a")
     assert found["errors"].empty
-    assert found["stiffness"]["stiffness"].notna().all()
+    told = found["stiffness"]["stiffness"].notna()
+    assert (told == (found["stiffness"]["coordinate"] == "extension")).all()
     assert set(found["stiffness"]["source"]) == {"others_pooled"}
 
 
@@ -193,7 +196,8 @@ def test_a_test_may_have_an_odd_name(tmp_path: Path) -> None:
         table["test"] = table["test"].replace("flexion", ODD)
     project = chains.write(tmp_path)
     assert layout_of(project).tests == (ODD, TESTS[1])
-    assert set(project.fit("a", "per_joint", ODD)["stiffness"]["status"]) == {"converged"}
+    rows = project.fit("a", "per_joint", ODD)["stiffness"].set_index("coordinate")
+    assert set(rows.loc["extension", "status"]) == {"converged"}
 
 
 def falling(root: Path, truth: Mapping[str, np.ndarray] = TRUTH, noise: float = 0.02) -> Written:

@@ -57,6 +57,8 @@ CASES = [
     Case("unknown test", "tests: [flexion, flexon]", 4, "tests.1", "unknown test 'flexon'", "did you mean 'flexion'"),
     Case("unknown cycles", "cycles: quiet", 4, "cycles", "did you mean 'quietest'"),
     Case("unknown steps", "steps: last", 4, "steps", "'all' or 'peak'"),
+    Case("stiffness of no threshold", "neutral_zone_below_nm_per_deg: 1.0", 4, "neutral_zone_below_nm_per_deg", "1, and no threshold asked for", "choose another definition"),
+    Case("threshold without a stiffness", "neutral_zone: threshold", 4, "neutral_zone", "without neutral_zone_below_nm_per_deg", "give both"),
     Case("no representation", "representations: []", 4, "representations", "at least 1 item"),
     Case("unknown representation", "representations: [per_level]", 4, "representations.0", "'per_joint'"),
     Case("literature is no fit", "representations: [literature]", 4, "representations.0", "'per_joint'"),
