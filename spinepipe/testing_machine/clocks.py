@@ -42,8 +42,9 @@ def read_test(
     beside = mapping.motion_files
     if beside is None or of.motion_file is None:
         return read_recording(folder / of.file, of, mapping)
+    motion_file = of.motion_file.replace("{stem}", Path(of.file).stem)
     mapping, of = mapping.of_file(of), of.model_copy(update=dict.fromkeys(OF_A_FILE))
-    other = of.model_copy(update={"file": of.motion_file.replace("{stem}", Path(of.file).stem)})
+    other = of.model_copy(update={"file": motion_file})
     wanted = list(mapping.motion)
     if (markers := beside.markers) is not None:
         wanted = [

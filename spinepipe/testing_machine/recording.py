@@ -215,11 +215,11 @@ def _numbers(
         gaps = [at for at, (one, _) in enumerate(there) if isinstance(one, MotionChannel)]
         empty = {at: list[int]() for at in gaps if bad[at].size}
         for number, (_, row) in enumerate(table.rows() if empty else ()):
-            for at, found_at in empty.items():
+            for at, rows in empty.items():
                 if not cell_at(row, places[at]):
-                    found_at.append(number)
-        for at, found_at in empty.items():
-            bad[at] = np.setdiff1d(bad[at], found_at)
+                    rows.append(number)
+        for at, rows in empty.items():
+            bad[at] = np.setdiff1d(bad[at], rows)
     if not any(one.size for one in bad):
         return lines, columns, [], notes
     # once more through the rows: the first bad cell of each column, and how numbers are written

@@ -7,6 +7,7 @@ of what is not known, a zero in its place.
 from pathlib import Path
 
 import numpy as np
+import opensim
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
@@ -146,7 +147,6 @@ def test_where_the_load_acts_is_softer_than_the_joint(tmp_path: Path) -> None:
 
 def test_opensim_holds_a_bushing_so() -> None:
     """Force and moment of its bushing at a body that is moved about a point, by differences."""
-    opensim = pytest.importorskip("opensim")
     system = opensim.Model()
     body = opensim.Body("upper", 1.0, opensim.Vec3(0.0), opensim.Inertia(1.0))
     system.addBody(body)
