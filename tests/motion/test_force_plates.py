@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c3d_of_ezc3d import write_c3d
 from ezc3d import c3d
 from scipy.spatial.transform import Rotation
 
@@ -142,5 +143,8 @@ def test_plates_that_cannot_be_read_are_named(
     assert caught.value.problems[0].found == says
 
 
-def test_a_file_without_plates_has_none(tmp_path: Path) -> None:
+def test_a_file_without_plates_or_channels_has_none(tmp_path: Path) -> None:
+    markers = write_c3d(tmp_path / "m.c3d", np.ones((3, 1, 3)), ["T1"])
+    assert (read_force_plates(markers), read_analog(markers).names) == ((), ())
+    assert read_analog(markers).values.shape == (3, 0)
     assert read_force_plates(written(tmp_path / "p.c3d", 2, USED=[0])) == ()
