@@ -92,7 +92,8 @@ def read_analog(path: Path, file: str | None = None) -> AnalogRecording:
 def _analog(whole: C3dFile) -> AnalogRecording:
     samples = max(whole.samples, 1)
     count = whole.analog // samples
-    raw = whole.cells()[:, 4 * whole.points :].reshape(-1, count)
+    raw = whole.cells()[:, 4 * whole.points : 4 * whole.points + count * samples]
+    raw = raw.reshape(whole.frames * samples, count)
     unsigned = "UNSIGNED" in whole.texts("ANALOG", "FORMAT")
     if unsigned and raw.dtype == np.int16:
         raw = raw.view("u2")
@@ -154,9 +155,8 @@ def _plate(whole: C3dFile, analog: AnalogRecording, k: int, turn: Array, file: s
     corners, origin = unit_m * of_plate("CORNERS", 3, 4).T, unit_m * of_plate("ORIGIN", 3)
     rows = (whole.sizes.get((PLATES, "CHANNEL")) or (CHANNELS[kind],))[0]
     channels = of_plate("CHANNEL", rows).astype(int)[: CHANNELS[kind]] - 1
-    if len(channels) < CHANNELS[kind] or not 0 <= channels.min() <= channels.max() < len(
-        analog.names
-    ):
+    there = (channels >= 0) & (channels < len(analog.names))
+    if len(channels) < CHANNELS[kind] or not there.all():
         found = f"channels {', '.join(str(one + 1) for one in channels)}"
         raise fail("CHANNEL", found, f"{CHANNELS[kind]} of {len(analog.names)}")
     values, units = analog.values[:, channels], [analog.units[one] for one in channels]

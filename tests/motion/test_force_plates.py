@@ -5,9 +5,11 @@ type; the plate lies askew in the laboratory. Catches a wrong sign, unit, offset
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from c3d_of_ezc3d import write_c3d
 from ezc3d import c3d
 from scipy.spatial.transform import Rotation
 
@@ -56,7 +58,7 @@ def channels_of(kind: int) -> np.ndarray:
 
 
 def written(
-    path: Path, kind: int, offset: int = 0, scale: float = 1.0, gen: float = 1.0, **changed: object
+    path: Path, kind: int, offset: int = 0, scale: float = 1.0, gen: float = 1.0, **changed: Any
 ) -> Path:
     values = channels_of(kind)
     content = c3d()
@@ -67,7 +69,11 @@ def written(
     content["data"]["points"] = np.ones((4, 1, FRAMES))
     count = values.shape[1]
     units = {1: [*UNITS[:3], "mm", "mm", "Nmm"], 2: UNITS, 3: ["N"] * 8, 4: ["V"] * 6}[kind]
-    analog = {"RATE": [50.0 * SAMPLES], "GEN_SCALE": [gen], "SCALE": [scale] * count}
+    analog: dict[str, Any] = {
+        "RATE": [50.0 * SAMPLES],
+        "GEN_SCALE": [gen],
+        "SCALE": [scale] * count,
+    }
     analog |= {
         "OFFSET": [offset] * count,
         "UNITS": units,
@@ -76,7 +82,7 @@ def written(
     for name, value in analog.items():
         parameters["ANALOG"][name]["value"] = value
     content["data"]["analogs"] = values.T[None]
-    plates: dict[str, object] = {
+    plates: dict[str, Any] = {
         "USED": [1],
         "TYPE": [kind],
         "CORNERS": 1e3 * np.array(CORNERS).T[:, :, None],
@@ -134,7 +140,7 @@ def test_an_origin_that_leads_upwards_is_turned_round_and_told(tmp_path: Path) -
     ],
 )
 def test_plates_that_cannot_be_read_are_named(
-    tmp_path: Path, name: str, value: object, says: str
+    tmp_path: Path, name: str, value: Any, says: str
 ) -> None:
     path = written(tmp_path / "p.c3d", 2, **{name: value})
     with pytest.raises(InputError) as caught:
@@ -142,5 +148,8 @@ def test_plates_that_cannot_be_read_are_named(
     assert caught.value.problems[0].found == says
 
 
-def test_a_file_without_plates_has_none(tmp_path: Path) -> None:
+def test_a_file_without_plates_or_channels_has_none(tmp_path: Path) -> None:
+    markers = write_c3d(tmp_path / "m.c3d", np.ones((3, 1, 3)), ["T1"])
+    assert (read_force_plates(markers), read_analog(markers).names) == ((), ())
+    assert read_analog(markers).values.shape == (3, 0)
     assert read_force_plates(written(tmp_path / "p.c3d", 2, USED=[0])) == ()
