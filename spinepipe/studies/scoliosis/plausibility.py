@@ -136,8 +136,19 @@ def _tilts(films: list[Film]) -> _Fault | None:
 
 
 def _corners(rows: pd.DataFrame) -> _Fault | None:
-    """Upper corners below lower ones, left ones to the right."""
+    """Corners around the vertebra, upper ones below lower ones, left ones to the right."""
     corner = corners(rows)
+    ends = [corner[f"{end}_left"] - corner[f"{end}_right"] for end in ("upper", "lower")]
+    if float(np.median(np.sum(ends[0] * ends[1], axis=1))) < 0.0:  # one endplate runs backwards
+        centre = np.mean(list(corner.values()), axis=0)
+        held = []
+        for name, points in corner.items():
+            y, z = np.median(points - centre, axis=0)
+            corner_there = f"{'upper' if z > 0.0 else 'lower'} {'left' if y > 0.0 else 'right'}"
+            if corner_there != name.replace("_", " "):
+                held.append(f"{name} has the {corner_there} corner")
+        words = f"suspected: corners listed around the vertebra; {', '.join(held)}: rename them"
+        return _Fault("corners_around", CORNERS[4], words)
     upper = corner["upper_left"] + corner["upper_right"]
     lower = corner["lower_left"] + corner["lower_right"]
     left = corner["upper_left"] + corner["lower_left"]
