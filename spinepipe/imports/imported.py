@@ -3,7 +3,7 @@
 import csv
 import os
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from dataclasses import replace as with_values
 from io import StringIO
@@ -11,6 +11,7 @@ from pathlib import Path
 
 from spinepipe.cohort.columns import TABLES
 from spinepipe.documents.form import TableForm
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
@@ -35,6 +36,11 @@ class ImportedCohort:
     sentences : what was done, for people.
     forms : of tables that are no cohort's own, as kinds of study read them; told in
         ``datapackage.json``.
+    settings : the file that says what the files are.
+    made_by : dotted keys of the settings that made a column, by stem of the table and column; where
+        they hold a mapping, its `unit`, `positive` and `column` are told by themselves.
+    units : sizes of units that may stand there, by name; those of one quantity together.
+    first_rows : of each file as they were understood, by its name: names of columns, then cells.
     """
 
     name: str
@@ -43,20 +49,30 @@ class ImportedCohort:
     by_hand: Mapping[str, str]
     sentences: tuple[str, ...]
     forms: tuple[TableForm, ...] = field(default=())
+    settings: YamlDocument | None = None
+    made_by: Mapping[tuple[str, str], Sequence[str]] = field(default_factory=dict)
+    units: Sequence[Mapping[str, float]] = ()
+    first_rows: Mapping[str, Sequence[Sequence[object]]] = field(default_factory=dict)
 
 
-def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
+def write(
+    imported: ImportedCohort,
+    folder: Path,
+    replace: bool,
+    look: Callable[[Path], None] | None = None,
+) -> list[str]:
     """Write the cohort folder, and return the names of files that were there and stayed.
 
     Parameters
     ----------
     replace : whether a folder that is there may be written again; what is edited by hand stays,
         and so does what the import does not write.
+    look : looks at the folder as it would be, and raises where it must not be written.
 
     Raises
     ------
     InputError
-        When the folder is there and must not be touched.
+        When the folder is there and must not be touched, and what ``look`` raises.
     """
     if folder.exists() and not replace:
         remedy = "choose another `cohort:` in the YAML, or add --replace"
@@ -64,9 +80,11 @@ def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
         raise InputError([InputProblem(str(folder), None, None, found, "a new folder", remedy)])
     stay = [name for name in imported.by_hand if (folder / name).exists()]
     folder.parent.mkdir(parents=True, exist_ok=True)
-    new = folder.with_name(f".{folder.name}.{os.getpid()}")
+    aside = folder.with_name(f".{folder.name}.{os.getpid()}")
+    new = aside / folder.name  # of its own name, which is asked when it is read
     old = folder.with_name(f".{folder.name}.before.{os.getpid()}")
-    shutil.rmtree(new, ignore_errors=True)
+    shutil.rmtree(aside, ignore_errors=True)
+    aside.mkdir()
     try:
         if folder.exists():
             shutil.copytree(folder, new)
@@ -78,6 +96,8 @@ def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
             elif name not in stay:
                 (new / name).write_text(content, encoding="utf-8")
         (new / FILE).write_text(_descriptor(imported, new), encoding="utf-8")
+        if look is not None:
+            look(new)
         # the new folder is whole before the old one goes, and the old one is kept until it is there
         if folder.exists():
             folder.rename(old)
@@ -89,7 +109,7 @@ def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
             raise
         shutil.rmtree(old, ignore_errors=True)
     finally:
-        shutil.rmtree(new, ignore_errors=True)
+        shutil.rmtree(aside, ignore_errors=True)
     return stay
 
 

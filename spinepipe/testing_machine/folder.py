@@ -14,7 +14,16 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
 from spinepipe.problems import InputError
 from spinepipe.report.words import count
-from spinepipe.testing_machine.channels import LOAD_COLUMNS
+from spinepipe.testing_machine.channels import (
+    ANGLES,
+    DIRECTIONS,
+    FORCES,
+    LENGTHS,
+    LOAD_COLUMNS,
+    MOMENTS,
+    SECONDS,
+    column_of,
+)
 from spinepipe.testing_machine.load_steps import (
     ReadingPrecision,
     ResampledTest,
@@ -31,6 +40,9 @@ BY_HAND = {
     "specimens.csv": "",
 }
 """Files that are made to be edited, and what is said of them."""
+
+SHOWN = 8
+"""Rows of a file that `spinepipe import --show` shows."""
 
 LEVEL_APART_MM = 35.0
 NOT_READ = {"deg": 0.1, "mm": 0.1}
@@ -108,7 +120,35 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         },
         by_hand=BY_HAND,
         sentences=tuple(_sentences(tests)),
+        settings=document,
+        made_by=_made_by(mapping),
+        units=(FORCES, MOMENTS, ANGLES, LENGTHS, SECONDS),
+        first_rows={
+            one.file: list(_first_rows(one)) for test in tests.tests for one in test.recordings
+        },
     )
+
+
+def _made_by(mapping: MachineMapping) -> dict[tuple[str, str], list[str]]:
+    """Keys of the settings that made each column."""
+    made = {("loads", "vertebra"): ["loaded"], ("loads", "time_s"): ["time"]}
+    made |= {("loads", column): ["load_point_mm"] for column in _POINT}
+    for number, load in enumerate(mapping.loads):
+        made["loads", DIRECTIONS[load.positive].load] = [f"loads.{number}"]
+    for number, motion in enumerate(mapping.motion):
+        column = column_of(DIRECTIONS[motion.positive].coordinate)
+        made.setdefault(("motion", column), []).append(f"motion.{number}")
+    return made
+
+
+def _first_rows(one: Recording) -> Iterator[Sequence[object]]:
+    """Names of the columns, as in the tables of the cohort, then the first rows of a file."""
+    columns = {"line": one.lines} | ({} if one.time is None else {"time_s": one.time})
+    ways = {way.load: word for word, way in DIRECTIONS.items() if way.sign > 0}
+    columns |= {f"{column} to {ways[column]}": values for column, values in one.loads.items()}
+    columns |= {f"{joint} {column}": values for (joint, column), values in one.motion.items()}
+    yield tuple(columns)
+    yield from zip(*(values[:SHOWN].tolist() for values in columns.values()), strict=True)
 
 
 def _sentences(tests: ImportedTests) -> Iterator[str]:
@@ -173,6 +213,8 @@ def _header(tests: ImportedTests) -> str:
             "translation_mm": _declared(tests.translation, "mm"),
         },
     }
+    if mapping.acknowledged_warnings:
+        document["acknowledged_warnings"] = list(mapping.acknowledged_warnings)
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)
 
 
