@@ -21,16 +21,19 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.plausibility import suspicions
 from spinepipe.studies.registry import every_form
 
-SIGNS = frozenset(
-    {"test_against_load", "joints_against_load", "motion_against_name", "signs_lost"},
-)
-"""Warnings about the direction in which a column is positive."""
+PARTS: Mapping[str, str] = {
+    **dict.fromkeys(("test_against_load", "joints_against_load"), "positive"),
+    **dict.fromkeys(("motion_against_name", "signs_lost"), "positive"),
+    **dict.fromkeys(("rotations_exchanged", "column_repeated", "column_constant"), "column"),
+    **dict.fromkeys(("column_zero", "joint_silent", "load_without_motion"), "column"),
+}
+"""The key that is suspected, by warning; it is the unit for all others."""
 
-COLUMNS = frozenset(
-    {"rotations_exchanged", "column_repeated", "column_constant", "column_zero"}
-    | {"joint_silent", "load_without_motion", "loop_backwards"}
-)
-"""Warnings about which column is taken; all others are about its unit."""
+SPEAKS_OF = {
+    "loads": re.compile("torque|moment|force|load|couple|kraft|fuerza"),
+    "motion": re.compile("angle|rotation|displac|winkel|verschieb|dépl|ángulo|desplaz"),
+}
+"""Names of columns that tell what they hold, in small letters."""
 
 
 def judge(imported: ImportedCohort, folder: Path) -> list[InputProblem]:
@@ -43,9 +46,11 @@ def judge(imported: ImportedCohort, folder: Path) -> list[InputProblem]:
     Raises
     ------
     InputError
-        With every problem that the reader of cohorts finds, else with all that looks wrong in
-        columns that settings made.
+        With all that names of columns speak against, else every problem that the reader of cohorts
+        finds, else all that looks wrong in columns that settings made.
     """
+    if exchanged := list(_against_names(imported)):
+        raise InputError(exchanged)
     try:
         cohort = read(folder, every_form())
     except InputError as error:
@@ -65,12 +70,26 @@ def judge(imported: ImportedCohort, folder: Path) -> list[InputProblem]:
 
 
 def _once(problems: Iterable[InputProblem]) -> Iterator[InputProblem]:
-    """The first problem of each place and column, with how many more there are."""
+    """The first problem of each place, with how many more there are."""
     of_place: dict[tuple[object, ...], list[InputProblem]] = defaultdict(list)
     for one in problems:
         of_place[one.file, one.row, one.column, one.allowed].append(one)
     for first, *others in of_place.values():
         yield replace(first, others=first.others + len(others)) if others else first
+
+
+def _against_names(imported: ImportedCohort) -> Iterator[InputProblem]:
+    """Loads whose column speaks of motion, and the reverse: exchanged they may look right."""
+    document = imported.settings
+    for (stem, _), keys in imported.made_by.items() if document is not None else ():
+        for key in (f"{key}.column" for key in keys if stem in SPEAKS_OF):
+            name = _value(document.data, key)  # type: ignore[union-attr]
+            said = {of for of, words in SPEAKS_OF.items() if words.search(str(name).lower())}
+            if said and stem not in said:
+                remedy = "exchange the columns of loads and motion, or name it by its number if it "
+                place = (document.file, document.line_of(key), key)  # type: ignore[union-attr]
+                found, allowed = f"{name!r} in {stem}", f"a column of {stem}"
+                yield InputProblem(*place, found, allowed, f"{remedy}is the right one")
 
 
 def _at_settings(
@@ -85,29 +104,30 @@ def _at_settings(
     document = imported.settings
     if not named or document is None:
         return None
-    joint = _cell(folder / f"{stem}.csv", problem.row, "joint")
-    own = [key for key in named if _value(document.data, f"{key}.joint") in (None, joint)] or named
-    part = "unit" if warning is None else _part(warning.name)
-    told = str(_value(document.data, f"{own[0]}.unit"))
-    units = _units(imported, told, problem.found, warning)
+    data = document.data
+    joint = _joint(folder / f"{stem}.csv", problem.row)
+    own = [key for key in named if _value(data, f"{key}.joint") in (None, joint)] or named
+    units = _units(imported, str(_value(data, f"{own[0]}.unit")), problem.found, warning)
+    part = PARTS.get(warning.name, "unit") if warning is not None else "unit"
     part = "column" if units == [] else part  # no other unit would do
-    keys = [_key(document.data, key, part) for key in own]
-    stands = _value(document.data, keys[0])
-    remedy = _remedy(imported, problem.remedy, part, folder.name, keys[0])
-    if units is not None:
-        wanted = f"suspected: {' or '.join(units)}" if units else "suspected: another column"
-        remedy = f"{wanted}; correct {', '.join(keys)}"
+    keys = [_key(data, key, part) for key in own]
+    if units is None:
+        # the words of the remedy, with keys of the settings in the place of columns of the cohort
+        remedy = re.sub(rf" in (?:{re.escape(folder.name)}/)?\w+\.csv", "", problem.remedy)
+        for (_, column), others in imported.made_by.items():
+            remedy = re.sub(rf"\b{column}\b", _key(data, others[0], part), remedy)
+        remedy = remedy if keys[0] in remedy else f"{remedy}; correct {', '.join(keys)}"
+        remedy += " or the unit of its load" if stem == "motion" and part == "unit" else ""
+    else:
+        suspected = " or ".join(units) or "another column"
+        remedy = f"suspected: {suspected}; correct {', '.join(keys)}"
     if warning is not None:
         remedy += f" (if you mean it: acknowledged_warnings: [{warning.group}] in {document.file})"
+    stands = _value(data, keys[0])
     found = problem.found if warning else f"{problem.column} {problem.found}"
     found = found if isinstance(stands, dict | list) else f"{stands!r}, and {found}"
-    return InputProblem(
-        document.file, document.line_of(keys[0]), keys[0], found, problem.allowed, remedy
-    )
-
-
-def _part(name: str) -> str:
-    return "positive" if name in SIGNS else "column" if name in COLUMNS else "unit"
+    place = (document.file, document.line_of(keys[0]), keys[0])
+    return InputProblem(*place, found, problem.allowed, remedy)
 
 
 def _key(data: Any, key: str, part: str) -> str:
@@ -120,21 +140,18 @@ def _value(data: Any, key: str) -> Any:
     for name in key.split("."):
         if isinstance(data, list) and name.isdecimal() and int(name) < len(data):
             data = data[int(name)]
-        elif isinstance(data, Mapping):
-            data = data.get(name)
         else:
-            return None
+            data = data.get(name) if isinstance(data, Mapping) else None
     return data
 
 
-def _cell(path: Path, line: int | None, column: str) -> str | None:
-    """A cell of a table with one line for each row; None where there is none."""
+def _joint(path: Path, line: int | None) -> str | None:
+    """The joint of a line of a table that has one line for each row."""
     if line is None or not path.is_file():
         return None
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
-    known = dict(zip(rows[0], rows[line - 1], strict=False)) if line <= len(rows) else {}
-    return known.get(column)
+    return dict(zip(rows[0], rows[line - 1], strict=False)).get("joint")
 
 
 def _units(
@@ -148,19 +165,9 @@ def _units(
     if warning is None:
         if not units or NUMBER.fullmatch(found.strip("'")) is None:
             return None
-        smaller = {size: name for name, size in reversed(list(units.items())) if size < units[told]}
+        smaller = {size: name for name, size in reversed(units.items()) if size < units[told]}
         return list(smaller.values())
     if warning.factor is None:
         return None
     wanted = units.get(told, 0.0) * warning.factor
     return [name for name, size in units.items() if isclose(size, wanted, rel_tol=0.05)][:1] or None
-
-
-def _remedy(imported: ImportedCohort, remedy: str, part: str, cohort: str, key: str) -> str:
-    """The words of a remedy, keys of the settings in the place of columns of the cohort."""
-    assert imported.settings is not None
-    words = re.sub(rf" in (?:{re.escape(cohort)}/)?\w+\.csv", "", remedy)
-    words = words.replace("; convert the column", "")
-    for (_, column), keys in imported.made_by.items():
-        words = re.sub(rf"\b{column}\b", _key(imported.settings.data, keys[0], part), words)
-    return words if key in words else f"{words}; correct {key}"

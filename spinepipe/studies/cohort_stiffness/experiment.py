@@ -17,7 +17,6 @@ from spinepipe.calibration import Evaluator, Problem
 from spinepipe.calibration.solvers import AtRest
 from spinepipe.calibration.uncertainty import uncertainty
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.cohort.load_tests import DRIVEN, moments
 from spinepipe.cohort.measured import MeasuredCycle
 from spinepipe.decomposition import eigh
@@ -56,7 +55,7 @@ from spinepipe.studies.cohort_stiffness.tables import (
     SIMULATED,
 )
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.units import COORDINATES, DEG_PER_RAD, DISPLAY_PER_SI, subtract_baseline
+from spinepipe.units import COORDINATES, subtract_baseline, to_si
 
 Row = dict[str, Any]
 
@@ -193,7 +192,7 @@ def run(
     name = finest(representations_of(settings, cohort.joint_names))
     frame = read_frame(fitted[0]) if fitted else None
     model, why = _simulation(settings, cohort, specimen, tests, others, name, frame)
-    sd = settings.measurement_sd or cohort.measurement_sd
+    sd = cohort.reading_sd(settings.measurement_sd)
     # Rows of each curve and, where the joint turns, of its axis: measured first, then simulated.
     curves: list[Row] = []
     axes: list[Row] = []
@@ -275,7 +274,7 @@ def _covariance(
 def _of_joint(
     cycle: LoadingLoop,
     joint: int,
-    sd: MeasurementSd | None,
+    sd: Array | None,
     zeroed: bool,
     model: Simulation | None,
     why: str,
@@ -296,7 +295,7 @@ def _of_joint(
         yield _refused(MEASURED, "", cycle.coordinate, told, Status.REFUSED), None
         return
     noise = None if sd is None else reading_noise(cycle.parts, 1.0, zeroed)
-    read = _Read(cycle, place, known, None if sd is None else sd.rotation_deg / DEG_PER_RAD)
+    read = _Read(cycle, place, known, None if sd is None else float(to_si(sd)[place]))
     spread = None
     if noise is not None and read.sd is not None:
         spread = replace(noise, root=read.sd * noise.root).at(known)
@@ -306,8 +305,8 @@ def _of_joint(
     root = None
     if sd is not None and noise is not None:
         # (12, 6 k) noise of the two end poses, whose steps share the unit errors of ``noise.root``
-        each: Array = np.array([sd.translation_mm] * 3 + [sd.rotation_deg] * 3) / DISPLAY_PER_SI
-        root = np.asarray(np.kron(noise.root[[first, last]], np.diag(each)), dtype=np.float64)
+        ends = np.kron(noise.root[[first, last]], np.diag(to_si(sd)))
+        root = np.asarray(ends, dtype=np.float64)
     yield row, read.axis(measured, root, np.zeros((12, 0)), MEASURED, "")
     yield _simulated(read, joint, model, why)
 
