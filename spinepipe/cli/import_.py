@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from spinepipe import cohort as cohorts
 from spinepipe.files import appearing
@@ -67,11 +68,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _show(path: Path, root: Path) -> int:
     """Print the first rows of each file, and draw the cohort that would be written."""
+    settings = read_settings(path)
     try:
         imported = read(path)
     except InputError as error:
         print(error)
-        _print_raw(read_settings(path).data, path.parent)
+        files = settings.data.get("files")
+        _print_raw(files if isinstance(files, list) else (), path.parent)
         return 1
     for file, rows in imported.first_rows.items():
         cells = [[f"{c:.6g}" if isinstance(c, float) else str(c) for c in row] for row in rows]
@@ -103,16 +106,15 @@ def _show(path: Path, root: Path) -> int:
     return 0
 
 
-def _print_raw(data: object, folder: Path) -> None:
-    """The first lines of every file that settings name and nothing could read, tabs as arrows."""
-    named = data.items() if isinstance(data, dict) else enumerate(data)  # type: ignore[call-overload]
-    for key, value in named:
-        if isinstance(value, dict | list):
-            _print_raw(value, folder)
-        elif key == "file" and (folder / str(value)).is_file():
-            print(f"\n{value}, as it stands:")
-            with (folder / str(value)).open("rb") as file:
-                start = file.read(RAW_LINES * 1000)
-            lines = ["no text"] if b"\0" in start else start.decode("utf-8", "replace").splitlines()
-            for number, line in enumerate(lines[:RAW_LINES], start=1):
-                print(f"{number:5}  {line.replace(chr(9), ' → ')[:RAW_WIDTH]}")
+def _print_raw(files: Any, folder: Path) -> None:
+    """The first lines of files that nothing could read, tabs as arrows; ``files`` of settings."""
+    named = (one.get("file") for one in files if isinstance(one, dict))
+    for name in dict.fromkeys(str(name) for name in named):
+        if not (folder / name).is_file():
+            continue
+        print(f"\n{name}, as it stands:")
+        with (folder / name).open("rb") as file:
+            start = file.read(RAW_LINES * 1000)
+        lines = ["no text"] if b"\0" in start else start.decode("utf-8", "replace").splitlines()
+        for number, line in enumerate(lines[:RAW_LINES], start=1):
+            print(f"{number:5}  {line.replace(chr(9), ' → ')[:RAW_WIDTH]}")

@@ -165,7 +165,7 @@ def _units(
     if warning is None:
         if not units or NUMBER.fullmatch(found.strip("'")) is None:
             return None
-        smaller = {size: name for name, size in reversed(units.items()) if size < units[told]}
+        smaller = {size: name for name, size in reversed(list(units.items())) if size < units[told]}
         return list(smaller.values())
     if warning.factor is None:
         return None

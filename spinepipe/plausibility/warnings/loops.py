@@ -41,15 +41,17 @@ def open_loops(
             told[test, number].append((specimen, joint, left))
     for (test, number), places in told.items():
         specimen, joint, left = places[0]
-        where = {"specimen": specimen, "test": test, "joint": cohort.joint_names[joint]}
+        name = cohort.joint_names[joint]
+        row = first_row(cohort, "motion", specimen=specimen, test=test, joint=name)
         yield warn(
             cohort,
             "loop_open",
-            TableCell("motion", first_row(cohort, "motion", **where), None),  # of no column's unit
-            whose=[name for name, *_ in places],
+            TableCell("motion", row, None),  # no fault of a column
+            whose=[whose for whose, *_ in places],
             column=COORDINATE_COLUMNS[number],
             left=left,
-            **{name: where[name] for name in ("test", "joint")},
+            test=test,
+            joint=name,
         )
 
 
