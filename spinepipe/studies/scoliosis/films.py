@@ -177,6 +177,13 @@ def corners(rows: pd.DataFrame) -> dict[str, Array]:
     }
 
 
+def run_around(rows: pd.DataFrame) -> bool:
+    """Whether endplates run against each other: corners listed around the vertebra."""
+    corner = corners(rows)
+    upper, lower = (corner[f"{end}_left"] - corner[f"{end}_right"] for end in ("upper", "lower"))
+    return bool(np.median(np.sum(upper * lower, axis=1)) < 0.0)  # False where there are none
+
+
 def _cross(one: Array, other: Array) -> Array:
     found: Array = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
     return found

@@ -272,9 +272,9 @@ def test_mirrored_corners_are_told_apart_from_bodies_on_their_sides() -> None:
     "listed, told",
     [
         # names in the order in which the columns hold them, from the upper left corner on
-        ("upper_left upper_right lower_right lower_left", "lower_left has the lower right corner"),
-        ("upper_left lower_left lower_right upper_right", "upper_right has the lower left corner"),
-        ("lower_right lower_left upper_left upper_right", "upper_left has the lower right corner"),
+        ("upper_left upper_right lower_right lower_left", "lower_left has the corner lower_right"),
+        ("upper_left lower_left lower_right upper_right", "upper_right has the corner lower_left"),
+        ("lower_right lower_left upper_left upper_right", "upper_left has the corner lower_right"),
     ],
 )
 @pytest.mark.filterwarnings("error")
