@@ -213,6 +213,8 @@ def _header(tests: ImportedTests) -> str:
             "translation_mm": _declared(tests.translation, "mm"),
         },
     }
+    if mapping.accuracy is not None:
+        document["accuracy"] = mapping.accuracy.model_dump(exclude_none=True)
     if mapping.acknowledged_warnings:
         document["acknowledged_warnings"] = list(mapping.acknowledged_warnings)
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from spinepipe.cohort.cohort import Group, VertebraName, joint_names
+from spinepipe.cohort.cohort import Accuracy, Group, VertebraName, joint_names
 from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem, did_you_mean, one_of
@@ -173,6 +173,9 @@ class MachineMapping(BaseModel):
         default=True,
         description="true: the reading of step 0 is subtracted in every cycle, as machines count "
         "from anywhere; false: readings stay, their zero is the neutral pose",
+    )
+    accuracy: Accuracy | None = Field(
+        default=None, description="of the instruments, as in cohort.yaml, which gets it too"
     )
     acknowledged_warnings: tuple[Group, ...] = Field(
         default=(),

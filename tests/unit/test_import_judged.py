@@ -155,12 +155,15 @@ def test_angles_in_radians(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "motion.0.unit: found 'deg'" in told
     assert "motion.1.unit: found 'deg'" in told
     assert "suspected: rad; correct motion.0.unit" in told
-    meant = {"acknowledged_warnings": ["motion"]}
+    meant = {"acknowledged_warnings": ["motion"], "accuracy": {"rotation_deg": 0.3}}
     path.write_text(path.read_text() + yaml.safe_dump(meant))
     assert run(tmp_path, path) == 0
     assert "warn  rig/motion.csv" in capsys.readouterr().out
     read = cohorts.read(tmp_path / "config" / "cohorts" / "rig")
     assert read.acknowledged_warnings == ("motion",)
+    sd = read.reading_sd()
+    assert sd is not None
+    assert sd[3] == 0.3  # beside what the rows scatter by
 
 
 def test_load_and_motion_exchanged_are_told_by_the_names_of_their_columns(
