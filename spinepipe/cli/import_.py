@@ -2,28 +2,52 @@
 
 import argparse
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
+from spinepipe import cohort as cohorts
+from spinepipe.files import appearing
 from spinepipe.imports.imported import write
-from spinepipe.imports.registry import read
+from spinepipe.imports.judge import judge, write_judged
+from spinepipe.imports.registry import read, read_settings
+from spinepipe.problems import InputError
+from spinepipe.report.specimen import view_of
+from spinepipe.report.specimen_page import specimen_page
 from spinepipe.report.words import listed
+from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS
+
+RAW_LINES, RAW_WIDTH = 8, 100
+"""What is shown of a file that is not understood."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which YAML, and whether a folder may be written again."""
+    """Which YAML, whether a folder may be written again, and whether only to look."""
     parser.add_argument("settings", type=Path, metavar="FILE.yaml", help="says what the files are")
     parser.add_argument(
         "--replace",
         action="store_true",
         help="write a cohort again that is there; files that are edited by hand stay",
     )
+    parser.add_argument(
+        "--show",
+        action="store_true",
+        help="write no cohort: show the first rows as they were understood, and draw a page",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read all files, write the folder, and say what was done."""
-    imported = read(options.settings)
-    folder = options.root / COHORTS / imported.name
-    stayed = write(imported, folder, options.replace)
+    """Read all files, judge them, write the folder, and say what was done."""
+    if options.show:
+        return _show(options.settings, options.root)
+    try:
+        imported = read(options.settings)
+        folder = options.root / COHORTS / imported.name
+        stayed, warnings = write_judged(imported, folder, options.replace)
+    except InputError:
+        told = f"Nothing was written. `spinepipe import --show {options.settings}` shows the files"
+        print(f"{told} as they are understood.")
+        raise
     for sentence in imported.sentences:
         print(sentence)
     print(f"Wrote {COHORTS / imported.name}.")
@@ -32,5 +56,61 @@ def run(options: argparse.Namespace) -> int:
     for name, remark in imported.by_hand.items():
         if remark and name not in stayed:
             print(remark)
+    for warning in warnings:
+        print(f"warn  {warning}")
     print(f"Next: spinepipe check {imported.name}, then spinepipe show {imported.name}.")
     return 0
+
+
+def _show(path: Path, root: Path) -> int:
+    """Print the first rows of each file, and draw the cohort that would be written."""
+    settings = read_settings(path)
+    try:
+        imported = read(path)
+    except InputError as error:
+        print(error)
+        files = settings.data.get("files")
+        _print_raw(files if isinstance(files, list) else (), path.parent)
+        return 1
+    for file, rows in imported.first_rows.items():
+        cells = [[f"{c:.6g}" if isinstance(c, float) else str(c) for c in row] for row in rows]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        print(f"\n{file}, as it is understood:")
+        for row in cells:
+            print("  " + "  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)))
+    print()
+    for sentence in imported.sentences:
+        print(sentence)
+    with TemporaryDirectory() as place:
+        folder = Path(place) / imported.name
+        write(imported, folder, replace=False)
+        try:
+            for warning in judge(imported, folder):
+                print(f"warn  {warning}")
+        except InputError as error:
+            print(error)
+        try:
+            cohort = cohorts.read(folder, every_form())
+        except InputError:
+            print("No page: the cohort cannot be read.")
+            return 1
+        output = root / "results" / "show" / f"{imported.name}-import.html"
+        with appearing(output) as temporary:
+            view = view_of(cohort, cohort.specimen_names[0], None, (0.0, 0.0, 0.0))
+            temporary.write_text(specimen_page(cohort, view), encoding="utf-8")
+    print(f"No cohort was written. Page: {output}")
+    return 0
+
+
+def _print_raw(files: Any, folder: Path) -> None:
+    """The first lines of files that nothing could read, tabs as arrows; ``files`` of settings."""
+    named = (one.get("file") for one in files if isinstance(one, dict))
+    for name in dict.fromkeys(str(name) for name in named):
+        if not (folder / name).is_file():
+            continue
+        print(f"\n{name}, as it stands:")
+        with (folder / name).open("rb") as file:
+            start = file.read(RAW_LINES * 1000)
+        lines = ["no text"] if b"\0" in start else start.decode("utf-8", "replace").splitlines()
+        for number, line in enumerate(lines[:RAW_LINES], start=1):
+            print(f"{number:5}  {line.replace(chr(9), ' → ')[:RAW_WIDTH]}")

@@ -10,10 +10,15 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, TypeVarTuple
 from weakref import WeakKeyDictionary
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 
 from spinepipe.documents.names import EVERYONE, LONGEST_NAME
+from spinepipe.units import COORDINATE_COLUMNS
+
+Array = NDArray[np.float64]
 
 Group = Literal["lengths", "postures", "masses", "loads", "motion", "zeroing", "errors", "persons"]
 """What can be meant though it looks wrong: ``acknowledged_warnings`` in cohort.yaml."""
@@ -58,6 +63,38 @@ class MeasurementSd(BaseModel):
     )
 
 
+_Deg = Annotated[float | None, Field(gt=0, le=45)]
+_Mm = Annotated[float | None, Field(gt=0, le=50)]
+
+
+class Accuracy(BaseModel):
+    """What the instrument may be off by as an SD, though repeats agree, per component."""
+
+    model_config = FORM
+
+    rotation_deg: _Deg = Field(default=None, description="of angles, deg")
+    translation_mm: _Mm = Field(default=None, description="of translations, mm")
+    force_n: float | None = Field(
+        default=None, gt=0, le=20000, description="of a rig's force, N; for supports.csv alone"
+    )
+    moment_nm: float | None = Field(
+        default=None, gt=0, le=500, description="of a rig's moment, N m; for supports.csv alone"
+    )
+    extension_deg: _Deg = Field(default=None, description="of this one, before `rotation_deg`")
+    right_bending_deg: _Deg = Field(default=None, description="likewise")
+    left_rotation_deg: _Deg = Field(default=None, description="likewise")
+    anterior_mm: _Mm = Field(default=None, description="of this one, before `translation_mm`")
+    superior_mm: _Mm = Field(default=None, description="likewise")
+    right_mm: _Mm = Field(default=None, description="likewise")
+
+    def each(self) -> "Array":
+        """(6,) mm and deg, NaN where it is not told."""
+        told = self.model_dump(exclude_none=True)
+        kinds = ["translation_mm"] * 3 + ["rotation_deg"] * 3
+        named = zip(COORDINATE_COLUMNS, kinds, strict=True)
+        return np.array([told.get(own, told.get(kind, np.nan)) for own, kind in named])
+
+
 class CohortHeader(BaseModel):
     """The keys of ``cohort.yaml``."""
 
@@ -96,6 +133,11 @@ class CohortHeader(BaseModel):
     measurement_sd: MeasurementSd | None = Field(
         default=None, description="standard deviations of one reading, may be left out"
     )
+    accuracy: Accuracy | None = Field(
+        default=None,
+        description="accuracy of the instrument beside its repeatability, which `measurement_sd` "
+        "is: of each coordinate the larger counts as the SD of a reading; may be left out",
+    )
     acknowledged_warnings: Annotated[tuple[Group, ...], Field(strict=False)] = Field(
         default=(),
         validation_alias=AliasChoices("acknowledged_warnings", "i_mean_it"),  # as files had it
@@ -124,7 +166,7 @@ class Cohort:
     gravity : whether 9.81 m/s2 acts along -y.
     zeroed_at_step_0 : whether step-0 coordinates were subtracted in every cycle; where the files
         say so of some tests alone, of the others as they were read.
-    measurement_sd : SD of one reading, if known.
+    measurement_sd, accuracy : of one reading, if known; see `reading_sd`.
     specimens : one row each; undeclared columns follow as text, as written.
     landmarks, joints, bodies : geometry and masses in ground, neutral pose.
     loads : ``specimen`` may be ``*`` (all); ``cycle`` is float64, NaN stands for every cycle.
@@ -160,6 +202,22 @@ class Cohort:
     made_up: bool = False
     rebuilt: bool = False
     acknowledged_warnings: tuple[Group, ...] = ()
+    accuracy: Accuracy | None = None
+
+    def reading_sd(self, stated: MeasurementSd | None = None) -> Array | None:
+        """(6,) mm and deg, of one reading: ``measurement_sd`` or ``accuracy``, which is larger.
+
+        None where neither tells all coordinates. A study may state another ``measurement_sd``.
+        """
+        sd, most = stated or self.measurement_sd, self.accuracy_sd
+        if sd is not None:
+            most = np.fmax([sd.translation_mm] * 3 + [sd.rotation_deg] * 3, most)
+        return most if np.isfinite(most).all() else None
+
+    @property
+    def accuracy_sd(self) -> Array:
+        """(6,) mm and deg, NaN where it is not told."""
+        return np.full(6, np.nan) if self.accuracy is None else self.accuracy.each()
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -200,6 +258,8 @@ class Cohort:
             "measurement_sd": None if sd is None else sd.model_dump(mode="json", exclude_none=True),
             "tests": self.tests,
         }
+        if self.accuracy is not None:
+            shared["accuracy"] = self.accuracy.model_dump(mode="json", exclude_none=True)
         rigs = ("supports", "preload")
         names = ("specimens", "landmarks", "joints", "bodies", "loads", "motion", *rigs)
         tables = {name: getattr(self, name) for name in names}

@@ -259,6 +259,7 @@ def _cohort(
         gravity=header.gravity,
         zeroed_at_step_0=zeroed,
         measurement_sd=header.measurement_sd,
+        accuracy=header.accuracy,
         specimens=final["specimens"],
         landmarks=final.get("landmarks"),
         joints=final.get("joints"),

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort.cohort import Cohort, MeasurementSd
+from spinepipe.cohort.cohort import Cohort
 from spinepipe.documents.names import EVERYONE
 from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase, Support
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, DISPLAY_PER_SI
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, to_si
 
 FREE, HELD, PRESCRIBED = "free", "held", "prescribed"
 STATES = (FREE, HELD, PRESCRIBED)
@@ -76,7 +76,7 @@ def with_supports(cohort: Cohort, specimen: str, case: LoadCase, motion: Array) 
     found = Rig(cohort.supports, cohort.joint_names).fixed(specimen, case.test)
     if not found:
         return case
-    read_as = _read_as(cohort.measurement_sd)
+    read_as = _read_as(cohort)
     steps = []
     for step, q in zip(case.steps, motion, strict=True):
         rig = tuple(
@@ -92,14 +92,16 @@ def with_supports(cohort: Cohort, specimen: str, case: LoadCase, motion: Array) 
     return replace(case, steps=tuple(steps))
 
 
-def _read_as(sd: MeasurementSd | None) -> Mapping[int, float | None]:
+def _read_as(cohort: Cohort) -> Mapping[int, float | None]:
     """m per N or rad per N m, by coordinate: one SD of a load counts as one SD of a motion."""
-    if sd is None:
-        return dict.fromkeys(range(6))
-    pairs = [(sd.translation_mm, sd.force_n)] * 3 + [(sd.rotation_deg, sd.moment_nm)] * 3
+    moved, told = cohort.reading_sd(), (cohort.measurement_sd, cohort.accuracy)
+    loads = [
+        max((of for sd in told if (of := getattr(sd, kind, None)) is not None), default=None)
+        for kind in ("force_n", "moment_nm")
+    ]
     return {
-        number: None if load is None else moved / float(DISPLAY_PER_SI[number]) / load
-        for number, (moved, load) in enumerate(pairs)
+        number: None if moved is None or load is None else float(to_si(moved)[number]) / load
+        for number, load in enumerate(np.repeat(np.array(loads, dtype=object), 3))
     }
 
 

@@ -60,6 +60,8 @@ def _problem(model: type[BaseModel], document: YamlDocument, detail: ErrorDetail
         remedy = "put it in quotes, as it is written: without them YAML makes no text of it"
     if detail["type"] == "literal_error":
         remedy = did_you_mean(str(detail["input"]), _quoted(expected), remedy)
+    if detail["type"] == "string_type" and isinstance(detail["input"], int | float):
+        remedy = "put it in quotes, so that it is a text"  # 12 and 1e3 may be names
     return InputProblem(*place, _shown(detail["input"]), allowed, remedy)
 
 

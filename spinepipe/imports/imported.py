@@ -3,13 +3,12 @@
 import csv
 import os
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from dataclasses import replace as with_values
 from functools import cache
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Annotated
 
@@ -17,15 +16,14 @@ import numpy as np
 import yaml
 from pydantic import BaseModel, Field, StringConstraints
 
-from spinepipe.cohort import Reader
 from spinepipe.cohort.cohort import FORM, VertebraName
 from spinepipe.cohort.columns import COHORT_YAML, TABLES
 from spinepipe.documents.form import TableForm, read_forms
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.frames import Pose, zxy_angles
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
-from spinepipe.studies.plausibility import refusals
 from spinepipe.studies.registry import every_form
 from spinepipe.units import MM_PER_M
 
@@ -85,6 +83,12 @@ class ImportedCohort:
     sentences : what was done, for people.
     forms : of tables that are no cohort's own, as kinds of study read them; told in
         ``datapackage.json``.
+    settings : the file that says what the files are.
+    made_by : dotted keys of the settings that made a column, by stem of the table and column; where
+        they hold a mapping, its `unit`, `positive` and `column` are told by themselves.
+    units : sizes of units that may stand there, by name; those of one quantity together.
+    origins : of each row of a table, by stem: the file and line that it came from.
+    first_rows : of each file as they were understood, by its name: names of columns, then cells.
     """
 
     name: str
@@ -93,20 +97,31 @@ class ImportedCohort:
     by_hand: Mapping[str, str]
     sentences: tuple[str, ...]
     forms: tuple[TableForm, ...] = field(default=())
+    settings: YamlDocument | None = None
+    made_by: Mapping[tuple[str, str], Sequence[str]] = field(default_factory=dict)
+    units: Sequence[Mapping[str, float]] = ()
+    origins: Mapping[str, Sequence[tuple[str, int | None]]] = field(default_factory=dict)
+    first_rows: Mapping[str, Sequence[Sequence[object]]] = field(default_factory=dict)
 
 
-def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
+def write(
+    imported: ImportedCohort,
+    folder: Path,
+    replace: bool,
+    look: Callable[[Path], None] | None = None,
+) -> list[str]:
     """Write the cohort folder, and return the names of files that were there and stayed.
 
     Parameters
     ----------
     replace : whether a folder that is there may be written again; what is edited by hand stays,
         and so does what the import does not write.
+    look : looks at the folder as it would be, and raises where it must not be written.
 
     Raises
     ------
     InputError
-        When the folder is there and must not be touched.
+        When the folder is there and must not be touched, and what ``look`` raises.
     """
     if folder.exists() and not replace:
         remedy = "choose another `cohort:` in the YAML, or add --replace"
@@ -114,9 +129,11 @@ def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
         raise InputError([InputProblem(str(folder), None, None, found, "a new folder", remedy)])
     stay = [name for name in imported.by_hand if (folder / name).exists()]
     folder.parent.mkdir(parents=True, exist_ok=True)
-    new = folder.with_name(f".{folder.name}.{os.getpid()}")
+    aside = folder.with_name(f".{folder.name}.{os.getpid()}")
+    new = aside / folder.name  # of its own name, which is asked when it is read
     old = folder.with_name(f".{folder.name}.before.{os.getpid()}")
-    shutil.rmtree(new, ignore_errors=True)
+    shutil.rmtree(aside, ignore_errors=True)
+    aside.mkdir()
     try:
         if folder.exists():
             shutil.copytree(folder, new)
@@ -128,6 +145,8 @@ def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
             elif name not in stay:
                 (new / name).write_text(content, encoding="utf-8")
         (new / FILE).write_text(_descriptor(imported, new), encoding="utf-8")
+        if look is not None:
+            look(new)
         # the new folder is whole before the old one goes, and the old one is kept until it is there
         if folder.exists():
             folder.rename(old)
@@ -139,11 +158,11 @@ def write(imported: ImportedCohort, folder: Path, replace: bool) -> list[str]:
             raise
         shutil.rmtree(old, ignore_errors=True)
     finally:
-        shutil.rmtree(new, ignore_errors=True)
+        shutil.rmtree(aside, ignore_errors=True)
     return stay
 
 
-def checked(
+def assembled(
     settings: ImportSettings,
     made_of: str,
     tables: Mapping[str, Sequence[Sequence[object]]],
@@ -151,19 +170,14 @@ def checked(
     origins: Mapping[str, Sequence[tuple[str, int | None]]],
     copied: Mapping[str, Path] = MappingProxyType({}),
 ) -> ImportedCohort:
-    """A cohort that was read as `spinepipe check` reads it, before anything is written.
+    """A cohort of these tables.
 
     Parameters
     ----------
     made_of : end of the sentence that says what the cohort was made of.
     tables : rows by stem, cells in the order of the form; tables without rows are left out.
-    origins : of each row of a table, by stem: the file and line that it came from.
+    origins : as in `ImportedCohort`.
     copied : files that become part of the folder as they are, by their names there.
-
-    Raises
-    ------
-    InputError
-        With every fault of the cohort, at the place that it came from.
     """
     forms = all_forms()
     header = settings.model_dump(include=set(ImportSettings.model_fields), mode="json")
@@ -175,27 +189,15 @@ def checked(
         if rows
     }
     text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=110)
-    files: dict[str, str | Path] = {COHORT_YAML: text, **texts, **copied}
-    further = tuple(form for stem, form in forms.items() if stem not in TABLES)
-    by_hand = {"specimens.csv": ""}
-    cohort = ImportedCohort(
-        settings.cohort, settings.title, files, by_hand, tuple(sentences), further
+    return ImportedCohort(
+        settings.cohort,
+        settings.title,
+        {COHORT_YAML: text, **texts, **copied},
+        {"specimens.csv": ""},
+        tuple(sentences),
+        tuple(form for stem, form in forms.items() if stem not in TABLES),
+        origins=origins,
     )
-    with TemporaryDirectory() as parent:
-        write(cohort, folder := Path(parent) / cohort.name, replace=False)
-        try:
-            found = refusals(Reader().read(folder, every_form()))
-        except InputError as error:
-            found = error.problems
-    if not found:
-        return cohort
-    told = []
-    for one in found:
-        rows_of = origins.get(one.file.rpartition("/")[2].removesuffix(".csv"), ())
-        at = (one.row or 0) - 2  # the header of a table is line 1
-        place = rows_of[at] if 0 <= at < len(rows_of) else (one.file, one.row)
-        told.append(with_values(one, file=place[0], row=place[1], rows=()))
-    raise InputError(told)
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:

@@ -23,7 +23,7 @@ from spinepipe.documents.settings import validate
 from spinepipe.documents.text import MOST_CSV_BYTES, read_bytes, read_text
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
-from spinepipe.imports.imported import ImportedCohort, ImportSettings, checked, rounded
+from spinepipe.imports.imported import ImportedCohort, ImportSettings, assembled, rounded
 from spinepipe.problems import InputError, InputProblem, did_you_mean
 from spinepipe.report.words import count
 
@@ -153,7 +153,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     sentences = (*_sentences(found, unread), *told_of_surfaces, POSTURE)
     files = ", ".join(dict.fromkeys(point.file for *_, point in picked))
     origins = {"landmarks": [(point.file, point.line) for *_, point in picked]}
-    return checked(settings, f"{files}. {POSTURE}", tables, sentences, origins)
+    return assembled(settings, f"{files}. {POSTURE}", tables, sentences, origins)
 
 
 def _matched(folder: Path, of: LandmarkFiles) -> Iterator[tuple[str, str, str]]:

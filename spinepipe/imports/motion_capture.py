@@ -23,7 +23,7 @@ from spinepipe.imports.imported import (
     ImportedCohort,
     ImportSettings,
     all_forms,
-    checked,
+    assembled,
     rounded,
 )
 from spinepipe.motion.reading import axes_of, read_motion
@@ -244,7 +244,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         **{"specimens": persons, "subjects": persons},
         "trials": [place(f"trials.{k}")[:2] for k in range(len(trials))],
     }
-    return checked(settings, f"{', '.join(known)}.", tables | rows, sentences, origins, copied)
+    return assembled(settings, f"{', '.join(known)}.", tables | rows, sentences, origins, copied)
 
 
 def _misnamed_columns(place: Place, of: RecordedTable) -> Iterator[InputProblem]:

@@ -15,7 +15,16 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
-from spinepipe.testing_machine.channels import LOAD_COLUMNS
+from spinepipe.testing_machine.channels import (
+    ANGLES,
+    DIRECTIONS,
+    FORCES,
+    LENGTHS,
+    LOAD_COLUMNS,
+    MOMENTS,
+    SECONDS,
+    column_of,
+)
 from spinepipe.testing_machine.check_settings import check_mapping
 from spinepipe.testing_machine.clocks import read_test
 from spinepipe.testing_machine.conversions import converted
@@ -38,6 +47,9 @@ BY_HAND = {
 }
 """Files that are made to be edited, and what is said of them."""
 
+SHOWN = 8
+"""Rows of a file that `spinepipe import --show` shows."""
+
 LEVEL_APART_MM = 35.0
 NOT_READ = {"deg": 0.1, "mm": 0.1}
 """SD that stands for a kind of reading that there is none of: the form asks for one."""
@@ -54,10 +66,12 @@ class ImportedTests:
 
     Attributes
     ----------
+    items : number of the item of `files` in the YAML that named each file.
     rotation, translation : how sure readings are, deg and mm; None where none were read.
     """
 
     mapping: MachineMapping
+    items: tuple[int, ...]
     tests: tuple[ResampledTest, ...]
     rotation: ReadingPrecision | None
     translation: ReadingPrecision | None
@@ -108,7 +122,7 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
     if problems:
         raise InputError(problems)
     sures = [reading_precision(tests, unit, mapping.zeroed) for unit in ("_deg", "_mm")]
-    return ImportedTests(mapping, tuple(tests), *sures)
+    return ImportedTests(mapping, numbers, tuple(tests), *sures)
 
 
 def _not_the_same(group: Sequence[Recording]) -> Iterator[InputProblem]:
@@ -141,7 +155,39 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         },
         by_hand=BY_HAND,
         sentences=tuple(_sentences(tests)),
+        settings=document,
+        made_by=_made_by(tests),
+        units=(FORCES, MOMENTS, ANGLES, LENGTHS, SECONDS),
+        first_rows={
+            one.file: list(_first_rows(one)) for test in tests.tests for one in test.recordings
+        },
     )
+
+
+def _made_by(tests: ImportedTests) -> dict[tuple[str, str], list[str]]:
+    """Keys of the settings that made each column, those of files of their own too."""
+    mapping = tests.mapping
+    made = {("loads", "vertebra"): ["loaded"], ("loads", "time_s"): ["time"]}
+    made |= {("loads", column): ["load_point_mm"] for column in _POINT}
+    for item, of in zip(tests.items, mapping.files, strict=True):
+        own = mapping.of_file(of)
+        for side in ("loads", "motion"):
+            prefix = side if getattr(of, side) is None else f"files.{item}.{side}"
+            for number, channel in enumerate(getattr(own, side)):
+                way = DIRECTIONS[channel.positive]
+                column = way.load if side == "loads" else column_of(way.coordinate)
+                made.setdefault((side, column), []).append(f"{prefix}.{number}")
+    return {place: list(dict.fromkeys(keys)) for place, keys in made.items()}
+
+
+def _first_rows(one: Recording) -> Iterator[Sequence[object]]:
+    """Names of the columns, as in the tables of the cohort, then the first rows of a file."""
+    columns = {"line": one.lines} | ({} if one.time is None else {"time_s": one.time})
+    ways = {way.load: word for word, way in DIRECTIONS.items() if way.sign > 0}
+    columns |= {f"{column} to {ways[column]}": values for column, values in one.loads.items()}
+    columns |= {f"{joint} {column}": values for (joint, column), values in one.motion.items()}
+    yield tuple(columns)
+    yield from zip(*(values[:SHOWN].tolist() for values in columns.values()), strict=True)
 
 
 def _sentences(tests: ImportedTests) -> Iterator[str]:
@@ -217,8 +263,10 @@ def _header(tests: ImportedTests) -> str:
             "translation_mm": _declared(tests.translation, "mm"),
         },
     }
-    if mapping.accuracy:
-        document["accuracy"] = dict(mapping.accuracy)
+    if mapping.accuracy is not None:
+        document["accuracy"] = mapping.accuracy.model_dump(exclude_none=True)
+    if mapping.acknowledged_warnings:
+        document["acknowledged_warnings"] = list(mapping.acknowledged_warnings)
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)
 
 
@@ -254,8 +302,11 @@ def sd_sentence(tests: ImportedTests) -> str:
 
 def _of_accuracy(tests: ImportedTests) -> Iterator[str]:
     """Which is larger, what repeats show or what the instrument may be off."""
-    for name, off in tests.mapping.accuracy.items():
+    accuracy = tests.mapping.accuracy
+    for name, off in accuracy.model_dump(exclude_none=True).items() if accuracy else ():
         unit = name.rpartition("_")[2]
+        if unit not in NOT_READ:
+            continue
         sd = _declared(tests.rotation if unit == "deg" else tests.translation, unit)
         which = "larger than" if off > sd else "not larger than"
         yield (

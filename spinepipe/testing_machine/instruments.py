@@ -13,10 +13,6 @@ _Shift = Literal["anterior", "posterior", "superior", "inferior", "right", "left
 SYNC = "signal of both clocks"
 """In the place of a joint: a column by which clocks are compared."""
 
-_Length = Literal["translation_mm", "anterior_mm", "superior_mm", "right_mm"]
-_Angle = Literal["rotation_deg", "extension_deg", "right_bending_deg", "left_rotation_deg"]
-AccuracyKey = _Length | _Angle
-
 
 class Rotations(BaseModel):
     """How three angles of a joint make one rotation."""

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from spinepipe.cohort.cohort import VertebraName
+from spinepipe.cohort.cohort import Accuracy, Group, VertebraName
 from spinepipe.testing_machine.channels import (
     LoadUnit,
     MotionUnit,
@@ -12,7 +12,6 @@ from spinepipe.testing_machine.channels import (
     Towards,
 )
 from spinepipe.testing_machine.instruments import (
-    AccuracyKey,
     LoadCell,
     Markers,
     MotionPoint,
@@ -246,6 +245,15 @@ class MachineMapping(BaseModel):
         description="true: the reading of step 0 is subtracted in every cycle, as machines count "
         "from anywhere; false: readings stay, their zero is the neutral pose",
     )
+    accuracy: Accuracy | None = Field(
+        default=None, description="of the instruments, as in cohort.yaml, which gets it too"
+    )
+    acknowledged_warnings: tuple[Group, ...] = Field(
+        default=(),
+        strict=False,
+        description="what looks wrong and is meant, as in cohort.yaml, which gets it too; else "
+        "nothing is written",
+    )
     form: FileForm = Field(default_factory=FileForm, description="how the machine writes its files")
     time: TimeChannel | None = Field(default=None, description="the column of time")
     loads: tuple[LoadChannel, ...] = Field(
@@ -266,12 +274,6 @@ class MachineMapping(BaseModel):
     )
     motion_points: tuple[MotionPoint, ...] = Field(
         default=(), strict=False, description="joints whose translations are not of their origin"
-    )
-    accuracy: dict[AccuracyKey, Annotated[float, Field(gt=0, le=50)]] = Field(
-        default_factory=dict,
-        description="how far the instrument may be off, as an SD: rotation_deg, translation_mm, or "
-        "a column of motion.csv, which counts for that alone; the larger of it and measurement_sd "
-        "is the noise",
     )
     steps: LoadSteps = Field(default_factory=LoadSteps, description="load steps that are kept")
     files: tuple[TestFile, ...] = Field(strict=False, description="the files")

@@ -270,12 +270,13 @@ def test_nothing_is_overwritten_unless_told(tmp_path: Path) -> None:
     assert main(command) == 0
     folder = tmp_path / "config/cohorts/rig"
     (folder / "motion.csv").write_text("mine")
-    (folder / "joints.csv").write_text("by hand")
+    joints = (folder / "joints.csv").read_text().replace("s01,L4L5,0,", "s01,L4L5,-2,")
+    (folder / "joints.csv").write_text(joints)
     assert main(command) == 1
     assert (folder / "motion.csv").read_text() == "mine"
     assert main([*command, "--replace"]) == 0
     assert len(pd.read_csv(folder / "motion.csv")) == 63
-    assert (folder / "joints.csv").read_text() == "by hand"
+    assert (folder / "joints.csv").read_text() == joints
     assert [one.name for one in folder.parent.iterdir()] == ["rig"]
 
 

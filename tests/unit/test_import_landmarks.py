@@ -20,6 +20,7 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.imports.imported import write
+from spinepipe.imports.judge import write_judged
 from spinepipe.imports.registry import read
 from spinepipe.problems import InputError
 
@@ -90,7 +91,7 @@ def landmarks(path: Path) -> pd.DataFrame:
 
 def refused(path: Path) -> str:
     with pytest.raises(InputError) as error:
-        read(path)
+        write_judged(read(path), path.parent / "judged" / "scans", False)
     return str(error.value)
 
 

@@ -19,6 +19,7 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.imports.imported import write
+from spinepipe.imports.judge import write_judged
 from spinepipe.imports.registry import read
 from spinepipe.motion.reading import read_motion
 from spinepipe.problems import InputError
@@ -151,7 +152,7 @@ def test_what_cannot_be_right_is_told_before_anything_is_written(
         at = at[one]  # type: ignore[index]
     at[key[-1]] = value  # type: ignore[index]
     with pytest.raises(InputError) as error:
-        read(made(tmp_path, document))
+        write_judged(read(made(tmp_path, document)), tmp_path / "judged" / "lab", False)
     assert told in str(error.value)
 
 

@@ -61,6 +61,7 @@ def _beyond(
         quantity,
         TableCell(check["table"], row, str(sizes.loc[row].idxmax())),
         remedy=unit and unit.mend(mended=f"{value * unit.factor:.3g}", columns=names),
+        factor=unit and unit.factor,
         certain=quantity.endswith("_sd") and not usual("any_sd").holds(value),
         value=value,
         more=f" and {len(odd) - 1} more" if len(odd) > 1 else "",

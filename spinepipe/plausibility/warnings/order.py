@@ -116,7 +116,9 @@ def _steps(cycles: Sequence[LoadedCycle]) -> _Order | None:
     here = float(np.median(given))
     if all(map(_stands_still, cycles)):
         return _Order("step_0_repeated", "step")
-    if here < FOLLOWS and float(np.median(turned)) > BEST:
+    # of a cycle that is the same to both sides, read backwards, or against its load, which is left
+    # to `response`, nobody can tell which it is, and a wrong sign happens more often
+    if AGAINST < here < FOLLOWS and float(np.median(turned)) > BEST:
         return _Order("steps_reversed", "step")
     moved = here < FOLLOWS or (steps > FEW and here < LATE_FOLLOWS)
     limit = BEST if here < FOLLOWS else LATE_BEST

@@ -16,7 +16,7 @@ from spinepipe.plausibility.score import suspect, usual
 from spinepipe.plausibility.warnings.columns import beyond_ranges, declared_errors
 from spinepipe.plausibility.warnings.lengths import COLUMNS
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
-from spinepipe.units import COORDINATE_COLUMNS
+from spinepipe.units import COORDINATE_COLUMNS, DEG_PER_RAD, MM_PER_M
 
 LOADS = ["fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm"]
 READ = list(COORDINATE_COLUMNS)
@@ -96,7 +96,7 @@ def too_small(cohort: Cohort) -> Warnings:
     if tested and turned > 0.0 and not usual("largest_rotation").holds(turned):
         row = int(np.argmax(sizes.max(axis=1)))
         place = TableCell("motion", row, str(sizes.iloc[row].idxmax()))
-        yield warn(cohort, "largest_rotation", place, value=turned)
+        yield warn(cohort, "largest_rotation", place, factor=DEG_PER_RAD, value=turned)
     for column in READ:
         read = motion[column].dropna().abs()
         read = read[read > ZERO]
@@ -105,7 +105,8 @@ def too_small(cohort: Cohort) -> Warnings:
             turns = column.endswith("_deg")
             name = "rotations_below_sd" if turns else "translations_below_sd"
             place = TableCell("motion", read.index[0], column)
-            yield warn(cohort, name, place, value=read.max(), sd=error)
+            factor = DEG_PER_RAD if turns else MM_PER_M
+            yield warn(cohort, name, place, factor=factor, value=read.max(), sd=error)
 
 
 def _repeated(cohort: Cohort) -> Warnings:
@@ -262,7 +263,8 @@ def _times(cohort: Cohort, loads: pd.DataFrame) -> Warnings:
     if len(steps) and not usual("time_step").holds(typical := float(steps.median())):
         unit = suspect("time_step", typical, "time_step")
         place = TableCell("loads", steps.index[0], "time_s")
-        yield warn(cohort, "time_step", place, remedy=unit and unit.mend(), value=typical)
+        remedy, factor = (unit.mend(), unit.factor) if unit else (None, None)
+        yield warn(cohort, "time_step", place, remedy=remedy, factor=factor, value=typical)
 
 
 def _silent(cohort: Cohort, motion: pd.DataFrame) -> Warnings:

@@ -17,7 +17,7 @@ from math import log, sqrt
 import numpy as np
 
 from spinepipe.anatomy.stiffness_range import plausible, range_of_level
-from spinepipe.cohort.cohort import Cohort
+from spinepipe.cohort.cohort import Array, Cohort
 from spinepipe.cohort.load_response import LoadedCycle, LoadResponse, load_responses, typical
 from spinepipe.cohort.load_tests import DRIVEN, PUSHED
 from spinepipe.plausibility.score import (
@@ -29,6 +29,7 @@ from spinepipe.plausibility.score import (
     unit_like,
     usual,
 )
+from spinepipe.plausibility.warnings.loops import open_loops
 from spinepipe.plausibility.warnings.order import tests_of
 from spinepipe.plausibility.warnings.warning import (
     PlausibilityWarning,
@@ -114,6 +115,7 @@ def responses(
     ]
     yield from _sizes(cohort, told)
     yield from _signs(cohort, told)
+    yield from open_loops(cohort, [one.answer for one in told], _noise(cohort))
     turned = {one.place[:2] for one in told if one.place[2] in ROTATIONS}
     for place, column in _against_names(cohort):
         if place not in turned and place not in explained and column not in spoilt:
@@ -159,6 +161,7 @@ def _sizes(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
             "motion_over_expected",
             TableCell(stem, row, column),
             remedy=unit and unit.mend(),
+            factor=unit and (1.0 / unit.factor if of_loads else unit.factor),
             whose=[name for name, *_ in places],
             tests=tests_of(places),
             motion=MOTION_COLUMNS[coordinate],
@@ -226,11 +229,15 @@ def _signs(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
         )
 
 
+def _noise(cohort: Cohort) -> Array:
+    """(6,) mm and deg, SD of one reading."""
+    sd = cohort.reading_sd()
+    return np.full(len(COORDINATES), USUAL_SD) if sd is None else sd
+
+
 def _is_against(cohort: Cohort, one: _Response) -> bool:
     """Whether a joint moves against its load, clear of the noise, as far as joints move."""
-    sd = cohort.measurement_sd
-    size = (USUAL_SD, USUAL_SD) if sd is None else (sd.translation_mm, sd.rotation_deg)
-    noise = to_si(np.repeat(size, 3))[COORDINATES.index(one.answer.coordinate)]
+    noise = to_si(_noise(cohort))[COORDINATES.index(one.answer.coordinate)]
     far = abs(one.ratio) >= usual("motion_over_expected").low
     return far and one.answer.correlation < AGAINST and one.answer.rms > CLEAR * noise
 

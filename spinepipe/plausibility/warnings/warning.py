@@ -26,11 +26,14 @@ class PlausibilityWarning:
     ----------
     group : what can be meant though it looks wrong: ``acknowledged_warnings`` in cohort.yaml.
     certain : it cannot be right; no run starts with it unless the cohort says that it is meant.
+    name : its row in `warnings.csv`. factor : of all numbers of its column that would mend it.
     """
 
     problem: InputProblem
     group: Group
     certain: bool = False
+    name: str = ""
+    factor: float | None = None
 
     @property
     def with_switch(self) -> InputProblem:
@@ -79,6 +82,7 @@ def warn(
     remedy: str | None = None,
     certain: bool | None = None,
     group: Group | None = None,
+    factor: float | None = None,
     whose: Iterable[object] = (),
     **values: object,
 ) -> PlausibilityWarning:
@@ -86,7 +90,8 @@ def warn(
 
     Parameters
     ----------
-    remedy, certain, group : in place of those of the row. whose : specimens, ``{whose}`` in texts.
+    remedy, certain, group : in place of those of the row. factor : of the numbers of the column
+        that would mend it, if a unit is behind it. whose : specimens, ``{whose}`` in texts.
     values : what the texts have in braces besides; ``{range}`` is that of the same name.
     """
     text = _texts()[name]
@@ -102,7 +107,7 @@ def warn(
         text["remedy"].format(**values) if remedy is None else remedy,
     )
     sure = text["certain"] == "yes" if certain is None else certain
-    return PlausibilityWarning(problem, group or text["group"], sure)
+    return PlausibilityWarning(problem, group or text["group"], sure, name, factor)
 
 
 def file_of(cohort: Cohort, stem: str) -> str:

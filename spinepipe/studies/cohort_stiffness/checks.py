@@ -119,7 +119,7 @@ def _levels(
 
 def _cost(document: YamlDocument, study: CohortStiffness, cohort: Cohort) -> Iterator[InputProblem]:
     """Weights need SDs; the published cost knows rotations only."""
-    if study.cost == "measurement_sd" and (study.measurement_sd or cohort.measurement_sd) is None:
+    if study.cost == "measurement_sd" and cohort.reading_sd(study.measurement_sd) is None:
         found = "null, and the cohort has none"
         allowed = "SDs of one reading, here or in cohort.yaml, for cost: measurement_sd"
         remedy = "fill them in, or choose cost: published"

@@ -59,7 +59,7 @@ from spinepipe.studies.cohort_stiffness.tables import (
     SIMULATED,
 )
 from spinepipe.tables import from_rows, read_frame, write
-from spinepipe.units import COORDINATES, DEG_PER_RAD, DISPLAY_PER_SI, subtract_baseline
+from spinepipe.units import COORDINATES, DEG_PER_RAD, subtract_baseline, to_si
 
 Row = dict[str, Any]
 
@@ -288,7 +288,7 @@ def _of_joint(
     why: str,
 ) -> Iterator[tuple[Row, Row | None]]:
     """Rows of the curve and of the axis, measured and simulated, of a joint that was read."""
-    sd, zeroed = settings.measurement_sd or cohort.measurement_sd, cohort.zeroed_at_step_0
+    sd, zeroed = cohort.reading_sd(settings.measurement_sd), cohort.zeroed_at_step_0
     measured = cycle.measured[:, joint]
     if cycle.coordinate is None:
         if np.isfinite(measured).any():
@@ -304,9 +304,7 @@ def _of_joint(
         yield _refused(MEASURED, "", cycle.coordinate, told, Status.REFUSED), None
         return
     noise = None if sd is None else reading_noise(cycle.parts, 1.0, zeroed)
-    read = _Read(
-        cycle, place, known, None if sd is None else sd.rotation_deg / DEG_PER_RAD, settings
-    )
+    read = _Read(cycle, place, known, None if sd is None else float(to_si(sd)[place]), settings)
     spread = None
     if noise is not None and read.sd is not None:
         spread = replace(noise, root=read.sd * noise.root).at(known)
@@ -316,8 +314,8 @@ def _of_joint(
     root = None
     if sd is not None and noise is not None:
         # (12, 6 k) noise of the two end poses, whose steps share the unit errors of ``noise.root``
-        each: Array = np.array([sd.translation_mm] * 3 + [sd.rotation_deg] * 3) / DISPLAY_PER_SI
-        root = np.asarray(np.kron(noise.root[[first, last]], np.diag(each)), dtype=np.float64)
+        ends = np.kron(noise.root[[first, last]], np.diag(to_si(sd)))
+        root = np.asarray(ends, dtype=np.float64)
     yield row, read.axis(measured, root, np.zeros((12, 0)), MEASURED, "")
     yield _simulated(read, joint, model, why)
 

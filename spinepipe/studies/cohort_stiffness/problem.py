@@ -32,7 +32,7 @@ from spinepipe.studies.cohort_stiffness.settings import ALL, ALL_BUT, CohortStif
 from spinepipe.studies.cohort_stiffness.stiffening import free_growth, laws
 from spinepipe.studies.parts import Damping, stiffness_of_joints
 from spinepipe.studies.problem import BUSHING, stiffness_problem
-from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATES, ROTATIONS
 
 FIRST_CYCLE = 1
 SEEN = "the base model's effects have values found on this specimen, for the file has none for all"
@@ -153,11 +153,10 @@ def _weights(study: CohortStiffness, cohort: Cohort) -> Array:
     """(6,) per mm2 and deg2."""
     if study.cost == "published":
         return np.array([float(name in ROTATIONS) for name in COORDINATES])
-    sd = study.measurement_sd or cohort.measurement_sd
+    sd = cohort.reading_sd(study.measurement_sd)
     assert sd is not None  # asked for when the study was checked
-    of = dict.fromkeys(TRANSLATIONS, sd.translation_mm)
-    of |= dict.fromkeys(ROTATIONS, sd.rotation_deg)
-    return np.array([of[name] ** -2.0 if name in study.free else 0.0 for name in COORDINATES])
+    named = zip(COORDINATES, sd.tolist(), strict=True)
+    return np.array([of_one**-2.0 if name in study.free else 0.0 for name, of_one in named])
 
 
 def start_stiffness(study: CohortStiffness, cohort: Cohort, representation: str) -> Array:

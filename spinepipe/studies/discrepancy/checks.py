@@ -98,7 +98,7 @@ def _loads_of_a_rig(
 
 def _noise(document: YamlDocument, study: Discrepancy, cohort: Cohort) -> Iterator[InputProblem]:
     """Repeated cycles or declared SDs: without either nobody knows what is above the noise."""
-    if (study.measurement_sd or cohort.measurement_sd) is not None:
+    if cohort.reading_sd(study.measurement_sd) is not None:
         return
     rows = readings(cohort, study.tests, study.coordinates)
     present = measured_columns(rows)

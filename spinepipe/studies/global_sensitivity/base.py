@@ -35,7 +35,6 @@ from spinepipe.tables import from_rows, write
 from spinepipe.units import (
     COORDINATE_UNITS,
     COORDINATES,
-    DISPLAY_PER_SI,
     STIFFNESS_UNITS,
     from_si,
     subtract_baseline,
@@ -257,8 +256,5 @@ def compared(predicted: float, measured: float, noise: float) -> dict[str, Any]:
 
 def _noise(cohort: Cohort, zeroed: bool) -> Array:
     """(6,) mm and deg, SD of one number of ``motion.csv``; zeroing adds the error of step 0."""
-    sd = cohort.measurement_sd
-    if sd is None:
-        return np.zeros(len(DISPLAY_PER_SI))
-    once = np.array([sd.translation_mm] * 3 + [sd.rotation_deg] * 3)
-    return once * (np.sqrt(2.0) if zeroed else 1.0)
+    once = cohort.reading_sd()
+    return np.zeros(6) if once is None else once * (np.sqrt(2.0) if zeroed else 1.0)

@@ -11,7 +11,7 @@ from spinepipe.report.words import AXIS, unit
 from spinepipe.status import USABLE
 from spinepipe.studies.joint_pose_sensitivity.retained import place_of
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.units import COORDINATES
 
 MISSED = 10.0
 """Percent of the measured motion: a larger error is told as missed."""
@@ -79,11 +79,8 @@ def _agreement(
     known = errors[errors["median"].notna() & errors["percent_of_measured"].notna()]
     if known.empty:
         return
-    sd = cohort.measurement_sd
-    reading = dict.fromkeys(COORDINATES, 0.0)
-    if sd is not None:
-        reading |= dict.fromkeys(TRANSLATIONS, sd.translation_mm or 0.0)
-        reading |= dict.fromkeys(ROTATIONS, sd.rotation_deg or 0.0)
+    sd = cohort.reading_sd()
+    reading = dict(zip(COORDINATES, [0.0] * 6 if sd is None else sd.tolist(), strict=True))
     above = known[known["median"] > 2.0 * known["coordinate"].map(reading)]
     if (known["maximum"] < ROUNDING).all() or above.empty:
         yield Conclusion("agreement", "within" if above.empty else "exact")

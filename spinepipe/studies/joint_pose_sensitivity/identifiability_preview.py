@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from spinepipe.calibration.uncertainty import Rank, rank_at_start
 from spinepipe.cohort import Cohort
 from spinepipe.model import RefusedModel
@@ -36,8 +34,8 @@ def told(
 
 
 def _rank(study: JointPoseSensitivity, cohort: Cohort, root: Path, specimen: str) -> Rank:
-    sd = cohort.measurement_sd
-    noise = None if sd is None else to_si(np.repeat([sd.translation_mm, sd.rotation_deg], 3))
+    sd = cohort.reading_sd()
+    noise = None if sd is None else to_si(sd)
     try:
         problem = calibration_problem(str(root), study, specimen)
         return rank_at_start(problem, noise, study.calibration.identifiable_below)

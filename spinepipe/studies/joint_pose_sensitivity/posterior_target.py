@@ -24,7 +24,7 @@ from spinepipe.statics import free_parameters
 from spinepipe.studies.joint_pose_sensitivity.landmarks import Landmarks
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
-from spinepipe.units import DISPLAY_PER_SI, TRANSLATIONS
+from spinepipe.units import TRANSLATIONS, to_si
 
 
 @dataclass(frozen=True)
@@ -137,11 +137,8 @@ class SpecimenPosterior:
     @property
     def noise(self) -> ResidualNoise:
         """Of the residuals, as the study says; of readings zero where no SD is declared."""
-        declared, sd = self.cohort.measurement_sd, np.zeros(6)  # m and rad, of one reading
-        if declared is not None:
-            known = [declared.translation_mm] * 3 + [declared.rotation_deg] * 3
-            sd = np.array(known) / DISPLAY_PER_SI
-        return noise_of(self.evaluator, sd, self.scatter)
+        sd = self.cohort.reading_sd()
+        return noise_of(self.evaluator, to_si(np.zeros(6) if sd is None else sd), self.scatter)
 
     @cached_property
     def unknowns(self) -> StiffnessAndLandmarks:

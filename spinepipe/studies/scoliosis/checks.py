@@ -23,6 +23,7 @@ from spinepipe.studies.scoliosis.films import (
     Film,
     by_reading,
     film_readings,
+    run_around,
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -62,7 +63,7 @@ def check_scoliosis(
             place = _FilmPlace(file, patient, position)
             faults = list(_film(cohort, place, film))
             yield from faults
-            if not faults:
+            if not faults and not run_around(film):  # which `plausibility` tells
                 shapes[position] = Film(*film_readings(film, cohort.vertebrae).mean(axis=0))
                 yield from _tilts(place, film, cohort.vertebrae, shapes[position])
         # then what films of one patient say of each other

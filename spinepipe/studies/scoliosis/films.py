@@ -154,8 +154,11 @@ def _of_corners(rows: pd.DataFrame) -> Film:
     corner = corners(rows)
     start, across = corner["upper_left"], corner["lower_right"] - corner["upper_left"]
     other, back = corner["upper_right"], corner["lower_left"] - corner["upper_right"]
-    # start + share across = other + s back, by Cramer's rule
-    share = _cross(other - start, back) / _cross(across, back)
+    # start + share across = other + s back, by Cramer's rule; the middle of a diagonal where they
+    # are parallel, as those of corners in another order are, which `plausibility` tells
+    turn = _cross(across, back)
+    share = np.full(len(turn), 0.5)
+    np.divide(_cross(other - start, back), turn, out=share, where=turn != 0.0)
     centre = start + share[:, None] * across
     # twice the line from the centre of the lower endplate to that of the upper one
     axis = (corner["upper_left"] + corner["upper_right"]) - (
@@ -172,6 +175,13 @@ def corners(rows: pd.DataFrame) -> dict[str, Array]:
         for end in ("upper", "lower")
         for side in ("left", "right")
     }
+
+
+def run_around(rows: pd.DataFrame) -> bool:
+    """Whether endplates run against each other: corners listed around the vertebra."""
+    corner = corners(rows)
+    upper, lower = (corner[f"{end}_left"] - corner[f"{end}_right"] for end in ("upper", "lower"))
+    return bool(np.median(np.sum(upper * lower, axis=1)) < 0.0)  # False where there are none
 
 
 def _cross(one: Array, other: Array) -> Array:

@@ -21,6 +21,7 @@ from spinepipe.studies.scoliosis.films import (
     by_reading,
     corners,
     film_of_rows,
+    run_around,
 )
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -136,8 +137,19 @@ def _tilts(films: list[Film]) -> _Fault | None:
 
 
 def _corners(rows: pd.DataFrame) -> _Fault | None:
-    """Upper corners below lower ones, left ones to the right."""
+    """Corners around the vertebra, upper ones below lower ones, left ones to the right."""
     corner = corners(rows)
+    if run_around(rows):
+        middle = np.mean(list(corner.values()), axis=0)
+        held = {}
+        for name, points in corner.items():
+            y, z = np.median(points - middle, axis=0)
+            held[name] = f"{'upper' if z > 0.0 else 'lower'}_{'left' if y > 0.0 else 'right'}"
+        pairs = [f"{name} has the corner {one}" for name, one in held.items() if name != one]
+        if len(set(held.values())) < len(held):  # leaning too far for their places to tell
+            pairs = ["columns do not have the corners of their names"]
+        words = f"suspected: corners listed around the vertebra; {', '.join(pairs)}: rename them"
+        return _Fault("corners_around", CORNERS[4], words)
     upper = corner["upper_left"] + corner["upper_right"]
     lower = corner["lower_left"] + corner["lower_right"]
     left = corner["upper_left"] + corner["lower_left"]

@@ -112,6 +112,20 @@ def test_thirty_differences_between_cycles_tell_the_noise(count: int, source: st
         assert estimated_noise([read(cycles)], None, False, 0) is None
 
 
+@sweep("accuracy, share", [(0.5, 1.0), (2.0, None)])
+def test_what_repeats_do_not_show_counts_where_it_is_larger(
+    accuracy: float, share: float | None
+) -> None:
+    cycles = np.random.default_rng(20031).normal(size=(2, 40, 1))
+    alone = estimated_noise([read(cycles)], None, False, 0)
+    found = estimated_noise([read(cycles)], None, False, 0, np.full(6, accuracy))
+    assert alone is not None
+    assert found is not None
+    assert found.sd[3] == (2.0 if share is None else share * alone.sd[3])
+    assert np.isnan(np.delete(found.sd, 3)).all()
+    assert found.correlation == alone.correlation
+
+
 def test_three_cycles_have_two_differences_a_step() -> None:
     cycles = np.random.default_rng(20032).normal(size=(3, 15, 1))
     found = estimated_noise([read(cycles)], None, False, 0)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pytest
 from scoliosis_cases import scaled
 from sweeps import sweep
 
@@ -16,7 +17,7 @@ from spinepipe.plausibility.score import table
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PACKAGE
 from spinepipe.studies.scoliosis import checks, plausibility
-from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film
+from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, Film, film_of_rows
 
 LEVELS = ("L4", "L3", "L2", "L1")
 PLACE = checks._FilmPlace("ais/films.csv", "p1", "erect")
@@ -265,6 +266,32 @@ def test_corners_are_where_their_names_say(turn: float, mirror: float, column: s
 def test_mirrored_corners_are_told_apart_from_bodies_on_their_sides() -> None:
     told = plausibility._corners(boxes(0, -1)), plausibility._corners(boxes(61))
     assert [one and one.warning for one in told] == ["corners_left_right", "corners_aside"]
+
+
+@sweep(
+    "listed, told",
+    [
+        # names in the order in which the columns hold them, from the upper left corner on
+        ("upper_left upper_right lower_right lower_left", "lower_left has the corner lower_right"),
+        ("upper_left lower_left lower_right upper_right", "upper_right has the corner lower_left"),
+        ("lower_right lower_left upper_left upper_right", "upper_left has the corner lower_right"),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_corners_listed_around_the_body_are_told_and_divide_by_nothing(
+    listed: str, told: str
+) -> None:
+    sound = boxes(7)
+    made = sound.copy()
+    names = ("upper_left", "upper_right", "lower_left", "lower_right")
+    for name, held in zip(names, listed.split(), strict=True):
+        for axis in "yz":
+            made[f"{name}_{axis}_mm"] = sound[f"{held}_{axis}_mm"]
+    found = plausibility._corners(made)
+    assert found is not None
+    assert found.warning == "corners_around"
+    assert told in str(found.remedy)
+    film_of_rows(made.assign(vertebra=LEVELS[:3]), LEVELS[:3])
 
 
 @sweep("largest, told", [(3.1, True), (3.2, False), (0.01, True), (0.0, False), (50.0, False)])

@@ -38,7 +38,7 @@ from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResul
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, DEG_PER_RAD, MM_PER_M
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, to_si
 
 GUESSED_SD = np.array([1e-3] * 3 + [np.deg2rad(1.0)] * 3)
 """For the first fit of a cohort that declares no SD and whose cycles differ in their loads."""
@@ -95,18 +95,17 @@ def prepare(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepa
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
         if name in (study.coordinates or COORDINATES) and motion[column].notna().any()
     )
-    sd, declared = study.measurement_sd or cohort.measurement_sd, None
-    if sd is not None:
-        translation, rotation = sd.translation_mm / MM_PER_M, sd.rotation_deg / DEG_PER_RAD
-        declared = np.array([translation] * 3 + [rotation] * 3)
+    sd = cohort.reading_sd(study.measurement_sd)
+    declared = None if sd is None else to_si(sd)
+    accuracy = to_si(cohort.accuracy_sd)
     # in an order of their own: how a cohort lists them says nothing, and changes no verdict
     tests, names = sorted(study.tests or cohort.tests), sorted(cohort.specimen_names)
     every = (specimen_readings(cohort, s, tests, coordinates) for s in names)
     measured = tuple(one for one in every if one.tests)
     readings, outliers = without_outliers(measured)
-    noise = estimated_noise(readings, declared, cohort.zeroed_at_step_0, outliers)
+    noise = estimated_noise(readings, declared, cohort.zeroed_at_step_0, outliers, accuracy)
     if noise is None:  # cycles of unequal loads may still tell, once the base is fitted
-        noise = estimated_noise(readings, GUESSED_SD, cohort.zeroed_at_step_0, outliers)
+        noise = estimated_noise(readings, GUESSED_SD, cohort.zeroed_at_step_0, outliers, accuracy)
     assert noise is not None
     return Prepared(study, cohort, file, coordinates, measured, readings, noise, declared)
 

@@ -8,7 +8,7 @@ residuals are noise.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,7 @@ class Noise:
     correlation : of neighbouring steps. source : ``repeats`` or ``declared``.
     differences : independent differences between cycles behind it, per coordinate (6,).
     outliers : readings left out.
+    accuracy : (6,) m and rad, which no SD is below; NaN where it is not told.
     """
 
     sd: Array
@@ -62,6 +63,7 @@ class Noise:
     differences: NDArray[np.int64]
     outliers: int
     zeroed: bool
+    accuracy: Array = field(default_factory=lambda: np.full(6, np.nan))
 
     def correlations(self, steps: int) -> Array:
         """(T, T) covariance of the readings of one cycle in units of SD squared, zeroed or not."""
@@ -74,23 +76,29 @@ class Noise:
 
 
 def estimated_noise(
-    specimens: Sequence[SpecimenReadings], declared: Array | None, zeroed: bool, outliers: int
+    specimens: Sequence[SpecimenReadings],
+    declared: Array | None,
+    zeroed: bool,
+    outliers: int,
+    accuracy: Array | None = None,
 ) -> Noise | None:
     """Noise from the repeats; where these are too few, as ``declared`` (6,) and doubted.
 
-    None when neither is there.
+    None when neither is there. ``accuracy`` (6,) counts where it is larger than repeats tell.
     """
+    floor = np.full(6, np.nan) if accuracy is None else accuracy
     contrasts = _contrasts(specimens)
     counts = np.array([sum(len(c) * c.shape[1] for c in contrasts[k]) for k in range(6)])
     tests = [test for one in specimens for test in one.tests]
     read = np.array([any(test.count[..., k].any() for test in tests) for k in range(6)])
     if np.all(counts[read] >= FEWEST):
         sd, correlation = _most_likely(contrasts, zeroed)
-        return Noise(np.where(read, sd, np.nan), correlation, REPEATS, counts, outliers, zeroed)
+        sd = np.where(read, np.fmax(sd, floor), np.nan)
+        return Noise(sd, correlation, REPEATS, counts, outliers, zeroed, floor)
     if declared is None:
         return None
     sd = np.where(read, DECLARED_DOUBT * declared, np.nan)
-    return Noise(sd, 0.0, DECLARED, counts, outliers, zeroed)
+    return Noise(sd, 0.0, DECLARED, counts, outliers, zeroed, floor)
 
 
 def _contrasts(specimens: Sequence[SpecimenReadings]) -> list[list[Array]]:
@@ -156,7 +164,7 @@ def noise_of_residuals(
     """
     residuals = [_residuals(one, predicted[name]) for name, one in readings.items()]
     kept, outliers = without_outliers(residuals)
-    found = estimated_noise(kept, None, noise.zeroed, noise.outliers + outliers)
+    found = estimated_noise(kept, None, noise.zeroed, noise.outliers + outliers, noise.accuracy)
     if found is None or found.source != REPEATS:
         return dict(readings), noise
     names = readings.items()
