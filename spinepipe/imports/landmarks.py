@@ -5,7 +5,6 @@ and mm; older `.fcsv` tell their axes by a number.
 """
 
 import csv
-import glob
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,6 +22,7 @@ from spinepipe.documents.settings import validate
 from spinepipe.documents.text import MOST_CSV_BYTES, read_bytes, read_text
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
+from spinepipe.imports.file_patterns import with_files
 from spinepipe.imports.imported import ImportedCohort, ImportSettings, assembled, rounded
 from spinepipe.problems import InputError, InputProblem, did_you_mean
 from spinepipe.report.words import count
@@ -110,32 +110,31 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     InputError
         With every problem of the settings, else of all files, else of the cohort they make.
     """
-    settings, problems = validate(LandmarkSettings, document)
-    if settings is None:
-        raise InputError(problems)
+    expanded, numbers, problems = with_files(folder, document, ("specimen", "vertebra"))
+    settings, faults = validate(LandmarkSettings, expanded)
+    if settings is None or problems:
+        raise InputError([*problems, *faults])
     found, unread = dict[str, Landmarks](), dict[str, list[str]]()
-    for number, of in enumerate(settings.files):
-        matched = list(_matched(folder, of))
-        if not matched:
+    for number, of in zip(numbers, settings.files, strict=True):
+        if not of.file or not of.specimen:
             place = (document.file, document.line_of(f"files.{number}"), f"files.{number}")
-            lacking = f"no file '{of.glob}'" if of.glob else "a file of nobody"
-            remedy = "name `file` and `specimen`, or a `glob` with {specimen} that files follow"
-            problems.append(InputProblem(*place, lacking, "files and whose", remedy))
-        for specimen, vertebra, file in matched:
-            points, faults = read_points(folder / file, file)
-            problems += faults
-            landmarks = found.setdefault(specimen, {})
-            for point in points:
-                key = _meant(point.label, vertebra, settings)
-                if key is None or point.place is None:
-                    why = "" if point.place is not None else " (not placed)"
-                    unread.setdefault(specimen, []).append(point.label + why)
-                elif key in landmarks:
-                    told = f"'{point.label}' a second time, after {landmarks[key].file}"
-                    where, remedy = (point.file, point.line, None), "delete or rename one of them"
-                    problems.append(InputProblem(*where, told, "each point once", remedy))
-                else:
-                    landmarks[key] = point
+            remedy = "name `file` and `specimen`, or a `glob` with {specimen}"
+            problems.append(InputProblem(*place, "a file of nobody", "files and whose", remedy))
+            continue
+        points, faults = read_points(folder / of.file, of.file)
+        problems += faults
+        landmarks = found.setdefault(of.specimen, {})
+        for point in points:
+            key = _meant(point.label, of.vertebra, settings)
+            if key is None or point.place is None:
+                why = "" if point.place is not None else " (not placed)"
+                unread.setdefault(of.specimen, []).append(point.label + why)
+            elif key in landmarks:
+                told = f"'{point.label}' a second time, after {landmarks[key].file}"
+                where, remedy = (point.file, point.line, None), "delete or rename one of them"
+                problems.append(InputProblem(*where, told, "each point once", remedy))
+            else:
+                landmarks[key] = point
     place = (document.file, document.line_of("files"), "files")
     for specimen, landmarks in found.items():
         problems += _lacking(place, settings, specimen, landmarks, unread.get(specimen, []))
@@ -154,21 +153,6 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     files = ", ".join(dict.fromkeys(point.file for *_, point in picked))
     origins = {"landmarks": [(point.file, point.line) for *_, point in picked]}
     return assembled(settings, f"{files}. {POSTURE}", tables, sentences, origins)
-
-
-def _matched(folder: Path, of: LandmarkFiles) -> Iterator[tuple[str, str, str]]:
-    """Specimen, vertebra (empty: not told) and path of every file that is meant."""
-    pattern, stars = re.escape(of.glob).replace(r"\*", "[^/]*"), of.glob
-    for name in ("specimen", "vertebra"):
-        pattern = pattern.replace(rf"\{{{name}\}}", f"(?P<{name}>[^/]+?)", 1)
-        pattern = pattern.replace(rf"\{{{name}\}}", f"(?P={name})")
-        stars = stars.replace(f"{{{name}}}", "*")
-    for file in [of.file] if of.file else sorted(glob.glob(stars, root_dir=folder)):
-        told = {"specimen": of.specimen, "vertebra": of.vertebra}
-        match = re.fullmatch(pattern, file)
-        told |= match.groupdict() if match else {}
-        if told["specimen"]:
-            yield told["specimen"], told["vertebra"], file
 
 
 def read_points(path: Path, file: str) -> tuple[list[PickedPoint], list[InputProblem]]:

@@ -12,6 +12,7 @@ from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.imports.file_patterns import with_files
 from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
@@ -29,7 +30,6 @@ from spinepipe.testing_machine.check_settings import check_mapping
 from spinepipe.testing_machine.clocks import read_test
 from spinepipe.testing_machine.conversions import converted
 from spinepipe.testing_machine.conversions import sentences as of_conversions
-from spinepipe.testing_machine.file_patterns import with_files
 from spinepipe.testing_machine.load_steps import (
     ReadingPrecision,
     ResampledTest,
@@ -89,7 +89,7 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
     InputError
         With every problem of the settings, else of all files, else of all tests.
     """
-    expanded, numbers, problems = with_files(folder, document)
+    expanded, numbers, problems = with_files(folder, document, ("specimen", "test"))
     mapping, faults = validate(MachineMapping, expanded)
     if mapping is not None and not problems:
         faults += check_mapping(expanded, mapping)

@@ -214,12 +214,12 @@ def _numbers(
     if table.form.empty_cells == "left_out":
         gaps = [at for at, (one, _) in enumerate(there) if isinstance(one, MotionChannel)]
         empty = {at: list[int]() for at in gaps if bad[at].size}
-        for number, (_, row) in enumerate(table.rows() if empty else ()):
-            for at, rows in empty.items():
-                if not cell_at(row, places[at]):
-                    rows.append(number)
-        for at, rows in empty.items():
-            bad[at] = np.setdiff1d(bad[at], rows)
+        for number, (_, texts) in enumerate(table.rows() if empty else ()):
+            for at, gap in empty.items():
+                if not cell_at(texts, places[at]):
+                    gap.append(number)
+        for at, gap in empty.items():
+            bad[at] = np.setdiff1d(bad[at], gap)
     if not any(one.size for one in bad):
         return lines, columns, [], notes
     # once more through the rows: the first bad cell of each column, and how numbers are written

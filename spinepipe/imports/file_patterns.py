@@ -1,7 +1,7 @@
 """Patterns of file names in the YAML, `glob:`, as the files that they match."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from glob import glob
@@ -13,7 +13,6 @@ from typing import Any
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem, one_of
 
-FIELDS = ("specimen", "test")
 MOST_LOOKED_AT = 5_000
 """Files among which the nearest names are sought."""
 
@@ -22,12 +21,16 @@ Fault = tuple[str, str, str]
 
 
 def with_files(
-    folder: Path, document: YamlDocument
+    folder: Path, document: YamlDocument, fields: Sequence[str]
 ) -> tuple[YamlDocument, tuple[int, ...], list[InputProblem]]:
     """The document with an item of `files` for each file that a pattern matches.
 
     Also the number of the item in the YAML for each of them, and problems: a pattern without a
     match, one that can be read in two ways, a file that two items name.
+
+    Parameters
+    ----------
+    fields : what names may tell, in braces.
     """
     entries = document.data.get("files")
     if not isinstance(entries, list):
@@ -43,7 +46,7 @@ def with_files(
         made: list[Any] = [entry]
         faults: list[Fault] = []
         if isinstance(entry, dict) and isinstance(entry.get("glob"), str):
-            found = list(_matches(folder, entry["glob"], entry))
+            found = list(_matches(folder, entry["glob"], entry, fields))
             made = [{**entry, **one} for one in found if isinstance(one, dict)]
             faults = [one for one in found if isinstance(one, tuple)]
         for item in made:
@@ -61,15 +64,17 @@ def with_files(
     return replace(document, data=data, lines=lines), tuple(numbers), problems
 
 
-def _matches(folder: Path, pattern: str, told: dict[str, Any]) -> Iterator[dict[str, str] | Fault]:
+def _matches(
+    folder: Path, pattern: str, told: dict[str, Any], known: Sequence[str]
+) -> Iterator[dict[str, str] | Fault]:
     """`file` and what its name says, for each match in natural order.
 
     ``told`` : what stands beside the pattern.
     """
     fields = re.findall(r"\{(\w*)\}", pattern)
     for name in dict.fromkeys(fields):
-        if name not in FIELDS:
-            yield f"'{{{name}}}'", one_of(f"{{{one}}}" for one in FIELDS), "correct the pattern"
+        if name not in known:
+            yield f"'{{{name}}}'", one_of(f"{{{one}}}" for one in known), "correct the pattern"
     for name in ("file", *fields):
         if name in told:
             yield f"`{name}` beside a pattern that tells it", "one of them", "delete one of them"
@@ -84,7 +89,8 @@ def _matches(folder: Path, pattern: str, told: dict[str, Any]) -> Iterator[dict[
             words = " or ".join(
                 ", ".join(f"{k} '{v}'" for k, v in one.items()) for one in (read, other)
             )
-            remedy = "write the test into the pattern instead, `test:` beside it; one for each test"
+            last = known[-1]
+            remedy = f"write the {last} into the pattern instead, `{last}:` beside it; one for each"
             yield f"{name}: {words}", "names that are read in one way", remedy
         yield {"file": name, **read}
     if not names:
