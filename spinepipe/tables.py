@@ -4,6 +4,7 @@ A file is only believed as it was written: each has checksums of its pages, whic
 verify, and a digest of all its bytes, so of the names, types and values of all columns.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,11 @@ TYPES = {
     "flag": pa.bool_(),
 }
 
+_PART = re.compile(r"([a-z_]+)-(.+)")
+"""A folder's or a file's name that tells a value. With ``=`` in place of ``-`` readers would make
+it a column of their own, of numbers where the value is of digits (docs/decisions/0063).
+"""
+
 SMALL_ROWS = 1000
 """Files of fewer rows are mostly footer: packing them costs time and gains nothing."""
 
@@ -44,14 +50,29 @@ def arrow_schema(table: Table) -> pa.Schema:
     )
 
 
-def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
+def place_of(path: str | Path) -> dict[str, str]:
+    """The ``name-value`` parts of a path, its suffix left out."""
+    parts = str(path).removesuffix(".parquet").split("/")
+    return {found[1]: found[2] for part in parts if (found := _PART.fullmatch(part))}
+
+
+def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]], path: str | Path = "") -> pa.Table:
     """Columns (NaN or None for empty cells) as a table that keeps the schema.
+
+    Parameters
+    ----------
+    path : the file they are for; of columns that are not given, its folders' names tell the value.
 
     Raises
     ------
     BadTable
         For a missing or extra column, an empty, infinite or out-of-range cell, or a double key.
     """
+    n = max(map(len, columns.values()), default=0)
+    for name, value in place_of(path).items():
+        if name in table.names and name not in columns:
+            kind = TYPES[table.column(name).type]
+            columns = {**columns, name: pa.repeat(pa.scalar(value).cast(kind), n)}
     if set(columns) != set(table.names):
         raise BadTable(f"{table.name}: columns differ: {sorted(set(columns) ^ set(table.names))}")
     arrays = [_array(table.name, column, columns[column.name]) for column in table.columns]
@@ -62,9 +83,7 @@ def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
 
 def _check_keys(table: Table, rows: pa.Table) -> None:
     keys = list(table.key)
-    if not keys:  # all of it is in the names of folders: one row at most
-        distinct = min(1, rows.num_rows)
-    elif rows.num_rows < SMALL_ROWS:
+    if rows.num_rows < SMALL_ROWS:
         distinct = len(set(zip(*(rows[key].to_pylist() for key in keys), strict=True)))
     else:
         distinct = rows.group_by(keys).aggregate([]).num_rows
@@ -225,12 +244,14 @@ def read_frames(paths: Sequence[str | Path]) -> dict[str, pd.DataFrame]:
     return StudyTables.read(paths)
 
 
-def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]]) -> pa.Table:
-    """Rows as a table that keeps the schema.
+def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]], path: str | Path = "") -> pa.Table:
+    """Rows as a table that keeps the schema; of what they lack, ``path`` tells the value.
 
     Raises
     ------
     BadTable
         As `to_arrow` does.
     """
-    return to_arrow(table, {name: [row[name] for row in rows] for name in table.names})
+    told = place_of(path)
+    names = [name for name in table.names if name not in told]
+    return to_arrow(table, {name: [row[name] for row in rows] for name in names}, path)

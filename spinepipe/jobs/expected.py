@@ -20,6 +20,7 @@ from spinepipe.studies.read import check
 from spinepipe.studies.registry import files_of, kind_of
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import StudyFiles
+from spinepipe.tables import place_of
 
 Place = Mapping[str, str]
 """Wildcards of a job: specimen, pose and what else its files' names say."""
@@ -163,9 +164,3 @@ class Expected:
         """The model files that the study makes."""
         names = [name for name in self.files.others if name.endswith(".yaml")]
         return [Path(self.root, self.files.folder, name) for name in names]
-
-
-def place_of(path: str) -> dict[str, str]:
-    """The ``name=value`` parts of a path, its suffix left out."""
-    parts = path.removesuffix(".parquet").split("/")
-    return dict(part.split("=", 1) for part in parts if "=" in part)

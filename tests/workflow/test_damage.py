@@ -19,17 +19,17 @@ POSES = "joint_pose_sensitivity"
 
 
 def simulation(pose: int, stiffness: str) -> str:
-    return f"{POSES}/jobs/specimen=s01/pose={pose:04d}/stiffness={stiffness}.parquet"
+    return f"{POSES}/jobs/specimen-s01/pose-{pose:04d}/stiffness-{stiffness}.parquet"
 
 
 FLIPPED, CUT = simulation(0, "best01"), simulation(2, "best01")
 LATE = f"{POSES}/calibrations.parquet"
 PICKLED = simulation(0, "best02")
 RANKED = f"{POSES}/best.json"
-BLOCK = f"{POSES}/blocks/simulations/specimen=s01/block=001.parquet"
+BLOCK = f"{POSES}/blocks/simulations/specimen-s01/block-001.parquet"
 
-FIT = "cohort_stiffness/fits/specimen=b/representation=per_joint/fitted_to=flexion"
-MOVED = "range_of_motion/jobs/specimen=b/pose=0001/stiffness=00.parquet"
+FIT = "cohort_stiffness/fits/specimen-b/representation-per_joint/fitted_to-flexion"
+MOVED = "range_of_motion/jobs/specimen-b/pose-0001/stiffness-00.parquet"
 MOTION = "tracking/opensim/a/flexion_extension/optk_generic.mot"
 LOST = (f"{FIT}/stiffness.parquet", MOVED, MOTION)
 OF_FIT = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors", "nuisances")}

@@ -2,8 +2,8 @@
 # The jobs stand in spinepipe/studies/cohort_stiffness.
 
 COHORTS = results_of("cohort_stiffness")
-OWN = "specimen={specimen}/representation={representation}/fitted_to={fitted_to}"
-POOL = "representation={representation}/fitted_to={fitted_to}/without={without}"
+OWN = "specimen-{specimen}/representation-{representation}/fitted_to-{fitted_to}"
+POOL = "representation-{representation}/fitted_to-{fitted_to}/without-{without}"
 
 
 wildcard_constraints:
@@ -18,10 +18,10 @@ rule literature:
         PROJECT.base_model,
     output:
         **tables_in(
-            f"{COHORTS}/literature/specimen={{specimen}}", "stiffness", "errors", "sign_checks"
+            f"{COHORTS}/literature/specimen-{{specimen}}", "stiffness", "errors", "sign_checks"
         ),
     log:
-        f"{LOGS}/literature/specimen={{specimen}}.log",
+        f"{LOGS}/literature/specimen-{{specimen}}.log",
     params:
         digest=digest("literature"),
     run:
@@ -82,10 +82,10 @@ rule experiment:
         fitted=lambda wildcards: layout(wildcards.study).simulated_fit(wildcards.specimen),
     output:
         **tables_in(
-            f"{COHORTS}/experiment/specimen={{specimen}}", "load_displacement", "helical_axes"
+            f"{COHORTS}/experiment/specimen-{{specimen}}", "load_displacement", "helical_axes"
         ),
     log:
-        f"{LOGS}/experiment/specimen={{specimen}}.log",
+        f"{LOGS}/experiment/specimen-{{specimen}}.log",
     params:
         digest=digest("experiment"),
     run:

@@ -13,7 +13,7 @@ PROJECT = Project(os.getcwd())
 run_job = partial(run.run_job, PROJECT)
 RESULTS = "results/{study}"
 LOGS = "results/{study}/logs"
-OF_BLOCK = "specimen={specimen}/block={block}"
+OF_BLOCK = "specimen-{specimen}/block-{block}"
 
 # Jobs that serve every kind of study.
 BLOCK = run.BLOCK

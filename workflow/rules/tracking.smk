@@ -2,7 +2,7 @@
 # The jobs stand in spinepipe/studies/tracking.
 
 TRACKED = results_of("tracking")
-PERSON = f"{TRACKED}/jobs/specimen={{specimen}}"
+PERSON = f"{TRACKED}/jobs/specimen-{{specimen}}"
 
 
 # Passive elements from the trials of one kind, or of two kinds together.
@@ -10,9 +10,9 @@ rule calibrate_passive:
     input:
         outdated("calibrate_passive", "calibrate"),
     output:
-        output=update(f"{PERSON}/law={{law,[a-z_]+}}/stiffness.parquet"),
+        output=update(f"{PERSON}/law-{{law,[a-z_]+}}/stiffness.parquet"),
     log:
-        f"{LOGS}/calibrate_passive/specimen={{specimen}}/{{law}}.log",
+        f"{LOGS}/calibrate_passive/specimen-{{specimen}}/{{law}}.log",
     params:
         digest=digest("calibrate"),
     run:
@@ -27,13 +27,13 @@ rule track:
         ),
     output:
         **tables_in(
-            f"{PERSON}/trial={{trial}}/approach={{approach,[a-z_0-9]+}}",
+            f"{PERSON}/trial-{{trial}}/approach-{{approach,[a-z_0-9]+}}",
             "tracked",
             "fits",
             "drawn",
         ),
     log:
-        f"{LOGS}/track/specimen={{specimen}}/trial={{trial}}/{{approach}}.log",
+        f"{LOGS}/track/specimen-{{specimen}}/trial-{{trial}}/{{approach}}.log",
     params:
         digest=digest("track"),
     run:
@@ -45,12 +45,12 @@ rule profile_stiffness:
         outdated("profile_stiffness", "profile"),
     output:
         **tables_in(
-            f"{PERSON}/region={{region}}/coordinate={{coordinate,[a-z_]+}}",
+            f"{PERSON}/region-{{region}}/coordinate-{{coordinate,[a-z_]+}}",
             "profiles",
             "profile_points",
         ),
     log:
-        f"{LOGS}/profile_stiffness/specimen={{specimen}}/{{region}}_{{coordinate}}.log",
+        f"{LOGS}/profile_stiffness/specimen-{{specimen}}/{{region}}_{{coordinate}}.log",
     params:
         digest=digest("profile"),
     run:
@@ -63,7 +63,7 @@ rule weigh_loads:
     output:
         output=update(f"{PERSON}/weights.parquet"),
     log:
-        f"{LOGS}/weigh_loads/specimen={{specimen}}.log",
+        f"{LOGS}/weigh_loads/specimen-{{specimen}}.log",
     params:
         digest=digest("weigh"),
     run:
@@ -77,7 +77,7 @@ rule examine_recordings:
     output:
         **tables_in(PERSON, "clusters", "remarks", "sizes"),
     log:
-        f"{LOGS}/examine_recordings/specimen={{specimen}}.log",
+        f"{LOGS}/examine_recordings/specimen-{{specimen}}.log",
     params:
         digest=digest("examine"),
     run:
@@ -91,7 +91,7 @@ rule export_skeleton:
     output:
         output=update(f"{TRACKED}/opensim/{{specimen}}.osim"),
     log:
-        f"{LOGS}/export_skeleton/specimen={{specimen}}.log",
+        f"{LOGS}/export_skeleton/specimen-{{specimen}}.log",
     params:
         digest=digest("skeleton"),
     run:
@@ -101,11 +101,11 @@ rule export_skeleton:
 rule export_motion:
     input:
         outdated("export_motion", "motion"),
-        tracked=f"{RESULTS}/jobs/specimen={{specimen}}/trial={{trial}}/approach={{approach}}/tracked.parquet",
+        tracked=f"{RESULTS}/jobs/specimen-{{specimen}}/trial-{{trial}}/approach-{{approach}}/tracked.parquet",
     output:
         output=update(f"{TRACKED}/opensim/{{specimen}}/{{trial}}/{{approach,[a-z_0-9]+}}.mot"),
     log:
-        f"{LOGS}/export_motion/specimen={{specimen}}/trial={{trial}}/{{approach}}.log",
+        f"{LOGS}/export_motion/specimen-{{specimen}}/trial-{{trial}}/{{approach}}.log",
     params:
         digest=digest("motion"),
     run:

@@ -44,7 +44,7 @@ from spinepipe.studies.cohort_stiffness.stiffening import (
     laws,
     status_with_growth,
 )
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, NUISANCES, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, NUISANCES, STIFFNESS
 from spinepipe.studies.problem import BUSHING
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES
@@ -76,7 +76,7 @@ def run(
     made = origin("fit", root, settings, cohort, [specimen])
     paths = {STIFFNESS: stiffness, FITS: fits, ERRORS: errors, NUISANCES: nuisances}
     for table, path in paths.items():
-        write(from_rows(table.without(*IN_FOLDERS), rows[table.name]), path, made)
+        write(from_rows(table, rows[table.name], path), path, made)
 
 
 def fitted(

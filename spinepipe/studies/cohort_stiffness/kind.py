@@ -153,13 +153,13 @@ class CohortLayout(StudyFiles):
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        own = f"specimen={specimen}"
+        own = f"specimen-{specimen}"
         if block == POOLED_BLOCK:
             folds = [(label, NOBODY) for label in self.load_sets]
             if self._held_out:
                 folds += product(self._without_case_folds, self.specimens)
             places = [
-                f"pooled/representation={representation}/fitted_to={label}/without={one}"
+                f"pooled/representation-{representation}/fitted_to-{label}/without-{one}"
                 for representation in self._pooled
                 for label, one in folds
             ]
@@ -181,7 +181,7 @@ class CohortLayout(StudyFiles):
             f"{self.folder}/{place}/stiffness.parquet"
             for name in self.specimens
             if name != specimen
-            for place in _fitted(f"fits/specimen={name}", [representation], [fitted_to])
+            for place in _fitted(f"fits/specimen-{name}", [representation], [fitted_to])
         ]
 
     def simulated_fit(self, specimen: str) -> list[str]:
@@ -189,7 +189,7 @@ class CohortLayout(StudyFiles):
         name = finest(self.representations)
         if name is None:
             return []
-        (place,) = _fitted(f"fits/specimen={specimen}", [name], [joint_label(self.tests)])
+        (place,) = _fitted(f"fits/specimen-{specimen}", [name], [joint_label(self.tests)])
         return [f"{self.folder}/{place}/stiffness.parquet"]
 
     @property
@@ -221,7 +221,7 @@ class CohortLayout(StudyFiles):
 def _fitted(folder: str, representations: Iterable[str], labels: Iterable[str]) -> list[str]:
     """Places of what is fitted of a specimen: each representation to each load set."""
     return [
-        f"{folder}/representation={representation}/fitted_to={label}"
+        f"{folder}/representation-{representation}/fitted_to-{label}"
         for representation, label in product(representations, labels)
     ]
 

@@ -50,9 +50,6 @@ NOBODY_FITTED = "no specimen has motion to fit"
 DECIDED = 0.5
 """Share of a newcomer's variance below which a specimen's own readings decide."""
 
-IN_POOLED = ("representation", "fitted_to")
-"""Columns that the folders of a file of one pooled fit carry."""
-
 _OF_SPREADS = (
     *("centre", "between_levels", "between_specimens", "between_joints", "scatter"),
     *("effective_unknowns", "log_likelihood", *SPREAD_CELLS),
@@ -85,8 +82,7 @@ def run(
     made = origin("pool", root, settings, cohort)
     paths = {STIFFNESS: stiffness, ERRORS: errors, FITS: fits, POOLING: pooling}
     for table, path in paths.items():
-        shape = table.without(*IN_POOLED, *(("without",) if table is POOLING else ()))
-        write(from_rows(shape, rows[table.name]), path, made)
+        write(from_rows(table, rows[table.name], path), path, made)
 
 
 def pooled(

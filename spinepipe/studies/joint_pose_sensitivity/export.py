@@ -98,7 +98,7 @@ def _calibrated(results: Path, specimen: str, pose: int) -> Array:
         Where there is none to use.
     """
     whole = results / "calibrations.parquet"
-    single = results / "calibrations" / f"specimen={specimen}" / f"pose={pose:04d}.parquet"
+    single = results / "calibrations" / f"specimen-{specimen}" / f"pose-{pose:04d}.parquet"
     path = single if single.is_file() else required_result(whole, "a computed study")
     rows = read_frame(path)
     rows = rows[(rows["specimen"] == specimen) & (rows["pose"] == pose)]

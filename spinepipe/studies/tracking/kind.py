@@ -121,7 +121,7 @@ class TrackingFiles(StudyFiles):
     def law_files(self, specimen: str, trial: str, approach: str) -> list[str]:
         """The calibration that a motion takes over."""
         law = self.taken[specimen, trial, approach]
-        return [] if law is None else [f"{self._of(specimen)}/law={law}/stiffness.parquet"]
+        return [] if law is None else [f"{self._of(specimen)}/law-{law}/stiffness.parquet"]
 
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
@@ -151,19 +151,19 @@ class TrackingFiles(StudyFiles):
         return (*skeletons, *(f"opensim/{'/'.join(key)}.mot" for key in self.taken))
 
     def _of(self, specimen: str) -> str:
-        return f"{self.folder}/jobs/specimen={specimen}"
+        return f"{self.folder}/jobs/specimen-{specimen}"
 
     def _parts(self, table: str, specimen: str) -> Iterator[str]:
         """Folders of a person's job files."""
         if table in _OF_MOTIONS:
             for who, trial, approach in self.taken:
                 if who == specimen:
-                    yield f"trial={trial}/approach={approach}/"
+                    yield f"trial-{trial}/approach-{approach}/"
         elif table == "stiffness":
-            yield from (f"law={law}/" for who, law in self.laws if who == specimen)
+            yield from (f"law-{law}/" for who, law in self.laws if who == specimen)
         elif table in _OF_PROFILES:
             for region, coordinate in product(REGIONS, PROFILED):
-                yield f"region={region}/coordinate={coordinate}/"
+                yield f"region-{region}/coordinate-{coordinate}/"
         else:
             yield ""
 

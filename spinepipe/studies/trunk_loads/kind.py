@@ -128,11 +128,11 @@ class TrunkFiles(StudyFiles):
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        place = f"{self.folder}/jobs/specimen={specimen}"
+        place = f"{self.folder}/jobs/specimen-{specimen}"
         if table == "responses":
             sampled = sampled_specimens(self.study, self.specimens)
             numbers = files_of_block(block, len(sampled), batches(self.study))
-            return [f"{place}/batch={number:05d}/responses.parquet" for number in numbers]
+            return [f"{place}/batch-{number:05d}/responses.parquet" for number in numbers]
         return [f"{place}/{table}.parquet"]
 
 
