@@ -4,7 +4,6 @@ A file is only believed as it was written: each has checksums of its pages, whic
 verify, and a digest of all its bytes, so of the names, types and values of all columns.
 """
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,11 +25,6 @@ TYPES = {
     "flag": pa.bool_(),
 }
 
-_PART = re.compile(r"([a-z_]+)-(.+)")
-"""A folder's or a file's name that tells a value. With ``=`` in place of ``-`` readers would make
-it a column of their own, of numbers where the value is of digits (docs/decisions/0063).
-"""
-
 SMALL_ROWS = 1000
 """Files of fewer rows are mostly footer: packing them costs time and gains nothing."""
 
@@ -50,18 +44,12 @@ def arrow_schema(table: Table) -> pa.Schema:
     )
 
 
-def place_of(path: str | Path) -> dict[str, str]:
-    """The ``name-value`` parts of a path, its suffix left out."""
-    parts = str(path).removesuffix(".parquet").split("/")
-    return {found[1]: found[2] for part in parts if (found := _PART.fullmatch(part))}
-
-
-def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]], path: str | Path = "") -> pa.Table:
+def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]], **same: Any) -> pa.Table:
     """Columns (NaN or None for empty cells) as a table that keeps the schema.
 
     Parameters
     ----------
-    path : the file they are for; of columns that are not given, its folders' names tell the value.
+    same : what stands in all rows of other columns, such as the specimen of a job file.
 
     Raises
     ------
@@ -69,10 +57,7 @@ def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]], path: str | Pat
         For a missing or extra column, an empty, infinite or out-of-range cell, or a double key.
     """
     n = max(map(len, columns.values()), default=0)
-    for name, value in place_of(path).items():
-        if name in table.names and name not in columns:
-            kind = TYPES[table.column(name).type]
-            columns = {**columns, name: pa.repeat(pa.scalar(value).cast(kind), n)}
+    columns = {**columns, **{name: pa.repeat(value, n) for name, value in same.items()}}
     if set(columns) != set(table.names):
         raise BadTable(f"{table.name}: columns differ: {sorted(set(columns) ^ set(table.names))}")
     arrays = [_array(table.name, column, columns[column.name]) for column in table.columns]
@@ -244,14 +229,13 @@ def read_frames(paths: Sequence[str | Path]) -> dict[str, pd.DataFrame]:
     return StudyTables.read(paths)
 
 
-def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]], path: str | Path = "") -> pa.Table:
-    """Rows as a table that keeps the schema; of what they lack, ``path`` tells the value.
+def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]], **same: Any) -> pa.Table:
+    """Rows as a table that keeps the schema; ``same`` as `to_arrow` takes it.
 
     Raises
     ------
     BadTable
         As `to_arrow` does.
     """
-    told = place_of(path)
-    names = [name for name in table.names if name not in told]
-    return to_arrow(table, {name: [row[name] for row in rows] for name in names}, path)
+    names = [name for name in table.names if name not in same]
+    return to_arrow(table, {name: [row[name] for row in rows] for name in names}, **same)

@@ -138,8 +138,7 @@ def _responses(study: GlobalSensitivity, cohort: Cohort, specimen: str, values: 
         batch = Batch(first, len(own), start, vary(start, study.changes, own))
         for name, cells in responses(batch, cohort.joint_names)[0].items():
             columns.setdefault(name, []).extend(cells)
-    columns["specimen"] = [specimen] * len(columns["sample"])
-    return to_arrow(RESPONSES, columns)
+    return to_arrow(RESPONSES, columns, specimen=specimen)
 
 
 def _headline(table: pd.DataFrame) -> str:

@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.jobs.collect import join_files
-from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.jobs.inputs import study_of
 from spinepipe.marks import mark_in
 from spinepipe.studies.registry import kind_of
 from spinepipe.studies.registry import place_of as function_of
-from spinepipe.tables import place_of
 
 _MOST_NAMED = 5
 

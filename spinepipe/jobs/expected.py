@@ -20,7 +20,8 @@ from spinepipe.studies.read import check
 from spinepipe.studies.registry import files_of, kind_of
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import StudyFiles
-from spinepipe.tables import place_of
+
+_PART = re.compile(r"([a-z_]+)-(.+)")
 
 Place = Mapping[str, str]
 """Wildcards of a job: specimen, pose and what else its files' names say."""
@@ -164,3 +165,13 @@ class Expected:
         """The model files that the study makes."""
         names = [name for name in self.files.others if name.endswith(".yaml")]
         return [Path(self.root, self.files.folder, name) for name in names]
+
+
+def place_of(path: str) -> dict[str, str]:
+    """The ``name-value`` parts of a path, its suffix left out.
+
+    With ``=`` in place of ``-`` readers of folders would make columns of them, of numbers where
+    values are of digits (docs/decisions/0063).
+    """
+    parts = map(_PART.fullmatch, path.removesuffix(".parquet").split("/"))
+    return {part[1]: part[2] for part in parts if part}

@@ -86,6 +86,7 @@ class WantedFiles:
     pose : number of a sampled joint pose; None for the cohort's own.
     start : whether with the stiffness where fits start, and not with a fitted one.
     representation : of stiffness, by name; None for the one that the study's results recommend.
+    test : whose loads and motion are wanted too; None for no test.
     """
 
     root: Path
@@ -94,6 +95,7 @@ class WantedFiles:
     pose: int | None = None
     start: bool = False
     representation: str | None = None
+    test: str | None = None
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ class Kind:
     ignored_by_figures : settings that no figure looks at.
     makes_models : the job that writes model files on which other studies may build.
     exports : ``file:function`` of what makes OpenSim's document of a specimen; called with study,
-        cohort and what is `WantedFiles`, it returns the document, and in words what it is.
+        cohort and what is `WantedFiles`, it returns `spinepipe.studies.exports.Exported`.
     why_no_export : where it has none, why, as a sentence.
     forms : files of a cohort's folder that it reads besides those of every cohort.
     holds : whether it solves tests in which a rig fixes joint coordinates (supports.csv).

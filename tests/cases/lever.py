@@ -7,11 +7,11 @@ import pandas as pd
 from small_project import Project, copy_project
 
 from spinepipe.jobs.collect import join_files
-from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.studies.global_sensitivity import analyse, base, calibrate, design, respond
 from spinepipe.studies.global_sensitivity.kind import KIND, SensitivityFiles
 from spinepipe.studies.read import check
-from spinepipe.tables import place_of, read_frame
+from spinepipe.tables import read_frame
 
 FORCE_N = (1.0, 2.0)
 POINT_MM = (20.0, 30.0)

@@ -11,12 +11,12 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from spinepipe.jobs.collect import join_files
-from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.marks import read_mark
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import place_of as place_of_job
 from spinepipe.studies.tracking.kind import KIND, TrackingFiles
-from spinepipe.tables import arrow_schema, place_of, read_frame
+from spinepipe.tables import arrow_schema, read_frame
 
 
 @dataclass(frozen=True)

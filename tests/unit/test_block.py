@@ -12,11 +12,11 @@ import pytest
 
 from spinepipe.jobs import block
 from spinepipe.jobs.block import PartsFailed
-from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.marks import read_mark
 from spinepipe.studies.range_of_motion import draw, simulate
 from spinepipe.studies.read import check
-from spinepipe.tables import place_of, read_frame
+from spinepipe.tables import read_frame
 
 STUDY, TABLE = grid_cases.STUDY, "range_of_motion"
 SETTINGS = (

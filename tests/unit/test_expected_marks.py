@@ -18,12 +18,12 @@ from spinepipe.jobs import collect, inputs
 from spinepipe.jobs.block import run_joined
 from spinepipe.jobs.collect import StaleFile
 from spinepipe.jobs.digest import base_marks, digest_of
-from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.expected import Expected, place_of
 from spinepipe.marks import DamagedFile, read_mark
 from spinepipe.model.file import EffectEntry, ModelFile, write_model
 from spinepipe.studies.range_of_motion import draw, simulate
 from spinepipe.studies.read import check
-from spinepipe.tables import metadata_of, place_of, read
+from spinepipe.tables import metadata_of, read
 
 STUDY = grid_cases.STUDY
 SETTINGS = (

@@ -183,18 +183,17 @@ def test_every_result_table_is_complete(table: Table) -> None:
             assert not column.name.endswith(f"_{unit}") or column.unit == unit
 
 
-def test_a_file_has_the_values_that_its_folders_are_named_after() -> None:
-    """As text stays text: by a folder ``specimen=001`` readers would take it for a number."""
+def test_what_all_rows_have_is_told_once() -> None:
     given = {name: cells for name, cells in ROWS.items() if name not in ("specimen", "pose")}
     given = {name: cells[:1] for name, cells in given.items()}
-    rows = to_arrow(TABLE, given, "results/x/specimen-001/pose-0007.parquet")
+    rows = to_arrow(TABLE, given, specimen="001", pose=7)
     assert rows.schema == arrow_schema(TABLE)
     assert rows["specimen"].to_pylist() == ["001"]
     assert rows["pose"].to_pylist() == [7]
     (row,) = rows.drop_columns(["specimen", "pose"]).to_pylist()
-    assert from_rows(TABLE, [row], "specimen-001/pose-0007.parquet") == rows
+    assert from_rows(TABLE, [row], specimen="001", pose=7) == rows
     with pytest.raises(BadTable, match="columns differ"):
-        to_arrow(TABLE, given, "results/x/pose-0007.parquet")
+        to_arrow(TABLE, given, pose=7)
 
 
 def test_a_folder_of_job_files_opens_as_one_data_set(tmp_path: Path) -> None:

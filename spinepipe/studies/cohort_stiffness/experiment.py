@@ -204,8 +204,8 @@ def run(
                 curves.append({**curve, **key})
                 axes += [{**axis, **key}] if axis else []
     made = origin("experiment", root, settings, cohort, [specimen], [mark_of(p) for p in fitted])
-    write(from_rows(LOAD_DISPLACEMENT, curves, load_displacement), load_displacement, made)
-    write(from_rows(HELICAL_AXES, axes, helical_axes), helical_axes, made)
+    write(from_rows(LOAD_DISPLACEMENT, curves, specimen=specimen), load_displacement, made)
+    write(from_rows(HELICAL_AXES, axes, specimen=specimen), helical_axes, made)
 
 
 def _simulation(

@@ -19,7 +19,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     representations_of,
     tests_of,
 )
-from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
+from spinepipe.studies.exports import Exported, opensim_document, problem, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.tables import read_frame
 
@@ -27,7 +27,7 @@ CRITERIA = ("left_out_specimen", "left_out_case", "fitted")
 """What recommends a representation: motion that no fit has seen, as far as any was held out."""
 
 
-def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
+def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> Exported:
     """OpenSim's document of the model, and in words which stiffness it has.
 
     Coordinates that were not fitted keep the published value.
@@ -56,7 +56,7 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
     frames = joint_frames(cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)
-    return opensim_document(model, f"the cohort's own joints, stiffness: {told}")
+    return opensim_document(model, f"the cohort's own joints, stiffness: {told}", cohort, wanted)
 
 
 def _recommended(wanted: WantedFiles, known: tuple[str, ...]) -> tuple[str, str]:

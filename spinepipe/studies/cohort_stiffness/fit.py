@@ -75,8 +75,9 @@ def run(
     rows = fitted(settings, cohort, specimen, representation, fitted_to, others)
     made = origin("fit", root, settings, cohort, [specimen])
     paths = {STIFFNESS: stiffness, FITS: fits, ERRORS: errors, NUISANCES: nuisances}
+    of = {"specimen": specimen, "representation": representation, "fitted_to": fitted_to}
     for table, path in paths.items():
-        write(from_rows(table, rows[table.name], path), path, made)
+        write(from_rows(table, rows[table.name], **of), path, made)
 
 
 def fitted(

@@ -51,8 +51,9 @@ def run(
     )
     read = [mark_of(path) for path in others]
     made = origin("left_out", root, settings, cohort, [specimen], read)
+    of = {"specimen": specimen, "representation": representation, "fitted_to": fitted_to}
     for table, path in ((STIFFNESS, stiffness), (ERRORS, errors)):
-        write(from_rows(table, rows[table.name], path), path, made)
+        write(from_rows(table, rows[table.name], **of), path, made)
 
 
 def predicted_by_others(

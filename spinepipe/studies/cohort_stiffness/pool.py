@@ -81,8 +81,10 @@ def run(
     rows = pooled(settings, cohort, representation, fitted_to, without, others, note)
     made = origin("pool", root, settings, cohort)
     paths = {STIFFNESS: stiffness, ERRORS: errors, FITS: fits, POOLING: pooling}
+    of = {"representation": representation, "fitted_to": fitted_to}
     for table, path in paths.items():
-        write(from_rows(table, rows[table.name], path), path, made)
+        told = of | {"without": without} if table is POOLING else of
+        write(from_rows(table, rows[table.name], **told), path, made)
 
 
 def pooled(

@@ -102,7 +102,7 @@ def run(
         write(table, path, made_by)
     values = factor_values(design, settings, slice(None)) * np.array(settings.per_si)
     failed = list(failed_rows(drawn, values, settings.units, responses, calibrated))
-    write(from_rows(FAILED_RUNS, failed, failed_runs), failed_runs, made_by)
+    write(from_rows(FAILED_RUNS, failed, specimen=specimen), failed_runs, made_by)
 
 
 def analysed(
@@ -118,8 +118,7 @@ def analysed(
             for name in table.names
             if name != "specimen"
         }
-        columns["specimen"] = [specimen] * len(columns["output"])
-        tables.append(to_arrow(table, columns))
+        tables.append(to_arrow(table, columns, specimen=specimen))
     return tables[0], tables[1]
 
 

@@ -62,7 +62,7 @@ def run(root: str, study: str, specimen: str, base_stiffness: str, base_motion: 
         (BASE_STIFFNESS, rows, base_stiffness),
         (BASE_MOTION, moved, base_motion),
     ):
-        write(from_rows(table, found, path), path, made_by)
+        write(from_rows(table, found, specimen=specimen), path, made_by)
 
 
 def base(settings: GlobalSensitivity, cohort: Cohort, specimen: str) -> tuple[Rows, Rows]:

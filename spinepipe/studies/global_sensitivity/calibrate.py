@@ -42,7 +42,7 @@ def run(
         for lane, sample in enumerate(one.varied.kept.tolist()):
             rows.append(_fitted(settings, cohort, specimen, one, lane, one.first + sample))
         rows.sort(key=lambda row: int(row["sample"]))
-        write(from_rows(CALIBRATED, rows, path), path, made_by)
+        write(from_rows(CALIBRATED, rows, specimen=specimen), path, made_by)
 
 
 def _fitted(

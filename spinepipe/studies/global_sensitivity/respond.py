@@ -50,7 +50,7 @@ def run(
                 f"{len(by_engine)} runs left to the engine of record",
                 file=sys.stderr,
             )
-        write(to_arrow(RESPONSES, columns, path), path, made_by | handed)
+        write(to_arrow(RESPONSES, columns, specimen=specimen), path, made_by | handed)
 
 
 def responses(batch: Batch, joints: Sequence[str]) -> tuple[dict[str, Any], NDArray[np.bool_]]:

@@ -11,10 +11,11 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.problems import InputError
 from spinepipe.status import Status
-from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
+from spinepipe.studies.exports import Exported, opensim_document, problem, refuse, required_result
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
     sampled_poses,
+    specimen_inputs,
     start_stiffness,
 )
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem, fitted_stiffness
@@ -24,7 +25,7 @@ from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 
 
-def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
+def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -> Exported:
     """OpenSim's document of the model, and in words which frames and which stiffness it has.
 
     Of the cohort's own pose the fit is made here; those of sampled poses are results.
@@ -47,7 +48,9 @@ def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -
     else:
         stiffness, origin = _calibrated(wanted.results, specimen, pose), "calibrated for this pose"
     model = bushing_model(study, cohort, specimen, frames, stiffness)
-    return opensim_document(model, f"joint pose {name}, stiffness: {origin}")
+    words = f"joint pose {name}, stiffness: {origin}"
+    tested = specimen_inputs(str(wanted.root), study.study, specimen, cohort.digest)
+    return opensim_document(model, words, cohort, wanted, tested.cases)
 
 
 def _fitted(study: JointPoseSensitivity, wanted: WantedFiles) -> Array:

@@ -88,12 +88,13 @@ def run(
         # measured motion as coordinates of the pose's joint frames, in which it is predicted
         if not isinstance(frames, str):
             tested = tuple(one.in_frames(inputs.frames, frames) for one in tested)
+        of = {"specimen": specimen, "pose": int(place["pose"]), "stiffness": place["stiffness"]}
         rows = [
             {**row, "joint": cohort.joint_names[row["joint"]]}
             for one, steps in zip(tested, ended, strict=True)
             for row in _case_rows(one, steps)
         ]
-        write(from_rows(SIMULATIONS, rows, path), path, made_by[place["stiffness"] == "calibrated"])
+        write(from_rows(SIMULATIONS, rows, **of), path, made_by[place["stiffness"] == "calibrated"])
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,12 @@ def run(
         values = drawn_stiffness(stamp(stiffness_sets))[int(place["stiffness"])]
         ends = _solved(settings, cohort, specimen, placed, values, tests)
         columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
-        write(to_arrow(RANGE_OF_MOTION, columns, path), path, made_by)
+        of = {
+            "specimen": specimen,
+            "pose": int(place["pose"]),
+            "stiffness": int(place["stiffness"]),
+        }
+        write(to_arrow(RANGE_OF_MOTION, columns, **of), path, made_by)
 
 
 def _solved(
