@@ -19,8 +19,9 @@ from spinepipe.studies.cohort_stiffness.settings import (
     representations_of,
     tests_of,
 )
-from spinepipe.studies.exports import Exported, opensim_document, problem, refuse, required_result
+from spinepipe.studies.exports import Exported, problem, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.opensim_files import opensim_document
 from spinepipe.tables import read_frame
 
 CRITERIA = ("left_out_specimen", "left_out_case", "fitted")

@@ -7,8 +7,9 @@ from spinepipe.cohort.specimen import joint_frames, on_bushings, spine_model
 from spinepipe.effects.contract import Array
 from spinepipe.model.file import effects_for, read_model
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.exports import Exported, opensim_document, refuse, required_result
+from spinepipe.studies.exports import Exported, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.opensim_files import opensim_document
 from spinepipe.studies.parts import Damping
 
 MODEL = "model_with_effects.yaml"

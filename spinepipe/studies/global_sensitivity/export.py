@@ -7,9 +7,10 @@ from spinepipe.cohort.specimen import joint_frames, on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError
 from spinepipe.status import USABLE
-from spinepipe.studies.exports import Exported, opensim_document, problem, refuse, required_result
+from spinepipe.studies.exports import Exported, problem, refuse, required_result
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.opensim_files import opensim_document
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES

@@ -11,7 +11,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.problems import InputError
 from spinepipe.status import Status
-from spinepipe.studies.exports import Exported, opensim_document, problem, refuse, required_result
+from spinepipe.studies.exports import Exported, problem, refuse, required_result
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
     sampled_poses,
@@ -21,6 +21,7 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem, fitted_stiffness
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.opensim_files import opensim_document
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 

@@ -4,8 +4,9 @@ import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import followers, joint_frames, on_bushings
-from spinepipe.studies.exports import Exported, opensim_document, refuse
+from spinepipe.studies.exports import Exported, refuse
 from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.opensim_files import opensim_document
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.studies.range_of_motion.grid import all_cases, virtual_tensions
 from spinepipe.studies.range_of_motion.settings import RangeOfMotion
