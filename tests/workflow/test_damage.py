@@ -28,17 +28,19 @@ PICKLED = simulation(0, "best02")
 RANKED = f"{POSES}/best.json"
 BLOCK = f"{POSES}/blocks/simulations/specimen-s01/block-001.parquet"
 
-FIT = "cohort_stiffness/fits/specimen-b/representation-per_joint/fitted_to-flexion"
+FITS = "cohort_stiffness/fits"
+OF_B = "specimen-b/representation-per_joint/fitted_to-flexion.parquet"
+FIT = f"{FITS}/stiffness/{OF_B}"
 MOVED = "range_of_motion/jobs/specimen-b/pose-0001/stiffness-00.parquet"
 MOTION = "tracking/opensim/a/flexion_extension/optk_generic.mot"
-LOST = (f"{FIT}/stiffness.parquet", MOVED, MOTION)
-OF_FIT = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors", "nuisances")}
+LOST = (FIT, MOVED, MOTION)
+OF_FIT = {f"{FITS}/{name}/{OF_B}" for name in ("stiffness", "fits", "errors", "nuisances")}
 """Made by the job of a lost file."""
 
 ASKED = (
     *(f"results/{POSES}/{name}.parquet" for name in ("simulations", "agreement")),
     *(f"results/{name}" for name in (RANKED, FLIPPED, PICKLED)),
-    f"results/{FIT}/stiffness.parquet",
+    f"results/{FIT}",
     f"results/{MOTION}",
     "all",
 )

@@ -32,9 +32,12 @@ def results_of(kind):
     return f"results/{{study,{one_of(PROJECT.names.get(kind, ['none of this kind']))}}}"
 
 
-def tables_in(folder, *names):
-    """Output of several tables in one folder, by their names."""
-    return {name: update(f"{folder}/{name}.parquet") for name in names}
+def tables_in(folder, *names, of=""):
+    """Output of several tables in one folder, by their names.
+
+    Job files lie in a folder of their table, so that it opens as one; `of` says what they are of.
+    """
+    return {name: update("/".join(filter(None, (folder, name, of))) + ".parquet") for name in names}
 
 
 def layout(study):

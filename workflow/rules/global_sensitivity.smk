@@ -26,7 +26,9 @@ rule base_of_specimen:
     input:
         outdated("base_of_specimen", "base"),
     output:
-        **tables_in(f"{SENSITIVITIES}/base/specimen-{{specimen}}", "base_stiffness", "base_motion"),
+        **tables_in(
+            f"{SENSITIVITIES}/base", "base_stiffness", "base_motion", of="specimen-{specimen}"
+        ),
     log:
         f"{LOGS}/base_of_specimen/specimen-{{specimen}}.log",
     params:
@@ -105,10 +107,11 @@ rule index_factors:
         ),
     output:
         **tables_in(
-            f"{SENSITIVITIES}/analysis/specimen-{{specimen}}",
+            f"{SENSITIVITIES}/analysis",
             "indices",
             "convergence",
             "failed_runs",
+            of="specimen-{specimen}",
         ),
     log:
         f"{LOGS}/index_factors/specimen-{{specimen}}.log",

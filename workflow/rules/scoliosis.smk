@@ -24,7 +24,7 @@ rule personalise:
         outdated("personalise"),
         population=lambda wildcards: layout(wildcards.study).population_files(wildcards.model),
     output:
-        **tables_in(f"{PATIENTS}/jobs/{HELD}", "laws", "positions", "displacements", "curves"),
+        **tables_in(f"{PATIENTS}/jobs", "laws", "positions", "displacements", "curves", of=HELD),
     log:
         f"{LOGS}/personalise/specimen-{{specimen}}/{{model}}.log",
     params:

@@ -9,7 +9,7 @@ rule hold:
         outdated("hold"),
     output:
         **tables_in(
-            f"{TRUNKS}/jobs/specimen-{{specimen}}",
+            f"{TRUNKS}/jobs",
             "tasks",
             "levels",
             "muscles",
@@ -19,6 +19,7 @@ rule hold:
             "masses",
             "scaling",
             "remarks",
+            of="specimen-{specimen}",
         ),
     log:
         f"{LOGS}/hold/specimen-{{specimen}}.log",
@@ -32,7 +33,7 @@ rule simplify:
     input:
         outdated("simplify"),
     output:
-        output=update(f"{TRUNKS}/jobs/specimen-{{specimen}}/simplified.parquet"),
+        output=update(f"{TRUNKS}/jobs/simplified/specimen-{{specimen}}.parquet"),
     log:
         f"{LOGS}/simplify/specimen-{{specimen}}.log",
     params:
@@ -86,7 +87,7 @@ rule samples_block:
 # One file by its name, such as one that got lost.
 use rule samples_block as sample_loads with:
     output:
-        output=update(f"{TRUNKS}/jobs/specimen-{{specimen}}/batch-{{batch}}/responses.parquet"),
+        output=update(f"{TRUNKS}/jobs/responses/specimen-{{specimen}}/batch-{{batch}}.parquet"),
     log:
         f"{LOGS}/sample_loads/specimen-{{specimen}}/batch-{{batch}}.log",
     params:

@@ -173,12 +173,12 @@ class CohortLayout(StudyFiles):
                 places += _fitted(f"fits/{own}", self._single, self.load_sets)
             if table in ("stiffness", "errors") and self._held_out:
                 places += _fitted(f"left_out/{own}", self._single, self._without_case_folds)
-        return [f"{self.folder}/{place}/{table}.parquet" for place in places]
+        return [self._file(place, table) for place in places]
 
     def fits_of_others(self, specimen: str, representation: str, fitted_to: str) -> list[str]:
         """Stiffness files of the other specimens' own fits."""
         return [
-            f"{self.folder}/{place}/stiffness.parquet"
+            self._file(place, "stiffness")
             for name in self.specimens
             if name != specimen
             for place in _fitted(f"fits/specimen-{name}", [representation], [fitted_to])
@@ -190,7 +190,11 @@ class CohortLayout(StudyFiles):
         if name is None:
             return []
         (place,) = _fitted(f"fits/specimen-{specimen}", [name], [joint_label(self.tests)])
-        return [f"{self.folder}/{place}/stiffness.parquet"]
+        return [self._file(place, "stiffness")]
+
+    def _file(self, place: str, table: str) -> str:
+        job, _, of = place.partition("/")
+        return f"{self.folder}/{job}/{table}/{of}.parquet"
 
     @property
     def _single(self) -> tuple[str, ...]:
