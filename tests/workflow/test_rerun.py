@@ -43,7 +43,7 @@ def made_of(project: Project, *tables: str) -> set[str]:
 
 def of_jobs(files: set[str]) -> set[str]:
     """Those that a job for one pose, batch or the like writes."""
-    return {name for name in files if "=" in name and "/blocks/" not in name}
+    return {name for name in files if "-" in name and "/blocks/" not in name}
 
 
 def test_one_look_plans_what_hangs_on_each_change_and_nothing_else(
@@ -86,12 +86,12 @@ def test_one_look_plans_what_hangs_on_each_change_and_nothing_else(
     assert {name for name in of[POSES] if "/blocks/" in name} == {
         f"{POSES}/blocks/simulations/specimen-s01/block-00{number}.parquet" for number in (0, 1)
     }
-    assert {name for name in of[POSES] if "=" not in name} == {
+    assert {name for name in of[POSES] if "-" not in name} == {
         f"{POSES}/simulations.parquet",
         *made_of(project, "simulations"),
     }
     assert "cohort_stiffness/findings.parquet" in of["cohort_stiffness"]
-    assert not {name for name in of["cohort_stiffness"] if "=" in name}
+    assert not {name for name in of["cohort_stiffness"] if "-" in name}
     assert of_jobs(of["range_of_motion"]) == {"range_of_motion/frames/specimen-b.parquet"}
     blocks = {name for name in of["range_of_motion"] if "/blocks/" in name}
     assert blocks == {name for name in before if name.startswith(MOVES_OF_B)}

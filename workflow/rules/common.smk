@@ -37,7 +37,8 @@ def tables_in(folder, *names, of=""):
 
     Job files lie in a folder of their table, so that it opens as one; `of` says what they are of.
     """
-    return {name: update("/".join(filter(None, (folder, name, of))) + ".parquet") for name in names}
+    pattern = f"{folder}/%s/{of}.parquet" if of else f"{folder}/%s.parquet"
+    return {name: update(pattern % name) for name in names}
 
 
 def layout(study):
