@@ -24,7 +24,7 @@ from tests.reference.peers.chain import t12_s1_chain
 
 STUDY = "t12s1_cohort_stiffness"
 STEPS = 10
-FIT = "fits/specimen=s01/representation=per_joint/fitted_to=all/stiffness.parquet"
+FIT = "fits/stiffness/specimen-s01/representation-per_joint/fitted_to-all.parquet"
 
 
 def specimen() -> Result:

@@ -18,7 +18,7 @@ from benchmarks.study import ROOT, Watch
 
 FOLDER = ROOT / ".benchmarks"
 REPEATS = 3
-LOST = "results/l1l4_joint_pose/jobs/specimen=s01/pose=0007/stiffness=best03.parquet"
+LOST = "results/l1l4_joint_pose/jobs/specimen-s01/pose-0007/stiffness-best03.parquet"
 
 Measured = dict[str, float]
 """`wall_s`, and of runs of a workflow `peak_mib` (shared pages counted once)."""

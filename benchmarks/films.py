@@ -51,6 +51,6 @@ def runs() -> Iterator[Run]:
     with copy_of_project() as folder:
         yield run_workflow("study of films, cold", folder, wanted, "60 s")
         yield run_workflow("nothing to do", folder, wanted, "")
-        lost = f"results/{STUDY}/jobs/specimen=p01/model=tangent/laws.parquet"
+        lost = f"results/{STUDY}/jobs/laws/specimen-p01/model-tangent.parquet"
         Path(folder, lost).unlink()
         yield run_workflow("one patient lost in one model", folder, [lost, *wanted], "")

@@ -60,7 +60,7 @@ def _write_study(folder: Path, cohort: Path) -> None:
 def _runs(folder: Path) -> Iterator[Run]:
     yield run_workflow("whole study, cold", str(folder), ["all"], "600 s, 2 GB")
     yield run_workflow("nothing to do", str(folder), ["all"], "")
-    (lost, *_) = sorted((folder / "results" / STUDY / "jobs").glob("*/pose=0007/*01.parquet"))
+    (lost, *_) = sorted((folder / "results" / STUDY / "jobs").glob("*/pose-0007/*01.parquet"))
     lost.unlink()
     yield run_workflow("one job file lost", str(folder), ["all"], "")
 

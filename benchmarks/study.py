@@ -54,11 +54,11 @@ def runs() -> Iterator[Run]:
         results = Path(folder) / "results" / STUDY
         yield run_workflow("poses, fits and simulations, cold", folder, wanted, "90 s, 1 GB")
         yield run_workflow("nothing to do", folder, wanted, "8 s")
-        (results / "jobs/specimen=s01/pose=0007/stiffness=best03.parquet").unlink()
+        (results / "jobs/specimen-s01/pose-0007/stiffness-best03.parquet").unlink()
         yield run_workflow(
             "one simulation lost", folder, [*wanted, _file("jobs", "best03")], "10 s"
         )
-        (results / "calibrations/specimen=s01/pose=0007.parquet").unlink()
+        (results / "calibrations/specimen-s01/pose-0007.parquet").unlink()
         yield run_workflow("one calibration lost", folder, [*wanted, _file("calibrations")], "12 s")
 
 
@@ -82,8 +82,8 @@ def copy_of_project() -> Iterator[str]:
 
 def _file(folder: str, stiffness: str = "") -> str:
     """A job file that was deleted: Snakemake does not miss it once the table is there."""
-    name = f"results/{STUDY}/{folder}/specimen=s01/pose=0007"
-    return f"{name}/stiffness={stiffness}.parquet" if stiffness else f"{name}.parquet"
+    name = f"results/{STUDY}/{folder}/specimen-s01/pose-0007"
+    return f"{name}/stiffness-{stiffness}.parquet" if stiffness else f"{name}.parquet"
 
 
 def targets() -> int:

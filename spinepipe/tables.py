@@ -44,14 +44,20 @@ def arrow_schema(table: Table) -> pa.Schema:
     )
 
 
-def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
+def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]], **same: Any) -> pa.Table:
     """Columns (NaN or None for empty cells) as a table that keeps the schema.
+
+    Parameters
+    ----------
+    same : what stands in all rows of other columns, such as the specimen of a job file.
 
     Raises
     ------
     BadTable
         For a missing or extra column, an empty, infinite or out-of-range cell, or a double key.
     """
+    n = max(map(len, columns.values()), default=0)
+    columns = {**columns, **{name: pa.repeat(value, n) for name, value in same.items()}}
     if set(columns) != set(table.names):
         raise BadTable(f"{table.name}: columns differ: {sorted(set(columns) ^ set(table.names))}")
     arrays = [_array(table.name, column, columns[column.name]) for column in table.columns]
@@ -62,9 +68,7 @@ def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]]) -> pa.Table:
 
 def _check_keys(table: Table, rows: pa.Table) -> None:
     keys = list(table.key)
-    if not keys:  # all of it is in the names of folders: one row at most
-        distinct = min(1, rows.num_rows)
-    elif rows.num_rows < SMALL_ROWS:
+    if rows.num_rows < SMALL_ROWS:
         distinct = len(set(zip(*(rows[key].to_pylist() for key in keys), strict=True)))
     else:
         distinct = rows.group_by(keys).aggregate([]).num_rows
@@ -225,12 +229,13 @@ def read_frames(paths: Sequence[str | Path]) -> dict[str, pd.DataFrame]:
     return StudyTables.read(paths)
 
 
-def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]]) -> pa.Table:
-    """Rows as a table that keeps the schema.
+def from_rows(table: Table, rows: Sequence[Mapping[Any, Any]], **same: Any) -> pa.Table:
+    """Rows as a table that keeps the schema; ``same`` as `to_arrow` takes it.
 
     Raises
     ------
     BadTable
         As `to_arrow` does.
     """
-    return to_arrow(table, {name: [row[name] for row in rows] for name in table.names})
+    names = [name for name in table.names if name not in same]
+    return to_arrow(table, {name: [row[name] for row in rows] for name in names}, **same)

@@ -113,11 +113,9 @@ def sensitivity(
     for specimen in study.chosen_specimens(cohort):
         say(f"{specimen}: {len(values)} runs")
         rows = _responses(study, cohort, specimen, values)
-        found, _ = analysed(study, design, list(outputs_of(rows, study)))
-        for frames, own in ((indices, found), (runs, rows)):
-            one = own.to_pandas()
-            one.insert(0, "specimen", specimen)
-            frames.append(one)
+        found, _ = analysed(study, design, list(outputs_of(rows, study)), specimen)
+        indices.append(found.to_pandas())
+        runs.append(rows.to_pandas())
     table = with_units(INDICES, pd.concat(indices, ignore_index=True))
     answered = with_units(RESPONSES, pd.concat(runs, ignore_index=True))
     drawn = pd.DataFrame(shown, columns=list(study.factor_names))
@@ -140,7 +138,7 @@ def _responses(study: GlobalSensitivity, cohort: Cohort, specimen: str, values: 
         batch = Batch(first, len(own), start, vary(start, study.changes, own))
         for name, cells in responses(batch, cohort.joint_names)[0].items():
             columns.setdefault(name, []).extend(cells)
-    return to_arrow(RESPONSES.without("specimen"), columns)
+    return to_arrow(RESPONSES, columns, specimen=specimen)
 
 
 def _headline(table: pd.DataFrame) -> str:

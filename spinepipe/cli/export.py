@@ -1,21 +1,33 @@
-"""`spinepipe export`: a specimen's model as an OpenSim file."""
+"""`spinepipe export`: a specimen's model as an OpenSim file, or the tables of a study as CSV."""
 
 import argparse
 from importlib import import_module
 from pathlib import Path
 
 from spinepipe.cli.find import specimen_of, study_names, unknown
+from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
+from spinepipe.jobs.report import descriptor_of
 from spinepipe.problems import InputError, InputProblem, one_of
+from spinepipe.report.words import count
+from spinepipe.schema.datapackage import FILE
 from spinepipe.studies import read as studies
+from spinepipe.studies.exports import Exported
 from spinepipe.studies.kind import WantedFiles
-from spinepipe.studies.registry import PACKAGE, every_kind, kind_of
+from spinepipe.studies.registry import PACKAGE, every_kind, files_of, kind_of
+from spinepipe.studies.study import Study
+from spinepipe.tables import read_frame
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which model, and where to."""
     parser.add_argument("study", metavar="STUDY", help="name of a study")
-    parser.add_argument("specimen", metavar="SPECIMEN", help="name of a specimen of its cohort")
+    parser.add_argument(
+        "specimen",
+        nargs="?",
+        metavar="SPECIMEN",
+        help="name of a specimen of its cohort (default: the first)",
+    )
     parser.add_argument(
         "--pose",
         type=int,
@@ -40,18 +52,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="as CSV the 6 x 6 stiffness of each joint about this point (mm, along its axes)",
     )
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FILE", help="file to write"
+        "--test",
+        metavar="NAME",
+        help="write the loads of a test into the file, and its motion beside it as FILE.mot",
+    )
+    written = parser.add_mutually_exclusive_group(required=True)
+    written.add_argument("-o", "--output", type=Path, metavar="FILE", help="file to write")
+    written.add_argument(
+        "--tables", type=Path, metavar="FOLDER", help="write all tables of the study as CSV instead"
     )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the file and say which frames and which stiffness are in it."""
+    """Write the file and say which frames and which stiffness are in it, or write the tables."""
     ending = ".osim" if options.matrix is None else ".csv"
-    if options.output.suffix != ending:
+    if options.output is not None and options.output.suffix != ending:
         raise InputError([_problem("-o", options.output.name, f"FILE{ending}", "rename it")])
     if options.study not in study_names(options.root):
         raise InputError([unknown("study", options.study, study_names(options.root))])
     study, cohort = studies.check(options.root, options.study)
+    if options.tables is not None:
+        return _write_tables(study, cohort, options)
     kind = kind_of(study.kind)
     if kind.exports is None:
         able = one_of([name for name, other in every_kind().items() if other.exports])
@@ -65,13 +86,36 @@ def run(options: argparse.Namespace) -> int:
         start=options.start,
         representation=options.representation,
         point_mm=None if options.matrix is None else tuple(options.matrix),
+        test=options.test,
     )
     module, _, function = kind.exports.partition(":")
     exported = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)
-    document, words = exported(study, cohort, wanted)
-    with appearing(options.output) as temporary:
-        temporary.write_text(document, encoding="utf-8")
-    print(f"{options.output}: specimen {wanted.specimen}, {words}")
+    made: Exported = exported(study, cohort, wanted)
+    for path, text in (
+        (options.output, made.document),
+        (options.output.with_suffix(".mot"), made.motion),
+    ):
+        if text:
+            with appearing(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+    print(f"{options.output}: specimen {wanted.specimen}, {made.words}")
+    return 0
+
+
+def _write_tables(study: Study, cohort: Cohort, options: argparse.Namespace) -> int:
+    """Write the tables that are there, and what their columns are."""
+    files, folder = files_of(study, cohort), options.tables
+    paths = [options.root / path for path in files.table_files(files.tables)]
+    found = [path for path in paths if path.is_file()]
+    if not found:
+        allowed, remedy = "a computed study", f"run `snakemake -j2 {files.page()}` first"
+        raise InputError([_problem("STUDY", "no tables", allowed, remedy)])
+    for path in found:
+        with appearing(folder / f"{path.stem}.csv") as temporary:
+            read_frame(path).to_csv(temporary, index=False)
+    with appearing(folder / FILE) as temporary:
+        temporary.write_text(descriptor_of(study, cohort, folder, ".csv"), encoding="utf-8")
+    print(f"{folder}: {count(len(found), 'table')}, explained in {FILE}")
     return 0
 
 

@@ -1,9 +1,6 @@
 """The rows of many files as one table."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-
-import pyarrow as pa
 
 from spinepipe.jobs.code import code_digest
 from spinepipe.jobs.digest import value_digest
@@ -19,7 +16,7 @@ class StaleFile(ValueError):
 
 
 def join_files(table: Table, marks: Mapping[str, str], output: str) -> None:
-    """Join files of a table; what their folders say of them becomes columns again.
+    """Join files of a table.
 
     Parameters
     ----------
@@ -34,9 +31,8 @@ def join_files(table: Table, marks: Mapping[str, str], output: str) -> None:
     found = [metadata_of(part) for part in parts]
     for (path, wanted), metadata in zip(marks.items(), found, strict=True):
         _check(path, wanted, metadata.get(KEY, ""))
-    rows = [_with_folders(table, path, part) for path, part in zip(marks, parts, strict=True)]
     mark = joined_digest(table, list(marks), list(marks.values()))
-    join(table, rows, output, {**_together(found), KEY: mark})
+    join(table, parts, output, {**_together(found), KEY: mark})
 
 
 def joined_digest(table: Table, parts: Sequence[str], marks: Sequence[str]) -> str:
@@ -62,15 +58,3 @@ def _together(found: Sequence[dict[str, str]]) -> dict[str, str]:
         several = value_digest(values) if key.endswith("_digest") else ", ".join(values)
         together[key] = values[0] if len(values) == 1 else several
     return together
-
-
-def _with_folders(table: Table, path: str, rows: pa.Table) -> pa.Table:
-    """Rows of one file with the ``name=value`` parts of its folders as columns."""
-    schema = arrow_schema(table)
-    for part in Path(path).parts[:-1]:
-        name, found, value = part.partition("=")
-        if found and name in schema.names and name not in rows.column_names:
-            kind = schema.field(name).type
-            column = pa.repeat(pa.scalar(value).cast(kind), rows.num_rows)
-            rows = rows.append_column(schema.field(name), column)
-    return rows

@@ -21,6 +21,8 @@ from spinepipe.studies.registry import files_of, kind_of
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import StudyFiles
 
+_PART = re.compile(r"([a-z_]+)-(.+)")
+
 Place = Mapping[str, str]
 """Wildcards of a job: specimen, pose and what else its files' names say."""
 
@@ -166,6 +168,10 @@ class Expected:
 
 
 def place_of(path: str) -> dict[str, str]:
-    """The ``name=value`` parts of a path, its suffix left out."""
-    parts = path.removesuffix(".parquet").split("/")
-    return dict(part.split("=", 1) for part in parts if "=" in part)
+    """The ``name-value`` parts of a path, its suffix left out.
+
+    With ``=`` in place of ``-`` readers of folders would make columns of them, of numbers where
+    values are of digits (docs/decisions/0063).
+    """
+    parts = map(_PART.fullmatch, path.removesuffix(".parquet").split("/"))
+    return {part[1]: part[2] for part in parts if part}

@@ -8,6 +8,7 @@ public door: an input that is newer than the file, where the file carries anothe
 import fcntl
 import json
 import os
+import shutil
 import sys
 import threading
 import time
@@ -233,6 +234,7 @@ class Project:
             warn(f"so do {len(self._lost) - _MOST_NAMED} more files below results")
         for name in self.at_work:
             sweep(f"results/{name}")
+            _drop_former(Path("results", name))
         code.keep()  # workers then read no source file for its digest
         warm_up(modules_of_many({one.study.kind for one in at_work}))
         threading.Thread(target=_stop_timers).start()
@@ -277,6 +279,15 @@ def _drop_damaged(record: Path) -> None:
                 json.loads(path.read_bytes())
             except ValueError:
                 path.unlink()
+
+
+def _drop_former(results: Path) -> None:
+    """Remove job files where versions before decision 0063 had them: read as one data set with
+    those of now, which are computed anew, each row would be there twice.
+    """
+    for former in ("*/specimen=*", "*/*/specimen=*", "*/representation=*"):
+        for path in results.glob(former):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def _stop_timers() -> None:

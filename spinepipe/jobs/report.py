@@ -104,13 +104,13 @@ def _write_page(
         write(told, folder / f"{CONCLUSIONS.name}.parquet", metadata)
 
 
-def descriptor_of(study: Study, cohort: Cohort, folder: Path) -> str:
-    """What the tables are that a study has in its folder by now, as a Data Package."""
+def descriptor_of(study: Study, cohort: Cohort, folder: Path, ending: str = ".parquet") -> str:
+    """What the tables are that a study has in a folder by now, as a Data Package."""
     has = files_of(study, cohort).tables
     shapes = [
-        (shape, f"{shape.name}.parquet")
+        (shape, f"{shape.name}{ending}")
         for shape in kind_of(study.kind).tables
-        if shape.name in has and (folder / f"{shape.name}.parquet").is_file()
+        if shape.name in has and (folder / f"{shape.name}{ending}").is_file()
     ]
     title = f"Results of the study {study.study} ({study.kind}) of the cohort {cohort.name}"
     return descriptor(study.study, title, shapes)

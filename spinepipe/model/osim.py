@@ -4,7 +4,7 @@ All body frames lie on ground in the neutral pose, so centres of mass, inertias 
 stand in the file as the model has them.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree.ElementTree import Element, SubElement
@@ -29,22 +29,43 @@ so, these are the joint's own Z-X'-Y'' angles, and the bushing is exactly k_i q_
 BUSHING_TRANSLATIONS = (2, 0, 1)
 """Joint translations (x, y, z) in the order of a bushing's axes."""
 
+ALONE = 0.036
+"""m from joint to joint, where there is one only: that of lumbar vertebrae."""
+
 TOKEN_MASS_KG = 1e-3
 TOKEN_INERTIA_KG_M2 = 1e-6 * np.eye(3)
 """OpenSim cannot move a body without mass or inertia; at rest neither of these loads a joint."""
 
 
-def expressible(model: SpineModel) -> tuple[SpineModel, tuple[str, ...]]:
-    """The model as far as an .osim file can say it, and the names of the effects that it cannot.
+def expressible(
+    model: SpineModel, loads: LoadCase | None = None
+) -> tuple[SpineModel, tuple[str, ...]]:
+    """The model as far as an .osim file can say it, and the names of what it cannot.
 
-    Said are linear bushings that act in all tests.
+    Said are linear bushings that act in the test of ``loads``, without one in all tests.
     """
-    said = [e for e in model.effects if e.effect.name == BUSHING and e.tests == ("*",)]
-    unsaid = dict.fromkeys(e.effect.name for e in model.effects if e not in said)
+    acting = [e for e in model.effects if loads is None or e.in_scope(loads.test)]
+    said = [e for e in acting if e.effect.name == BUSHING and (loads or e.tests == ("*",))]
+    unsaid = list(dict.fromkeys(e.effect.name for e in acting if e not in said))
+    if loads is not None and loads.fixed:
+        unsaid.append("coordinates that the rig fixes")
     return replace(model, effects=tuple(said)), tuple(unsaid)
 
 
-def osim(model: SpineModel, loads: LoadCase | None = None, left_out: Sequence[str] = ()) -> str:
+def times(loads: LoadCase) -> Array:
+    """(T,) s: as recorded, else one second a step where not all are or where they do not rise."""
+    recorded = [step.time for step in loads.steps if step.time is not None]
+    if len(recorded) == len(loads.steps) and all(a < b for a, b in pairwise(recorded)):
+        return np.array(recorded)
+    return np.array([float(step.step) for step in loads.steps])
+
+
+def osim(
+    model: SpineModel,
+    loads: LoadCase | None = None,
+    left_out: Sequence[str] = (),
+    points: Mapping[str, Mapping[str, Array]] | None = None,
+) -> str:
     """OpenSim document of a model, readable by OpenSim 4.0 and later.
 
     Coordinates are named after joint and coordinate, e.g. ``L3L4_anterior`` (m, rad); the lowest
@@ -56,6 +77,8 @@ def osim(model: SpineModel, loads: LoadCase | None = None, left_out: Sequence[st
     loads : written as prescribed forces: constant for one step, else piecewise linear through the
         steps at their recorded times, or at one second per step number when not all are recorded.
     left_out : what the model has beside what is written, see `expressible`; told in ``credits``.
+    points : (3,) m in ground by vertebra and name: markers, such as ``L4_left_pedicle_base``. Those
+        of another vertebra than the model's bodies are on ground.
 
     Raises
     ------
@@ -63,7 +86,8 @@ def osim(model: SpineModel, loads: LoadCase | None = None, left_out: Sequence[st
         For an effect other than a linear bushing, and a name that OpenSim cannot take.
     """
     stiffness = _stiffness(model, loads)
-    for name in (model.specimen, *model.joints, *(body.name for body in model.bodies)):
+    points = points or {}
+    for name in (model.specimen, *model.joints, *(body.name for body in model.bodies), *points):
         if not NAME.fullmatch(name):
             raise RefusedModel(
                 f"{model.specimen}: OpenSim cannot take the name {name!r}; "
@@ -73,15 +97,24 @@ def osim(model: SpineModel, loads: LoadCase | None = None, left_out: Sequence[st
     root = SubElement(document, "Model", name=model.specimen)
     told(root, "credits", _credits(model, left_out))
     told(root, "gravity", numbers(model.gravity))
-    bodies, joints, forces = (listed(root, kind) for kind in ("Body", "Joint", "Force"))
+    kinds = ("Body", "Joint", "Force", "Marker")
+    bodies, joints, forces, markers = (listed(root, kind) for kind in kinds)
     paths = ("/ground", *(f"/bodyset/{body.name}" for body in model.bodies))
+    ends = [frame.origin for frame in model.frames]
+    last = model.frames[-1].rotation[:, 1]
+    ends.append(2 * ends[-1] - ends[-2] if len(ends) > 1 else ends[-1] + ALONE * last)
     for j, (lower, upper) in enumerate(pairwise(paths)):
         body, frame = model.bodies[j], model.frames[j]
         inertia = body.inertia if body.inertia.any() else TOKEN_INERTIA_KG_M2
-        bodies.append(parts.body(body.name, body.mass or TOKEN_MASS_KG, body.com, inertia))
+        drawn = frame, ends[j + 1]
+        bodies.append(parts.body(body.name, body.mass or TOKEN_MASS_KG, body.com, inertia, *drawn))
         joints.append(parts.joint(model.joints[j], (lower, frame), (upper, frame)))
         forces.append(_bushing(model, j, (lower, upper), stiffness[j]))
     forces.extend([] if loads is None else _prescribed_forces(loads, paths[1:]))
+    on = {body.name: path for body, path in zip(model.bodies, paths[1:], strict=True)}
+    for vertebra, places in points.items():
+        for name, at in places.items():
+            markers.append(parts.marker(f"{vertebra}_{name}", on.get(vertebra, paths[0]), at))
     return parts.written(document)
 
 
@@ -135,11 +168,7 @@ def _bushing(model: SpineModel, j: int, paths: tuple[str, str], stiffness: Array
 
 def _prescribed_forces(loads: LoadCase, paths: Sequence[str]) -> list[Element]:
     """One prescribed force per loaded point, its components as functions of time."""
-    # the recorded times in s where all are and rise, else one second a step
-    times = [float(step.step) for step in loads.steps]
-    recorded = [step.time for step in loads.steps if step.time is not None]
-    if len(recorded) == len(loads.steps) and all(a < b for a, b in pairwise(recorded)):
-        times = recorded
+    seconds = times(loads).tolist()
     wrenches: dict[tuple[int, tuple[float, ...]], Array] = {}
     for number, step in enumerate(loads.steps):
         for wrench in step.wrenches:
@@ -152,9 +181,9 @@ def _prescribed_forces(loads: LoadCase, paths: Sequence[str]) -> list[Element]:
         told(element, "socket_frame", paths[body])
         told(element, "pointIsGlobal", "false")
         told(element, "forceIsGlobal", "true")
-        _functions(element, "forceFunctions", [_function(times, f) for f in history.T[:3]])
+        _functions(element, "forceFunctions", [_function(seconds, f) for f in history.T[:3]])
         _functions(element, "pointFunctions", [_function((), (p,)) for p in point])
-        _functions(element, "torqueFunctions", [_function(times, m) for m in history.T[3:]])
+        _functions(element, "torqueFunctions", [_function(seconds, m) for m in history.T[3:]])
         elements.append(element)
     return elements
 

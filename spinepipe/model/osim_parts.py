@@ -5,12 +5,19 @@ from collections.abc import Iterable
 from math import atan2, cos, hypot, sin
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import numpy as np
+
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.units import COORDINATES
 
 NAME = re.compile(r"[A-Za-z0-9_.-]+")
 """OpenSim separates paths by / and reads lists of names by spaces."""
+
+DRAWN = np.array([0.47, 0.39, 0.62])
+"""Half the depth, height and width of a drawn vertebra, for each m from joint to joint: a lumbar
+one is about 34, 28 and 45 mm. Nothing is computed with it.
+"""
 
 AXES = (
     ("rotation1", "extension", "0 0 1"),
@@ -55,9 +62,21 @@ def numbers(values: Iterable[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def body(name: str, mass: float, com: Array, inertia: Array) -> Element:
-    """A body: kg, centre of mass (3,) m in its frame, inertia (3, 3) kg m2 about that."""
+def body(name: str, mass: float, com: Array, inertia: Array, low: Pose, high: Array) -> Element:
+    """A body: kg, centre of mass (3,) m in its frame, inertia (3, 3) kg m2 about that.
+
+    It is drawn between two joints.
+
+    Parameters
+    ----------
+    low, high : pose of the joint below in its frame, and place (3,) m of that above.
+    """
     element = Element("Body", name=name)
+    middle = SubElement(SubElement(element, "components"), "PhysicalOffsetFrame", name="drawn")
+    geometry = SubElement(SubElement(middle, "attached_geometry"), "Ellipsoid", name="vertebra")
+    told(geometry, "socket_frame", "..")
+    told(geometry, "radii", numbers(float(np.linalg.norm(high - low.origin)) * DRAWN))
+    _placed(middle, "..", Pose(low.rotation, 0.5 * (low.origin + high)))
     told(element, "mass", repr(float(mass)))
     told(element, "mass_center", numbers(com))
     told(element, "inertia", numbers(inertia[SIX]))
@@ -100,11 +119,14 @@ def offset_frames(lower: tuple[str, Pose], upper: tuple[str, Pose]) -> Element:
     """Frames ``lower`` and ``upper`` on two bodies: path of each, and the frame's pose in it."""
     frames = Element("frames")
     for name, (path, frame) in (("lower", lower), ("upper", upper)):
-        offset = SubElement(frames, "PhysicalOffsetFrame", name=name)
-        told(offset, "socket_parent", path)
-        told(offset, "translation", numbers(frame.origin))
-        told(offset, "orientation", numbers(_xyz_angles(frame.rotation)))
+        _placed(SubElement(frames, "PhysicalOffsetFrame", name=name), path, frame)
     return frames
+
+
+def _placed(offset: Element, path: str, frame: Pose) -> None:
+    told(offset, "socket_parent", path)
+    told(offset, "translation", numbers(frame.origin))
+    told(offset, "orientation", numbers(_xyz_angles(frame.rotation)))
 
 
 def _xyz_angles(rotation: Array) -> tuple[float, float, float]:

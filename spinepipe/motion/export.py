@@ -62,8 +62,10 @@ def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
     parts.told(model, "gravity", parts.numbers(STANDARD_GRAVITY))
     bodies, joints, listed = (parts.listed(model, kind) for kind in ("Body", "Joint", "Marker"))
     masses = skeleton.masses
-    for body, kg, com, about in zip(BODIES, masses.kg, masses.com, masses.about_com, strict=True):
-        bodies.append(parts.body(body, float(kg), com, about))
+    ends = [step.origin for step in skeleton.steps]
+    each = zip(BODIES, masses.kg, masses.com, masses.about_com, (*ends, ends[-1]), strict=True)
+    for body, kg, com, about, end in each:
+        bodies.append(parts.body(body, float(kg), com, about, _HERE, end))
     paths = ("/ground", *(f"/bodyset/{body}" for body in BODIES))
     steps = (_HERE, *skeleton.steps)
     named = zip((PELVIS_JOINT, *JOINTS), pairwise(paths), steps, strict=True)
@@ -74,10 +76,15 @@ def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
     return parts.written(document)
 
 
-def mot(name: str, time_s: Array, q: Array) -> str:
-    """OpenSim's motion file of postures (F, 18, 6) m and rad at times (F,) s: m and deg."""
-    rows = np.column_stack([time_s, (q * _PER_SI).reshape(len(q), len(COLUMNS))])
+def mot(name: str, time_s: Array, q: Array, columns: Sequence[str] = COLUMNS) -> str:
+    """OpenSim's motion file of postures (F, J, 6) m and rad at times (F,) s: m and deg.
+
+    Parameters
+    ----------
+    columns : names of the 6 J coordinates; by default those of a skeleton.
+    """
+    rows = np.column_stack([time_s, (q * _PER_SI).reshape(len(q), len(columns))])
     head = (name, "version=1", f"nRows={len(rows)}", f"nColumns={rows.shape[1]}", "inDegrees=yes")
-    lines = [*head, "endheader", "\t".join(("time", *COLUMNS))]
+    lines = [*head, "endheader", "\t".join(("time", *columns))]
     lines += ["\t".join(f"{value:.15g}" for value in row) for row in rows.tolist()]
     return "\n".join(lines) + "\n"

@@ -12,7 +12,7 @@ is its cell of the same column. Groups of several kinds of studies are in the fi
 
 import csv
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from math import inf
 from pathlib import Path
@@ -79,14 +79,6 @@ class Table:
                 for one in self.columns
             ),
         ]
-
-    def without(self, *names: str) -> "Table":
-        """The table with some columns left out (those that a folder name carries)."""
-        return replace(
-            self,
-            key=tuple(name for name in self.key if name not in names),
-            columns=tuple(column for column in self.columns if column.name not in names),
-        )
 
 
 FILE = "tables.csv"

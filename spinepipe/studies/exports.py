@@ -1,9 +1,8 @@
-"""What kinds share in writing a specimen's model for OpenSim: what is refused, and the file."""
+"""What kinds share in writing files for OpenSim: what is refused, and what comes of it."""
 
 from pathlib import Path
+from typing import NamedTuple
 
-from spinepipe.model import SpineModel
-from spinepipe.model.osim import expressible, osim
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.kind import WantedFiles
 
@@ -13,9 +12,18 @@ _OPTIONS = {
         "--representation",
         "none: stiffness of this kind of study has one representation",
     ),
+    "test": ("--test", "none: motions of this kind of study are among its results"),
     "point_mm": ("--matrix", "none: this kind of study tells no stiffness matrix"),
 }
 """What some kinds do not have, by its name in `WantedFiles`."""
+
+
+class Exported(NamedTuple):
+    """OpenSim's document of a model, in words what it is, and of a test the motion as .mot."""
+
+    document: str
+    words: str
+    motion: str = ""
 
 
 def refuse(wanted: WantedFiles, *has: str) -> None:
@@ -38,21 +46,6 @@ def refuse(wanted: WantedFiles, *has: str) -> None:
     ]
     if problems:
         raise InputError(problems)
-
-
-def opensim_document(model: SpineModel, words: str) -> tuple[str, str]:
-    """OpenSim's document of a model, and in words what it is and what it leaves out.
-
-    Raises
-    ------
-    RefusedModel
-        For a name that OpenSim cannot take.
-    """
-    said, unsaid = expressible(model)
-    document = osim(said, left_out=unsaid)
-    if unsaid:
-        words += f"; not in the file, as OpenSim has no counterpart: {', '.join(unsaid)}"
-    return document, words
 
 
 def required_result(path: Path, what: str) -> Path:

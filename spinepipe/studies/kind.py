@@ -87,6 +87,7 @@ class WantedFiles:
     start : whether with the stiffness where fits start, and not with a fitted one.
     representation : of stiffness, by name; None for the one that the study's results recommend.
     point_mm : from each joint's origin, where its matrix is told; None for OpenSim's file.
+    test : whose loads and motion are wanted too; None for no test.
     """
 
     root: Path
@@ -96,6 +97,7 @@ class WantedFiles:
     start: bool = False
     representation: str | None = None
     point_mm: tuple[float, float, float] | None = None
+    test: str | None = None
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class Kind:
     ignored_by_figures : settings that no figure looks at.
     makes_models : the job that writes model files on which other studies may build.
     exports : ``file:function`` of what makes OpenSim's document of a specimen; called with study,
-        cohort and what is `WantedFiles`, it returns the document, and in words what it is.
+        cohort and what is `WantedFiles`, it returns `spinepipe.studies.exports.Exported`.
     why_no_export : where it has none, why, as a sentence.
     forms : files of a cohort's folder that it reads besides those of every cohort.
     holds : whether it solves tests in which a rig fixes joint coordinates (supports.csv).

@@ -166,11 +166,11 @@ class StudyFiles(ABC):
 
     def block_file(self, table: str, specimen: str, block: str) -> str:
         """The file of one block of a table."""
-        return f"{self.folder}/blocks/{table}/specimen={specimen}/block={block}.parquet"
+        return f"{self.folder}/blocks/{table}/specimen-{specimen}/block-{block}.parquet"
 
     def specimen_file(self, table: str, specimen: str) -> str:
         """The job file of a specimen, of a table that has one for each."""
-        return f"{self.folder}/{table}/specimen={specimen}.parquet"
+        return f"{self.folder}/{table}/specimen-{specimen}.parquet"
 
     def results(self, full: bool = False) -> list[str]:
         """What a reader of the study wants to have: report, tables, figures and the rest."""

@@ -57,7 +57,8 @@ class Run:
             name = self.files.job_of(table, str(file))
             made = self.files.made_of_jobs
             together = [one for one in made if self.files.job_of(one, "") == name]
-            paths = {one: str(file.with_name(f"{one}.parquet")) for one in together}
+            here = f"/jobs/{table}/"
+            paths = {one: str(file).replace(here, f"/jobs/{one}/") for one in together}
             files: dict[str, Any] = dict(paths) if len(paths) > 1 else {"output": str(file)}
             if name == "track":
                 laws = self.files.law_files(place["specimen"], place["trial"], place["approach"])

@@ -8,9 +8,13 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+import opensim
+import pandas as pd
 import pytest
+from study_cases import STUDY, Size, project
 from sweeps import sweep
 
+from spinepipe.cli import main
 from spinepipe.effects import EffectKind, Parameter
 from spinepipe.model import LoadCase, RefusedModel, ScopedEffect
 from spinepipe.model.osim import osim
@@ -18,6 +22,7 @@ from tests.reference import bridge
 from tests.reference.peers import chain as chains
 from tests.reference.peers import opensim_peer, pinocchio_peer
 from tests.reference.peers.chain import WEIGHTLESS, Array, Chain, Load
+from tests.reference.peers.newton import root as root_of
 
 
 @dataclass(frozen=True)
@@ -144,3 +149,64 @@ def test_what_opensim_cannot_say_is_refused_by_name() -> None:
         osim(model.with_effects((*model.effects, foreign)))
     with pytest.raises(RefusedModel, match="the name 'my spine'"):
         osim(replace(model, specimen="my spine"))
+
+
+LOADS = """specimen,test,step,time_s,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm,px_mm,py_mm,pz_mm
+*,flexion,0,0,V1,0,0,0,0,0,0,0,85,0
+*,flexion,1,2,V1,5,-20,8,1,0.5,-2,10,85,-4
+*,flexion,2,5,V1,10,-40,-16,2,1.5,-4,10,85,-4
+*,flexion,2,5,V2,-6,0,3,0,0,0,0,40,0
+"""
+
+
+def test_a_test_is_exported_with_its_loads_and_its_motion(tmp_path: Path) -> None:
+    """OpenSim's own equilibria under the loads in the file are the motion in the file beside it."""
+    root = project(tmp_path, Size())
+    (root / "config/cohorts/straight/loads.csv").write_text(LOADS)
+    file = tmp_path / "m.osim"
+    command = ["--root", str(root), "export", STUDY, "a", "--start", "--test", "flexion"]
+    assert main([*command, "-o", str(file)]) == 0
+    built = opensim_peer.load_osim(file)
+    motion = opensim.Storage(str(file.with_suffix(".mot")))
+    names = [motion.getColumnLabels().get(k) for k in range(motion.getColumnLabels().getSize())]
+    assert names[0] == "time"
+    assert sorted(names[1:]) == sorted(built.coordinates)
+    assert motion.isInDegrees()
+    built.model.getSimbodyEngine().convertDegreesToRadians(motion)
+    columns = []
+    for name in ("time", *built.coordinates):
+        cells = opensim.ArrayDouble()
+        motion.getTimeColumn(cells) if name == "time" else motion.getDataColumn(name, cells)
+        columns.append([cells.get(k) for k in range(cells.getSize())])
+    times, *rest = columns
+    assert times == [0.0, 2.0, 5.0]
+    told = np.array(rest).T
+    assert np.abs(told).max() > 0.05  # rad
+    for time, q in zip(times, told, strict=True):
+        at = built._replace(ramp_time=time)
+        found = root_of(lambda x, _, at=at: opensim_peer.residual(at, x), np.zeros(q.shape), 1e-12)
+        np.testing.assert_allclose(found, q, rtol=0, atol=1e-12)
+
+
+def test_landmarks_are_markers_and_vertebrae_are_drawn(tmp_path: Path) -> None:
+    root = project(tmp_path, Size())
+    file = tmp_path / "m.osim"
+    assert main(["--root", str(root), "export", STUDY, "a", "--start", "-o", str(file)]) == 0
+    model = opensim.Model(str(file))
+    state = model.initSystem()
+    rows = pd.read_csv(root / "config/cohorts/straight/landmarks.csv").query("specimen == 'a'")
+    markers, bodies = model.getMarkerSet(), model.getBodySet()
+    assert markers.getSize() == len(rows)
+    for row in rows.itertuples():
+        one = markers.get(f"{row.vertebra}_{row.landmark}")
+        at = np.array([row.x_mm, row.y_mm, row.z_mm]) / 1000.0
+        np.testing.assert_allclose(one.getLocationInGround(state).to_numpy(), at, atol=1e-15)
+        assert one.getParentFrameName().endswith("ground" if row.vertebra == "V3" else row.vertebra)
+    # joints are where the lower vertebra's upper endplate meets the upper one's lower: every 36 mm
+    heights = []
+    for name in ("V2", "V1"):
+        drawn = opensim.PhysicalFrame.safeDownCast(bodies.get(name).getComponent("drawn"))
+        heights.append(drawn.getPositionInGround(state).to_numpy()[1])
+        shape = opensim.Ellipsoid.safeDownCast(drawn.get_attached_geometry(0))
+        assert 0.010 < shape.get_radii().get(1) < 0.018
+    assert np.diff(heights) == pytest.approx(0.036)

@@ -82,7 +82,7 @@ def contents(output: Path) -> dict[str, str]:
 def test_all_that_went_in_and_came_out_and_nothing_else(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name in ("jobs/specimen=a/x.parquet", "blocks/x.parquet", "logs/x.log", ".left.json.1"):
+    for name in ("jobs/specimen-a/x.parquet", "blocks/x.parquet", "logs/x.log", ".left.json.1"):
         (root / "results" / STUDY / name).parent.mkdir(parents=True, exist_ok=True)
         (root / "results" / STUDY / name).write_text("no result")
     (root / "config/cohorts/straight/.#loads.csv").write_text("an editor's")

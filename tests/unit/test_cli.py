@@ -3,6 +3,7 @@
 Catches a command that prints another answer, writes elsewhere or ends well where it should not.
 """
 
+import json
 import os
 import re
 import shutil
@@ -333,6 +334,12 @@ def test_export_says_why_a_kind_has_none(tmp_path: Path, run: Run) -> None:
         (True, [STUDY, "z", "-o", "a.osim"], "unknown specimen 'z'"),
         (True, ["prob", "a", "-o", "a.osim"], "did you mean 'probe'?"),
         (True, [STUDY, "a", "-o", "a.xml"], "allowed: FILE.osim"),
+        (
+            True,
+            [STUDY, "a", "--test", "flex", "-o", "a.osim"],
+            "found flex; allowed: one of flexion",
+        ),
+        (False, [STUDY, "--tables", "all"], "run `snakemake -j2 results/probe/report.html` first"),
     ],
 )
 def test_export_of_what_is_not_there(
@@ -348,6 +355,29 @@ def test_export_of_what_is_not_there(
     code, _, err = run("--root", tmp_path, "export", *arguments)
     assert code == 1
     assert says in err
+
+
+def test_tables_are_exported_as_csv(tmp_path: Path, run: Run) -> None:
+    """Each as it is, names of digits too; what cannot stand in a CSV stands beside it."""
+    results(project(tmp_path, Size(specimens=("001", "002"))), Size(specimens=("001", "002")))
+    folder = tmp_path / "tables"
+    code, out, _ = run("--root", tmp_path, "export", STUDY, "--tables", folder)
+    assert (code, "3 tables" in out) == (0, True)
+    package = json.loads((folder / "datapackage.json").read_text())
+    dtypes = {"string": str, "integer": "Int32", "number": float, "boolean": "boolean"}
+    assert {one["name"] for one in package["resources"]} == {"poses", "calibrations", "simulations"}
+    for one in package["resources"]:
+        types = {field["name"]: dtypes[field["type"]] for field in one["schema"]["fields"]}
+        read = pd.read_csv(folder / one["path"], dtype=types)
+        table = pd.read_parquet(tmp_path / "results" / STUDY / f"{one['name']}.parquet")
+        assert list(read) == list(table)
+        for name, kind in types.items():
+            if kind is float:
+                np.testing.assert_allclose(read[name], table[name].astype(float), rtol=1e-15)
+            else:
+                cells = (one[name].astype(object).fillna("").tolist() for one in (read, table))
+                assert next(cells) == next(cells)
+        assert set(read["specimen"]) == {"001", "002"}
 
 
 def test_engine_agrees_with_the_closed_form() -> None:

@@ -30,7 +30,7 @@ SETTINGS = (
     "poses: 2\nstiffness_sets: 2\n"
     "virtual_tests: {moment_nm: 7.5, tests: [flexion, left_rotation], steps: 3}\n"
 )
-BLOCK = f"results/{STUDY}/blocks/range_of_motion/specimen=a/block=000.parquet"
+BLOCK = f"results/{STUDY}/blocks/range_of_motion/specimen-a/block-000.parquet"
 
 
 def job_files(told: Expected, specimen: str) -> list[str]:
@@ -278,7 +278,7 @@ def test_a_reading_of_one_specimen_reruns_no_fit_of_another(tmp_path: Path, stud
     again = changed(lambda: expected_of(tmp_path, study), lambda: loads.write_text("".join(rows)))
     files = {name for name in jobs(expected_of(tmp_path, study)) if name.endswith(".parquet")}
     joint = {name for name in files if "/pooled/" in name or "/left_out/" in name}
-    own = {name for name in files if "specimen=s02/" in name}
+    own = {name for name in files if "specimen-s02" in name}
     assert own
     assert again & files == own | joint
 

@@ -44,10 +44,10 @@ def page(root: Path, **up_to_date: bool | None) -> str:
 
 def fail(root: Path, name: str, words: str, at: float | None = None) -> Path:
     """The log of a job that failed, and an empty one of a job that went well."""
-    log = root / "results" / name / "logs" / "simulate" / "specimen=a.log"
+    log = root / "results" / name / "logs" / "simulate" / "specimen-a.log"
     log.parent.mkdir(parents=True, exist_ok=True)
     log.write_text(f"job simulate study={name}: {words}\nTraceback\n")
-    (log.parent / "specimen=b.log").write_text("")
+    (log.parent / "specimen-b.log").write_text("")
     made = (root / "results" / name / "report.html").stat().st_mtime
     os.utime(log, (made + (at or 1.0),) * 2)
     return log

@@ -76,13 +76,6 @@ def test_a_type_that_is_none_is_told_with_its_place(of: str, tmp_path: Path) -> 
         tables(tmp_path, ROWS.replace("side,text", f"side,{of}"))
 
 
-def test_columns_that_a_folder_carries_are_left_out_of_the_key_too(tmp_path: Path) -> None:
-    table = tables(tmp_path, ROWS)["sizes"].without("specimen")
-    assert table.key == ("step",)
-    assert table.names[0] == "step"
-    assert table.column("side").allowed == ("left", "right", "")
-
-
 @sweep(
     "kind, table, column, values",
     [

@@ -7,14 +7,25 @@ import errno
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
+import pyarrow.dataset
 import pytest
 from sweeps import sweep
 
 from spinepipe.schema import Column, Table
 from spinepipe.status import Status
 from spinepipe.studies.registry import every_kind
-from spinepipe.tables import BadTable, arrow_schema, join, read, read_frame, to_arrow, write
+from spinepipe.tables import (
+    BadTable,
+    arrow_schema,
+    from_rows,
+    join,
+    read,
+    read_frame,
+    to_arrow,
+    write,
+)
 
 TABLE = Table(
     "small",
@@ -106,7 +117,7 @@ def test_no_rows_are_a_table_too() -> None:
 
 
 def test_a_written_table_reads_back_with_its_metadata(tmp_path: Path) -> None:
-    rows, path = to_arrow(TABLE, ROWS), tmp_path / "deep" / "specimen=a" / "rows.parquet"
+    rows, path = to_arrow(TABLE, ROWS), tmp_path / "deep" / "specimen-a" / "rows.parquet"
     write(rows, path, {"seed": "7", "code": "abc"})
     again = read(path)
     assert again.replace_schema_metadata(None) == rows
@@ -170,5 +181,30 @@ def test_every_result_table_is_complete(table: Table) -> None:
         assert not column.nullable or (column.empty and column.name not in table.key)
         for unit in ("mm", "deg"):
             assert not column.name.endswith(f"_{unit}") or column.unit == unit
-    without = table.without("specimen")
-    assert "specimen" not in (*without.key, *without.names)
+
+
+def test_what_all_rows_have_is_told_once() -> None:
+    given = {name: cells for name, cells in ROWS.items() if name not in ("specimen", "pose")}
+    given = {name: cells[:1] for name, cells in given.items()}
+    rows = to_arrow(TABLE, given, specimen="001", pose=7)
+    assert rows.schema == arrow_schema(TABLE)
+    assert rows["specimen"].to_pylist() == ["001"]
+    assert rows["pose"].to_pylist() == [7]
+    (row,) = rows.drop_columns(["specimen", "pose"]).to_pylist()
+    assert from_rows(TABLE, [row], specimen="001", pose=7) == rows
+    with pytest.raises(BadTable, match="columns differ"):
+        to_arrow(TABLE, given, pose=7)
+
+
+def test_a_folder_of_job_files_opens_as_one_data_set(tmp_path: Path) -> None:
+    """As readers open it that make a column of each ``name=value`` in a path."""
+    for name in ("001", "010"):
+        path = tmp_path / f"specimen-{name}" / "rows.parquet"
+        path.parent.mkdir()
+        write(to_arrow(TABLE, {**ROWS, "specimen": [name] * 3, "pose": [0, 1, 2]}), path, {})
+    for rows in (
+        pd.read_parquet(tmp_path),
+        pyarrow.dataset.dataset(tmp_path, partitioning="hive").to_table().to_pandas(),
+    ):
+        assert set(rows["specimen"]) == {"001", "010"}
+        assert len(rows) == 6

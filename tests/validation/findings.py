@@ -35,7 +35,7 @@ def _studies(seeds: Sequence[int]) -> Iterator[tuple[str, int, Path]]:
     base = ROOT / "results" / "validation" / "findings" / made_by(*MODULES)
     for seed in seeds:
         for law in LAWS:
-            folder = base / f"law={law}" / f"seed={seed:04d}"
+            folder = base / f"law-{law}" / f"seed={seed:04d}"
             if not (folder / "done").exists():
                 _run(law, seed, folder)
                 print(f"findings: {law} truth, seed {seed} done", flush=True)

@@ -27,7 +27,7 @@ echo $!
 """
 # Which process reads the Snakefile: one for each time Snakemake is started.
 NOTE = "\nPath('queue', f'{os.getpid()}.start').touch()\n"
-BLOCK = "range_of_motion/blocks/range_of_motion/specimen=b/block=000.parquet"
+BLOCK = "range_of_motion/blocks/range_of_motion/specimen-b/block-000.parquet"
 
 
 def with_queue(project: Project) -> Project:
@@ -67,7 +67,7 @@ def lose_block(project: Project) -> None:
     """One block and the job files that it holds."""
     project.path(f"results/{BLOCK}").unlink()
     for stiffness in ("00", "01"):
-        move = f"range_of_motion/jobs/specimen=b/pose=0000/stiffness={stiffness}.parquet"
+        move = f"range_of_motion/jobs/specimen-b/pose-0000/stiffness-{stiffness}.parquet"
         project.path(f"results/{move}").unlink()
 
 

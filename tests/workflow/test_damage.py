@@ -19,26 +19,28 @@ POSES = "joint_pose_sensitivity"
 
 
 def simulation(pose: int, stiffness: str) -> str:
-    return f"{POSES}/jobs/specimen=s01/pose={pose:04d}/stiffness={stiffness}.parquet"
+    return f"{POSES}/jobs/specimen-s01/pose-{pose:04d}/stiffness-{stiffness}.parquet"
 
 
 FLIPPED, CUT = simulation(0, "best01"), simulation(2, "best01")
 LATE = f"{POSES}/calibrations.parquet"
 PICKLED = simulation(0, "best02")
 RANKED = f"{POSES}/best.json"
-BLOCK = f"{POSES}/blocks/simulations/specimen=s01/block=001.parquet"
+BLOCK = f"{POSES}/blocks/simulations/specimen-s01/block-001.parquet"
 
-FIT = "cohort_stiffness/fits/specimen=b/representation=per_joint/fitted_to=flexion"
-MOVED = "range_of_motion/jobs/specimen=b/pose=0001/stiffness=00.parquet"
+FITS = "cohort_stiffness/fits"
+OF_B = "specimen-b/representation-per_joint/fitted_to-flexion.parquet"
+FIT = f"{FITS}/stiffness/{OF_B}"
+MOVED = "range_of_motion/jobs/specimen-b/pose-0001/stiffness-00.parquet"
 MOTION = "tracking/opensim/a/flexion_extension/optk_generic.mot"
-LOST = (f"{FIT}/stiffness.parquet", MOVED, MOTION)
-OF_FIT = {f"{FIT}/{name}.parquet" for name in ("stiffness", "fits", "errors", "nuisances")}
+LOST = (FIT, MOVED, MOTION)
+OF_FIT = {f"{FITS}/{name}/{OF_B}" for name in ("stiffness", "fits", "errors", "nuisances")}
 """Made by the job of a lost file."""
 
 ASKED = (
     *(f"results/{POSES}/{name}.parquet" for name in ("simulations", "agreement")),
     *(f"results/{name}" for name in (RANKED, FLIPPED, PICKLED)),
-    f"results/{FIT}/stiffness.parquet",
+    f"results/{FIT}",
     f"results/{MOTION}",
     "all",
 )
@@ -82,6 +84,9 @@ def test_damaged_and_lost_files_are_computed_again_by_the_same_run_with_the_same
         assert checked.count(f"results/{name}: damaged") == 1
     spoil(done, RANKED, content[RANKED].replace(b'"pose": ', b'"pose": 1'))
     spoil(done, BLOCK, content[BLOCK] + b"more")
+    former = done.path(f"results/{POSES}/jobs/specimen=s01/pose=0000/stiffness=best01.parquet")
+    former.parent.mkdir(parents=True)
+    former.write_bytes(content[FLIPPED])  # as versions before decision 0063 called it: twice a row
     said = done.run(*ASKED)
     for name in (RANKED, BLOCK):
         assert said.count(f"results/{name} is damaged") == 1
@@ -93,6 +98,6 @@ def test_damaged_and_lost_files_are_computed_again_by_the_same_run_with_the_same
         path.unlink(missing_ok=True)
     assert done.contents() == content
     again = written(before, done.files())
-    jobs = {name for name in again if "=" in name and "/blocks/" not in name}
+    jobs = {name for name in again if "-" in name and "/blocks/" not in name}
     assert jobs == {FLIPPED, CUT, PICKLED, MOVED} | OF_FIT
     assert MOTION in again

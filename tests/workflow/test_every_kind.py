@@ -13,6 +13,8 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
+import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
 from made_pages import SVG
@@ -131,3 +133,26 @@ def test_full_makes_all_tables_and_all_after_it_has_nothing_to_do(
     for kind in SMALL:
         look_at_tables(project, kind, full=True)
         look_at_results(project, kind, full=True)
+
+
+@pytest.mark.parametrize("kind", SMALL)
+def test_folders_of_job_files_open_as_one_data_set(eight: Project, kind: str) -> None:
+    """By readers that make a column of ``name=value`` in paths; with the rows of the table."""
+    files = layout(eight, kind)
+    for name in (*files.made_of_jobs, *files.by_specimen):
+        path = eight.path(f"{files.folder}/{name}.parquet")
+        if not path.exists():  # of `full`
+            continue
+        whole, parts = pq.read_table(path), [files.block_files(name)]
+        if name in files.made_of_jobs:
+            places = files.blocks(name)
+            parts.append([file for place in places for file in files.job_files(name, *place)])
+        for made in parts:
+            folders = {eight.path(re.split(r"/[a-z_]+-", file)[0]) for file in made}
+            found = [ds.dataset(one, partitioning="hive").to_table() for one in folders]
+            for one in found:
+                assert one.schema.remove_metadata() == whole.schema.remove_metadata(), name
+            assert sum(one.num_rows for one in found) == whole.num_rows, name
+            frames = [pd.read_parquet(one) for one in folders]
+            assert sum(map(len, frames)) == whole.num_rows, name
+            assert {column for one in frames for column in one} == set(whole.column_names)

@@ -42,7 +42,7 @@ def run_job(job, rule, wildcards, *others):
 
 
 def job_file(specimen: str) -> str:
-    return f"counted/joints/specimen={specimen}.parquet"
+    return f"counted/joints/specimen-{specimen}.parquet"
 
 
 def test_failing_jobs_are_named_the_others_kept_and_a_killed_run_goes_on(
@@ -60,7 +60,7 @@ def test_failing_jobs_are_named_the_others_kept_and_a_killed_run_goes_on(
     assert "Traceback" not in done.stdout
     listed = done.stdout.partition(f"\n{len(ACCIDENTS)} jobs failed:")[2]
     for specimen, (_, words) in ACCIDENTS.items():
-        log = f"results/counted/logs/count_joints/specimen={specimen}.log"
+        log = f"results/counted/logs/count_joints/specimen-{specimen}.log"
         assert f"job count_joints study=counted specimen={specimen}: " in done.stdout
         assert words in done.stdout
         assert f"count_joints study=counted specimen={specimen} (log: {log})" in listed
@@ -231,11 +231,11 @@ def test_a_file_that_kills_its_process_is_named_and_takes_no_other_along(
     ended = project.snakemake("-j2", "--keep-going", target)
     assert ended.returncode != 0
     for specimen in "ab":
-        dead = f"results/range_of_motion/jobs/specimen={specimen}/pose=0001/stiffness=01.parquet"
+        dead = f"results/range_of_motion/jobs/specimen-{specimen}/pose-0001/stiffness-01.parquet"
         assert re.search(rf"job moves_block .*{dead}: .*SIGKILL", ended.stdout), ended.stdout
     jobs = {name for name in before if name.startswith("range_of_motion/jobs/")}
     made = written(before, project.files()) & jobs
-    assert jobs - made == {name for name in jobs if name.endswith("pose=0001/stiffness=01.parquet")}
+    assert jobs - made == {name for name in jobs if name.endswith("pose-0001/stiffness-01.parquet")}
     project.path("dying").unlink()
     assert jobs & project.rerun(target) == jobs - made
 

@@ -22,11 +22,11 @@ pytestmark = pytest.mark.slow
 
 POSES = "joint_pose_sensitivity"
 SIMULATIONS = f"{POSES}/jobs/"
-BATCH = "global_sensitivity/jobs/responses/specimen=b/batch=00002.parquet"
+BATCH = "global_sensitivity/jobs/responses/specimen-b/batch-00002.parquet"
 MOTION = "tracking/opensim/a/flexion_extension/optk_generic.mot"
 """Lost files."""
 
-MOVES_OF_B = "range_of_motion/blocks/range_of_motion/specimen=b/"
+MOVES_OF_B = "range_of_motion/blocks/range_of_motion/specimen-b/"
 
 UNTOUCHED = ("scoliosis", "trunk_loads")
 
@@ -43,7 +43,7 @@ def made_of(project: Project, *tables: str) -> set[str]:
 
 def of_jobs(files: set[str]) -> set[str]:
     """Those that a job for one pose, batch or the like writes."""
-    return {name for name in files if "=" in name and "/blocks/" not in name}
+    return {name for name in files if "-" in name and "/blocks/" not in name}
 
 
 def test_one_look_plans_what_hangs_on_each_change_and_nothing_else(
@@ -84,15 +84,15 @@ def test_one_look_plans_what_hangs_on_each_change_and_nothing_else(
     assert "discrepancy/discrepancy/verdict.json" in of["discrepancy"]
     assert not of_jobs(of[POSES])
     assert {name for name in of[POSES] if "/blocks/" in name} == {
-        f"{POSES}/blocks/simulations/specimen=s01/block=00{number}.parquet" for number in (0, 1)
+        f"{POSES}/blocks/simulations/specimen-s01/block-00{number}.parquet" for number in (0, 1)
     }
-    assert {name for name in of[POSES] if "=" not in name} == {
+    assert {name for name in of[POSES] if "-" not in name} == {
         f"{POSES}/simulations.parquet",
         *made_of(project, "simulations"),
     }
     assert "cohort_stiffness/findings.parquet" in of["cohort_stiffness"]
-    assert not {name for name in of["cohort_stiffness"] if "=" in name}
-    assert of_jobs(of["range_of_motion"]) == {"range_of_motion/frames/specimen=b.parquet"}
+    assert not {name for name in of["cohort_stiffness"] if "-" in name}
+    assert of_jobs(of["range_of_motion"]) == {"range_of_motion/frames/specimen-b.parquet"}
     blocks = {name for name in of["range_of_motion"] if "/blocks/" in name}
     assert blocks == {name for name in before if name.startswith(MOVES_OF_B)}
     batches = {name for name in of_jobs(of["global_sensitivity"]) if "/jobs/" in name}
@@ -132,7 +132,7 @@ def test_files_that_are_dated_anew_are_as_they_were(
 def test_a_job_file_is_made_when_asked_for_by_name(eight: Project, tmp_path: Path) -> None:
     """And nothing that is made of it."""
     project = eight.copy(tmp_path / "project")
-    lost = f"{SIMULATIONS}specimen=s01/pose=0003/stiffness=best02.parquet"
+    lost = f"{SIMULATIONS}specimen-s01/pose-0003/stiffness-best02.parquet"
     os.unlink(project.path(f"results/{lost}"))
     before = project.files()
     project.run(f"results/{lost}")

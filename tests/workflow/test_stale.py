@@ -81,7 +81,7 @@ def test_copied_results_are_known_by_their_marks(done: Project) -> None:
     without_record(done)
     assert done.planned(*TABLES) == set()
     done.edit(f"config/studies/{KIND}.yaml", *SEED)
-    landmarks = {f"{KIND}/landmarks{part}.parquet" for part in ("", "/specimen=s01")}
+    landmarks = {f"{KIND}/landmarks{part}.parquet" for part in ("", "/specimen-s01")}
     assert landmarks <= done.planned(*TABLES, f"results/{KIND}/landmarks.parquet")
 
 
@@ -102,8 +102,8 @@ def test_what_has_another_mark_or_none_or_was_cut_off_is_computed_again(
     done: Project, recorded: bool
 ) -> None:
     """Whether Snakemake has records of them or not: the files tell."""
-    blocks = f"{KIND}/blocks/simulations/specimen=s01"
-    another, none = f"{blocks}/block=000.parquet", f"{blocks}/block=001.parquet"
+    blocks = f"{KIND}/blocks/simulations/specimen-s01"
+    another, none = f"{blocks}/block-000.parquet", f"{blocks}/block-001.parquet"
     cut_off = f"{KIND}/success.parquet"
     spoil(done.path(f"results/{another}"), metadata=True)
     spoil(done.path(f"results/{none}"), metadata=False)

@@ -2,8 +2,8 @@
 # The jobs stand in spinepipe/studies/cohort_stiffness.
 
 COHORTS = results_of("cohort_stiffness")
-OWN = "specimen={specimen}/representation={representation}/fitted_to={fitted_to}"
-POOL = "representation={representation}/fitted_to={fitted_to}/without={without}"
+OWN = "specimen-{specimen}/representation-{representation}/fitted_to-{fitted_to}"
+POOL = "representation-{representation}/fitted_to-{fitted_to}/without-{without}"
 
 
 wildcard_constraints:
@@ -18,10 +18,14 @@ rule literature:
         PROJECT.base_model,
     output:
         **tables_in(
-            f"{COHORTS}/literature/specimen={{specimen}}", "stiffness", "errors", "sign_checks"
+            f"{COHORTS}/literature",
+            "stiffness",
+            "errors",
+            "sign_checks",
+            of="specimen-{specimen}",
         ),
     log:
-        f"{LOGS}/literature/specimen={{specimen}}.log",
+        f"{LOGS}/literature/specimen-{{specimen}}.log",
     params:
         digest=digest("literature"),
     run:
@@ -33,7 +37,7 @@ rule fit:
         outdated("fit"),
         PROJECT.base_model,
     output:
-        **tables_in(f"{COHORTS}/fits/{OWN}", "stiffness", "fits", "errors", "nuisances"),
+        **tables_in(f"{COHORTS}/fits", "stiffness", "fits", "errors", "nuisances", of=OWN),
     log:
         f"{LOGS}/fits/{OWN}.log",
     params:
@@ -51,7 +55,7 @@ rule left_out:
             wildcards.specimen, wildcards.representation, wildcards.fitted_to
         ),
     output:
-        **tables_in(f"{COHORTS}/left_out/{OWN}", "stiffness", "errors"),
+        **tables_in(f"{COHORTS}/left_out", "stiffness", "errors", of=OWN),
     log:
         f"{LOGS}/left_out/{OWN}.log",
     params:
@@ -65,7 +69,7 @@ rule pool:
         outdated("pool"),
         PROJECT.base_model,
     output:
-        **tables_in(f"{COHORTS}/pooled/{POOL}", "stiffness", "fits", "errors", "pooling"),
+        **tables_in(f"{COHORTS}/pooled", "stiffness", "fits", "errors", "pooling", of=POOL),
     log:
         f"{LOGS}/pooled/{POOL}.log",
     params:
@@ -82,10 +86,13 @@ rule experiment:
         fitted=lambda wildcards: layout(wildcards.study).simulated_fit(wildcards.specimen),
     output:
         **tables_in(
-            f"{COHORTS}/experiment/specimen={{specimen}}", "load_displacement", "helical_axes"
+            f"{COHORTS}/experiment",
+            "load_displacement",
+            "helical_axes",
+            of="specimen-{specimen}",
         ),
     log:
-        f"{LOGS}/experiment/specimen={{specimen}}.log",
+        f"{LOGS}/experiment/specimen-{{specimen}}.log",
     params:
         digest=digest("experiment"),
     run:

@@ -13,7 +13,7 @@ PROJECT = Project(os.getcwd())
 run_job = partial(run.run_job, PROJECT)
 RESULTS = "results/{study}"
 LOGS = "results/{study}/logs"
-OF_BLOCK = "specimen={specimen}/block={block}"
+OF_BLOCK = "specimen-{specimen}/block-{block}"
 
 # Jobs that serve every kind of study.
 BLOCK = run.BLOCK
@@ -32,9 +32,13 @@ def results_of(kind):
     return f"results/{{study,{one_of(PROJECT.names.get(kind, ['none of this kind']))}}}"
 
 
-def tables_in(folder, *names):
-    """Output of several tables in one folder, by their names."""
-    return {name: update(f"{folder}/{name}.parquet") for name in names}
+def tables_in(folder, *names, of=""):
+    """Output of several tables in one folder, by their names.
+
+    Job files lie in a folder of their table, so that it opens as one; `of` says what they are of.
+    """
+    pattern = f"{folder}/%s/{of}.parquet" if of else f"{folder}/%s.parquet"
+    return {name: update(pattern % name) for name in names}
 
 
 def layout(study):

@@ -26,9 +26,11 @@ rule base_of_specimen:
     input:
         outdated("base_of_specimen", "base"),
     output:
-        **tables_in(f"{SENSITIVITIES}/base/specimen={{specimen}}", "base_stiffness", "base_motion"),
+        **tables_in(
+            f"{SENSITIVITIES}/base", "base_stiffness", "base_motion", of="specimen-{specimen}"
+        ),
     log:
-        f"{LOGS}/base_of_specimen/specimen={{specimen}}.log",
+        f"{LOGS}/base_of_specimen/specimen-{{specimen}}.log",
     params:
         digest=digest("base"),
     run:
@@ -55,10 +57,10 @@ rule responses_block:
 use rule responses_block as respond with:
     output:
         output=update(
-            f"{SENSITIVITIES}/jobs/responses/specimen={{specimen}}/batch={{batch}}.parquet"
+            f"{SENSITIVITIES}/jobs/responses/specimen-{{specimen}}/batch-{{batch}}.parquet"
         ),
     log:
-        f"{LOGS}/respond/specimen={{specimen}}/batch={{batch}}.log",
+        f"{LOGS}/respond/specimen-{{specimen}}/batch-{{batch}}.log",
     params:
         digest=digest("respond"),
         table="responses",
@@ -84,10 +86,10 @@ rule calibrated_block:
 use rule calibrated_block as calibrate_samples with:
     output:
         output=update(
-            f"{SENSITIVITIES}/jobs/calibrated/specimen={{specimen}}/batch={{batch}}.parquet"
+            f"{SENSITIVITIES}/jobs/calibrated/specimen-{{specimen}}/batch-{{batch}}.parquet"
         ),
     log:
-        f"{LOGS}/calibrate_samples/specimen={{specimen}}/batch={{batch}}.log",
+        f"{LOGS}/calibrate_samples/specimen-{{specimen}}/batch-{{batch}}.log",
     params:
         digest=digest("calibrate"),
         table="calibrated",
@@ -105,13 +107,14 @@ rule index_factors:
         ),
     output:
         **tables_in(
-            f"{SENSITIVITIES}/analysis/specimen={{specimen}}",
+            f"{SENSITIVITIES}/analysis",
             "indices",
             "convergence",
             "failed_runs",
+            of="specimen-{specimen}",
         ),
     log:
-        f"{LOGS}/index_factors/specimen={{specimen}}.log",
+        f"{LOGS}/index_factors/specimen-{{specimen}}.log",
     params:
         digest=digest("analyse"),
     run:

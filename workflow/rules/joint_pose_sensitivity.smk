@@ -30,9 +30,9 @@ rule sample_landmarks:
     input:
         outdated("sample_landmarks"),
     output:
-        output=update(f"{POSES}/landmarks/specimen={{specimen}}.parquet"),
+        output=update(f"{POSES}/landmarks/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/sample_landmarks/specimen={{specimen}}.log",
+        f"{LOGS}/sample_landmarks/specimen-{{specimen}}.log",
     params:
         digest=digest("sample_landmarks"),
     run:
@@ -42,11 +42,11 @@ rule sample_landmarks:
 rule build_models:
     input:
         outdated("build_models"),
-        landmarks=f"{RESULTS}/landmarks/specimen={{specimen}}.parquet",
+        landmarks=f"{RESULTS}/landmarks/specimen-{{specimen}}.parquet",
     output:
-        output=update(f"{POSES}/poses/specimen={{specimen}}.parquet"),
+        output=update(f"{POSES}/poses/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/build_models/specimen={{specimen}}.log",
+        f"{LOGS}/build_models/specimen-{{specimen}}.log",
     params:
         digest=digest("build_models"),
     run:
@@ -57,7 +57,7 @@ rule build_models:
 rule calibrations_block:
     input:
         outdated_block("calibrations_block", part="calibrate", job="calibrate"),
-        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+        poses=f"{RESULTS}/poses/specimen-{{specimen}}.parquet",
     output:
         output=update(f"{POSES}/blocks/{{table,calibrations}}/{OF_BLOCK}.parquet"),
     log:
@@ -71,9 +71,9 @@ rule calibrations_block:
 # One file by its name, such as one that got lost.
 use rule calibrations_block as calibrate with:
     output:
-        output=update(f"{POSES}/calibrations/specimen={{specimen}}/pose={{pose}}.parquet"),
+        output=update(f"{POSES}/calibrations/specimen-{{specimen}}/pose-{{pose}}.parquet"),
     log:
-        f"{LOGS}/calibrate/specimen={{specimen}}/pose={{pose}}.log",
+        f"{LOGS}/calibrate/specimen-{{specimen}}/pose-{{pose}}.log",
     params:
         digest=digest("calibrate"),
         table="calibrations",
@@ -97,7 +97,7 @@ rule rank_models:
 rule simulations_block:
     input:
         outdated_block("simulations_block", part="simulate", job="simulate"),
-        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+        poses=f"{RESULTS}/poses/specimen-{{specimen}}.parquet",
         calibrations=lambda wildcards: layout(wildcards.study).blocks_of_calibrations(
             wildcards.specimen
         ),
@@ -115,10 +115,10 @@ rule simulations_block:
 use rule simulations_block as simulate with:
     output:
         output=update(
-            f"{POSES}/jobs/specimen={{specimen}}/pose={{pose}}/stiffness={{stiffness,calibrated|best[0-9]{{2}}}}.parquet"
+            f"{POSES}/jobs/specimen-{{specimen}}/pose-{{pose}}/stiffness-{{stiffness,calibrated|best[0-9]{{2}}}}.parquet"
         ),
     log:
-        f"{LOGS}/simulate/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
+        f"{LOGS}/simulate/specimen-{{specimen}}/pose-{{pose}}-{{stiffness}}.log",
     params:
         digest=digest("simulate"),
         table="simulations",
@@ -129,10 +129,10 @@ rule bootstrap:
         outdated("bootstrap"),
     output:
         output=update(
-            f"{POSES}/bootstrap/specimen={{specimen}}/bootstrap={{bootstrap}}/loading={{loading}}/batch={{batch}}.parquet"
+            f"{POSES}/bootstrap/specimen-{{specimen}}/bootstrap-{{bootstrap}}/loading-{{loading}}/batch-{{batch}}.parquet"
         ),
     log:
-        f"{LOGS}/bootstrap/specimen={{specimen}}/{{bootstrap}}-{{loading}}-{{batch}}.log",
+        f"{LOGS}/bootstrap/specimen-{{specimen}}/{{bootstrap}}-{{loading}}-{{batch}}.log",
     params:
         digest=digest("bootstrap"),
     run:
@@ -142,13 +142,13 @@ rule bootstrap:
 rule fit_by_method:
     input:
         outdated("fit_by_method"),
-        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+        poses=f"{RESULTS}/poses/specimen-{{specimen}}.parquet",
     output:
         output=update(
-            f"{POSES}/methods/specimen={{specimen}}/pose={{pose}}/method={{method}}.parquet"
+            f"{POSES}/methods/specimen-{{specimen}}/pose-{{pose}}/method-{{method}}.parquet"
         ),
     log:
-        f"{LOGS}/methods/specimen={{specimen}}/pose={{pose}}-{{method}}.log",
+        f"{LOGS}/methods/specimen-{{specimen}}/pose-{{pose}}-{{method}}.log",
     params:
         digest=digest("fit_by_method"),
     run:
@@ -159,9 +159,9 @@ rule landmark_errors:
     input:
         outdated("landmark_errors"),
     output:
-        output=update(f"{POSES}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.parquet"),
+        output=update(f"{POSES}/precision/specimen-{{specimen}}/sd_mm-{{sd_mm}}.parquet"),
     log:
-        f"{LOGS}/precision/specimen={{specimen}}/sd_mm={{sd_mm}}.log",
+        f"{LOGS}/precision/specimen-{{specimen}}/sd_mm-{{sd_mm}}.log",
     params:
         digest=digest("landmark_errors"),
     run:
@@ -172,9 +172,9 @@ rule spread_over_landmark_sd:
     input:
         outdated("spread_over_landmark_sd"),
     output:
-        output=update(f"{POSES}/spread_over_landmark_sd/specimen={{specimen}}.parquet"),
+        output=update(f"{POSES}/spread_over_landmark_sd/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/spread_over_landmark_sd/specimen={{specimen}}.log",
+        f"{LOGS}/spread_over_landmark_sd/specimen-{{specimen}}.log",
     params:
         digest=digest("spread_over_landmark_sd"),
     run:
@@ -185,9 +185,9 @@ rule over_load_point:
     input:
         outdated("over_load_point"),
     output:
-        output=update(f"{POSES}/stiffness_over_load_point/specimen={{specimen}}.parquet"),
+        output=update(f"{POSES}/stiffness_over_load_point/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/over_load_point/specimen={{specimen}}.log",
+        f"{LOGS}/over_load_point/specimen-{{specimen}}.log",
     params:
         digest=digest("over_load_point"),
     run:
@@ -197,13 +197,13 @@ rule over_load_point:
 rule posterior:
     input:
         outdated("posterior"),
-        poses=f"{RESULTS}/poses/specimen={{specimen}}.parquet",
+        poses=f"{RESULTS}/poses/specimen-{{specimen}}.parquet",
     output:
-        posterior=update(f"{POSES}/posterior/specimen={{specimen}}.parquet"),
-        posterior_motion=update(f"{POSES}/posterior_motion/specimen={{specimen}}.parquet"),
-        pose_weights=update(f"{POSES}/pose_weights/specimen={{specimen}}.parquet"),
+        posterior=update(f"{POSES}/posterior/specimen-{{specimen}}.parquet"),
+        posterior_motion=update(f"{POSES}/posterior_motion/specimen-{{specimen}}.parquet"),
+        pose_weights=update(f"{POSES}/pose_weights/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/posterior/specimen={{specimen}}.log",
+        f"{LOGS}/posterior/specimen-{{specimen}}.log",
     params:
         digest=digest("posterior"),
     run:

@@ -8,9 +8,9 @@ rule sample_frames:
     input:
         outdated("sample_frames"),
     output:
-        output=update(f"{MOTIONS}/frames/specimen={{specimen}}.parquet"),
+        output=update(f"{MOTIONS}/frames/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/sample_frames/specimen={{specimen}}.log",
+        f"{LOGS}/sample_frames/specimen-{{specimen}}.log",
     params:
         digest=digest("sample_frames"),
     run:
@@ -34,7 +34,7 @@ rule draw_stiffness:
 rule moves_block:
     input:
         outdated_block("moves_block", part="move", job="simulate"),
-        frames=f"{RESULTS}/frames/specimen={{specimen}}.parquet",
+        frames=f"{RESULTS}/frames/specimen-{{specimen}}.parquet",
         stiffness_sets=f"{RESULTS}/stiffness_sets.parquet",
     output:
         output=update(f"{MOTIONS}/blocks/{{table,range_of_motion}}/{OF_BLOCK}.parquet"),
@@ -50,10 +50,10 @@ rule moves_block:
 use rule moves_block as move with:
     output:
         output=update(
-            f"{MOTIONS}/jobs/specimen={{specimen}}/pose={{pose,[0-9]+}}/stiffness={{stiffness,[0-9]+}}.parquet"
+            f"{MOTIONS}/jobs/specimen-{{specimen}}/pose-{{pose,[0-9]+}}/stiffness-{{stiffness,[0-9]+}}.parquet"
         ),
     log:
-        f"{LOGS}/move/specimen={{specimen}}/pose={{pose}}-{{stiffness}}.log",
+        f"{LOGS}/move/specimen-{{specimen}}/pose-{{pose}}-{{stiffness}}.log",
     params:
         digest=digest("simulate"),
         table="range_of_motion",

@@ -2,7 +2,7 @@
 # The jobs stand in spinepipe/studies/scoliosis.
 
 PATIENTS = results_of("scoliosis")
-HELD = "specimen={specimen}/model={model,[a-z_]+}"
+HELD = "specimen-{specimen}/model-{model,[a-z_]+}"
 
 
 rule population:
@@ -24,9 +24,9 @@ rule personalise:
         outdated("personalise"),
         population=lambda wildcards: layout(wildcards.study).population_files(wildcards.model),
     output:
-        **tables_in(f"{PATIENTS}/jobs/{HELD}", "laws", "positions", "displacements", "curves"),
+        **tables_in(f"{PATIENTS}/jobs", "laws", "positions", "displacements", "curves", of=HELD),
     log:
-        f"{LOGS}/personalise/specimen={{specimen}}/{{model}}.log",
+        f"{LOGS}/personalise/specimen-{{specimen}}/{{model}}.log",
     params:
         digest=digest("personalise"),
     run:
@@ -37,9 +37,9 @@ rule variants:
     input:
         outdated("variants"),
     output:
-        output=update(f"{PATIENTS}/variants/specimen={{specimen}}.parquet"),
+        output=update(f"{PATIENTS}/variants/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/variants/specimen={{specimen}}.log",
+        f"{LOGS}/variants/specimen-{{specimen}}.log",
     params:
         digest=digest("variants"),
     run:

@@ -2,7 +2,7 @@
 # The jobs stand in spinepipe/studies/tracking.
 
 TRACKED = results_of("tracking")
-PERSON = f"{TRACKED}/jobs/specimen={{specimen}}"
+JOBS = f"{TRACKED}/jobs"
 
 
 # Passive elements from the trials of one kind, or of two kinds together.
@@ -10,9 +10,9 @@ rule calibrate_passive:
     input:
         outdated("calibrate_passive", "calibrate"),
     output:
-        output=update(f"{PERSON}/law={{law,[a-z_]+}}/stiffness.parquet"),
+        output=update(f"{JOBS}/stiffness/specimen-{{specimen}}/law-{{law,[a-z_]+}}.parquet"),
     log:
-        f"{LOGS}/calibrate_passive/specimen={{specimen}}/{{law}}.log",
+        f"{LOGS}/calibrate_passive/specimen-{{specimen}}/{{law}}.log",
     params:
         digest=digest("calibrate"),
     run:
@@ -27,13 +27,14 @@ rule track:
         ),
     output:
         **tables_in(
-            f"{PERSON}/trial={{trial}}/approach={{approach,[a-z_0-9]+}}",
+            JOBS,
             "tracked",
             "fits",
             "drawn",
+            of="specimen-{specimen}/trial-{trial}/approach-{approach,[a-z_0-9]+}",
         ),
     log:
-        f"{LOGS}/track/specimen={{specimen}}/trial={{trial}}/{{approach}}.log",
+        f"{LOGS}/track/specimen-{{specimen}}/trial-{{trial}}/{{approach}}.log",
     params:
         digest=digest("track"),
     run:
@@ -45,12 +46,13 @@ rule profile_stiffness:
         outdated("profile_stiffness", "profile"),
     output:
         **tables_in(
-            f"{PERSON}/region={{region}}/coordinate={{coordinate,[a-z_]+}}",
+            JOBS,
             "profiles",
             "profile_points",
+            of="specimen-{specimen}/region-{region}/coordinate-{coordinate,[a-z_]+}",
         ),
     log:
-        f"{LOGS}/profile_stiffness/specimen={{specimen}}/{{region}}_{{coordinate}}.log",
+        f"{LOGS}/profile_stiffness/specimen-{{specimen}}/{{region}}_{{coordinate}}.log",
     params:
         digest=digest("profile"),
     run:
@@ -61,9 +63,9 @@ rule weigh_loads:
     input:
         outdated("weigh_loads", "weigh"),
     output:
-        output=update(f"{PERSON}/weights.parquet"),
+        output=update(f"{JOBS}/weights/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/weigh_loads/specimen={{specimen}}.log",
+        f"{LOGS}/weigh_loads/specimen-{{specimen}}.log",
     params:
         digest=digest("weigh"),
     run:
@@ -75,9 +77,9 @@ rule examine_recordings:
     input:
         outdated("examine_recordings", "examine"),
     output:
-        **tables_in(PERSON, "clusters", "remarks", "sizes"),
+        **tables_in(JOBS, "clusters", "remarks", "sizes", of="specimen-{specimen}"),
     log:
-        f"{LOGS}/examine_recordings/specimen={{specimen}}.log",
+        f"{LOGS}/examine_recordings/specimen-{{specimen}}.log",
     params:
         digest=digest("examine"),
     run:
@@ -91,7 +93,7 @@ rule export_skeleton:
     output:
         output=update(f"{TRACKED}/opensim/{{specimen}}.osim"),
     log:
-        f"{LOGS}/export_skeleton/specimen={{specimen}}.log",
+        f"{LOGS}/export_skeleton/specimen-{{specimen}}.log",
     params:
         digest=digest("skeleton"),
     run:
@@ -101,11 +103,11 @@ rule export_skeleton:
 rule export_motion:
     input:
         outdated("export_motion", "motion"),
-        tracked=f"{RESULTS}/jobs/specimen={{specimen}}/trial={{trial}}/approach={{approach}}/tracked.parquet",
+        tracked=f"{RESULTS}/jobs/tracked/specimen-{{specimen}}/trial-{{trial}}/approach-{{approach}}.parquet",
     output:
         output=update(f"{TRACKED}/opensim/{{specimen}}/{{trial}}/{{approach,[a-z_0-9]+}}.mot"),
     log:
-        f"{LOGS}/export_motion/specimen={{specimen}}/trial={{trial}}/{{approach}}.log",
+        f"{LOGS}/export_motion/specimen-{{specimen}}/trial-{{trial}}/{{approach}}.log",
     params:
         digest=digest("motion"),
     run:

@@ -9,7 +9,7 @@ rule hold:
         outdated("hold"),
     output:
         **tables_in(
-            f"{TRUNKS}/jobs/specimen={{specimen}}",
+            f"{TRUNKS}/jobs",
             "tasks",
             "levels",
             "muscles",
@@ -19,9 +19,10 @@ rule hold:
             "masses",
             "scaling",
             "remarks",
+            of="specimen-{specimen}",
         ),
     log:
-        f"{LOGS}/hold/specimen={{specimen}}.log",
+        f"{LOGS}/hold/specimen-{{specimen}}.log",
     params:
         digest=digest("hold"),
     run:
@@ -32,9 +33,9 @@ rule simplify:
     input:
         outdated("simplify"),
     output:
-        output=update(f"{TRUNKS}/jobs/specimen={{specimen}}/simplified.parquet"),
+        output=update(f"{TRUNKS}/jobs/simplified/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/simplify/specimen={{specimen}}.log",
+        f"{LOGS}/simplify/specimen-{{specimen}}.log",
     params:
         digest=digest("simplify"),
     run:
@@ -86,9 +87,9 @@ rule samples_block:
 # One file by its name, such as one that got lost.
 use rule samples_block as sample_loads with:
     output:
-        output=update(f"{TRUNKS}/jobs/specimen={{specimen}}/batch={{batch}}/responses.parquet"),
+        output=update(f"{TRUNKS}/jobs/responses/specimen-{{specimen}}/batch-{{batch}}.parquet"),
     log:
-        f"{LOGS}/sample_loads/specimen={{specimen}}/batch={{batch}}.log",
+        f"{LOGS}/sample_loads/specimen-{{specimen}}/batch-{{batch}}.log",
     params:
         digest=digest("respond"),
         table="responses",

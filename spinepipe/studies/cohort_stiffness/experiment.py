@@ -210,8 +210,8 @@ def run(
                 curves.append({**curve, **key, **definition})
                 axes += [{**axis, **key}] if axis else []
     made = origin("experiment", root, settings, cohort, [specimen], [mark_of(p) for p in fitted])
-    write(from_rows(LOAD_DISPLACEMENT.without("specimen"), curves), load_displacement, made)
-    write(from_rows(HELICAL_AXES.without("specimen"), axes), helical_axes, made)
+    write(from_rows(LOAD_DISPLACEMENT, curves, specimen=specimen), load_displacement, made)
+    write(from_rows(HELICAL_AXES, axes, specimen=specimen), helical_axes, made)
 
 
 def _simulation(

@@ -22,15 +22,16 @@ from spinepipe.studies.cohort_stiffness.settings import (
     tests_of,
 )
 from spinepipe.studies.cohort_stiffness.tables import STIFFNESS
-from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
+from spinepipe.studies.exports import Exported, problem, refuse, required_result
 from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.opensim_files import opensim_document
 from spinepipe.tables import read_frame
 
 CRITERIA = ("left_out_specimen", "left_out_case", "fitted")
 """What recommends a representation: motion that no fit has seen, as far as any was held out."""
 
 
-def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
+def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> Exported:
     """OpenSim's document of the model, or its matrices as CSV; in words which stiffness it has.
 
     Coordinates that were not fitted keep the published value.
@@ -40,7 +41,7 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
     InputError
         Where the study has no such representation, no results, or no fit of the specimen.
     """
-    refuse(wanted, "representation", "point_mm")
+    refuse(wanted, "representation", "point_mm", "test")
     every = representations_of(study, cohort.joint_names)
     known = tuple(one for one in every if one not in NUISANCE)  # the file has joints as stated
     name = wanted.representation
@@ -64,10 +65,12 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> tup
         rows = pd.DataFrame(columns=STIFFNESS.names) if wanted.start else rows
         table = matrix_table(rows, k, cohort.joint_names, frames, wanted.point_mm)
         where = "({:g}, {:g}, {:g}) mm from its origin".format(*wanted.point_mm)
-        return table.to_csv(index=False), f"6 x 6 stiffness of each joint about {where}, {told}"
+        return Exported(
+            table.to_csv(index=False), f"6 x 6 stiffness of each joint about {where}, {told}"
+        )
     others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)
-    return opensim_document(model, f"the cohort's own joints, stiffness: {told}")
+    return opensim_document(model, f"the cohort's own joints, stiffness: {told}", cohort, wanted)
 
 
 def _recommended(wanted: WantedFiles, known: tuple[str, ...]) -> tuple[str, str]:

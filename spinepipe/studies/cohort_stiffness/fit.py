@@ -43,7 +43,7 @@ from spinepipe.studies.cohort_stiffness.stiffening import (
     laws,
     status_with_growth,
 )
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, IN_FOLDERS, NUISANCES, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, FITS, NUISANCES, STIFFNESS
 from spinepipe.studies.problem import BUSHING
 from spinepipe.tables import from_rows, write
 from spinepipe.units import COORDINATES
@@ -71,8 +71,9 @@ def run(
     rows = fitted(settings, cohort, specimen, representation, fitted_to, others)
     made = origin("fit", root, settings, cohort, [specimen])
     paths = {STIFFNESS: stiffness, FITS: fits, ERRORS: errors, NUISANCES: nuisances}
+    of = {"specimen": specimen, "representation": representation, "fitted_to": fitted_to}
     for table, path in paths.items():
-        write(from_rows(table.without(*IN_FOLDERS), rows[table.name]), path, made)
+        write(from_rows(table, rows[table.name], **of), path, made)
 
 
 def fitted(

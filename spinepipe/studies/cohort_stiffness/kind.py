@@ -160,13 +160,13 @@ class CohortLayout(StudyFiles):
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        own = f"specimen={specimen}"
+        own = f"specimen-{specimen}"
         if block == POOLED_BLOCK:
             folds = [(label, NOBODY) for label in self.load_sets if table != PREDICTED]
             if self._held_out and table != "stiffness":
                 folds += product(self._without_case_folds, self.specimens)
             places = [
-                f"pooled/representation={representation}/fitted_to={label}/without={one}"
+                f"pooled/representation-{representation}/fitted_to-{label}/without-{one}"
                 for representation in self._pooled
                 for label, one in folds
             ]
@@ -181,15 +181,15 @@ class CohortLayout(StudyFiles):
             if table in (PREDICTED, "errors") and self._held_out:
                 places += _fitted(f"left_out/{own}", self._single, self._without_case_folds)
         table = "stiffness" if table == PREDICTED else table
-        return [f"{self.folder}/{place}/{table}.parquet" for place in places]
+        return [self._file(place, table) for place in places]
 
     def fits_of_others(self, specimen: str, representation: str, fitted_to: str) -> list[str]:
         """Stiffness files of the other specimens' own fits."""
         return [
-            f"{self.folder}/{place}/stiffness.parquet"
+            self._file(place, "stiffness")
             for name in self.specimens
             if name != specimen
-            for place in _fitted(f"fits/specimen={name}", [representation], [fitted_to])
+            for place in _fitted(f"fits/specimen-{name}", [representation], [fitted_to])
         ]
 
     def simulated_fit(self, specimen: str) -> list[str]:
@@ -197,8 +197,12 @@ class CohortLayout(StudyFiles):
         name = finest(self.representations)
         if name is None:
             return []
-        (place,) = _fitted(f"fits/specimen={specimen}", [name], [joint_label(self.tests)])
-        return [f"{self.folder}/{place}/stiffness.parquet"]
+        (place,) = _fitted(f"fits/specimen-{specimen}", [name], [joint_label(self.tests)])
+        return [self._file(place, "stiffness")]
+
+    def _file(self, place: str, table: str) -> str:
+        job, _, of = place.partition("/")
+        return f"{self.folder}/{job}/{table}/{of}.parquet"
 
     @property
     def _single(self) -> tuple[str, ...]:
@@ -229,7 +233,7 @@ class CohortLayout(StudyFiles):
 def _fitted(folder: str, representations: Iterable[str], labels: Iterable[str]) -> list[str]:
     """Places of what is fitted of a specimen: each representation to each load set."""
     return [
-        f"{folder}/representation={representation}/fitted_to={label}"
+        f"{folder}/representation-{representation}/fitted_to-{label}"
         for representation, label in product(representations, labels)
     ]
 

@@ -24,7 +24,7 @@ from spinepipe.studies.cohort_stiffness.problem import (
 )
 from spinepipe.studies.cohort_stiffness.settings import CohortStiffness
 from spinepipe.studies.cohort_stiffness.stiffening import Growth, laws, median_growth
-from spinepipe.studies.cohort_stiffness.tables import ERRORS, IN_FOLDERS, STIFFNESS
+from spinepipe.studies.cohort_stiffness.tables import ERRORS, STIFFNESS
 from spinepipe.tables import from_rows, read_frame, write
 from spinepipe.units import COORDINATES
 
@@ -52,8 +52,9 @@ def run(
     )
     read = [mark_of(path) for path in others]
     made = origin("left_out", root, settings, cohort, [specimen], read)
+    of = {"specimen": specimen, "representation": representation, "fitted_to": fitted_to}
     for table, path in ((STIFFNESS, stiffness), (ERRORS, errors)):
-        write(from_rows(table.without(*IN_FOLDERS), rows[table.name]), path, made)
+        write(from_rows(table, rows[table.name], **of), path, made)
 
 
 def predicted_by_others(

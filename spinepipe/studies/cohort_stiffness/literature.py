@@ -74,9 +74,9 @@ def run(
     k = start_stiffness(settings, cohort, PUBLISHED[0])
     signs = sign_rows(cohort, specimen, tests, k, others)
     made = origin("literature", root, settings, cohort, [specimen])
-    write(from_rows(STIFFNESS.without("specimen"), values), stiffness, made)
-    write(from_rows(ERRORS.without("specimen"), seen), errors, made)
-    write(from_rows(SIGN_CHECKS.without("specimen"), signs), sign_checks, made)
+    write(from_rows(STIFFNESS, values, specimen=specimen), stiffness, made)
+    write(from_rows(ERRORS, seen, specimen=specimen), errors, made)
+    write(from_rows(SIGN_CHECKS, signs, specimen=specimen), sign_checks, made)
 
 
 def sign_rows(

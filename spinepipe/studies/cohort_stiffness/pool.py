@@ -57,9 +57,6 @@ UNTOLD_SD = 0.999 * MEAN_SD
 DECIDED = 0.5
 """Share of a newcomer's variance below which a specimen's own readings decide."""
 
-IN_POOLED = ("representation", "fitted_to")
-"""Columns that the folders of a file of one pooled fit carry."""
-
 _OF_SPREADS = (
     *("centre", "between_levels", "between_specimens", "between_joints", "scatter"),
     *("effective_unknowns", "log_likelihood", *SPREAD_CELLS),
@@ -91,9 +88,10 @@ def run(
     rows = pooled(settings, cohort, representation, fitted_to, without, others, note)
     made = origin("pool", root, settings, cohort)
     paths = {STIFFNESS: stiffness, ERRORS: errors, FITS: fits, POOLING: pooling}
+    of = {"representation": representation, "fitted_to": fitted_to}
     for table, path in paths.items():
-        shape = table.without(*IN_POOLED, *(("without",) if table is POOLING else ()))
-        write(from_rows(shape, rows[table.name]), path, made)
+        told = of | {"without": without} if table is POOLING else of
+        write(from_rows(table, rows[table.name], **told), path, made)
 
 
 def pooled(

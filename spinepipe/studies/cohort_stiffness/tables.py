@@ -29,9 +29,6 @@ GROWTH_CELLS = tuple(name for name in STIFFNESS.names if name.startswith("growth
 SPREAD_CELLS = tuple(name for name in POOLING.names if name.startswith("growth"))
 """Columns of how that spreads in a cohort."""
 
-IN_FOLDERS = ("specimen", "representation", "fitted_to")
-"""Columns that the folders of a file of one fit carry."""
-
 MEASURED, SIMULATED = "measured", "simulated"
 
 WHOLE, DIRECTION, SMALL, NOT_READ, NO_POSE = (

@@ -97,27 +97,28 @@ def run(
     read = [mark_of(path) for path in (design, *responses, *calibrated)]
     made_by = provenance("analyse", settings, cohort, [specimen], read)
     drawn = design_of(settings)
-    rows = analysed(settings, drawn, outputs)
+    rows = analysed(settings, drawn, outputs, specimen)
     for table, path in zip(rows, (indices, convergence), strict=True):
         write(table, path, made_by)
     values = factor_values(design, settings, slice(None)) * np.array(settings.per_si)
     failed = list(failed_rows(drawn, values, settings.units, responses, calibrated))
-    write(from_rows(FAILED_RUNS.without("specimen"), failed), failed_runs, made_by)
+    write(from_rows(FAILED_RUNS, failed, specimen=specimen), failed_runs, made_by)
 
 
 def analysed(
-    settings: GlobalSensitivity, design: Design, outputs: Sequence[OutputGroup]
+    settings: GlobalSensitivity, design: Design, outputs: Sequence[OutputGroup], specimen: str
 ) -> tuple[pa.Table, pa.Table]:
     """The tables ``indices`` and ``convergence`` of one specimen."""
     each = [_analysed(settings, design, one) for one in outputs]
     tables = []
     for place, table in enumerate((INDICES, CONVERGENCE)):
-        own = table.without("specimen")
         parts = [part for found in each for part in found[place]]
         columns = {
-            name: list(chain.from_iterable(part[name] for part in parts)) for name in own.names
+            name: list(chain.from_iterable(part[name] for part in parts))
+            for name in table.names
+            if name != "specimen"
         }
-        tables.append(to_arrow(own, columns))
+        tables.append(to_arrow(table, columns, specimen=specimen))
     return tables[0], tables[1]
 
 

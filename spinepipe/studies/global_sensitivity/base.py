@@ -61,8 +61,7 @@ def run(root: str, study: str, specimen: str, base_stiffness: str, base_motion: 
         (BASE_STIFFNESS, rows, base_stiffness),
         (BASE_MOTION, moved, base_motion),
     ):
-        # the specimen is in the name of the folder
-        write(from_rows(table.without("specimen"), found), path, made_by)
+        write(from_rows(table, found, specimen=specimen), path, made_by)
 
 
 def base(settings: GlobalSensitivity, cohort: Cohort, specimen: str) -> tuple[Rows, Rows]:

@@ -14,11 +14,8 @@ from spinepipe.studies.global_sensitivity.batch import Batch, batch_of, made_of_
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import problem_of
 from spinepipe.studies.global_sensitivity.tables import CALIBRATED
-from spinepipe.tables import to_arrow, write
+from spinepipe.tables import from_rows, write
 from spinepipe.units import STIFFNESS_COLUMNS
-
-TABLE = CALIBRATED.without("specimen")
-"""A job file: the specimen is in its folder's name."""
 
 STARTS = 1
 
@@ -45,8 +42,7 @@ def run(
         for lane, sample in enumerate(one.varied.kept.tolist()):
             rows.append(_fitted(settings, cohort, specimen, one, lane, one.first + sample))
         rows.sort(key=lambda row: int(row["sample"]))
-        columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
-        write(to_arrow(TABLE, columns), path, made_by)
+        write(from_rows(CALIBRATED, rows, specimen=specimen), path, made_by)
 
 
 def _fitted(

@@ -7,15 +7,16 @@ from spinepipe.cohort.specimen import joint_frames, on_bushings
 from spinepipe.effects.contract import Array
 from spinepipe.problems import InputError
 from spinepipe.status import USABLE
-from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
+from spinepipe.studies.exports import Exported, problem, refuse, required_result
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.opensim_files import opensim_document
 from spinepipe.studies.parts import stiffness_of_joints
 from spinepipe.tables import read_frame
 from spinepipe.units import COORDINATES
 
 
-def exported(study: GlobalSensitivity, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
+def exported(study: GlobalSensitivity, cohort: Cohort, wanted: WantedFiles) -> Exported:
     """OpenSim's document of the model, and in words what it is.
 
     Raises
@@ -23,7 +24,7 @@ def exported(study: GlobalSensitivity, cohort: Cohort, wanted: WantedFiles) -> t
     InputError
         Where a joint pose or a representation is asked for, or the fit has no result.
     """
-    refuse(wanted)
+    refuse(wanted, "test")
     frames = joint_frames(cohort, wanted.specimen)
     stiffness = stiffness_of_joints(cohort, study.start_stiffness, study.level_stiffness)
     told = "the study's own, nothing is fitted"
@@ -33,7 +34,7 @@ def exported(study: GlobalSensitivity, cohort: Cohort, wanted: WantedFiles) -> t
             stiffness = _fitted(wanted, stiffness)
     damping = np.array(study.damping.in_order(), dtype=float)
     model = on_bushings(cohort, wanted.specimen, frames, stiffness, damping)
-    return opensim_document(model, f"the cohort's own joints, stiffness: {told}")
+    return opensim_document(model, f"the cohort's own joints, stiffness: {told}", cohort, wanted)
 
 
 def _fitted(wanted: WantedFiles, start: Array) -> Array:

@@ -91,10 +91,10 @@ class SensitivityFiles(StudyFiles):
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
         if table in _BY_SPECIMEN:
-            return [f"{self.folder}/{_FOLDER[table]}/specimen={specimen}/{table}.parquet"]
+            return [f"{self.folder}/{_FOLDER[table]}/{table}/specimen-{specimen}.parquet"]
         numbers = files_of_block(block, len(self.specimens), self.n_batches)
-        folder = f"{self.folder}/jobs/{table}/specimen={specimen}"
-        return [f"{folder}/batch={number:05d}.parquet" for number in numbers]
+        folder = f"{self.folder}/jobs/{table}/specimen-{specimen}"
+        return [f"{folder}/batch-{number:05d}.parquet" for number in numbers]
 
     def blocks_of(self, table: str, specimen: str) -> list[str]:
         """The blocks of a table that hold a specimen; none where there is no such table."""

@@ -17,9 +17,6 @@ from spinepipe.studies.selected_tests import SelectedTest
 from spinepipe.tables import to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, from_si, subtract_baseline
 
-TABLE = RESPONSES.without("specimen")
-"""A job file: the specimen is in its folder's name."""
-
 HANDED_OVER = "share_by_engine_of_record"
 """In a file's metadata: runs whose stability nothing simpler proves."""
 
@@ -53,7 +50,7 @@ def run(
                 f"{len(by_engine)} runs left to the engine of record",
                 file=sys.stderr,
             )
-        write(to_arrow(TABLE, columns), path, made_by | handed)
+        write(to_arrow(RESPONSES, columns, specimen=specimen), path, made_by | handed)
 
 
 def responses(batch: Batch, joints: Sequence[str]) -> tuple[dict[str, Any], NDArray[np.bool_]]:

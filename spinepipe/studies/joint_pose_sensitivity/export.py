@@ -11,20 +11,22 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.problems import InputError
 from spinepipe.status import Status
-from spinepipe.studies.exports import opensim_document, problem, refuse, required_result
+from spinepipe.studies.exports import Exported, problem, refuse, required_result
 from spinepipe.studies.joint_pose_sensitivity.inputs import (
     bushing_model,
     sampled_poses,
+    specimen_inputs,
     start_stiffness,
 )
 from spinepipe.studies.joint_pose_sensitivity.problem import calibration_problem, fitted_stiffness
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.kind import WantedFiles
+from spinepipe.studies.opensim_files import opensim_document
 from spinepipe.tables import read_frame
 from spinepipe.units import STIFFNESS_COLUMNS
 
 
-def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
+def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -> Exported:
     """OpenSim's document of the model, and in words which frames and which stiffness it has.
 
     Of the cohort's own pose the fit is made here; those of sampled poses are results.
@@ -34,7 +36,7 @@ def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -
     InputError
         Where there is no such pose, or no stiffness that fits it.
     """
-    refuse(wanted, "pose")
+    refuse(wanted, "pose", "test")
     specimen, pose = wanted.specimen, wanted.pose
     if pose is None:
         frames, name = joint_frames(cohort, specimen), "nominal"
@@ -47,7 +49,9 @@ def exported(study: JointPoseSensitivity, cohort: Cohort, wanted: WantedFiles) -
     else:
         stiffness, origin = _calibrated(wanted.results, specimen, pose), "calibrated for this pose"
     model = bushing_model(study, cohort, specimen, frames, stiffness)
-    return opensim_document(model, f"joint pose {name}, stiffness: {origin}")
+    words = f"joint pose {name}, stiffness: {origin}"
+    tested = specimen_inputs(str(wanted.root), study.study, specimen, cohort.digest)
+    return opensim_document(model, words, cohort, wanted, tested.cases)
 
 
 def _fitted(study: JointPoseSensitivity, wanted: WantedFiles) -> Array:
@@ -98,7 +102,7 @@ def _calibrated(results: Path, specimen: str, pose: int) -> Array:
         Where there is none to use.
     """
     whole = results / "calibrations.parquet"
-    single = results / "calibrations" / f"specimen={specimen}" / f"pose={pose:04d}.parquet"
+    single = results / "calibrations" / f"specimen-{specimen}" / f"pose-{pose:04d}.parquet"
     path = single if single.is_file() else required_result(whole, "a computed study")
     rows = read_frame(path)
     rows = rows[(rows["specimen"] == specimen) & (rows["pose"] == pose)]

@@ -111,23 +111,23 @@ class JointPoseFiles(StudyFiles):
     def _places(self) -> dict[str, list[str]]:
         """Of each table that is joined in blocks, its job files in a specimen's folder."""
         study = self.study
-        own, stiffness = [f"pose={pose:04d}" for pose in range(study.poses)], ["calibrated"]
+        own, stiffness = [f"pose-{pose:04d}" for pose in range(study.poses)], ["calibrated"]
         stiffness += [f"best{rank:02d}" for rank in range(1, study.best_models + 1)]
         bootstraps = (("start", study.start_bootstrap), ("damping", study.damping_bootstrap))
         precision = study.landmark_precision
         return {
             "calibrations": own,
-            "simulations": [f"{pose}/stiffness={name}" for pose in own for name in stiffness],
+            "simulations": [f"{pose}/stiffness-{name}" for pose in own for name in stiffness],
             "bootstrap": [
-                f"bootstrap={name}/loading={loading}/batch={number:05d}"
+                f"bootstrap-{name}/loading-{loading}/batch-{number:05d}"
                 for name, part in bootstraps
                 for loading in part.loadings
                 for number in range(-(-part.sets // SETS_PER_BATCH))
             ],
             "method_fits": [
-                f"{pose}/method={name}" for pose in own[: study.methods.poses] for name in METHODS
+                f"{pose}/method-{name}" for pose in own[: study.methods.poses] for name in METHODS
             ],
-            "precision_errors": [f"sd_mm={sd:.15g}" for sd in precision.sd_mm if precision.poses],
+            "precision_errors": [f"sd_mm-{sd:.15g}" for sd in precision.sd_mm if precision.poses],
         }
 
     @property
@@ -175,7 +175,7 @@ class JointPoseFiles(StudyFiles):
         """The job files of which a block is made."""
         size = self._per_block(table)
         places = self._places[table][int(block) * size : (int(block) + 1) * size]
-        folder = f"{self.folder}/{IN_BLOCKS[table][1]}/specimen={specimen}"
+        folder = f"{self.folder}/{IN_BLOCKS[table][1]}/specimen-{specimen}"
         return [f"{folder}/{place}.parquet" for place in places]
 
     def blocks_of_calibrations(self, specimen: str) -> list[str]:

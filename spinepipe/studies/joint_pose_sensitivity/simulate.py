@@ -32,12 +32,9 @@ from spinepipe.studies.joint_pose_sensitivity.inputs import (
 )
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.joint_pose_sensitivity.tables import SIMULATIONS
-from spinepipe.tables import read_frame, to_arrow, write
+from spinepipe.tables import from_rows, read_frame, write
 from spinepipe.units import COORDINATE_COLUMNS, STIFFNESS_COLUMNS, from_si
 from spinepipe.world import Chain
-
-TABLE = SIMULATIONS.without("specimen", "pose")
-"""Columns of a file of this job: its specimen and pose are in the names of its folders."""
 
 
 def run(
@@ -91,13 +88,13 @@ def run(
         # measured motion as coordinates of the pose's joint frames, in which it is predicted
         if not isinstance(frames, str):
             tested = tuple(one.in_frames(inputs.frames, frames) for one in tested)
+        of = {"specimen": specimen, "pose": int(place["pose"]), "stiffness": place["stiffness"]}
         rows = [
-            {**row, "stiffness": place["stiffness"], "joint": cohort.joint_names[row["joint"]]}
+            {**row, "joint": cohort.joint_names[row["joint"]]}
             for one, steps in zip(tested, ended, strict=True)
             for row in _case_rows(one, steps)
         ]
-        columns = {column.name: [row[column.name] for row in rows] for column in TABLE.columns}
-        write(to_arrow(TABLE, columns), path, made_by[place["stiffness"] == "calibrated"])
+        write(from_rows(SIMULATIONS, rows, **of), path, made_by[place["stiffness"] == "calibrated"])
 
 
 @dataclass(frozen=True)

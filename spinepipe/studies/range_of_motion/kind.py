@@ -69,7 +69,7 @@ class RangeOfMotionFiles(StudyFiles):
         files = []
         for number in files_of_block(block, len(self.specimens), self._per_specimen):
             pose, stiffness = divmod(number, self.study.stiffness_sets)
-            place = f"specimen={specimen}/pose={pose:04d}/stiffness={stiffness:02d}"
+            place = f"specimen-{specimen}/pose-{pose:04d}/stiffness-{stiffness:02d}"
             files.append(f"{self.folder}/jobs/{place}.parquet")
         return files
 

@@ -26,9 +26,6 @@ from spinepipe.studies.selected_tests import SelectedTest
 from spinepipe.tables import read_frame, to_arrow, write
 from spinepipe.units import COORDINATE_COLUMNS, MM_PER_M, ROTATIONS, STIFFNESS_COLUMNS, from_si
 
-TABLE = RANGE_OF_MOTION.without("specimen", "pose")
-"""A job file: specimen and pose are in its folders' names."""
-
 Ends = list[tuple[Array, Status, str]]
 """End of each stored step: motion (J, 6) in mm and deg, NaN where there is none; how, and why."""
 
@@ -51,8 +48,12 @@ def run(
         values = drawn_stiffness(stamp(stiffness_sets))[int(place["stiffness"])]
         ends = _solved(settings, cohort, specimen, placed, values, tests)
         columns = _columns(cohort.joint_names, zip(tests, ends, strict=True))
-        columns["stiffness"] = [int(place["stiffness"])] * len(columns["test"])
-        write(to_arrow(TABLE, columns), path, made_by)
+        of = {
+            "specimen": specimen,
+            "pose": int(place["pose"]),
+            "stiffness": int(place["stiffness"]),
+        }
+        write(to_arrow(RANGE_OF_MOTION, columns, **of), path, made_by)
 
 
 def _solved(

@@ -122,8 +122,8 @@ class ScoliosisFiles(StudyFiles):
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        place = f"{self.folder}/jobs/specimen={specimen}"
-        return [f"{place}/model={model}/{table}.parquet" for model in self.study.models]
+        place = f"{self.folder}/jobs/{table}/specimen-{specimen}"
+        return [f"{place}/model-{model}.parquet" for model in self.study.models]
 
 
 def _population(expected: Any, place: Mapping[str, str]) -> list[str]:

@@ -121,7 +121,7 @@ class TrackingFiles(StudyFiles):
     def law_files(self, specimen: str, trial: str, approach: str) -> list[str]:
         """The calibration that a motion takes over."""
         law = self.taken[specimen, trial, approach]
-        return [] if law is None else [f"{self._of(specimen)}/law={law}/stiffness.parquet"]
+        return [] if law is None else [f"{self._of('stiffness', specimen)}/law-{law}.parquet"]
 
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
@@ -141,8 +141,8 @@ class TrackingFiles(StudyFiles):
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        place = self._of(specimen)
-        return [f"{place}/{part}{table}.parquet" for part in self._parts(table, specimen)]
+        place = self._of(table, specimen)
+        return [f"{place}{part}.parquet" for part in self._parts(table, specimen)]
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -150,20 +150,20 @@ class TrackingFiles(StudyFiles):
         skeletons = (f"opensim/{name}.osim" for name in self.specimens)
         return (*skeletons, *(f"opensim/{'/'.join(key)}.mot" for key in self.taken))
 
-    def _of(self, specimen: str) -> str:
-        return f"{self.folder}/jobs/specimen={specimen}"
+    def _of(self, table: str, specimen: str) -> str:
+        return f"{self.folder}/jobs/{table}/specimen-{specimen}"
 
     def _parts(self, table: str, specimen: str) -> Iterator[str]:
-        """Folders of a person's job files."""
+        """What a person's job files are of."""
         if table in _OF_MOTIONS:
             for who, trial, approach in self.taken:
                 if who == specimen:
-                    yield f"trial={trial}/approach={approach}/"
+                    yield f"/trial-{trial}/approach-{approach}"
         elif table == "stiffness":
-            yield from (f"law={law}/" for who, law in self.laws if who == specimen)
+            yield from (f"/law-{law}" for who, law in self.laws if who == specimen)
         elif table in _OF_PROFILES:
             for region, coordinate in product(REGIONS, PROFILED):
-                yield f"region={region}/coordinate={coordinate}/"
+                yield f"/region-{region}/coordinate-{coordinate}"
         else:
             yield ""
 

@@ -13,7 +13,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.marks import KEY, write_marked
 from spinepipe.motion.export import mot, opensim_names, osim
 from spinepipe.motion.skeleton import BODIES
-from spinepipe.studies.exports import refuse
+from spinepipe.studies.exports import Exported, refuse
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.tracking.persons import TrackedPerson, motion_digests, person_of
 from spinepipe.studies.tracking.settings import Tracking
@@ -50,16 +50,16 @@ def document(person: TrackedPerson) -> str:
     return osim(person.skeleton, markers, name)
 
 
-def exported(study: Tracking, cohort: Cohort, wanted: WantedFiles) -> tuple[str, str]:
+def exported(study: Tracking, cohort: Cohort, wanted: WantedFiles) -> Exported:
     """OpenSim's model of a person, and in words what it is: a skeleton, without stiffness.
 
     Raises
     ------
     InputError
-        Where a joint pose or a representation is asked for.
+        Where a joint pose, a representation or a test is asked for.
     """
     refuse(wanted)
     person = person_of(cohort, wanted.specimen, cohort.folder, study.scaling)
     size = "made as large as markers say" if study.scaling == "markers" else "of the cohort"
     count = len(person.markers)
-    return document(person), f"skeleton {size}, {count} markers, without head and arms"
+    return Exported(document(person), f"skeleton {size}, {count} markers, without head and arms")

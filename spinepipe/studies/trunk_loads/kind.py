@@ -128,12 +128,12 @@ class TrunkFiles(StudyFiles):
 
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
-        place = f"{self.folder}/jobs/specimen={specimen}"
+        place = f"{self.folder}/jobs/{table}/specimen-{specimen}"
         if table == "responses":
             sampled = sampled_specimens(self.study, self.specimens)
             numbers = files_of_block(block, len(sampled), batches(self.study))
-            return [f"{place}/batch={number:05d}/responses.parquet" for number in numbers]
-        return [f"{place}/{table}.parquet"]
+            return [f"{place}/batch-{number:05d}.parquet" for number in numbers]
+        return [f"{place}.parquet"]
 
 
 def _source(expected: Any, _place: Mapping[str, str]) -> list[str]:

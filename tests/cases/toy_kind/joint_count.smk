@@ -3,9 +3,9 @@ rule count_joints:
     input:
         outdated("count_joints", "count"),
     output:
-        output=update(f"{results_of('joint_count')}/joints/specimen={{specimen}}.parquet"),
+        output=update(f"{results_of('joint_count')}/joints/specimen-{{specimen}}.parquet"),
     log:
-        f"{LOGS}/count_joints/specimen={{specimen}}.log",
+        f"{LOGS}/count_joints/specimen-{{specimen}}.log",
     params:
         digest=digest("count"),
     run:

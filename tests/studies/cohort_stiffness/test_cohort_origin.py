@@ -30,14 +30,14 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
     Chains({"a": A, "b": A}, ["flexion"], noise_deg=0.1).write(root)
     made = []
     for specimen in "ab":
-        named = f"specimen={specimen}"
+        named = f"specimen-{specimen}"
         told = placed(root / "literature", named, "stiffness", "errors", "sign_checks")
         literature.run(str(root), STUDY, specimen, **told)
-        place = f"{named}/representation=per_joint/fitted_to=flexion"
+        place = f"{named}/representation-per_joint/fitted_to-flexion"
         own = placed(root / "own", place, "stiffness", "fits", "errors", "nuisances")
         fit.run(str(root), STUDY, specimen, "per_joint", "flexion", **own)
         made += [told, own]
-    place = "representation=partially_pooled/fitted_to=flexion"
+    place = "representation-partially_pooled/fitted_to-flexion/without-nobody"
     whole = placed(root / "pool", place, "stiffness", "fits", "errors", "pooling")
     pool.run(str(root), STUDY, "partially_pooled", "flexion", "nobody", **whole)
     return [*made, whole]

@@ -14,7 +14,7 @@ from straight_chains import JOINTS, NAME, SPECIMENS, TESTS
 pytestmark = pytest.mark.slow
 
 STUDY = "cohort_stiffness"
-FIT = f"{STUDY}/fits/specimen=b/representation=per_joint/fitted_to=flexion/stiffness.parquet"
+FIT = f"{STUDY}/fits/stiffness/specimen-b/representation-per_joint/fitted_to-flexion.parquet"
 
 
 def table(project: Project, name: str) -> pd.DataFrame:

@@ -98,6 +98,7 @@ def test_a_run_counts_once_however_many_steps_and_joints_it_has(tmp_path: Path) 
     made = [
         {
             **dict.fromkeys(column.name for column in RESPONSES.columns),
+            "specimen": "a",
             "sample": sample,
             "test": test,
             "step": step,
@@ -111,7 +112,7 @@ def test_a_run_counts_once_however_many_steps_and_joints_it_has(tmp_path: Path) 
         for joint in ("L3L4", "L2L3")
     ]
     path = str(tmp_path / "block.parquet")
-    write(from_rows(RESPONSES.without("specimen"), made), path, {})
+    write(from_rows(RESPONSES, made), path, {})
     found = of_runs([path])
     told = {test: [WAYS[way] for way in ways] for test, ways in found.items()}
     assert told["push"] == ["converged"] * 3

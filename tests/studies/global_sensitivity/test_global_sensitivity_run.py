@@ -71,8 +71,8 @@ def test_samples_per_target_change_no_row(tmp_path: Path) -> None:
     write_lever(Project(tmp_path), *few)
     single, batches = (tables_of(tmp_path, name) for name in ("single", "batches"))
     jobs = tmp_path / "results"
-    assert len(list(jobs.glob("single/jobs/responses/specimen=a/*.parquet"))) == 48
-    assert len(list(jobs.glob("batches/jobs/responses/specimen=a/*.parquet"))) == 7
+    assert len(list(jobs.glob("single/jobs/responses/specimen-a/*.parquet"))) == 48
+    assert len(list(jobs.glob("batches/jobs/responses/specimen-a/*.parquet"))) == 7
     assert single.keys() == batches.keys()
     for name in single:
         pd.testing.assert_frame_equal(single[name], batches[name])

@@ -47,7 +47,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(root: Path, folder: Path, *numbers: int) -> dict[int, Any]:
     """Row of each pose from the file that the job writes of it."""
     folder.mkdir(exist_ok=True)
-    files = {n: folder / f"pose={n:04d}.parquet" for n in numbers}
+    files = {n: folder / f"pose-{n:04d}.parquet" for n in numbers}
     parts = {str(path): {"pose": f"{n:04d}"} for n, path in files.items()}
     calibrate.run(str(root), STUDY, str(root / "poses.parquet"), SPECIMEN, parts)
     return {n: read_frame(path).iloc[0] for n, path in files.items()}

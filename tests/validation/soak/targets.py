@@ -77,7 +77,7 @@ spinepipe.marks._digest = lambda file, marks: marks.content
 """
 """Added to it to find out what verifying costs: marks are read, and nothing else of a file."""
 
-FILE = f"{NAME}/jobs/responses/specimen={{}}/batch={{}}.parquet"
+FILE = f"{NAME}/jobs/responses/specimen-{{}}/batch-{{}}.parquet"
 
 Row = dict[str, Any]
 
