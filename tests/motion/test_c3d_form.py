@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from spinepipe.motion.c3d_parameters import DEC, INTEL, MIPS, FormError
 from spinepipe.motion.reading import read_motion
-from spinepipe.motion.reading_c3d import DEC, INTEL, MIPS, FormError, parse_c3d
+from spinepipe.motion.reading_c3d import parse_c3d
 from spinepipe.problems import InputError, InputProblem
 
 PLACES_MM = np.array(
