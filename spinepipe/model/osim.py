@@ -14,8 +14,8 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import osim_parts as parts
-from spinepipe.model.osim_parts import NAME, listed, numbers, told
-from spinepipe.model.spine import LoadCase, RefusedModel, ScopedEffect, SpineModel
+from spinepipe.model.osim_parts import numbers, told
+from spinepipe.model.spine import LoadCase, ScopedEffect, SpineModel
 
 BUSHING = "linear_bushing"
 
@@ -92,18 +92,11 @@ def osim(
     for scoped in model.effects:
         np.add.at(stiffness, list(scoped.joints), scoped.values)
     points = points or {}
-    for name in (model.specimen, *model.joints, *(body.name for body in model.bodies), *points):
-        if not NAME.fullmatch(name):
-            raise RefusedModel(
-                f"{model.specimen}: OpenSim cannot take the name {name!r}; "
-                "use letters, digits, _ . and - only"
-            )
-    document = parts.document()
-    root = SubElement(document, "Model", name=model.specimen)
-    told(root, "credits", _credits(model, left_out))
-    told(root, "gravity", numbers(model.gravity))
-    kinds = ("Body", "Joint", "Force", "Marker")
-    bodies, joints, forces, markers = (listed(root, kind) for kind in kinds)
+    names = (*model.joints, *(body.name for body in model.bodies), *points)
+    root, (bodies, joints, forces, markers) = parts.document(
+        *(model.specimen, _credits(model, left_out), model.gravity),
+        *(("Body", "Joint", "Force", "Marker"), names),
+    )
     paths = ("/ground", *(f"/bodyset/{body.name}" for body in model.bodies))
     ends = [frame.origin for frame in model.frames]
     last = model.frames[-1].rotation[:, 1]
@@ -120,13 +113,13 @@ def osim(
     for vertebra, places in points.items():
         for name, at in places.items():
             markers.append(parts.marker(f"{vertebra}_{name}", on.get(vertebra, paths[0]), at))
-    return parts.written(document)
+    return parts.written(root)
 
 
 def _credits(model: SpineModel, left_out: Sequence[str]) -> str:
     massless = [body.name for body in model.bodies if body.mass == 0.0]
     inertialess = [body.name for body in model.bodies if not body.inertia.any()]
-    text = "Written by spinepipe. Units: m, kg, s, N, rad."
+    text = ""
     if massless:
         text += f" Without mass in the model, 1 g here: {', '.join(massless)}."
     if inertialess:

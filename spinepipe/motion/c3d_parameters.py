@@ -16,9 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_DIMENSIONS = 7
-"""Of the array of a parameter, by the form."""
-
 INTEL, DEC, MIPS = 84, 85, 86
 """By which processor numbers were written: Intel (low byte first), DEC (low byte first, reals of
 its own) or MIPS (high byte first)."""
@@ -108,7 +105,7 @@ def _value(data: bytes, at: int, name: str, processor: int) -> Value:
     kind, dimensions = struct.unpack_from("<bB", data, at)
     sizes = data[at + 2 : at + 2 + dimensions]
     begin, size = at + 2 + dimensions, abs(kind) * prod(sizes)
-    if dimensions > MOST_DIMENSIONS or len(sizes) < dimensions or begin + size > len(data):
+    if begin + size > len(data):
         raise FormError(f"a parameter {name!a} of {size} bytes, which are not there")
     if kind == CHARACTERS:
         longest = sizes[0] if sizes else size

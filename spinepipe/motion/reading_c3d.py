@@ -48,7 +48,6 @@ COUNT_ENDS = 65_535
 
 BELIEVED_SCALE = "header and POINT:SCALE differ in sign; the file's size fits {}"
 BELIEVED_ANALOG = "header and ANALOG:USED differ; the file's size fits {} numbers a frame"
-BELIEVED_FRAMES = "header and POINT:FRAMES differ by one frame; the file has room for {} frames"
 
 AGAIN = "export the motion again"
 
@@ -176,23 +175,17 @@ class C3dFile:
     def frames(self) -> int:
         """Number of frames, as told; where nothing tells it, as many as there is room for.
 
-        The last block of a file is filled up with noughts, which are no frames. Of two numbers
-        that contradict each other it is one of them: `_contradictions` has such files.
+        The last block of a file is filled up with noughts, which are no frames. Files that tell
+        two numbers are refused.
         """
         if told := self.frames_told:
-            return self.room if self.off_by_one else next(iter(told))
+            return next(iter(told))
         if not self.room:
             return 0
         last_block = self.data[max(self.start, len(self.data) - BLOCK + 1) :]
         noughts = len(last_block) - len(last_block.rstrip(b"\0"))
         filled = len(self.data) - self.start - noughts
         return min(self.room, -(-filled // self.bytes_of_frame(self.scale, self.analog)))
-
-    @property
-    def off_by_one(self) -> bool:
-        """Whether header and parameters differ by one frame, of which the file's size has one."""
-        told = sorted(self.frames_told)
-        return len(told) == 2 and told[1] - told[0] == 1 and self.room in told
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -202,8 +195,6 @@ class C3dFile:
             found.append(BELIEVED_SCALE.format("reals" if self.scale < 0.0 else "whole numbers"))
         if self.analog != self.header_analog:
             found.append(BELIEVED_ANALOG.format(self.analog))
-        if self.off_by_one:
-            found.append(BELIEVED_FRAMES.format(self.frames))
         return tuple(found)
 
     def cells(self) -> NDArray[np.float32] | NDArray[np.int16]:
@@ -291,7 +282,7 @@ def _contradictions(whole: C3dFile, markers: bool) -> Iterator[tuple[str, str, s
         yield "POINT:USED", found, "at least one, the same twice"
         return
     frames = whole.frames_told
-    if len(frames) > 1 and not whole.off_by_one:
+    if len(frames) > 1:
         found = f"{' frames and '.join(map(str, sorted(frames)))} frames"
         yield "POINT:FRAMES", found, "the same in header and parameters"
     elif whole.first > whole.last:

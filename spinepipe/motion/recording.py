@@ -22,13 +22,8 @@ MOST_RECORDING_BYTES = 128_000_000
 M_PER = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Units in which motion is written."""
 
-WORDS = {
-    f"{word}{ending}": sign
-    for word, sign in (("milli", "mm"), ("centi", "cm"), ("", "m"))
-    for ending in ("meters", "metres")
-}
-SHORTEST_WORD = 4
-"""Letters of a word that some programs cut off: `mete`."""
+WORDS = {"mill": "mm", "cent": "cm", "mete": "m", "metr": "m"}
+"""Units by the first letters of their words, which some programs cut off: `mete`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,16 +77,14 @@ def recording_from(
 
 
 def unit_of(file: str, row: int | None, column: str, text: str) -> float:
-    """What one unit of a file is in m: one of `M_PER`, or its word, which may be cut off.
+    """What one unit of a file is in m: one of `M_PER`, or its word.
 
     Raises
     ------
     InputError
         Where it is none.
     """
-    known = text.strip().lower()
-    if len(known) >= SHORTEST_WORD:
-        known = next((unit for word, unit in WORDS.items() if word.startswith(known)), known)
+    known = WORDS.get(text.strip().lower()[:4], text.strip().lower())
     if known not in M_PER:
         allowed = ", ".join(M_PER)
         raise InputError([InputProblem(file, row, column, repr(text), allowed, "correct the unit")])
