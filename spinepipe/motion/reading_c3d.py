@@ -315,7 +315,7 @@ def parse_c3d(data: bytes) -> C3dFile:
     # the header, by bytes: four 16-bit words from 2, the scale at 12, first block of frames at 16,
     # samples a frame at 18, the rate at 20
     words = numbers_at(data, WORD, 2, 9, processor).tolist()
-    points, analog, first, last, block, samples = (*words[:4], *words[7:])
+    (points, analog, first, last), (block, samples) = words[:4], words[7:]
     scale, _, rate = numbers_at(data, REAL, 12, 3, processor).tolist()
     # parameters end where frames begin, if that is behind them, or else with the file
     frames = (block - 1) * BLOCK
