@@ -47,6 +47,7 @@ COUNT_ENDS = 65_535
 """Largest number of 16 bits. Longer recordings have it as number of frames, which tells nothing."""
 
 BELIEVED_SCALE = "header and POINT:SCALE differ in sign; the file's size fits {}"
+BELIEVED_FRAMES = "header and POINT:FRAMES differ by one frame; the file has room for {} frames"
 BELIEVED_ANALOG = "header and ANALOG:USED differ; the file's size fits {} numbers a frame"
 
 AGAIN = "export the motion again"
@@ -109,11 +110,11 @@ class C3dFile:
         return self.number("RATE") or self.header_rate
 
     @cached_property
-    def layouts(self) -> list[tuple[float, int]]:
-        """Scales and numbers of analog channels that frames may have, as header and parameters say.
+    def layouts(self) -> list[tuple[float, int, int]]:
+        """Scale, numbers of analog channels in a frame and frames (0: not told), as the file says.
 
-        Where the two differ, in the sign of the scale or the analog numbers, only those with which
-        the frames that are told fill the file up to less than a block.
+        Where header and parameters differ in the sign of the scale or in a number, only those that
+        fill the file up to less than a block.
         """
         scales, analog = [self.number("SCALE") or self.header_scale], [self.header_analog]
         if -np.inf < scales[0] * self.header_scale < 0.0:
@@ -121,12 +122,9 @@ class C3dFile:
         used = self.numbers("ANALOG", "USED")
         if used and (told := int(used[0]) * max(self.samples, 1)) != self.header_analog:
             analog.append(told)
-        every, left = list(product(scales, analog)), len(self.data) - self.start
-        fits = [
-            one
-            for one in every
-            if any(0 <= left - n * self.bytes_of_frame(*one) < BLOCK for n in self.frames_told)
-        ]
+        every = list(product(scales, analog, self.frames_told or [0]))
+        left = len(self.data) - self.start
+        fits = [one for one in every if 0 <= left - one[2] * self.bytes_of_frame(*one[:2]) < BLOCK]
         return every if len(every) == 1 else fits
 
     @property
@@ -175,11 +173,10 @@ class C3dFile:
     def frames(self) -> int:
         """Number of frames, as told; where nothing tells it, as many as there is room for.
 
-        The last block of a file is filled up with noughts, which are no frames. Files that tell
-        two numbers are refused.
+        The last block of a file is filled up with noughts, which are no frames.
         """
-        if told := self.frames_told:
-            return next(iter(told))
+        if told := self.layouts[0][2]:
+            return told
         if not self.room:
             return 0
         last_block = self.data[max(self.start, len(self.data) - BLOCK + 1) :]
@@ -195,6 +192,8 @@ class C3dFile:
             found.append(BELIEVED_SCALE.format("reals" if self.scale < 0.0 else "whole numbers"))
         if self.analog != self.header_analog:
             found.append(BELIEVED_ANALOG.format(self.analog))
+        if len(self.frames_told) > 1:
+            found.append(BELIEVED_FRAMES.format(self.frames))
         return tuple(found)
 
     def cells(self) -> NDArray[np.float32] | NDArray[np.int16]:
@@ -262,6 +261,11 @@ def _contradictions(whole: C3dFile, markers: bool) -> Iterator[tuple[str, str, s
     if not SLOWEST <= whole.rate <= FASTEST:
         allowed = f"{SLOWEST:g} to {FASTEST:g} frames a second"
         yield "POINT:RATE", f"{whole.rate:g} frames a second", allowed
+    frames = sorted(whole.frames_told)
+    if frames and frames[-1] - frames[0] > 1:
+        found = f"{' frames and '.join(map(str, frames))} frames"
+        yield "POINT:FRAMES", found, "the same in header and parameters"
+        return
     if len(whole.layouts) != 1:
         scale = whole.number("SCALE") or 0.0
         if scale * whole.header_scale < 0.0:
@@ -270,7 +274,9 @@ def _contradictions(whole: C3dFile, markers: bool) -> Iterator[tuple[str, str, s
             yield "POINT:SCALE", found, allowed
         else:
             found = f"{whole.header_analog} analog numbers a frame in the header"
-            yield "ANALOG:USED", found, "channels times samples a frame, as the parameters tell"
+            found += f", {' or '.join(map(str, frames))} frames"
+            allowed = "channels times samples a frame, as the parameters tell"
+            yield "POINT:FRAMES" if len(frames) > 1 else "ANALOG:USED", found, allowed
         return
     if not np.isfinite(whole.scale) or whole.scale == 0.0:
         yield "POINT:SCALE", f"a scale of {whole.scale:g}", "a finite number that is not zero"
@@ -281,15 +287,11 @@ def _contradictions(whole: C3dFile, markers: bool) -> Iterator[tuple[str, str, s
         found = f"{whole.points} markers in the header{told}"
         yield "POINT:USED", found, "at least one, the same twice"
         return
-    frames = whole.frames_told
-    if len(frames) > 1:
-        found = f"{' frames and '.join(map(str, sorted(frames)))} frames"
-        yield "POINT:FRAMES", found, "the same in header and parameters"
-    elif whole.first > whole.last:
+    if whole.first > whole.last:
         found = f"frames from {whole.first} to {whole.last}"
         yield "POINT:FRAMES", found, "a first frame before the last"
     elif not whole.frames or whole.frames > whole.room:
-        told = f" of {next(iter(frames))}" if frames else ""
+        told = f" of {frames[0]}" if frames else ""
         found = f"room for {whole.room}{told} frames"
         yield "POINT:FRAMES", found, "all that are told; the file may be cut off"
 

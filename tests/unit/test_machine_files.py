@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import openpyxl
+import opensim
 import pytest
 import yaml
 from hypothesis import given, settings
@@ -204,6 +205,19 @@ def test_plain_text_goes_the_fast_way() -> None:
     lines, numbers = table.columns([1, 0], [lambda _: np.nan] * 2, plain=True)
     np.testing.assert_array_equal(numbers, [MOMENT, TIME])
     assert (lines[0], lines[-1]) == (2, ROWS + 1)
+
+
+def test_a_table_that_opensim_writes(tmp_path: Path) -> None:
+    table = opensim.TimeSeriesTable()
+    table.setColumnLabels(["Moment", "Angle"])
+    for time, *row in zip(TIME.tolist(), MOMENT.tolist(), ANGLE.tolist(), strict=True):
+        table.appendRow(time, opensim.RowVector(row))
+    table.addTableMetaDataString("inDegrees", "yes")
+    opensim.STOFileAdapter().write(table, str(tmp_path / "a.txt"))
+    head = (tmp_path / "a.txt").read_text().partition("endheader")[0]
+    form = {"delimiter": "tab", "names_line": head.count("\n") + 2}
+    (one,) = read(tmp_path, form=form, time={"column": "time", "unit": "s"})
+    assert same(one)
 
 
 def test_workbooks(tmp_path: Path) -> None:
