@@ -261,33 +261,26 @@ def _contradictions(whole: C3dFile, markers: bool) -> Iterator[tuple[str, str, s
     if not SLOWEST <= whole.rate <= FASTEST:
         allowed = f"{SLOWEST:g} to {FASTEST:g} frames a second"
         yield "POINT:RATE", f"{whole.rate:g} frames a second", allowed
-    frames = sorted(whole.frames_told)
-    if frames and frames[-1] - frames[0] > 1:
+    frames, undecided = sorted(whole.frames_told), len(whole.layouts) != 1
+    apart = frames[-1] - frames[0] if frames else 0
+    scale, used = whole.number("SCALE") or 0.0, whole.number("USED")
+    if undecided and scale * whole.header_scale < 0.0:
+        found = f"a scale of {scale:g}, and {whole.header_scale:g} in the header"
+        allowed = "the same sign: below zero for reals, above it for whole numbers"
+        yield "POINT:SCALE", found, allowed
+    elif apart > 1 or (undecided and apart):
         found = f"{' frames and '.join(map(str, frames))} frames"
         yield "POINT:FRAMES", found, "the same in header and parameters"
-        return
-    if len(whole.layouts) != 1:
-        scale = whole.number("SCALE") or 0.0
-        if scale * whole.header_scale < 0.0:
-            found = f"a scale of {scale:g}, and {whole.header_scale:g} in the header"
-            allowed = "the same sign: below zero for reals, above it for whole numbers"
-            yield "POINT:SCALE", found, allowed
-        else:
-            found = f"{whole.header_analog} analog numbers a frame in the header"
-            found += f", {' or '.join(map(str, frames))} frames"
-            allowed = "channels times samples a frame, as the parameters tell"
-            yield "POINT:FRAMES" if len(frames) > 1 else "ANALOG:USED", found, allowed
-        return
-    if not np.isfinite(whole.scale) or whole.scale == 0.0:
+    elif undecided:
+        found = f"{whole.header_analog} analog numbers a frame in the header"
+        yield "ANALOG:USED", found, "channels times samples a frame, as the parameters tell"
+    elif not np.isfinite(whole.scale) or whole.scale == 0.0:
         yield "POINT:SCALE", f"a scale of {whole.scale:g}", "a finite number that is not zero"
-        return
-    used = whole.number("USED")
-    if (markers and not whole.points) or (used is not None and used != whole.points):
+    elif (markers and not whole.points) or (used is not None and used != whole.points):
         told = "" if used is None else f", {used:g} in its parameters"
         found = f"{whole.points} markers in the header{told}"
         yield "POINT:USED", found, "at least one, the same twice"
-        return
-    if whole.first > whole.last:
+    elif whole.first > whole.last:
         found = f"frames from {whole.first} to {whole.last}"
         yield "POINT:FRAMES", found, "a first frame before the last"
     elif not whole.frames or whole.frames > whole.room:
