@@ -7,10 +7,9 @@ about z, a force or translation to posterior a negative one along x: the axes of
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import SequenceMatcher
-from itertools import zip_longest
 from typing import Literal
 
+from spinepipe.problems import did_you_mean
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 LOAD_COLUMNS = ("fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm")
@@ -89,27 +88,16 @@ def column_of(coordinate: str) -> str:
 def mistyped(name: str, names: Iterable[str], otherwise: str) -> str:
     """A remedy for an unknown column: the name that it is but for a slip of typing, if any.
 
-    Words of three letters and numbers tell axes and sides (`LB`, `Mz`, `Force2`), and so do first
-    and last letters: a name that differs there is another quantity, and is not offered.
+    Short words, first and last letters tell axes and sides (`LB`, `MomentZ`, `right`, `posterior`):
+    a name that differs there is another quantity, and is not offered.
     """
-    for other in names if _words(name) else ():
-        words = zip_longest(_words(name), _words(other), fillvalue="")
-        if all(
-            a == b
-            or (
-                min(len(a), len(b)) > 3
-                and (a[0], a[-1]) == (b[0], b[-1])
-                and SequenceMatcher(None, a, b).ratio() > 0.75
-            )
-            for a, b in words
-        ):
-            return f"did you mean '{other}'?"
-    return otherwise
+    return did_you_mean(name, [one for one in names if _sides(one) == _sides(name)], otherwise)
 
 
-def _words(name: str) -> list[str]:
-    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", name[:60])
-    return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", apart)]
+def _sides(name: str) -> list[str]:
+    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", name).lower()
+    words = re.findall(r"[^\W\d_]+|\d+", apart)
+    return [word if len(word) < 4 else word[0] + word[-1] for word in words]
 
 
 def factor_of(unit: str, positive: str) -> float:

@@ -121,8 +121,7 @@ def _understood(
             problems.append(
                 InputProblem(of.file, None, str(channel.column), found, allowed, remedy)
             )
-    notation = Notation(table.form.decimal, table.form.thousands)
-    lines, numbers, faults, notes = _numbers(table, of.file, there, notation, table.notes)
+    lines, numbers, faults = _numbers(table, of.file, there)
     problems += faults
     if len(lines) < FEWEST_LINES:
         found, allowed = f"{len(lines)} lines of numbers", f"at least {FEWEST_LINES}"
@@ -148,6 +147,7 @@ def _understood(
     }
     every = [*loads.values(), *motion.values()]
     whole = np.all([np.isfinite(one) for one in every], axis=0)
+    notes = table.notes
     if empty := int(np.count_nonzero(~whole)):
         notes = (*notes, f"{count(empty, 'row')} with an empty cell left out")
     sound = whole.copy()
@@ -200,10 +200,9 @@ def _numbers(
     table: RawTable,
     file: str,
     there: Sequence[tuple[Channel, int]],
-    notation: Notation,
-    notes: tuple[str, ...] = (),
-) -> tuple[Lines, dict[str | int, Array], list[InputProblem], tuple[str, ...]]:
-    """Lines, numbers by column, problems of cells that have none, and what is to be said."""
+) -> tuple[Lines, dict[str | int, Array], list[InputProblem]]:
+    """Lines, numbers by column, and problems of cells that have none."""
+    notation = Notation(table.form.decimal, table.form.thousands)
     clocks = [one.unit == "clock" for one, _ in there]
     places = [place for _, place in there]
     plain = notation.thousands is None and not any(clocks)
@@ -221,7 +220,7 @@ def _numbers(
         for at, gap in empty.items():
             bad[at] = np.setdiff1d(bad[at], gap)
     if not any(one.size for one in bad):
-        return lines, columns, [], notes
+        return lines, columns, []
     # once more through the rows: the first bad cell of each column, and how numbers are written
     first = {(int(one[0]), at): "" for at, one in enumerate(bad) if one.size}
 
@@ -234,11 +233,6 @@ def _numbers(
                     yield cell_at(row, place)
 
     able = notations_of(cells())
-    grouped = [one for one in able if one.decimal == notation.decimal and one.thousands]
-    readings = [{one.value(cell) for one in able} for cell in first.values()]
-    if grouped and notation.thousands is None and all(len(one) == 1 for one in readings):
-        told = f"numbers have a {grouped[0].thousands} between thousands"
-        return _numbers(table, file, there, grouped[0], (*notes, told))
     problems = []
     for (row, at), cell in first.items():
         channel = there[at][0]
@@ -254,7 +248,7 @@ def _numbers(
         problems.append(
             InputProblem(file, int(lines[row]), str(channel.column), found, allowed, what)
         )
-    return lines, columns, problems, notes
+    return lines, columns, problems
 
 
 def _backwards(time: Array, lines: Lines, file: str, column: str) -> Iterator[InputProblem]:

@@ -348,14 +348,6 @@ def test_both_decimal_signs_in_one_file_end_no_circle(tmp_path: Path) -> None:
         assert "set `form" not in told
 
 
-def test_thousands_beyond_doubt_are_read_and_told(tmp_path: Path) -> None:
-    rows = [f'{t},"{1000 * m:,.1f}",{a}' for t, m, a in zip(TIME, MOMENT, ANGLE, strict=True)]
-    loads = [{**LOAD, "unit": "N mm"}]
-    (found,) = read(tmp_path, "\n".join(["t,Moment,Angle", *rows]), loads=loads)
-    assert same(found)
-    assert "a comma between thousands" in found.notes[0]
-
-
 @sweep(
     "cell, unit, says",
     [
