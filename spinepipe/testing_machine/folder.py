@@ -196,7 +196,8 @@ def _sentences(tests: ImportedTests) -> Iterator[str]:
         yield from _of_test(test)
     mapping = tests.mapping
     yield from of_conversions({place for test in tests.tests for place in test.places}, mapping)
-    yield from _of_accuracy(tests)
+    if mapping.accuracy is not None:
+        yield "The accuracy goes on to cohort.yaml; where it is larger than the SD, it counts."
     yield f"SD of a reading: {sd_sentence(tests)}"
     if mapping.zeroed:
         yield "Readings count from those of step 0 of their cycle (zeroed_at_step_0: true)."
@@ -300,21 +301,6 @@ def sd_sentence(tests: ImportedTests) -> str:
     return " ".join(words)
 
 
-def _of_accuracy(tests: ImportedTests) -> Iterator[str]:
-    """Which is larger, what repeats show or what the instrument may be off."""
-    accuracy = tests.mapping.accuracy
-    for name, off in accuracy.model_dump(exclude_none=True).items() if accuracy else ():
-        unit = name.rpartition("_")[2]
-        if unit not in NOT_READ:
-            continue
-        sd = _declared(tests.rotation if unit == "deg" else tests.translation, unit)
-        which = "larger than" if off > sd else "not larger than"
-        yield (
-            f"Accuracy of the instrument, {name.rpartition('_')[0].replace('_', ' ')}: {off:g} "
-            f"{unit}, {which} the SD of a reading, {sd:g} {unit}: {max(off, sd):g} counts as noise."
-        )
-
-
 def _specimens(tests: ImportedTests) -> list[str]:
     return list(dict.fromkeys(test.specimen for test in tests.tests))
 
@@ -322,12 +308,11 @@ def _specimens(tests: ImportedTests) -> list[str]:
 def _joints(tests: ImportedTests) -> Rows:
     """A template: joints above each other, axes of ground."""
     joints = joint_names(tests.mapping.vertebrae)
-    origins = {one.joint: one.origin_mm for one in tests.mapping.motion_points}
     rows: Rows = [("specimen", "joint", *_FRAME)]
     for specimen in _specimens(tests):
         for number, joint in enumerate(joints):
-            origin = origins.get(joint, (0, number * LEVEL_APART_MM, 0))
-            rows.append((specimen, joint, *(f"{value:g}" for value in origin), 0, 0, 0))
+            height = f"{number * LEVEL_APART_MM:g}"
+            rows.append((specimen, joint, 0, height, 0, 0, 0, 0))
     return rows
 
 

@@ -14,7 +14,6 @@ from spinepipe.testing_machine.channels import (
 from spinepipe.testing_machine.instruments import (
     LoadCell,
     Markers,
-    MotionPoint,
     Point,
     Rotations,
 )
@@ -39,8 +38,7 @@ class FileForm(BaseModel):
     )
     thousands: Literal["point", "comma", "space", "apostrophe"] | None = Field(
         default=None,
-        description="what stands between thousands; null: nothing, or what all numbers of a file "
-        "show beyond doubt",
+        description="what stands between thousands; null: nothing",
     )
     sheet: _Column | None = Field(
         default=None,
@@ -271,9 +269,6 @@ class MachineMapping(BaseModel):
         default=None,
         description="order of three rotations; null: z, x', y'' (extension, right "
         "bending, left rotation, each about axes that those before have turned)",
-    )
-    motion_points: tuple[MotionPoint, ...] = Field(
-        default=(), strict=False, description="joints whose translations are not of their origin"
     )
     steps: LoadSteps = Field(default_factory=LoadSteps, description="load steps that are kept")
     files: tuple[TestFile, ...] = Field(strict=False, description="the files")
