@@ -169,6 +169,7 @@ def assembled(
     sentences: Sequence[str],
     origins: Mapping[str, Sequence[tuple[str, int | None]]],
     copied: Mapping[str, Path] = MappingProxyType({}),
+    further: Mapping[str, object] = MappingProxyType({}),
 ) -> ImportedCohort:
     """A cohort of these tables.
 
@@ -178,11 +179,13 @@ def assembled(
     tables : rows by stem, cells in the order of the form; tables without rows are left out.
     origins : as in `ImportedCohort`.
     copied : files that become part of the folder as they are, by their names there.
+    further : keys of ``cohort.yaml`` besides those that all imports have.
     """
     forms = all_forms()
     header = settings.model_dump(include=set(ImportSettings.model_fields), mode="json")
-    header["source"] += f" Made by `spinepipe import` of {made_of}"
-    header["gravity"] = "bodies.csv" in copied
+    source = settings.source.rstrip(". ")
+    header["source"] = f"{source}. Made by `spinepipe import` of {made_of}"
+    header |= {"gravity": "bodies.csv" in copied, **further}
     texts = {
         forms[stem].file: csv_text([forms[stem].names[: len(rows[0])], *rows])
         for stem, rows in tables.items()

@@ -18,7 +18,6 @@ from spinepipe.testing_machine.settings import (
 
 def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """What is wrong with the keys taken together, each problem at its line."""
-    yield from _fewest(document, mapping)
     yield from _names(document, mapping)
     keys = {key: key for key in OF_A_FILE}
     common = not mapping.files
@@ -54,8 +53,7 @@ def _of_file(
         yield _at(
             document, keys["load_point_mm"], "nothing", allowed, "add `load_point_mm: [x, y, z]`"
         )
-    yield from _directions(document, mapping, keys)
-    yield from _columns(document, mapping, keys)
+    yield from _channels(document, mapping, keys)
     form = mapping.form
     if form.first_line is not None and form.first_line <= form.names_line:
         allowed = f"a line below the names, which are in line {form.names_line}"
@@ -68,18 +66,6 @@ def _of_file(
 
 def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str) -> InputProblem:
     return InputProblem(document.file, document.line_of(key), key, found, allowed, remedy)
-
-
-def _fewest(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
-    """Lists that must not be empty (a rule of pydantic would speak up for their bad items too)."""
-    fewest = {"vertebrae": 2, "files": 1}
-    for key, least in fewest.items():
-        there = len(getattr(mapping, key))
-        if there < least:
-            yield _at(document, key, f"{there} of them", f"at least {least}", "add what is missing")
-    if mapping.steps.levels is not None and not mapping.steps.levels:
-        remedy = "name levels, or delete the key"
-        yield _at(document, "steps.levels", "an empty list", "at least 1", remedy)
 
 
 def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
@@ -128,57 +114,28 @@ def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
             yield _at(document, "motion", "columns and markers", "one of them", "delete one")
 
 
-def _directions(
+def _channels(
     document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
 ) -> Iterator[InputProblem]:
-    """A unit tells whether something turns or shifts; the direction must do so too."""
-    sides: tuple[tuple[str, tuple[LoadChannel | MotionChannel, ...]], ...] = (
-        ("loads", mapping.loads),
-        ("motion", mapping.motion),
-    )
-    for side, channels in sides:
-        for number, channel in enumerate(channels):
-            turns = channel.unit in MOMENTS or channel.unit in ANGLES
-            fit = tuple(word for word, one in DIRECTIONS.items() if one.turns == turns)
-            if channel.positive not in fit:
-                key = f"{keys[side]}.{number}.positive"
-                found = f"'{channel.positive}' in {channel.unit}"
-                yield _at(document, key, found, one_of(fit), "correct the direction or the unit")
-
-
-def _columns(
-    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
-) -> Iterator[InputProblem]:
-    """Each column once, each quantity once; numbers only where there are no names."""
-    loads, motion, beside = keys["loads"], keys["motion"], mapping.motion_files
-    of_loads = [(f"{loads}.{n}.column", one.column) for n, one in enumerate(mapping.loads)]
-    of_motion = [(f"{motion}.{n}.column", one.column) for n, one in enumerate(mapping.motion)]
-    if mapping.time is not None:
-        of_loads.insert(0, (f"{keys['time']}.column", mapping.time.column))
-    files = [(mapping.form, of_loads + of_motion)]
-    if beside is not None:
-        files = [(mapping.form, of_loads), (beside.form, of_motion)]
-    for form, named in files:
-        times = Counter(column for _, column in named)
-        for key, column in named:
-            if times[column] > 1:
-                found = f"column {column!r} twice"
-                yield _at(document, key, found, "each column once", "correct one")
-            if form.names_line == 0 and isinstance(column, str):
-                allowed = "a number from 1, as names_line is 0"
-                yield _at(document, key, f"'{column}'", allowed, "tell the column's number")
-    meant: list[tuple[str, tuple[str, ...]]] = [
-        (f"{loads}.{n}.positive", (DIRECTIONS[one.positive].load,))
-        for n, one in enumerate(mapping.loads)
+    """Directions that do not fit their unit, and quantities that two columns give."""
+    channels: list[tuple[str, LoadChannel | MotionChannel, str]] = [
+        (f"{keys['loads']}.{number}.positive", one, DIRECTIONS[one.positive].load)
+        for number, one in enumerate(mapping.loads)
     ]
-    meant += [
-        (f"{motion}.{n}.positive", (one.joint, DIRECTIONS[one.positive].coordinate))
-        for n, one in enumerate(mapping.motion)
+    channels += [
+        (f"{keys['motion']}.{number}.positive", one, f"{one.joint} {coordinate}")
+        for number, one in enumerate(mapping.motion)
+        for coordinate in (DIRECTIONS[one.positive].coordinate,)
     ]
-    again = Counter(quantity for _, quantity in meant)
-    for key, quantity in meant:
+    again = Counter(quantity for *_, quantity in channels)
+    for key, channel, quantity in channels:
+        turns = channel.unit in MOMENTS or channel.unit in ANGLES
+        fit = tuple(word for word, one in DIRECTIONS.items() if one.turns == turns)
+        if channel.positive not in fit:
+            found = f"'{channel.positive}' in {channel.unit}"
+            yield _at(document, key, found, one_of(fit), "correct the direction or the unit")
         if again[quantity] > 1:
-            found, allowed = f"{' '.join(quantity)} from two columns", "one column for each"
+            found, allowed = f"{quantity} from two columns", "one column for each"
             yield _at(document, key, found, allowed, "delete one of them or correct its direction")
 
 

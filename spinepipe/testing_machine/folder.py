@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.cohort.columns import COHORT_YAML
+from spinepipe.cohort.columns import TABLES
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.imports.file_patterns import with_files
-from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
+from spinepipe.imports.imported import ImportedCohort, Rows, assembled, rounded
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
 from spinepipe.testing_machine.channels import (
@@ -21,7 +20,6 @@ from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     FORCES,
     LENGTHS,
-    LOAD_COLUMNS,
     MOMENTS,
     SECONDS,
     column_of,
@@ -38,7 +36,6 @@ from spinepipe.testing_machine.load_steps import (
 )
 from spinepipe.testing_machine.recording import Recording
 from spinepipe.testing_machine.settings import MachineMapping
-from spinepipe.units import COORDINATE_COLUMNS
 
 BY_HAND = {
     "joints.csv": "joints.csv is a template: it has the first joint at the origin, all axes along "
@@ -53,11 +50,6 @@ SHOWN = 8
 LEVEL_APART_MM = 35.0
 NOT_READ = {"deg": 0.1, "mm": 0.1}
 """SD that stands for a kind of reading that there is none of: the form asks for one."""
-
-_POINT = ("px_mm", "py_mm", "pz_mm")
-_FRAME = ("x_mm", "y_mm", "z_mm", "extension_deg", "right_bending_deg", "left_rotation_deg")
-
-Rows = list[Sequence[object]]
 
 
 @dataclass(frozen=True)
@@ -142,19 +134,18 @@ def _not_the_same(group: Sequence[Recording]) -> Iterator[InputProblem]:
 def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     """As `read`, with the tables of the cohort folder."""
     tests = read(folder, document)
-    mapping = tests.mapping
-    return ImportedCohort(
-        name=mapping.cohort,
-        title=mapping.title,
-        files={
-            COHORT_YAML: _header(tests),
-            "specimens.csv": csv_text([("specimen",), *((name,) for name in _specimens(tests))]),
-            "joints.csv": csv_text(_joints(tests)),
-            "loads.csv": csv_text(_loads(tests)),
-            "motion.csv": csv_text(_motion(tests)),
-        },
+    tables = {
+        "specimens": [(name,) for name in _specimens(tests)],
+        "joints": _joints(tests),
+        "loads": _loads(tests),
+        "motion": _motion(tests),
+    }
+    cohort = assembled(
+        tests.mapping, _made_of(tests), tables, [*_sentences(tests)], {}, further=_header(tests)
+    )
+    return replace(
+        cohort,
         by_hand=BY_HAND,
-        sentences=tuple(_sentences(tests)),
         settings=document,
         made_by=_made_by(tests),
         units=(FORCES, MOMENTS, ANGLES, LENGTHS, SECONDS),
@@ -168,7 +159,7 @@ def _made_by(tests: ImportedTests) -> dict[tuple[str, str], list[str]]:
     """Keys of the settings that made each column, those of files of their own too."""
     mapping = tests.mapping
     made = {("loads", "vertebra"): ["loaded"], ("loads", "time_s"): ["time"]}
-    made |= {("loads", column): ["load_point_mm"] for column in _POINT}
+    made |= {("loads", f"p{axis}_mm"): ["load_point_mm"] for axis in "xyz"}
     for item, of in zip(tests.items, mapping.files, strict=True):
         own = mapping.of_file(of)
         for side in ("loads", "motion"):
@@ -240,35 +231,29 @@ def _unit(one: Recording) -> str:
     return "N" if one.driving.endswith("_n") else "N m"
 
 
-def _header(tests: ImportedTests) -> str:
-    mapping = tests.mapping
+def _made_of(tests: ImportedTests) -> str:
     # a text of a YAML file has an end: of very many files the first
-    files = listed(dict.fromkeys(of.file for of in mapping.files), 50, None)
+    files = listed(dict.fromkeys(of.file for of in tests.mapping.files), 50, None)
     rows = np.concatenate([cycle.rows for test in tests.tests for cycle in test.cycles])
-    end = "" if mapping.source.rstrip().endswith(".") else "."
-    source = (
-        f"{mapping.source.rstrip()}{end} Made by `spinepipe import` of {files}: cycles cut at "
-        "reversals of the load, each reading by local regression on the load over "
-        f"{int(np.median(rows))} rows (median), loading and unloading apart. "
+    return (
+        f"{files}: cycles cut at reversals of the load, each reading by local regression on the "
+        f"load over {int(np.median(rows))} rows (median), loading and unloading apart. "
         f"measurement_sd: {sd_sentence(tests)}"
     )
-    document = {
-        "cohort": mapping.cohort,
-        "title": mapping.title,
-        "source": source,
-        "vertebrae": list(mapping.vertebrae),
-        "gravity": False,
+
+
+def _header(tests: ImportedTests) -> dict[str, object]:
+    """Keys of ``cohort.yaml`` that no other import has."""
+    mapping = tests.mapping
+    told = mapping.model_dump(include={"accuracy", "acknowledged_warnings"}, exclude_none=True)
+    return {
         "zeroed_at_step_0": mapping.zeroed,
         "measurement_sd": {
             "rotation_deg": _declared(tests.rotation, "deg"),
             "translation_mm": _declared(tests.translation, "mm"),
         },
+        **{key: value for key, value in told.items() if value},
     }
-    if mapping.accuracy is not None:
-        document["accuracy"] = mapping.accuracy.model_dump(exclude_none=True)
-    if mapping.acknowledged_warnings:
-        document["acknowledged_warnings"] = list(mapping.acknowledged_warnings)
-    return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)
 
 
 def _declared(sure: ReadingPrecision | None, unit: str) -> float:
@@ -308,19 +293,16 @@ def _specimens(tests: ImportedTests) -> list[str]:
 def _joints(tests: ImportedTests) -> Rows:
     """A template: joints above each other, axes of ground."""
     joints = joint_names(tests.mapping.vertebrae)
-    rows: Rows = [("specimen", "joint", *_FRAME)]
-    for specimen in _specimens(tests):
-        for number, joint in enumerate(joints):
-            height = f"{number * LEVEL_APART_MM:g}"
-            rows.append((specimen, joint, 0, height, 0, 0, 0, 0))
-    return rows
+    return [
+        (specimen, joint, 0, f"{number * LEVEL_APART_MM:g}", 0, 0, 0, 0)
+        for specimen in _specimens(tests)
+        for number, joint in enumerate(joints)
+    ]
 
 
 def _loads(tests: ImportedTests) -> Rows:
     vertebra = tests.mapping.loaded_vertebra
-    rows: Rows = [
-        ("specimen", "test", "cycle", "step", "vertebra", *LOAD_COLUMNS, *_POINT, "time_s")
-    ]
+    rows: Rows = []
     for test in tests.tests:
         for number, cycle in enumerate(test.cycles, start=1):
             point = tests.mapping.of_file(cycle.of).load_point_mm or ("", "", "")
@@ -334,7 +316,8 @@ def _loads(tests: ImportedTests) -> Rows:
 
 def _motion(tests: ImportedTests) -> Rows:
     joints = joint_names(tests.mapping.vertebrae)
-    rows: Rows = [("specimen", "test", "cycle", "step", "joint", *COORDINATE_COLUMNS)]
+    columns = TABLES["motion"].names[5:]
+    rows: Rows = []
     for test in tests.tests:
         at = {place: number for number, place in enumerate(test.places)}
         for number, cycle in enumerate(test.cycles, start=1):
@@ -342,7 +325,7 @@ def _motion(tests: ImportedTests) -> Rows:
                 for joint in joints:
                     cells = [
                         rounded(values[at[joint, name]]) if (joint, name) in at else ""
-                        for name in COORDINATE_COLUMNS
+                        for name in columns
                     ]
                     rows.append((test.specimen, test.test, number, step, joint, *cells))
     return rows

@@ -189,6 +189,8 @@ def _place(
         return InputProblem(file, line, str(column), found, "each name once", remedy)
     known: Sequence[str] = names or [str(n + 1) for n in range(table.width)]
     remedy = "correct the name; look whether `form.names_line` is right"
+    if not names:
+        remedy = "tell the column's number, as `form.names_line` is 0"
     if len(names) == 1:
         remedy = f"is `form.delimiter` right? With {table.form.delimiter} the file has one column"
     free = [name for name in names if name not in {one.column for one in channels}]
