@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from spinepipe.decomposition import svd
 from spinepipe.frames import zxy_angles
-from spinepipe.problems import InputProblem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.instruments import LoadCell, Markers, Rotations
 from spinepipe.testing_machine.recording import Recording
@@ -31,18 +31,24 @@ THINNEST_MM = 1.0
 """
 
 
-def converted(one: Recording, mapping: MachineMapping) -> tuple[Recording, list[InputProblem]]:
-    """The recording in the cohort's terms; problems where it lacks what the settings ask for."""
+def converted(one: Recording, mapping: MachineMapping) -> Recording:
+    """The recording in the cohort's terms.
+
+    Raises
+    ------
+    InputError
+        Where it lacks what the settings ask for.
+    """
     rotations, cell = mapping.rotations, mapping.load_cell
     lacks = [
         *(_lacking_rotations(one, rotations, mapping.zeroed) if rotations is not None else ()),
         *(_lacking_loads(one, cell) if cell is not None else ()),
     ]
-    if not lacks and rotations is not None:
+    if lacks:
+        raise InputError([InputProblem(one.file, None, *lack) for lack in lacks])
+    if rotations is not None:
         one = _in_our_order(one, rotations)
-    if not lacks and cell is not None:
-        one = _applied(one, cell, mapping.of_file(one.of).load_point_mm)
-    return one, [InputProblem(one.file, None, *lack) for lack in lacks]
+    return one if cell is None else _applied(one, cell, mapping.of_file(one.of).load_point_mm)
 
 
 def _lacking_rotations(
@@ -101,11 +107,14 @@ def _zxy(told: Array, rotations: Rotations) -> Array:
     return np.degrees(zxy_angles(turned.as_matrix()))
 
 
-def joint_rotations(
-    one: Recording, markers: Markers, vertebrae: tuple[str, ...]
-) -> tuple[Recording, list[InputProblem]]:
+def joint_rotations(one: Recording, markers: Markers, vertebrae: tuple[str, ...]) -> Recording:
     """The recording with rotations of joints, from the pose of its first row, in the place of
     markers; those of a cluster are of least squares (Kabsch 1976, Acta Cryst A32, 922-923).
+
+    Raises
+    ------
+    InputError
+        Where the markers of a cluster lie on a line.
     """
     turned: dict[str, Array] = {}
     problems = []
@@ -122,12 +131,14 @@ def joint_rotations(
         u, _, v = svd(seen[0].T @ seen)
         u[..., -1] *= np.linalg.det(u @ v)[:, None]  # no mirror image
         turned[vertebra] = (u @ v).swapaxes(1, 2)
+    if problems:
+        raise InputError(problems)
     motion: dict[tuple[str, str], Array] = {}
     for lower, upper in pairwise(vertebrae):
         below = turned.get(lower, np.eye(3)[None])
         angles = np.degrees(zxy_angles(below.swapaxes(1, 2) @ turned[upper]))
         motion |= {(upper + lower, name): angles[:, n] for n, name in enumerate(TURNS)}
-    return replace(one, motion=motion, finest=dict.fromkeys(motion, 0.0)), problems
+    return replace(one, motion=motion, finest=dict.fromkeys(motion, 0.0))
 
 
 def _lacking_loads(one: Recording, cell: LoadCell) -> Iterator[tuple[str, str, str, str]]:

@@ -95,22 +95,21 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
         raise InputError(problems)
     recordings: dict[tuple[str, str], list[Recording]] = {}
     for of in mapping.files:
-        recording, faults = read_test(folder, of, mapping)
-        if recording is not None:
-            recording, faults = converted(recording, mapping)
-        problems += faults
-        if recording is not None and not faults:
+        try:
+            recording = converted(read_test(folder, of, mapping), mapping)
             recordings.setdefault((of.specimen, of.test), []).append(recording)
-    tests = []
+        except InputError as error:
+            problems += error.problems
     for group in recordings.values():
         problems += _not_the_same(group)
     if problems:
         raise InputError(problems)
+    tests = []
     for group in recordings.values():
-        test, faults = resample_test(group, mapping.steps, mapping.zeroed)
-        problems += faults
-        if test is not None:
-            tests.append(test)
+        try:
+            tests.append(resample_test(group, mapping.steps, mapping.zeroed))
+        except InputError as error:
+            problems += error.problems
     if problems:
         raise InputError(problems)
     sures = [reading_precision(tests, unit, mapping.zeroed) for unit in ("_deg", "_mm")]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.decomposition import pinvh
-from spinepipe.problems import InputProblem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.cycles import Branch, Cycle, Segmentation, segment
 from spinepipe.testing_machine.recording import Recording
@@ -208,18 +208,20 @@ def sds_of(readings: Sequence[Reading]) -> Array:
     return own * np.sqrt((1 + r) / (1 - r))
 
 
-def resample_test(
-    recordings: Sequence[Recording], steps: LoadSteps, zeroed: bool
-) -> tuple[ResampledTest | None, list[InputProblem]]:
+def resample_test(recordings: Sequence[Recording], steps: LoadSteps, zeroed: bool) -> ResampledTest:
     """The cycles of recordings of one test of one specimen, on steps that all of them reach.
 
     Parameters
     ----------
     zeroed : whether readings count from those of step 0 of their cycle.
+
+    Raises
+    ------
+    InputError
+        Where there is no cycle, where files are no repeats, or where a level is out of reach.
     """
-    problems = [found for one in recordings for found in _out_of_range(one, steps)]
-    if problems:
-        return None, problems
+    if problems := [found for one in recordings for found in _out_of_range(one, steps)]:
+        raise InputError(problems)
     cuts = [
         segment(
             *(one.loads[one.driving], steps.smallest_reversal),
@@ -233,14 +235,13 @@ def resample_test(
         for problem in _cut_problems(one, found, cuts[0])
     ]
     if problems:
-        return None, problems
+        raise InputError(problems)
     kept = [
         (one, cycle) for one, found in zip(recordings, cuts, strict=True) for _, cycle in found.kept
     ]
     cycles = [cycle for _, cycle in kept]
-    problems = list(_beyond(recordings[0], cuts[0], cycles, steps))
-    if problems:
-        return None, problems
+    if problems := list(_beyond(recordings[0], cuts[0], cycles, steps)):
+        raise InputError(problems)
     sides = common_levels(cuts[0], cycles, steps.per_side, steps.levels)
     first = recordings[0]
     places = tuple(first.motion)
@@ -248,20 +249,13 @@ def resample_test(
     for one, cycle in kept:
         planned = plan(cuts[0], sides, cycle, one.loads[one.driving])
         longest = max(longest, planned, key=len)
-        result = _resample(one, cycle, planned, zeroed)
-        if isinstance(result, InputProblem):
-            problems.append(result)
-        else:
-            done.append(result)
-    if problems:
-        return None, problems
+        done.append(_resample(one, cycle, planned, zeroed))
     levels = tuple(step.level for step in longest)
     of = first.of
-    made = ResampledTest(
+    return ResampledTest(
         of.specimen, of.test, first.driving, places, levels, tuple(done),
         tuple(recordings), tuple(cuts),
     )  # fmt: skip
-    return made, []
 
 
 def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[InputProblem]:
@@ -316,7 +310,7 @@ def _beyond(
 
 def _resample(
     one: Recording, cycle: Cycle, planned: Sequence[Step], zeroed: bool
-) -> ResampledCycle | InputProblem:
+) -> ResampledCycle:
     load = one.loads[one.driving]
     others = [name for name in one.loads if name != one.driving]
     columns = [*one.motion.values(), *(one.loads[name] for name in others)]
@@ -335,7 +329,8 @@ def _resample(
             line = int(one.lines[branch.first])
             found = f"{branch.last - branch.first + 1} lines on the way to or from a reversal"
             remedy = "record more often, or raise `steps.smallest_reversal`"
-            return InputProblem(one.file, line, one.driving, found, "at least 3", remedy)
+            place = (one.file, line, one.driving)
+            raise InputError([InputProblem(*place, found, "at least 3", remedy)])
         readings.append(reading)
     values = np.array([reading.values for reading in readings])
     n = len(one.motion)

@@ -19,7 +19,7 @@ import openpyxl
 import pandas as pd
 from numpy.typing import NDArray
 
-from spinepipe.problems import InputProblem, one_of
+from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.testing_machine.settings import FileForm
 
 MOST_BYTES = 300_000_000
@@ -136,11 +136,13 @@ def text_rows(form: FileForm, text: bytes) -> Iterator[tuple[int, list[str]]]:
         line = reader.line_num + 1
 
 
-def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProblem:
-    """The table in a file's bytes, or why there is none.
+def open_table(data: bytes, file: str, form: FileForm) -> RawTable:
+    """The table in a file's bytes.
 
     Raises
     ------
+    InputError
+        Where there is none.
     csv.Error
         Where rows are no table.
     """
@@ -155,13 +157,13 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProble
     else:
         text = _decoded(data, form)
     if not isinstance(text, str):
-        return InputProblem(file, None, None, *text)
+        raise InputError([InputProblem(file, None, None, *text)])
     if text.startswith("LabVIEW Measurement") and "names_line" not in form.model_fields_set:
         told = _labview(text)
         if isinstance(told, tuple):
             line, found = told
             remedy = "give each segment its own file, with the file's header"
-            return InputProblem(file, line, None, found, "one segment", remedy)
+            raise InputError([InputProblem(file, line, None, found, "one segment", remedy)])
         own = form.model_fields_set  # what the YAML says counts more than a header that is wrong
         form = form.model_copy(update={key: told[key] for key in told.keys() - own})
         notes = (f"its header is followed: separator {form.delimiter}, decimal {form.decimal}",)
@@ -173,7 +175,7 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProble
     if form.names_line and not names:
         allowed = f"names of columns in line {form.names_line}"
         found = "no such line, or an empty one"
-        return InputProblem(file, None, None, found, allowed, "correct it")
+        raise InputError([InputProblem(file, None, None, found, allowed, "correct it")])
     width = max([len(names), *(len(row) for _, row in islice(table.rows(), LOOKED_AT))])
     return replace(table, names=names, width=width)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import medfilt
 
 from spinepipe.documents.text import read_bytes
-from spinepipe.problems import InputProblem, one_of
+from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.report.words import count
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
@@ -82,32 +82,34 @@ class Recording:
     notes: tuple[str, ...] = ()
 
 
-def read_recording(
-    path: Path, of: TestFile, mapping: MachineMapping
-) -> tuple[Recording | None, list[InputProblem]]:
-    """Read one file; None, and every problem, where it cannot be used."""
+def read_recording(path: Path, of: TestFile, mapping: MachineMapping) -> Recording:
+    """Read one file.
+
+    Raises
+    ------
+    InputError
+        With every problem of the file.
+    """
     file = of.file
     if not path.is_file():
         allowed = "a file, told relative to the YAML"
-        return None, [InputProblem(file, None, None, "no such file", allowed, "correct the path")]
+        lacks = InputProblem(file, None, None, "no such file", allowed, "correct the path")
+        raise InputError([lacks])
     data, problems = read_bytes(path, file, MOST_BYTES)
     if problems:
-        return None, problems
+        raise InputError(problems)
     mapping = mapping.of_file(of)
     try:
-        table = open_table(data, file, mapping.form)
-        if isinstance(table, InputProblem):
-            return None, [table]
-        return _understood(table, of, mapping)
+        return _understood(open_table(data, file, mapping.form), of, mapping)
     except csv.Error as error:
         found = f"no table ({error})"
         remedy = "look at `form.delimiter`; open the file and save it anew"
-        return None, [InputProblem(file, None, None, found, "rows of cells", remedy)]
+        raise InputError(
+            [InputProblem(file, None, None, found, "rows of cells", remedy)]
+        ) from error
 
 
-def _understood(
-    table: RawTable, of: TestFile, mapping: MachineMapping
-) -> tuple[Recording | None, list[InputProblem]]:
+def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recording:
     channels: list[Channel] = [*mapping.loads, *mapping.motion]
     if mapping.time is not None:
         channels.insert(0, mapping.time)
@@ -126,7 +128,7 @@ def _understood(
     if len(lines) < FEWEST_LINES:
         found, allowed = f"{len(lines)} lines of numbers", f"at least {FEWEST_LINES}"
         remedy = "look whether `form.first_line` is right"
-        return None, [InputProblem(of.file, table.first, None, found, allowed, remedy)]
+        raise InputError([InputProblem(of.file, table.first, None, found, allowed, remedy)])
     time = None
     if mapping.time is not None and mapping.time.column in numbers:
         time = numbers[mapping.time.column]
@@ -135,7 +137,7 @@ def _understood(
         time = (time - time[0]) * SECONDS[mapping.time.unit]
         problems = [*_backwards(time, lines, of.file, str(mapping.time.column)), *problems]
     if problems:
-        return None, problems
+        raise InputError(problems)
     loads = {
         DIRECTIONS[one.positive].load: numbers[one.column] * factor_of(one.unit, one.positive)
         for one in mapping.loads
@@ -157,7 +159,7 @@ def _understood(
     steps = {  # between readings that differ
         place: np.diff(np.unique(one[whole])) for place, one in motion.items()
     }
-    recording = Recording(
+    return Recording(
         file=of.file,
         of=of,
         lines=lines[sound],
@@ -169,7 +171,6 @@ def _understood(
         spikes=int(np.count_nonzero(whole & ~sound)),
         notes=notes,
     )
-    return recording, []
 
 
 def _place(

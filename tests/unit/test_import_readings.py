@@ -308,9 +308,7 @@ def test_the_best_shift_is_that_of_the_signals(shift: float) -> None:
     def bump(time: np.ndarray) -> np.ndarray:
         return np.exp(-(((time - 25.0) / 6.0) ** 2)) + np.exp(-(((time - 33.0) / 3.0) ** 2))
 
-    found, likeness, next_best, _ = best_shift(
-        read_at, bump(read_at + shift), seen, -bump(seen), True
-    )
+    found, likeness, next_best = best_shift(read_at, bump(read_at + shift), seen, -bump(seen), True)
     assert found == pytest.approx(shift, abs=0.01)
     assert likeness > 0.99
     assert next_best < 0.9
