@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 
 SHIFTS, TURNS = COORDINATE_COLUMNS[:3], COORDINATE_COLUMNS[3:]
 ABOUT = {"x": "right_bending_deg", "y": "left_rotation_deg", "z": "extension_deg"}
-UNCLEAR_DEG = 0.1
 THINNEST_MM = 1.0
 """A cluster whose markers are nearer than this (RMS) to a line does not tell how it turns about it.
 """
@@ -41,23 +40,18 @@ def converted(one: Recording, mapping: MachineMapping) -> Recording:
     """
     rotations, cell = mapping.rotations, mapping.load_cell
     lacks = [
-        *(_lacking_rotations(one, rotations, mapping.zeroed) if rotations is not None else ()),
+        *(_lacking_rotations(one) if rotations is not None else ()),
         *(_lacking_loads(one, cell) if cell is not None else ()),
     ]
     if lacks:
         raise InputError([InputProblem(one.file, None, *lack) for lack in lacks])
     if rotations is not None:
-        one = _in_our_order(one, rotations)
+        one = _in_our_order(one, rotations, mapping.zeroed)
     return one if cell is None else _applied(one, cell, mapping.of_file(one.of).load_point_mm)
 
 
-def _lacking_rotations(
-    one: Recording, rotations: Rotations, zeroed: bool
-) -> Iterator[tuple[str, str, str, str]]:
-    """Key, what was found, what is allowed, remedy.
-
-    Where rotations do not start at zero, it must be told what they count from if that matters.
-    """
+def _lacking_rotations(one: Recording) -> Iterator[tuple[str, str, str, str]]:
+    """Key, what was found, what is allowed, remedy."""
     for joint in dict.fromkeys(joint for joint, _ in one.motion):
         there = sum((joint, name) in one.motion for name in TURNS)
         if there in (1, 2):
@@ -65,44 +59,34 @@ def _lacking_rotations(
             allowed = "all three: fewer are no rotation that could be told in another order"
             remedy = "add them, or delete `rotations` if they are angles of z, x', y''"
             yield "rotations", found, allowed, remedy
-        elif there and zeroed and rotations.zero is None:
-            told = _told(one, joint)
-            ways = [rotations.model_copy(update={"zero": zero}) for zero in ("each_angle", "pose")]
-            apart = [_zxy(told, way) - _zxy(told, rotations) for way in ways]
-            most = max(float(np.ptp(one, axis=0).max()) for one in apart)
-            if most > UNCLEAR_DEG:
-                start = ", ".join(f"{angle:.3g}" for angle in told[0])
-                found = f"{joint} at {start} deg about x, y, z first"
-                allowed = f"a start at zero, or a word: it makes a difference of {most:.2g} deg"
-                remedy = "add `zero: neutral`, each_angle or pose to `rotations`"
-                yield "rotations.zero", found, allowed, remedy
 
 
-def _told(one: Recording, joint: str) -> Array:
-    return np.column_stack([one.motion[joint, name] for name in ABOUT.values()])
-
-
-def _in_our_order(one: Recording, rotations: Rotations) -> Recording:
+def _in_our_order(one: Recording, rotations: Rotations, zeroed: bool) -> Recording:
     motion, finest = dict(one.motion), dict(one.finest)
     for joint in dict.fromkeys(joint for joint, name in one.motion if name in TURNS):
-        turned = _zxy(_told(one, joint), rotations)
+        told = np.column_stack([one.motion[joint, name] for name in ABOUT.values()])
+        turned = _zxy(told, rotations, zeroed)
         coarsest = max(finest[joint, name] for name in TURNS)
         for place, name in enumerate(TURNS):
             motion[joint, name], finest[joint, name] = turned[:, place], coarsest
     return replace(one, motion=motion, finest=finest)
 
 
-def _zxy(told: Array, rotations: Rotations) -> Array:
-    """(N, 3) angles of Z, X', Y'', deg, of (N, 3) angles about x, y, z, deg, told otherwise."""
-    if rotations.zero == "each_angle":
-        told = told - told[0]
+def _zxy(told: Array, rotations: Rotations, zeroed: bool) -> Array:
+    """(N, 3) angles of Z, X', Y'', deg, of (N, 3) angles about x, y, z, deg, told otherwise.
+
+    Parameters
+    ----------
+    zeroed : whether they count from the pose of the first row: differences of angles would be those
+        of no rotation.
+    """
     if rotations.order == "helical":
         turned = Rotation.from_rotvec(told, degrees=True)
     else:
         order = rotations.order.upper() if rotations.axes == "body" else rotations.order
         places = ["xyz".index(axis) for axis in rotations.order]
         turned = Rotation.from_euler(order, told[:, places], degrees=True)
-    if rotations.zero == "pose":
+    if zeroed:
         turned = turned * turned[0].inv()
     return np.degrees(zxy_angles(turned.as_matrix()))
 
@@ -181,7 +165,8 @@ def sentences(places: set[tuple[str, str]], mapping: MachineMapping) -> Iterator
         axes = "axes that turn with them" if rotations.axes == "body" else "fixed axes"
         how = f"in the order {', '.join(rotations.order)} about {axes}"
         how = "as rotation vectors" if rotations.order == "helical" else how
-        yield f"Rotations, told {how}, are converted to those of z, x', y''."
+        since = ", from the pose of the first row" if mapping.zeroed else ""
+        yield f"Rotations, told {how}, are converted to those of z, x', y''{since}."
     plain = [j for j in joints if any((j, name) in places for name in SHIFTS)]
     if plain:
         yield (

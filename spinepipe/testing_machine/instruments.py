@@ -29,12 +29,6 @@ class Rotations(BaseModel):
         description="body: about axes that the rotations before have turned (Euler, Cardan); "
         "space: about axes that stay",
     )
-    zero: Literal["neutral", "each_angle", "pose"] | None = Field(
-        default=None,
-        description="where rotations count from; neutral: as read; each_angle: each angle from its "
-        "first row (encoders); pose: from the pose of the first row (markers); null: as read, "
-        "refused where that makes a difference of 0.1 deg",
-    )
 
 
 class LoadCell(BaseModel):

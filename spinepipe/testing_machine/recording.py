@@ -149,9 +149,7 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
     }
     every = [*loads.values(), *motion.values()]
     whole = np.all([np.isfinite(one) for one in every], axis=0)
-    notes = table.notes
-    if empty := int(np.count_nonzero(~whole)):
-        notes = (*notes, f"{count(empty, 'row')} with an empty cell left out")
+    empty = int(np.count_nonzero(~whole))
     sound = whole.copy()
     # a signal by which clocks are compared jumps and may
     read = [*loads.values(), *(one for (joint, _), one in motion.items() if joint != SYNC)]
@@ -169,7 +167,7 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
         motion={place: values[sound] for place, values in sorted(motion.items())},
         finest={place: float(one.min()) if one.size else 0.0 for place, one in steps.items()},
         spikes=int(np.count_nonzero(whole & ~sound)),
-        notes=notes,
+        notes=(f"{count(empty, 'row')} with an empty cell left out",) if empty else (),
     )
 
 

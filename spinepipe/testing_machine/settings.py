@@ -47,7 +47,7 @@ class FileForm(BaseModel):
         ge=0,
         le=10_000,
         description="line that holds the names of the columns, the first line is 1; 0: none does, "
-        "and columns are told by their number from 1; left out, an .lvm file tells it itself",
+        "and columns are told by their number from 1",
     )
     first_line: int | None = Field(
         default=None,

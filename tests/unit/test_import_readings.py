@@ -208,28 +208,23 @@ def test_rotation_vectors(tmp_path: Path) -> None:
     )
 
 
-@sweep("zero", ["each_angle", "pose"])
-def test_rotations_that_count_from_anywhere_need_a_word(tmp_path: Path, zero: str) -> None:
+def test_rotations_count_from_the_pose_of_the_first_row(tmp_path: Path) -> None:
     moment = swings()["M"]
     given, start = angles(moment), {"x": 6.0, "y": -9.0, "z": 12.0}
     turned = matrix("x", given["x"]) @ matrix("y", given["y"]) @ matrix("z", given["z"])
-    shown = {axis: given[axis] + start[axis] for axis in "xyz"}
-    if zero == "pose":
-        first = np.eye(3)
-        for axis in "xyz":
-            first = first @ matrix(axis, np.array([start[axis]]))[0]
-        # angles of x, y', z'' of R R0: R02 = sin y, R12 = -sin x cos y, R01 = -cos y sin z
-        whole = turned @ first
-        y = np.arcsin(whole[:, 0, 2])
-        x, z = -np.arcsin(whole[:, 1, 2] / np.cos(y)), -np.arcsin(whole[:, 0, 1] / np.cos(y))
-        shown = dict(zip("xyz", np.degrees([x, y, z]), strict=True))
-    columns = {**swings(), **told(shown)}
-    with pytest.raises(InputError, match="add `zero: neutral`, each_angle or pose"):
-        read(tmp_path, columns, motion=ROTATIONS, rotations={"order": "xyz"})
-    tests = read(tmp_path, columns, motion=ROTATIONS, rotations={"order": "xyz", "zero": zero})
+    first = np.eye(3)
+    for axis in "xyz":
+        first = first @ matrix(axis, np.array([start[axis]]))[0]
+    # angles of x, y', z'' of R R0: R02 = sin y, R12 = -sin x cos y, R01 = -cos y sin z
+    whole = turned @ first
+    y = np.arcsin(whole[:, 0, 2])
+    x, z = -np.arcsin(whole[:, 1, 2] / np.cos(y)), -np.arcsin(whole[:, 0, 1] / np.cos(y))
+    columns = {**swings(), **told(dict(zip("xyz", np.degrees([x, y, z]), strict=True)))}
+    tests = read(tmp_path, columns, motion=ROTATIONS, rotations={"order": "xyz"})
     found = [of(tests, f"{word}_deg")[3] for word in SIDES]
     peak = np.searchsorted(moment[:101], 7.5)
     np.testing.assert_allclose(found, ours(turned)[:, peak], atol=0.05)
+    assert "from the pose of the first row" in said(tests)
 
 
 def test_three_rotations_without_an_order_are_told(tmp_path: Path) -> None:
