@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from spinepipe.problems import did_you_mean
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 LOAD_COLUMNS = ("fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm")
 """Columns of ``loads.csv`` that a channel can fill."""
@@ -52,37 +51,35 @@ class Direction:
 
     Attributes
     ----------
-    load, coordinate : column of ``loads.csv`` and joint coordinate along which it lies.
+    load, motion : column of ``loads.csv`` and of ``motion.csv`` along which it lies.
     sign : 1 where it is the positive direction of these, else -1.
-    turns : whether it is one of a moment and a rotation, not of a force and a translation.
     """
 
     load: str
-    coordinate: str
+    motion: str
     sign: int
-    turns: bool
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is one of a moment and a rotation, not of a force and a translation."""
+        return self.motion.endswith("_deg")
 
 
 DIRECTIONS: Mapping[str, Direction] = {
-    "anterior": Direction("fx_n", "anterior", 1, False),
-    "posterior": Direction("fx_n", "anterior", -1, False),
-    "superior": Direction("fy_n", "superior", 1, False),
-    "inferior": Direction("fy_n", "superior", -1, False),
-    "right": Direction("fz_n", "right", 1, False),
-    "left": Direction("fz_n", "right", -1, False),
-    "extension": Direction("mz_nm", "extension", 1, True),
-    "flexion": Direction("mz_nm", "extension", -1, True),
-    "right_bending": Direction("mx_nm", "right_bending", 1, True),
-    "left_bending": Direction("mx_nm", "right_bending", -1, True),
-    "left_rotation": Direction("my_nm", "left_rotation", 1, True),
-    "right_rotation": Direction("my_nm", "left_rotation", -1, True),
+    "anterior": Direction("fx_n", "anterior_mm", 1),
+    "posterior": Direction("fx_n", "anterior_mm", -1),
+    "superior": Direction("fy_n", "superior_mm", 1),
+    "inferior": Direction("fy_n", "superior_mm", -1),
+    "right": Direction("fz_n", "right_mm", 1),
+    "left": Direction("fz_n", "right_mm", -1),
+    "extension": Direction("mz_nm", "extension_deg", 1),
+    "flexion": Direction("mz_nm", "extension_deg", -1),
+    "right_bending": Direction("mx_nm", "right_bending_deg", 1),
+    "left_bending": Direction("mx_nm", "right_bending_deg", -1),
+    "left_rotation": Direction("my_nm", "left_rotation_deg", 1),
+    "right_rotation": Direction("my_nm", "left_rotation_deg", -1),
 }
 """Every direction by the word for it."""
-
-
-def column_of(coordinate: str) -> str:
-    """Column of ``motion.csv`` of a joint coordinate."""
-    return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
 
 
 def mistyped(name: str, names: Iterable[str], otherwise: str) -> str:

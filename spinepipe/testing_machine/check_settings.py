@@ -106,7 +106,7 @@ def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
             key, found = "motion_files.markers.clusters", ", ".join(sorted(wrong))
             allowed = f"each of {', '.join(mapping.vertebrae)} (the first may be left out)"
             yield _at(document, key, f"{found} wrong or missing", allowed, "correct the names")
-        ways = [DIRECTIONS[way].coordinate for way in marks.axes]
+        ways = [DIRECTIONS[way].motion for way in marks.axes]
         if len(set(ways)) < len(ways):
             allowed = "an axis forwards, one upwards and one sidewards, each of either sign"
             yield _at(document, "motion_files.markers", "an axis twice", allowed, "correct `axes`")
@@ -123,9 +123,12 @@ def _channels(
         for number, one in enumerate(mapping.loads)
     ]
     channels += [
-        (f"{keys['motion']}.{number}.positive", one, f"{one.joint} {coordinate}")
+        (
+            f"{keys['motion']}.{number}.positive",
+            one,
+            f"{one.joint} {DIRECTIONS[one.positive].motion}",
+        )
         for number, one in enumerate(mapping.motion)
-        for coordinate in (DIRECTIONS[one.positive].coordinate,)
     ]
     again = Counter(quantity for *_, quantity in channels)
     for key, channel, quantity in channels:

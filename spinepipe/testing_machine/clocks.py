@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.signal import correlate, correlation_lags, savgol_filter
 
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.testing_machine.channels import DIRECTIONS, column_of
+from spinepipe.testing_machine.channels import DIRECTIONS
 from spinepipe.testing_machine.conversions import SHIFTS, joint_rotations
 from spinepipe.testing_machine.instruments import SYNC
-from spinepipe.testing_machine.recording import Recording, read_recording
+from spinepipe.testing_machine.recording import FEWEST_LINES, Recording, read_recording
 from spinepipe.testing_machine.settings import OF_A_FILE, MachineMapping, MotionChannel, TestFile
 
 Array = NDArray[np.float64]
@@ -31,8 +31,6 @@ peak, has more than the other of it.
 
 GAP = 3.0
 """Usual intervals without a reading that are too long for a straight line."""
-
-FEWEST_ROWS = 10
 
 
 def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
@@ -87,7 +85,7 @@ def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
     if of.shift_s is not None:
         return _together(*clocks, of.shift_s, "as told")
     # what the load drives goes its way; other motion may go either way
-    driven = {column_of(d.coordinate) for d in DIRECTIONS.values() if d.load == loads.driving}
+    driven = {d.motion for d in DIRECTIONS.values() if d.load == loads.driving}
     moved = [(one, name not in driven) for (_, name), one in motion.motion.items()]
     moved = [pair for pair in moved if not pair[1]] or moved
     load = loads.loads[loads.driving]
@@ -125,10 +123,10 @@ def _together(
     gaps = np.diff(at)
     known = (on >= at[0]) & (on <= at[-1]) & (gaps[after - 1] <= GAP * np.median(gaps))
     rows = int(np.count_nonzero(known))
-    if rows < FEWEST_ROWS:
+    if rows < FEWEST_LINES:
         found = f"{rows} rows within the time of both files, at a shift of {shift:g} s"
         remedy = "correct it: from the first row of the motion to the first row of the loads"
-        allowed = f"at least {FEWEST_ROWS}"
+        allowed = f"at least {FEWEST_LINES}"
         raise InputError([InputProblem(loads.file, None, "shift_s", found, allowed, remedy)])
 
     def put(one: Recording, values: Array) -> Array:

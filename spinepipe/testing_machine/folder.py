@@ -22,17 +22,17 @@ from spinepipe.testing_machine.channels import (
     LENGTHS,
     MOMENTS,
     SECONDS,
-    column_of,
 )
 from spinepipe.testing_machine.check_settings import check_mapping
 from spinepipe.testing_machine.clocks import read_test
 from spinepipe.testing_machine.conversions import converted
 from spinepipe.testing_machine.conversions import sentences as of_conversions
-from spinepipe.testing_machine.load_steps import (
+from spinepipe.testing_machine.load_steps import ResampledTest, resample_test
+from spinepipe.testing_machine.precision import (
     ReadingPrecision,
-    ResampledTest,
+    declared_sd,
     reading_precision,
-    resample_test,
+    sd_sentence,
 )
 from spinepipe.testing_machine.recording import Recording
 from spinepipe.testing_machine.settings import MachineMapping
@@ -48,8 +48,6 @@ SHOWN = 8
 """Rows of a file that `spinepipe import --show` shows."""
 
 LEVEL_APART_MM = 35.0
-NOT_READ = {"deg": 0.1, "mm": 0.1}
-"""SD that stands for a kind of reading that there is none of: the form asks for one."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +163,7 @@ def _made_by(tests: ImportedTests) -> dict[tuple[str, str], list[str]]:
             prefix = side if getattr(of, side) is None else f"files.{item}.{side}"
             for number, channel in enumerate(getattr(own, side)):
                 way = DIRECTIONS[channel.positive]
-                column = way.load if side == "loads" else column_of(way.coordinate)
+                column = way.load if side == "loads" else way.motion
                 made.setdefault((side, column), []).append(f"{prefix}.{number}")
     return {place: list(dict.fromkeys(keys)) for place, keys in made.items()}
 
@@ -188,7 +186,7 @@ def _sentences(tests: ImportedTests) -> Iterator[str]:
     yield from of_conversions({place for test in tests.tests for place in test.places}, mapping)
     if mapping.accuracy is not None:
         yield "The accuracy goes on to cohort.yaml; where it is larger than the SD, it counts."
-    yield f"SD of a reading: {sd_sentence(tests)}"
+    yield f"SD of a reading: {sd_sentence(tests.rotation, tests.translation)}"
     if mapping.zeroed:
         yield "Readings count from those of step 0 of their cycle (zeroed_at_step_0: true)."
     else:
@@ -237,7 +235,7 @@ def _made_of(tests: ImportedTests) -> str:
     return (
         f"{files}: cycles cut at reversals of the load, each reading by local regression on the "
         f"load over {int(np.median(rows))} rows (median), loading and unloading apart. "
-        f"measurement_sd: {sd_sentence(tests)}"
+        f"measurement_sd: {sd_sentence(tests.rotation, tests.translation)}"
     )
 
 
@@ -248,41 +246,11 @@ def _header(tests: ImportedTests) -> dict[str, object]:
     return {
         "zeroed_at_step_0": mapping.zeroed,
         "measurement_sd": {
-            "rotation_deg": _declared(tests.rotation, "deg"),
-            "translation_mm": _declared(tests.translation, "mm"),
+            "rotation_deg": declared_sd(tests.rotation, "deg"),
+            "translation_mm": declared_sd(tests.translation, "mm"),
         },
         **{key: value for key, value in told.items() if value},
     }
-
-
-def _declared(sure: ReadingPrecision | None, unit: str) -> float:
-    """The SD with two digits, rounded up."""
-    if sure is None or sure.sd == 0.0:
-        return NOT_READ[unit]
-    scale = 10.0 ** (1 - int(np.floor(np.log10(sure.sd))))
-    return float(f"{np.ceil(sure.sd * scale - 1e-9) / scale:.10g}")
-
-
-def sd_sentence(tests: ImportedTests) -> str:
-    """Where the declared SDs come from."""
-    words = []
-    for sure, unit in ((tests.rotation, "deg"), (tests.translation, "mm")):
-        if sure is None:
-            words.append(f"No motion in {unit} was read, {NOT_READ[unit]} stands for its SD.")
-        elif sure.sd == 0.0:
-            words.append(f"Readings in {unit} never change, {NOT_READ[unit]} stands for their SD.")
-        else:
-            between = (
-                "no cycle is repeated"
-                if np.isnan(sure.cycles)
-                else f"{sure.cycles:.2g} {unit} between cycles"
-            )
-            words.append(
-                f"{_declared(sure, unit):g} {unit}, the largest of {sure.regression:.2g} {unit} by "
-                f"what rows leave around the regression ({sure.row:.2g} for a single row), "
-                f"{between}, and {sure.finest:.2g} by the resolution of the files."
-            )
-    return " ".join(words)
 
 
 def _specimens(tests: ImportedTests) -> list[str]:

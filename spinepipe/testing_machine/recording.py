@@ -19,7 +19,6 @@ from spinepipe.report.words import count
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     SECONDS,
-    column_of,
     factor_of,
     mistyped,
 )
@@ -143,7 +142,7 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
         for one in mapping.loads
     }
     motion = {
-        (one.joint, column_of(DIRECTIONS[one.positive].coordinate)): numbers[one.column]
+        (one.joint, DIRECTIONS[one.positive].motion): numbers[one.column]
         * factor_of(one.unit, one.positive)
         for one in mapping.motion
     }
