@@ -135,9 +135,9 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     for specimen, landmarks in found.items():
         problems += _lacking(place, settings, specimen, landmarks, unread.get(specimen, []))
     surfaces = list[tuple[str, ...]]()
-    if (of := settings.surfaces) is not None:
+    if (named := settings.surfaces) is not None:
         place = (document.file, document.line_of("surfaces.file"), "surfaces.file")
-        surfaces, faults = _surfaces(folder, place, of, found, settings.vertebrae)
+        surfaces, faults = _surfaces(folder, place, named, found, settings.vertebrae)
         problems += faults
     if problems:
         raise InputError(problems)
