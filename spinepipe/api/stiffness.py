@@ -12,14 +12,13 @@ from spinepipe.api.result import Result, frame
 from spinepipe.api.simulation import simulate
 from spinepipe.api.study import NAME, Say, model_path, study_of
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.specimen import joint_frames
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, read_model
 from spinepipe.progress import silent
 from spinepipe.status import NOT_FITTED, USABLE
 from spinepipe.studies.base_model import BUSHING
 from spinepipe.studies.cohort_stiffness.fit import fitted
 from spinepipe.studies.cohort_stiffness.left_out import predicted_by_others
-from spinepipe.studies.cohort_stiffness.point_matrix import Axes, matrix_table
+from spinepipe.studies.cohort_stiffness.point_matrix import matrix_table
 from spinepipe.studies.cohort_stiffness.pool import pooled
 from spinepipe.studies.cohort_stiffness.problem import (
     base_effects,
@@ -72,10 +71,7 @@ class Stiffness(Result):
         return simulate(self.model, self.cohort)
 
     def stiffness_matrix(
-        self,
-        point_mm: Sequence[float] = (0.0, 0.0, 0.0),
-        joint: str | None = None,
-        axes: Axes = "joint",
+        self, point_mm: Sequence[float] = (0.0, 0.0, 0.0), joint: str | None = None
     ) -> pd.DataFrame:
         """The 6 x 6 stiffness and compliance of joints about a point, an entry a row.
 
@@ -83,7 +79,7 @@ class Stiffness(Result):
 
         Parameters
         ----------
-        point_mm : from the joint's origin along its axes; with ``axes="ground"`` in ground.
+        point_mm : from the joint's origin along its axes.
         joint : which one; None for all.
         """
         found, names = [pd.DataFrame(columns=["joint"])], self.cohort.joint_names
@@ -91,8 +87,7 @@ class Stiffness(Result):
             rows = self.table[self.table["specimen"] == specimen]
             given = (one for one in self.model.effects[0].values if one.specimen == specimen)
             k = np.array([[one.parameters[c] for c in STIFFNESS_COLUMNS] for one in given])
-            frames = joint_frames(self.cohort, specimen)
-            one = matrix_table(rows, k, names, frames, point_mm, axes)
+            one = matrix_table(rows, k, names, point_mm)
             found.append(one.assign(specimen=specimen))
         every = pd.concat(found, ignore_index=True)
         return every if joint is None else every[every["joint"] == joint].reset_index(drop=True)

@@ -8,11 +8,11 @@ from spinepipe.cli.find import specimen_of, study_names, unknown
 from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
 from spinepipe.jobs.report import descriptor_of
-from spinepipe.problems import InputError, InputProblem, one_of
+from spinepipe.problems import InputError, one_of
 from spinepipe.report.words import count
 from spinepipe.schema.datapackage import FILE
 from spinepipe.studies import read as studies
-from spinepipe.studies.exports import Exported
+from spinepipe.studies.exports import Exported, problem
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.registry import PACKAGE, every_kind, files_of, kind_of
 from spinepipe.studies.study import Study
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     """Write the file and say which frames and which stiffness are in it, or write the tables."""
     ending = ".osim" if options.matrix is None else ".csv"
     if options.output is not None and options.output.suffix != ending:
-        raise InputError([_problem("-o", options.output.name, f"FILE{ending}", "rename it")])
+        raise InputError([problem("-o", options.output.name, f"FILE{ending}", "rename it")])
     if options.study not in study_names(options.root):
         raise InputError([unknown("study", options.study, study_names(options.root))])
     study, cohort = studies.check(options.root, options.study)
@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     if kind.exports is None:
         able = one_of([name for name, other in every_kind().items() if other.exports])
         why = kind.why_no_export or "choose such a study"
-        raise InputError([_problem("STUDY", f"kind {study.kind}", f"a study of kind {able}", why)])
+        raise InputError([problem("STUDY", f"kind {study.kind}", f"a study of kind {able}", why)])
     wanted = WantedFiles(
         root=options.root,
         results=options.root / "results" / study.study,
@@ -109,7 +109,7 @@ def _write_tables(study: Study, cohort: Cohort, options: argparse.Namespace) -> 
     found = [path for path in paths if path.is_file()]
     if not found:
         allowed, remedy = "a computed study", f"run `snakemake -j2 {files.page()}` first"
-        raise InputError([_problem("STUDY", "no tables", allowed, remedy)])
+        raise InputError([problem("STUDY", "no tables", allowed, remedy)])
     for path in found:
         with appearing(folder / f"{path.stem}.csv") as temporary:
             read_frame(path).to_csv(temporary, index=False)
@@ -117,7 +117,3 @@ def _write_tables(study: Study, cohort: Cohort, options: argparse.Namespace) -> 
         temporary.write_text(descriptor_of(study, cohort, folder, ".csv"), encoding="utf-8")
     print(f"{folder}: {count(len(found), 'table')}, explained in {FILE}")
     return 0
-
-
-def _problem(column: str, found: str, allowed: str, remedy: str) -> InputProblem:
-    return InputProblem("command line", None, column, found, allowed, remedy)

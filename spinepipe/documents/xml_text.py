@@ -8,7 +8,6 @@ from spinepipe.documents.text import read_bytes
 from spinepipe.problems import InputProblem
 
 MOST_BYTES = 50_000_000
-DEEPEST = 100
 
 LINE = "#line"
 """Attribute with the line on which an element begins; no file can have one of this name."""
@@ -24,24 +23,15 @@ def read_xml(path: Path, file: str) -> tuple[Element | None, list[InputProblem]]
     data, problems = read_bytes(path, file, MOST_BYTES)
     if problems:
         return None, problems
-    parser, builder, depth = expat.ParserCreate(), TreeBuilder(), 0
+    parser, builder = expat.ParserCreate(), TreeBuilder()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        if depth > DEEPEST:
-            raise ValueError(f"more than {DEEPEST} levels within each other")
         builder.start(tag, attributes | {LINE: str(parser.CurrentLineNumber)})
-
-    def end(tag: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(tag)
 
     def refuse(*_: object) -> None:
         raise ValueError("a document type")
 
-    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartElementHandler, parser.EndElementHandler = start, builder.end
     parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, refuse
     try:
         parser.Parse(data, True)

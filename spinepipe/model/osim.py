@@ -4,7 +4,7 @@ All body frames lie on ground in the neutral pose, so centres of mass, inertias 
 stand in the file as the model has them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree.ElementTree import Element, SubElement
@@ -14,8 +14,8 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
 from spinepipe.model import osim_parts as parts
-from spinepipe.model.osim_parts import NAME, listed, numbers, told
-from spinepipe.model.spine import LoadCase, RefusedModel, SpineModel
+from spinepipe.model.osim_parts import numbers, told
+from spinepipe.model.spine import LoadCase, ScopedEffect, SpineModel
 
 BUSHING = "linear_bushing"
 
@@ -44,11 +44,14 @@ def expressible(
 
     Said are linear bushings that act in the test of ``loads``, without one in all tests.
     """
-    acting = [e for e in model.effects if loads is None or e.in_scope(loads.test)]
-    said = [e for e in acting if e.effect.name == BUSHING and (loads or e.tests == ("*",))]
-    unsaid = list(dict.fromkeys(e.effect.name for e in acting if e not in said))
+    said, unsaid = list[ScopedEffect](), dict[str, None]()
+    for one in model.effects:
+        if one.effect.name == BUSHING and (loads or one.tests == ("*",)):
+            said += [one] if loads is None or one.in_scope(loads.test) else []
+        elif loads is None or one.in_scope(loads.test):
+            unsaid[one.effect.name] = None
     if loads is not None and loads.fixed:
-        unsaid.append("coordinates that the rig fixes")
+        unsaid["coordinates that the rig fixes"] = None
     return replace(model, effects=tuple(said)), tuple(unsaid)
 
 
@@ -63,42 +66,37 @@ def times(loads: LoadCase) -> Array:
 def osim(
     model: SpineModel,
     loads: LoadCase | None = None,
-    left_out: Sequence[str] = (),
     points: Mapping[str, Mapping[str, Array]] | None = None,
 ) -> str:
     """OpenSim document of a model, readable by OpenSim 4.0 and later.
 
     Coordinates are named after joint and coordinate, e.g. ``L3L4_anterior`` (m, rad); the lowest
     vertebra is ground. A body without mass or without inertia, which the model allows only where
-    neither matters, gets 1 g or 1e-6 kg m2, and ``credits`` in the file says which.
+    neither matters, gets 1 g or 1e-6 kg m2, and ``credits`` in the file says which, as well as what
+    of the model is not `expressible`.
 
     Parameters
     ----------
     loads : written as prescribed forces: constant for one step, else piecewise linear through the
         steps at their recorded times, or at one second per step number when not all are recorded.
-    left_out : what the model has beside what is written, see `expressible`; told in ``credits``.
     points : (3,) m in ground by vertebra and name: markers, such as ``L4_left_pedicle_base``. Those
         of another vertebra than the model's bodies are on ground.
 
     Raises
     ------
     RefusedModel
-        For an effect other than a linear bushing, and a name that OpenSim cannot take.
+        Of a name that OpenSim cannot take.
     """
-    stiffness = _stiffness(model, loads)
+    model, left_out = expressible(model, loads)
+    stiffness = np.zeros((model.n_joints, 6))  # N/m and N m/rad, summed over bushings
+    for scoped in model.effects:
+        np.add.at(stiffness, list(scoped.joints), scoped.values)
     points = points or {}
-    for name in (model.specimen, *model.joints, *(body.name for body in model.bodies), *points):
-        if not NAME.fullmatch(name):
-            raise RefusedModel(
-                f"{model.specimen}: OpenSim cannot take the name {name!r}; "
-                "use letters, digits, _ . and - only"
-            )
-    document = parts.document()
-    root = SubElement(document, "Model", name=model.specimen)
-    told(root, "credits", _credits(model, left_out))
-    told(root, "gravity", numbers(model.gravity))
-    kinds = ("Body", "Joint", "Force", "Marker")
-    bodies, joints, forces, markers = (listed(root, kind) for kind in kinds)
+    names = (*model.joints, *(body.name for body in model.bodies), *points)
+    root, (bodies, joints, forces, markers) = parts.document(
+        *(model.specimen, _credits(model, left_out), model.gravity),
+        *(("Body", "Joint", "Force", "Marker"), names),
+    )
     paths = ("/ground", *(f"/bodyset/{body.name}" for body in model.bodies))
     ends = [frame.origin for frame in model.frames]
     last = model.frames[-1].rotation[:, 1]
@@ -115,34 +113,13 @@ def osim(
     for vertebra, places in points.items():
         for name, at in places.items():
             markers.append(parts.marker(f"{vertebra}_{name}", on.get(vertebra, paths[0]), at))
-    return parts.written(document)
-
-
-def _stiffness(model: SpineModel, loads: LoadCase | None) -> Array:
-    """(J, 6) stiffness of each coordinate, N/m and N m/rad, summed over the bushings in scope."""
-    total = np.zeros((model.n_joints, 6))
-    for scoped in model.effects:
-        name = scoped.effect.name
-        if loads is None and scoped.tests != ("*",):
-            tests = ", ".join(scoped.tests)
-            raise RefusedModel(
-                f"{model.specimen}: effect {name} acts in {tests} only; give the loads of a test"
-            )
-        if loads is not None and not scoped.in_scope(loads.test):
-            continue
-        if name != BUSHING:
-            raise RefusedModel(
-                f"{model.specimen}: effect {name} has no counterpart in an .osim file; "
-                "only linear_bushing can be exported"
-            )
-        np.add.at(total, list(scoped.joints), scoped.values)
-    return total
+    return parts.written(root)
 
 
 def _credits(model: SpineModel, left_out: Sequence[str]) -> str:
     massless = [body.name for body in model.bodies if body.mass == 0.0]
     inertialess = [body.name for body in model.bodies if not body.inertia.any()]
-    text = "Written by spinepipe. Units: m, kg, s, N, rad."
+    text = ""
     if massless:
         text += f" Without mass in the model, 1 g here: {', '.join(massless)}."
     if inertialess:
@@ -181,23 +158,18 @@ def _prescribed_forces(loads: LoadCase, paths: Sequence[str]) -> list[Element]:
         told(element, "socket_frame", paths[body])
         told(element, "pointIsGlobal", "false")
         told(element, "forceIsGlobal", "true")
-        _functions(element, "forceFunctions", [_function(seconds, f) for f in history.T[:3]])
-        _functions(element, "pointFunctions", [_function((), (p,)) for p in point])
-        _functions(element, "torqueFunctions", [_function(seconds, m) for m in history.T[3:]])
+        constant = np.tile(point, (len(seconds), 1))
+        columns = {"force": history[:, :3], "point": constant, "torque": history[:, 3:]}
+        for kind, values in columns.items():
+            functions = SubElement(element, "FunctionSet", name=f"{kind}Functions")
+            each = (_function(seconds, of.tolist()) for of in values.T)
+            SubElement(functions, "objects").extend(each)
         elements.append(element)
     return elements
 
 
-def _functions(parent: Element, name: str, functions: Iterable[Element]) -> None:
-    SubElement(SubElement(parent, "FunctionSet", name=name), "objects").extend(functions)
-
-
-def _function(times: Sequence[float], values: Sequence[float] | Array) -> Element:
-    """A constant, or lines through the values: level outside, as OpenSim extends the end pieces."""
-    if len(values) == 1:
-        element = Element("Constant")
-        told(element, "value", repr(float(values[0])))
-        return element
+def _function(times: Sequence[float], values: Sequence[float]) -> Element:
+    """Lines through the values: level outside, as OpenSim extends the end pieces."""
     element = Element("PiecewiseLinearFunction")
     told(element, "x", numbers([times[0] - 1.0, *times, times[-1] + 1.0]))
     told(element, "y", numbers([values[0], *values, values[-1]]))

@@ -9,6 +9,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
+from spinepipe.model.spine import RefusedModel
 from spinepipe.units import COORDINATES
 
 NAME = re.compile(r"[A-Za-z0-9_.-]+")
@@ -34,9 +35,31 @@ SIX = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 """Places of xx, yy, zz, xy, xz, yz in a (3, 3) inertia."""
 
 
-def document() -> Element:
-    """The root of a document."""
-    return Element("OpenSimDocument", Version="40000")
+def document(
+    name: str, credits: str, gravity: Array, kinds: Iterable[str], names: Iterable[str]
+) -> tuple[Element, list[Element]]:
+    """The root of a document with one model, and the lists of objects in the model's sets.
+
+    Parameters
+    ----------
+    gravity : (3,) m/s2. kinds : of objects, such as `Body`. names : of all objects.
+
+    Raises
+    ------
+    RefusedModel
+        Of a name that OpenSim cannot take.
+    """
+    for one in (name, *names):
+        if not NAME.fullmatch(one):
+            raise RefusedModel(
+                f"{name}: OpenSim cannot take the name {one!r}; use letters, digits, _ . and - only"
+            )
+    root = Element("OpenSimDocument", Version="40000")
+    model = SubElement(root, "Model", name=name)
+    told(model, "credits", f"Written by spinepipe. Units: m, kg, s, N, rad.{credits}")
+    told(model, "gravity", numbers(gravity))
+    sets = (SubElement(model, f"{kind}Set", name=f"{kind.lower()}set") for kind in kinds)
+    return root, [SubElement(one, "objects") for one in sets]
 
 
 def written(root: Element) -> str:
@@ -44,12 +67,6 @@ def written(root: Element) -> str:
     indent(root)
     text = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
-
-
-def listed(model: Element, kind: str) -> Element:
-    """The list of objects in one of the model's sets."""
-    named = SubElement(model, f"{kind}Set", name=f"{kind.lower()}set")
-    return SubElement(named, "objects")
 
 
 def told(parent: Element, tag: str, text: str) -> None:

@@ -7,13 +7,11 @@ two-sided exponentials, for which OpenSim has no force.
 
 from collections.abc import Sequence
 from itertools import chain, count, pairwise
-from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
-from spinepipe.model import RefusedModel
 from spinepipe.model import osim_parts as parts
 from spinepipe.motion.skeleton import BODIES, JOINTS, MarkerSet, Skeleton
 from spinepipe.units import COORDINATES, DEG_PER_RAD, STANDARD_GRAVITY, TRANSLATIONS
@@ -51,16 +49,10 @@ def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
     RefusedModel
         Of names that OpenSim cannot take.
     """
-    for one in (name, *markers.names):
-        if not parts.NAME.fullmatch(one):
-            raise RefusedModel(
-                f"{name}: OpenSim cannot take the name {one!r}; use letters, digits, _ . and - only"
-            )
-    document = parts.document()
-    model = SubElement(document, "Model", name=name)
-    parts.told(model, "credits", "Written by spinepipe. Units: m, kg, s, N, rad.")
-    parts.told(model, "gravity", parts.numbers(STANDARD_GRAVITY))
-    bodies, joints, listed = (parts.listed(model, kind) for kind in ("Body", "Joint", "Marker"))
+    kinds = ("Body", "Joint", "Marker")
+    root, (bodies, joints, placed) = parts.document(
+        name, "", STANDARD_GRAVITY, kinds, markers.names
+    )
     masses = skeleton.masses
     ends = [step.origin for step in skeleton.steps]
     each = zip(BODIES, masses.kg, masses.com, masses.about_com, (*ends, ends[-1]), strict=True)
@@ -72,8 +64,8 @@ def osim(skeleton: Skeleton, markers: MarkerSet, name: str) -> str:
     for joint, (lower, upper), step in named:
         joints.append(parts.joint(joint, (lower, step), (upper, _HERE)))
     for marker, on, at in zip(markers.names, markers.body, markers.at, strict=True):
-        listed.append(parts.marker(marker, paths[on + 1], at))
-    return parts.written(document)
+        placed.append(parts.marker(marker, paths[on + 1], at))
+    return parts.written(root)
 
 
 def mot(name: str, time_s: Array, q: Array, columns: Sequence[str] = COLUMNS) -> str:

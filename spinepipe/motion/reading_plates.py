@@ -21,9 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.motion.reading import DEFAULT_AXES, axes_of
-from spinepipe.motion.reading_c3d import C3dFile, open_c3d
-from spinepipe.motion.recording import M_PER, unit_of
+from spinepipe.motion.reading_c3d import AGAIN, C3dFile, open_c3d
+from spinepipe.motion.recording import M_PER
 from spinepipe.problems import InputError, InputProblem
 
 PLATES = "FORCE_PLATFORM"
@@ -41,55 +40,44 @@ NO_NEWTONS = "ANALOG:UNITS of plate {} says '{}', taken for N"
 
 
 @dataclass(frozen=True, eq=False)
-class AnalogRecording:
-    """Channels (C) over samples (S).
-
-    Attributes
-    ----------
-    names, units : (C,), as the file has them. time_s : (S,). values : (S, C), in these units.
-    """
-
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    time_s: Array
-    values: Array
-
-
-@dataclass(frozen=True, eq=False)
 class ForcePlate:
-    """What a plate measured, on the axes of ground.
+    """What a plate measured, on the axes of the file.
 
     Attributes
     ----------
-    kind : type of the plate, from 1 to 4. corners : (4, 3) m. time_s : (S,).
-    force : (S, 3) N on the person. moment : (S, 3) N m, about the middle of the surface.
+    time_s : (S,). force : (S, 3) N on the person.
     centre_of_pressure : (S, 3) m on the surface, NaN below `LEAST_N`. free_moment : (S, 3) N m,
         about it and square to the surface; NaN with it.
     repaired : what was read otherwise than it stands in the file, one sentence each.
     """
 
-    kind: int
-    corners: Array
     time_s: Array
     force: Array
-    moment: Array
     centre_of_pressure: Array
     free_moment: Array
     repaired: tuple[str, ...]
 
 
-def read_analog(path: Path, file: str | None = None) -> AnalogRecording:
-    """Analog channels of a `.c3d`, none where it has none.
+def read_force_plates(path: Path, file: str | None = None) -> tuple[ForcePlate, ...]:
+    """Force plates of a `.c3d`, none where it has none.
+
+    Parameters
+    ----------
+    file : its name in messages; None: that of the path.
 
     Raises
     ------
     InputError
-        Where it cannot be read or contradicts itself.
+        Where it cannot be read or contradicts itself, and of plates of other types.
     """
-    return _analog(open_c3d(path, file or path.name, markers=False))
+    name = file or path.name
+    whole = open_c3d(path, name, markers=False)
+    count = int(next(iter(whole.numbers(PLATES, "USED")), 0))
+    return tuple(_plate(whole, k, count, name) for k in range(count))
 
 
-def _analog(whole: C3dFile) -> AnalogRecording:
+def analog_values(whole: C3dFile) -> Array:
+    """(S, C) values of the channels, in the units that the file tells."""
     samples = max(whole.samples, 1)
     count = whole.analog // samples
     raw = whole.cells()[:, 4 * whole.points : 4 * whole.points + count * samples]
@@ -106,40 +94,13 @@ def _analog(whole: C3dFile) -> AnalogRecording:
     offset = of_channels("OFFSET", 0.0)
     offset -= np.where((offset >= 1 << 15) & (not unsigned), 1 << 16, 0)
     general = next(iter(whole.numbers("ANALOG", "GEN_SCALE")), 1.0)
-    values = (raw - offset) * (general * of_channels("SCALE", 1.0))
-    texts = (whole.texts("ANALOG", name)[:count] for name in ("LABELS", "UNITS"))
-    names, units = (tuple(one + [""] * (count - len(one))) for one in texts)
-    return AnalogRecording(names, units, whole.time_s(samples), values)
+    return (raw - offset) * (general * of_channels("SCALE", 1.0))
 
 
-def read_force_plates(
-    path: Path, axes: str = DEFAULT_AXES, file: str | None = None
-) -> tuple[ForcePlate, ...]:
-    """Force plates of a `.c3d`, none where it has none.
-
-    Parameters
-    ----------
-    axes : what forwards, up and right are in the axes of the file, as for `read_motion`.
-    file : its name in messages; None: that of the path.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be read or contradicts itself, and of plates of other types.
-    ValueError
-        Of axes that are none.
-    """
-    turn, name = axes_of(axes), file or path.name
-    whole = open_c3d(path, name, markers=False)
-    count = int(next(iter(whole.numbers(PLATES, "USED")), 0))
-    analog = _analog(whole) if count else None
-    return tuple(_plate(whole, analog, k, turn, name) for k in range(count) if analog)
-
-
-def _plate(whole: C3dFile, analog: AnalogRecording, k: int, turn: Array, file: str) -> ForcePlate:
+def _plate(whole: C3dFile, k: int, count: int, file: str) -> ForcePlate:
     def fail(column: str, found: str, allowed: str) -> InputError:
         place = (file, None, f"{PLATES}:{column}")
-        return InputError([InputProblem(*place, found, allowed, "export the motion again")])
+        return InputError([InputProblem(*place, found, allowed, AGAIN)])
 
     def of_plate(name: str, *shape: int) -> Array:
         """The part of a parameter that is this plate's; its last index counts plates."""
@@ -151,15 +112,15 @@ def _plate(whole: C3dFile, analog: AnalogRecording, k: int, turn: Array, file: s
     kind = int(of_plate("TYPE", 1)[0])
     if kind not in CHANNELS:
         raise fail("TYPE", f"a plate of type {kind}", "types 1 to 4")
-    unit_m = unit_of(file, None, "POINT:UNITS", whole.unit_text)
+    unit_m, analog = whole.unit_m(file), analog_values(whole)
     corners, origin = unit_m * of_plate("CORNERS", 3, 4).T, unit_m * of_plate("ORIGIN", 3)
-    rows = (whole.sizes.get((PLATES, "CHANNEL")) or (CHANNELS[kind],))[0]
+    rows = max(CHANNELS[kind], len(whole.numbers(PLATES, "CHANNEL")) // count)
     channels = of_plate("CHANNEL", rows).astype(int)[: CHANNELS[kind]] - 1
-    there = (channels >= 0) & (channels < len(analog.names))
-    if len(channels) < CHANNELS[kind] or not there.all():
+    if channels.min() < 0 or channels.max() >= analog.shape[1]:
         found = f"channels {', '.join(str(one + 1) for one in channels)}"
-        raise fail("CHANNEL", found, f"{CHANNELS[kind]} of {len(analog.names)}")
-    values, units = analog.values[:, channels], [analog.units[one] for one in channels]
+        raise fail("CHANNEL", found, f"{CHANNELS[kind]} of {analog.shape[1]}")
+    told = dict(enumerate(whole.texts("ANALOG", "UNITS")))
+    values, units = analog[:, channels], [told.get(one, "") for one in channels.tolist()]
     repaired = []
     if kind == 4:
         values = values @ of_plate("CAL_MATRIX", 6, 6).T
@@ -199,12 +160,9 @@ def _plate(whole: C3dFile, analog: AnalogRecording, k: int, turn: Array, file: s
     at = np.pad(at, ((0, 0), (0, 1)))
     at[np.abs(force[:, 2]) < LEAST_N] = np.nan
     free = moment - np.cross(at, force)
-    to_ground = (turn @ own).T
-    middle = corners.mean(axis=0) @ turn.T
-    return ForcePlate(
-        *(kind, corners @ turn.T, analog.time_s, force @ to_ground, moment @ to_ground),
-        *(middle + at @ to_ground, free @ to_ground, tuple(repaired)),
-    )
+    time_s = whole.time_s(max(whole.samples, 1))
+    at = corners.mean(axis=0) + at @ own.T
+    return ForcePlate(time_s, force @ own.T, at, free @ own.T, tuple(repaired))
 
 
 def _newton_metre(unit: str, unit_m: float) -> float:

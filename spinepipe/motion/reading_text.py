@@ -122,6 +122,21 @@ class NumberBlock:
         """Line of a row, counted from 0."""
         return next(line for k, (line, _) in enumerate(self.rows()) if k == row)
 
+    def check_times(self, times: Array, name: str, may_stand: bool = False) -> None:
+        """Refuse times (F,) s of a column that do not grow; two that are equal may be allowed.
+
+        Raises
+        ------
+        InputError
+            Of a time that is empty, or not behind the one before it.
+        """
+        for k in np.flatnonzero(np.isnan(times))[:1].tolist():
+            raise fault(self.file, self.line(k), name, "nothing", "a time", "fill it in")
+        steps = np.diff(times)
+        for k in np.flatnonzero(steps < 0.0 if may_stand else steps <= 0.0)[:1].tolist():
+            found, remedy = f"{times[k + 1]:g} s after {times[k]:g} s", "correct the time"
+            raise fault(self.file, self.line(k + 1), name, found, "times that grow", remedy)
+
     def numbers(self) -> tuple[Array, bool]:
         """(F, width) the numbers, NaN where a cell is empty; whether further cells were left out.
 
@@ -242,9 +257,7 @@ def read_csv(path: Path, file: str) -> MarkerRecording:
     if not len(numbers):
         raise fault(file, 1, None, "no frames", "a header and frames", "export it again")
     time_s = numbers[:, header.index(TIME)]
-    for k in np.flatnonzero(~(np.diff(time_s, prepend=-np.inf) > 0.0))[:1].tolist():
-        found = f"{time_s[k]:g} s"
-        raise fault(file, block.line(k), TIME, found, "times that grow", "correct the time")
+    block.check_times(time_s, TIME)
     places = scale * numbers[:, order].reshape(len(numbers), len(names), 3)
     return recording_from(names, time_s, places)
 

@@ -127,12 +127,7 @@ def _times(block: NumberBlock, column: Array, rate: float) -> tuple[Array, tuple
     """Times (F,) s, and what was repaired."""
     if not np.any(np.isfinite(column) & (column != 0.0)) and len(column) > 1:
         return np.arange(len(column)) / rate, ("times are from DataRate, the column has none",)
-    for k in np.flatnonzero(~np.isfinite(column))[:1].tolist():
-        raise fault(block.file, block.line(k), "Time", "nothing", "a time", "fill it in")
-    for k in np.flatnonzero(np.diff(column) <= 0.0)[:1].tolist():
-        found = f"{column[k + 1]:g} s after {column[k]:g} s"
-        remedy = "correct the time"
-        raise fault(block.file, block.line(k + 1), "Time", found, "times that grow", remedy)
+    block.check_times(column, "Time")
     # half of the last digit is lost at either end: files have times of three decimals at 60 Hz
     lasts, wanted = float(column[-1] - column[0]), (len(column) - 1) / rate
     if abs(lasts - wanted) > RATE_DIFFERS * wanted + 10.0 ** -_decimals(block):

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +22,8 @@ MOST_RECORDING_BYTES = 128_000_000
 M_PER = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Units in which motion is written."""
 
-WORDS = {
-    f"{word}{ending}": sign
-    for word, sign in (("milli", "mm"), ("centi", "cm"), ("", "m"))
-    for ending in ("meters", "metres")
-}
-SHORTEST_WORD = 4
-"""Letters of a word that some programs cut off: `mete`."""
+WORDS = {"mill": "mm", "cent": "cm", "mete": "m", "metr": "m"}
+"""Units by the first letters of their words, which some programs cut off: `mete`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +51,22 @@ class MarkerRecording:
             array.flags.writeable = False
 
 
+def check_file(path: Path, file: str) -> None:
+    """Refuse a recording that is not there, or larger than any is read.
+
+    Raises
+    ------
+    InputError
+        Which of the two.
+    """
+    if not path.is_file():
+        allowed, remedy = "a file of motion", "correct the name"
+        raise InputError([InputProblem(file, None, None, "no such file", allowed, remedy)])
+    if (size := path.stat().st_size) > MOST_RECORDING_BYTES:
+        found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_RECORDING_BYTES / 1e6:g} MB"
+        raise InputError([InputProblem(file, None, None, found, allowed, "crop it")])
+
+
 def recording_from(
     names: tuple[str, ...], time_s: Array, raw: Array, repaired: tuple[str, ...] = ()
 ) -> MarkerRecording:
@@ -65,16 +77,14 @@ def recording_from(
 
 
 def unit_of(file: str, row: int | None, column: str, text: str) -> float:
-    """What one unit of a file is in m: one of `M_PER`, or its word, which may be cut off.
+    """What one unit of a file is in m: one of `M_PER`, or its word.
 
     Raises
     ------
     InputError
         Where it is none.
     """
-    known = text.strip().lower()
-    if len(known) >= SHORTEST_WORD:
-        known = next((unit for word, unit in WORDS.items() if word.startswith(known)), known)
+    known = WORDS.get(text.strip().lower()[:4], text.strip().lower())
     if known not in M_PER:
         allowed = ", ".join(M_PER)
         raise InputError([InputProblem(file, row, column, repr(text), allowed, "correct the unit")])

@@ -7,15 +7,12 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.kind import WantedFiles
 
 _OPTIONS = {
-    "pose": ("--pose", "none: this kind of study exports no sampled joints"),
-    "representation": (
-        "--representation",
-        "none: stiffness of this kind of study has one representation",
-    ),
-    "test": ("--test", "none: motions of this kind of study are among its results"),
-    "point_mm": ("--matrix", "none: this kind of study tells no stiffness matrix"),
+    "pose": ("--pose", "exports no sampled joints"),
+    "representation": ("--representation", "has one representation of stiffness"),
+    "test": ("--test", "has motions among its results"),
+    "point_mm": ("--matrix", "tells no stiffness matrix"),
 }
-"""What some kinds do not have, by its name in `WantedFiles`."""
+"""What some kinds do not have, by its name in `WantedFiles`: the option, and what they do."""
 
 
 class Exported(NamedTuple):
@@ -38,29 +35,28 @@ def refuse(wanted: WantedFiles, *has: str) -> None:
     InputError
         With every such option.
     """
-    asked = {name: getattr(wanted, name) for name in _OPTIONS if name not in has}
     problems = [
-        problem(_OPTIONS[name][0], f"{value}", _OPTIONS[name][1], "leave it out")
-        for name, value in asked.items()
-        if value is not None
+        problem(option, f"{value}", f"none: this kind of study {does}", "leave it out")
+        for name, (option, does) in _OPTIONS.items()
+        if name not in has and (value := getattr(wanted, name)) is not None
     ]
     if problems:
         raise InputError(problems)
 
 
-def required_result(path: Path, what: str) -> Path:
+def required_result(path: Path, otherwise: str = "add --start") -> Path:
     """A result file that must be there.
 
     Raises
     ------
     InputError
-        With the command that makes it.
+        With the command that makes it, and how to do without.
     """
     if not path.is_file():
         folders = path.parts
         name = "/".join(folders[folders.index("results") :])
-        remedy = f"run `snakemake -j2 {name}` first, or add --start"
-        raise InputError([problem("STUDY", f"no {name}", what, remedy)])
+        remedy = f"run `snakemake -j2 {name}` first, or {otherwise}"
+        raise InputError([problem("STUDY", f"no {name}", "a computed study", remedy)])
     return path
 
 

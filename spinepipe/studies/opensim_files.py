@@ -43,7 +43,13 @@ def opensim_document(
     """
     case, motion = None, ""
     if wanted.test is not None:
-        case = _case(wanted, cases or _cases(cohort, wanted.specimen))
+        if not cases and cohort.loads is not None:
+            cases = measured_specimen(cohort, wanted.specimen, cohort.tests).cases
+        known = {one.test: one for one in first_cycles(cases)}
+        if wanted.test not in known:
+            allowed = one_of(list(known)) if known else "none: no loads are known"
+            raise InputError([problem("--test", wanted.test, allowed, "correct the name")])
+        case = known[wanted.test]
         steps = follow(System(Chain(model), model, case))
         if failed := [one for one in steps if not one.usable]:
             how = failed[0].equilibrium
@@ -54,23 +60,10 @@ def opensim_document(
         names = [f"{joint}_{name}" for joint in model.joints for name in COORDINATES]
         motion = mot(f"{model.specimen}_{case.test}", times(case), q, names)
         words += f"; loads and motion of {case.test}, cycle {case.cycle}"
-    said, unsaid = expressible(model, case)
+    _, unsaid = expressible(model, case)
     points = {} if cohort.landmarks is None else landmarks(cohort, model.specimen)
-    document = osim(said, case, unsaid, points)
+    document = osim(model, case, points)
     if unsaid:
         words += f"; not in the file, as OpenSim has no counterpart: {', '.join(unsaid)}"
         words += " (the motion is of the model with them)" if case else ""
     return Exported(document, words, motion)
-
-
-def _cases(cohort: Cohort, specimen: str) -> Sequence[LoadCase]:
-    return () if cohort.loads is None else measured_specimen(cohort, specimen, cohort.tests).cases
-
-
-def _case(wanted: WantedFiles, cases: Sequence[LoadCase]) -> LoadCase:
-    """The first cycle of the test that is wanted."""
-    known = {one.test: one for one in first_cycles(cases)}
-    if wanted.test not in known:
-        allowed = one_of(list(known)) if known else "none: no loads are known"
-        raise InputError([problem("--test", str(wanted.test), allowed, "correct the name")])
-    return known[wanted.test]

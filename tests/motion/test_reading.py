@@ -277,7 +277,7 @@ def test_what_is_no_file_of_motion_is_named(tmp_path: Path) -> None:
         ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2", 2, None, "3 cells"),
         ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "\n0,1,b,3", 3, "T1_y_mm", "'b'"),
         ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,inf,3", 2, "T1_y_mm", "'inf'"),
-        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2,3\n\n0,1,2,3", 4, "time_s", "0 s"),
+        ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "0,1,2,3\n\n0,1,2,3", 4, "time_s", "0 s after 0 s"),
         ("time_s,T1_x_mm,T1_y_mm,T1_z_mm", "", 1, None, "no frames"),
     ],
 )

@@ -329,7 +329,11 @@ def test_export_says_why_a_kind_has_none(tmp_path: Path, run: Run) -> None:
 @pytest.mark.parametrize(
     ("computed", "arguments", "says"),
     [
-        (False, [STUDY, "a", "--pose", "1", "-o", "a.osim"], "run `snakemake results/probe/poses"),
+        (
+            False,
+            [STUDY, "a", "--pose", "1", "-o", "a.osim"],
+            "run `snakemake -j2 results/probe/poses",
+        ),
         (True, [STUDY, "a", "--pose", "99", "-o", "a.osim"], "found pose 99; allowed: 0 to 11"),
         (True, [STUDY, "z", "-o", "a.osim"], "unknown specimen 'z'"),
         (True, ["prob", "a", "-o", "a.osim"], "did you mean 'probe'?"),

@@ -83,7 +83,7 @@ class OsimDocument:
             remedy = "open it in OpenSim 4 and save it again"
             raise InputError([InputProblem(file, 1, None, found, allowed, remedy)])
         self.model, self._frames = model, dict[str, Element]()
-        self._find_frames(model, "")
+        self._find_frames()
         if all(one.get("name") != GROUND for one in self._frames.values()):
             self._frames[f"/{GROUND}"] = Element("Ground", name=GROUND)
         every = self._frames.values()
@@ -123,21 +123,24 @@ class OsimDocument:
             return np.array(default)
         return np.array(words, dtype=float)
 
-    def frame(self, at: Element, key: str, depth: int = 0) -> Placement | None:
+    def frame(self, at: Element, key: str) -> Placement | None:
         """The body of a frame that an element names, and where the frame lies in it."""
-        named = (at.findtext(key) or "").strip()
-        found = self._frames.get(normpath(join(at.get(_PATH, "/"), named)))
-        if found is None:  # told by its name alone
-            last = named.rpartition("/")[2]
-            alike = [one for one in self._frames.values() if one.get("name") == last]
-            found = alike[0] if len(alike) == 1 else None
-        if found is None or depth > len(self._frames):
-            self.fault(at, key, f"'{named}'", "a body or frame of this file", "correct the name")
-            return None
-        if found.tag != _OFFSET:
-            return found.get("name", ""), _HERE
-        under = self.frame(found, "socket_parent", depth + 1)
-        return under and (under[0], under[1] @ self._pose(found, "translation", "orientation"))
+        pose = _HERE
+        for _ in range(len(self._frames) + 1):  # more frames on each other are a circle
+            named = (at.findtext(key) or "").strip()
+            found = self._frames.get(normpath(join(at.get(_PATH, "/"), named)))
+            if found is None:  # told by its name alone
+                last = named.rpartition("/")[2]
+                alike = [one for one in self._frames.values() if one.get("name") == last]
+                found = alike[0] if len(alike) == 1 else None
+            if found is None:
+                break
+            if found.tag != _OFFSET:
+                return found.get("name", ""), pose
+            pose = self._pose(found, "translation", "orientation") @ pose
+            at, key = found, "socket_parent"
+        self.fault(at, key, f"'{named}'", "a body or frame of this file", "correct the name")
+        return None
 
     def side(self, at: Element, new: str, old: str, *pose: str) -> Placement | None:
         """The frame of a socket; in older files a body, and keys of where a frame lies in it."""
@@ -146,24 +149,26 @@ class OsimDocument:
         on = self.frame(at, old)
         return on and (on[0], self._pose(at, *pose)) if pose else on
 
-    def function(self, at: Element, name: str, inputs: list[float]) -> float | None:
-        """Value of the function that an element has under a name; None: of a form not read."""
-        one = next((of for of in at if of.get("name") == name), at.find(f"{name}/*"))
-        if one is None or one.tag == "Constant":
-            return 0.0 if one is None else float(self.numbers(one, "value", (0.0,))[0])
-        if one.tag == "MultiplierFunction":
-            inner = self.function(one, "function", inputs)
-            return inner and inner * float(self.numbers(one, "scale", (1.0,))[0])
-        if one.tag == "LinearFunction":
-            factors = self.numbers(one, "coefficients", (1.0,) * len(inputs) + (0.0,))
-            return float(factors @ [*inputs, 1.0])
-        x, y = self.numbers(one, "x", ()), self.numbers(one, "y", ())
+    def function(self, at: Element, inputs: list[float]) -> float | None:
+        """Value of the function of an axis; None: of a form that is not read."""
+        found, scale = next((of for of in at if of.get("name") == "function"), None), 1.0
+        found = at.find("function/*") if found is None else found
+        while found is not None and found.tag == "MultiplierFunction":
+            scale *= float(self.numbers(found, "scale", (1.0,))[0])
+            found = found.find("function/*")
+        if found is None or found.tag == "Constant":
+            value = 0.0 if found is None else float(self.numbers(found, "value", (0.0,))[0])
+            return scale * value
+        if found.tag == "LinearFunction":
+            factors = self.numbers(found, "coefficients", (1.0,) * len(inputs) + (0.0,))
+            return scale * float(factors @ [*inputs, 1.0])
+        x, y = self.numbers(found, "x", ()), self.numbers(found, "y", ())
         if len(inputs) == 1 and len(x) == len(y) > 1 and np.diff(x).min() > 0.0:
             slopes, at_point = np.diff(y) / np.diff(x), np.abs(x - inputs[0]) < 1e-12
             if np.ptp(slopes) < 1e-9:
-                return float(y[0] + slopes[0] * (inputs[0] - x[0]))
+                return scale * float(y[0] + slopes[0] * (inputs[0] - x[0]))
             if at_point.any():  # a spline is known in its points alone
-                return float(y[at_point][0])
+                return scale * float(y[at_point][0])
         return None
 
     def _pose(self, at: Element, location: str, orientation: str) -> Pose:
@@ -172,14 +177,16 @@ class OsimDocument:
         turned = Rotation.from_euler("XYZ", angles).as_matrix()
         return Pose(turned, self.numbers(at, location, ORIGIN))
 
-    def _find_frames(self, element: Element, path: str) -> None:
+    def _find_frames(self) -> None:
         """Give all elements their paths, and note those that are frames."""
-        for child in element:
-            name = child.tag.lower() if child.tag.endswith("Set") else child.get("name")
-            child.set(_PATH, f"{path}/{name}" if name else path or "/")
-            if name and child.tag in ("Ground", "Body", _OFFSET):
-                self._frames[child.get(_PATH, "")] = child
-            self._find_frames(child, child.get(_PATH, "").rstrip("/"))
+        self.model.set(_PATH, "/")
+        for parent in self.model.iter():  # before its children
+            path = parent.get(_PATH, "/").rstrip("/")
+            for child in parent:
+                name = child.tag.lower() if child.tag.endswith("Set") else child.get("name")
+                child.set(_PATH, f"{path}/{name}" if name else path or "/")
+                if name and child.tag in ("Ground", "Body", _OFFSET):
+                    self._frames[child.get(_PATH, "")] = child
 
     def _joints(self) -> Iterator[OsimJoint]:
         every = [(joint, "") for joint in self.objects("JointSet", "Joint")]
@@ -207,7 +214,7 @@ class OsimDocument:
                 inputs = [self.values.get(n, 0.0) for n in one.findtext("coordinates", "").split()]
                 axis = self.numbers(one, "axis", (1.0, 0.0, 0.0))
                 axis /= np.linalg.norm(axis) or 1.0
-                amount = self.function(one, "function", inputs)
+                amount = self.function(one, inputs)
                 steps.append((one.get("name", "").startswith("rotation"), axis, amount))
         elif joint.tag in _COORDINATES:
             for letter, name in zip(_COORDINATES[joint.tag], names, strict=False):

@@ -75,7 +75,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         _joints(spine, specimen),
         _bodies(spine, specimen),
         _markers(spine, specimen),
-        muscle_tables(spine, specimen, settings.muscle_groups),
+        muscle_tables(spine, specimen),
     ):
         tables |= made
         told += sentences
@@ -224,10 +224,3 @@ def _not_read(osim: OsimDocument) -> Iterator[str]:
     if kinds:
         every = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
         yield f"Not read: {every}."
-    for one in osim.objects("ConstraintSet", "CoordinateCouplerConstraint"):
-        names = one.findtext("independent_coordinate_names", "").split()
-        inputs = [osim.values.get(name, 0.0) for name in names]
-        value = osim.function(one, "coupled_coordinates_function", inputs)
-        dependent = one.findtext("dependent_coordinate_name", "").strip()
-        if value is not None and abs(value - osim.values.get(dependent, 0.0)) > 1e-6:
-            yield f"{one.get('name')} does not hold in the default pose: OpenSim takes another."

@@ -8,7 +8,6 @@ them these are the same, in others to the first order.
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping
 from itertools import pairwise
 from xml.etree.ElementTree import Element
 
@@ -32,16 +31,15 @@ FORCES = MUSCLE, BUSHING_FORCE = "Muscle", "BushingForce"
 """Ends of the names of OpenSim's forces that are read, such as Thelen2003Muscle."""
 
 _KINDS = ("PathPoint", "ConditionalPathPoint")
-_SIDE = re.compile(r".*[_.-](r|l|right|left)", re.IGNORECASE)
-_MORE_GROUPS = {"E0": "external_oblique", "TR": "transversus_abdominis"}
-"""By how names begin in the models of Bruno 2015 and Allaire 2020."""
+_GROUPS = {**GROUPS, "E0": "external_oblique", "TR": "transversus_abdominis"}
+"""By how names begin, also in the models of Bruno 2015 and Allaire 2020."""
 
 _PARAMETERS = ("max_isometric_force_n", "optimal_fibre_length_mm", "wrap_objects")
 
 
-def muscle_tables(spine: OsimSpine, specimen: str, own_groups: Mapping[str, str]) -> Made:
+def muscle_tables(spine: OsimSpine, specimen: str) -> Made:
     """Rows of the tables by file, none where no muscle counts; and sentences."""
-    osim, groups = spine.document, {**own_groups, **GROUPS, **_MORE_GROUPS}
+    osim = spine.document
     points: Rows = [("muscle", "point", "body", *POINT)]
     parameters: Rows = [("muscle", "group", "side", *_PARAMETERS)]
     out, used, conditional, wrapped = defaultdict[str, list[str]](list), dict[str, None](), 0, 0
@@ -70,12 +68,12 @@ def muscle_tables(spine: OsimSpine, specimen: str, own_groups: Mapping[str, str]
                 one.findtext("wrap_object", "").strip() for one in muscle.iter("PathWrap")
             )
             wrapped += bool(wraps)
-            known = [group for start, group in groups.items() if name.startswith(start)]
+            known = [group for start, group in _GROUPS.items() if name.startswith(start)]
             group = known[0] if known else re.split(r"[\d_.-]", name)[0].lower() or name
             fibre = float(osim.numbers(muscle, "optimal_fiber_length", (0.1,))[0]) * MM_PER_M
-            parameters.append(
-                (name, group, _side(spine, name, places), *cells((force, fibre)), wraps)
-            )
+            across = sum(float(spine.ground(body).apply(at)[2]) for body, at in places)
+            side = SIDES[across < 0.0]
+            parameters.append((name, group, side, *cells((force, fibre)), wraps))
     told = [f"Left out: {count(len(n), 'muscle')} {why}: {listed(n)}." for why, n in out.items()]
     if not used:
         return {}, told
@@ -96,14 +94,6 @@ def muscle_tables(spine: OsimSpine, specimen: str, own_groups: Mapping[str, str]
         "muscle_parameters.csv": parameters,
         "body_frames.csv": frames,
     }, told
-
-
-def _side(spine: OsimSpine, name: str, places: list[tuple[str, Array]]) -> str:
-    """By the end of the name; else by where it lies."""
-    if match := _SIDE.fullmatch(name):
-        return next(side for side in SIDES if side[0] == match[1][0].lower())
-    across = sum(float(spine.ground(body).apply(at)[2]) for body, at in places)
-    return SIDES[across < 0.0]
 
 
 NEAR = 1e-6

@@ -38,8 +38,3 @@ class OsimSettings(BaseModel):
         description="what forwards, up and right are in the axes of the model, as in `x z -y` "
         "where z is up and y to the left",
     )
-    muscle_groups: dict[str, str] = Field(
-        default_factory=dict,
-        description="group of muscles by how their names begin, such as `{RA: rectus_abdominis}`; "
-        "counts before the groups that are known",
-    )

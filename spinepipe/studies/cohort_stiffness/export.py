@@ -60,22 +60,22 @@ def exported(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles) -> Exp
         told += f" ({kept} of {len(rows)} as published: no reading tells of them)" * bool(kept)
     if name in STIFFENING and not wanted.start:
         told += ", at rest: that it grows with motion is not in the file"
-    frames = joint_frames(cohort, wanted.specimen)
     if wanted.point_mm is not None:
         rows = pd.DataFrame(columns=STIFFNESS.names) if wanted.start else rows
-        table = matrix_table(rows, k, cohort.joint_names, frames, wanted.point_mm)
+        table = matrix_table(rows, k, cohort.joint_names, wanted.point_mm)
         where = "({:g}, {:g}, {:g}) mm from its origin".format(*wanted.point_mm)
         return Exported(
             table.to_csv(index=False), f"6 x 6 stiffness of each joint about {where}, {told}"
         )
     others = base_effects(base_of(str(wanted.root), study), cohort, wanted.specimen)
+    frames = joint_frames(cohort, wanted.specimen)
     model = stiff_model(cohort, wanted.specimen, frames, k, others)
     return opensim_document(model, f"the cohort's own joints, stiffness: {told}", cohort, wanted)
 
 
 def _recommended(wanted: WantedFiles, known: tuple[str, ...]) -> tuple[str, str]:
     """The representation that is best on held-out motion, and why it is taken, in words."""
-    ranking = read_frame(required_result(wanted.results / "ranking.parquet", "a computed study"))
+    ranking = read_frame(required_result(wanted.results / "ranking.parquet"))
     own = ranking[ranking["representation"].isin(known)]
     for criterion in CRITERIA:
         rows = own[own["criterion"] == criterion].dropna(subset=["rank"])
@@ -94,7 +94,7 @@ def _fitted(study: CohortStiffness, cohort: Cohort, wanted: WantedFiles, name: s
     InputError
         Where there is no fit to use.
     """
-    rows = read_frame(required_result(wanted.results / "stiffness.parquet", "a computed study"))
+    rows = read_frame(required_result(wanted.results / "stiffness.parquet"))
     tests = tests_of(study, cohort)
     own = rows[
         (rows["specimen"] == wanted.specimen)

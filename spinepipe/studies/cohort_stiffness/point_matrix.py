@@ -8,42 +8,28 @@ that of the neutral pose without load, where no load adds stiffness by turning w
 
 from collections.abc import Sequence
 from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from spinepipe.effects.contract import Array
-from spinepipe.frames import Pose
 from spinepipe.studies.cohort_stiffness.problem import with_stiffness
 from spinepipe.units import COORDINATES, MM_PER_M
-
-Axes = Literal["joint", "ground"]
 
 _SPATIAL = tuple(map(COORDINATES.index, ("right_bending", "left_rotation", "extension")))
 _ORDER = [0, 1, 2, *_SPATIAL]
 """Coordinates along x, y and z of the joint, then about these."""
 
-NAMES = {
-    "joint": [COORDINATES[place] for place in _ORDER],
-    "ground": ["x", "y", "z", "about_x", "about_y", "about_z"],
-}
+NAMES = [COORDINATES[place] for place in _ORDER]
 """What rows and columns are called."""
 
 _UNITS = ("N/m", "N/rad"), ("N m/m", "N m/rad")
 _INVERSE_UNITS = ("m/N", "m/(N m)"), ("rad/N", "rad/(N m)")
 
-_ROUNDING = 1e-12
-"""A smaller share of a spring in an entry is none: the axes are turned in floating point."""
-
 
 def matrix_table(
-    rows: pd.DataFrame,
-    values: Array,
-    joints: Sequence[str],
-    frames: Sequence[Pose],
-    point_mm: Sequence[float],
-    axes: Axes = "joint",
+    rows: pd.DataFrame, values: Array, joints: Sequence[str], point_mm: Sequence[float]
 ) -> pd.DataFrame:
     """36 rows per joint: stiffness and compliance with the ends of 95 % intervals, NaN for unknown.
 
@@ -53,32 +39,27 @@ def matrix_table(
     Parameters
     ----------
     rows : of the table ``stiffness``, one fit of one specimen. values : (J, 6) SI, of what is in no
-        row. frames : in ground. point_mm : from each joint's origin along its axes; with ``axes``
-        ``ground``, a place in ground, and force and moment along its axes.
+        row. point_mm : from each joint's origin along its axes.
     """
     every = [with_stiffness(values, joints, rows), *np.full((2, *values.shape), np.nan)]
     for number, end in enumerate(("low", "high"), 1):
         every[number] = with_stiffness(every[number], joints, rows.assign(stiffness=rows[end]))
     free = set(rows["coordinate"])
+    x = np.eye(6)  # the origin moves by u + r x theta
+    x[:3, 3:] = np.cross(np.asarray(point_mm, dtype=float) / MM_PER_M, np.eye(3)).T
+    back = 2.0 * np.eye(6) - x  # its inverse
+    parts = np.einsum("ci,cj->cij", x, x), np.einsum("ic,jc->cij", back, back)
+    taken = (parts[0] != 0.0) | (parts[1] != 0.0)
     found = []
-    for place, (joint, frame) in enumerate(zip(joints, frames, strict=True)):
-        r, turn = np.asarray(point_mm, dtype=float) / MM_PER_M, np.eye(3)
-        if axes == "ground":
-            r, turn = frame.inverse().apply(r), frame.rotation.T
-        x = np.eye(6)
-        x[:3, 3:] = np.cross(r, np.eye(3)).T  # the origin moves by u + r x theta
-        x = x @ np.kron(np.eye(2), turn)
+    for place, joint in enumerate(joints):
         k, low, high = (one[place, _ORDER] for one in every)
-        back = np.linalg.inv(x)
-        parts = np.einsum("ci,cj->cij", x, x), np.einsum("ic,jc->cij", back, back)
         stiffness = _sum(parts[0], k, low, high)
         compliance = _sum(parts[1], 1.0 / k, 1.0 / high, 1.0 / low)
-        taken = np.any(np.abs(np.stack(parts)) > _ROUNDING, axis=0)
         for i, j in product(range(6), repeat=2):
-            names = [name for c, name in enumerate(NAMES["joint"]) if taken[c, i, j]]
+            names = [name for c, name in enumerate(NAMES) if taken[c, i, j]]
             found.append(
                 {
-                    **{"joint": joint, "row": NAMES[axes][i], "column": NAMES[axes][j]},
+                    **{"joint": joint, "row": NAMES[i], "column": NAMES[j]},
                     **_cells("stiffness", stiffness[:, i, j], _UNITS[i > 2][j > 2]),
                     **_cells("compliance", compliance[:, i, j], _INVERSE_UNITS[i > 2][j > 2]),
                     "published": ", ".join(name for name in names if name not in free),
@@ -98,7 +79,6 @@ def _sum(weights: Array, value: Array, low: Array, high: Array) -> Array:
     MOVER: each end is as far away as the ways to the parts' ends, as independent errors add up
     (Zou and Donner 2008, doi:10.1002/sim.3095).
     """
-    weights = np.where(np.abs(weights) < _ROUNDING, 0.0, weights)
     ends = [(value, value), (low, high), (high, low)]  # of positive and of negative weights
     middle, least, most = (
         np.where(weights, weights * np.where(weights > 0.0, *(e[:, None, None] for e in pair)), 0.0)

@@ -34,9 +34,7 @@ def exported(study: Discrepancy, cohort: Cohort, wanted: WantedFiles) -> Exporte
         return opensim_document(model, words, cohort, wanted)
     found = wanted.results / "discrepancy" / MODEL
     told = "start of the study, its base model" if wanted.start else "fitted with the effects found"
-    path = (
-        wanted.root / base if wanted.start and base else required_result(found, "a computed study")
-    )
+    path = wanted.root / base if wanted.start and base else required_result(found)
     file = read_model(path)
     effects = effects_for(file, wanted.specimen, cohort.joint_names)
     model = spine_model(cohort, wanted.specimen, frames, effects, damping)

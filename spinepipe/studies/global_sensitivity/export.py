@@ -39,9 +39,7 @@ def exported(study: GlobalSensitivity, cohort: Cohort, wanted: WantedFiles) -> E
 
 def _fitted(wanted: WantedFiles, start: Array) -> Array:
     """(J, 6) what the study's results have of the specimen, all joints alike."""
-    rows = read_frame(
-        required_result(wanted.results / "base_stiffness.parquet", "a computed study")
-    )
+    rows = read_frame(required_result(wanted.results / "base_stiffness.parquet"))
     own = rows[rows["specimen"] == wanted.specimen]
     if own.empty or not own["status"].isin(USABLE).all():
         found = "; ".join(["no fit of " + wanted.specimen, *own["message"].unique()])

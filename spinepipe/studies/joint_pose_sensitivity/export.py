@@ -78,11 +78,7 @@ def _sampled(results: Path, specimen: str, pose: int) -> tuple[Pose, ...]:
     InputError
         When there are no results yet, no such pose, or its landmarks define no frame.
     """
-    path = results / "poses.parquet"
-    if not path.is_file():
-        name = "/".join(path.parts[-3:])  # from the folder of the Snakefile
-        remedy = f"run `snakemake {name}` first, or leave --pose out"
-        raise InputError([problem("--pose", f"no {name}", "a computed study", remedy)])
+    path = required_result(results / "poses.parquet", "leave --pose out")
     poses = sampled_poses(str(path))
     frames, reason = poses.of(specimen, pose)
     if frames is None:
@@ -103,7 +99,7 @@ def _calibrated(results: Path, specimen: str, pose: int) -> Array:
     """
     whole = results / "calibrations.parquet"
     single = results / "calibrations" / f"specimen-{specimen}" / f"pose-{pose:04d}.parquet"
-    path = single if single.is_file() else required_result(whole, "a computed study")
+    path = single if single.is_file() else required_result(whole)
     rows = read_frame(path)
     rows = rows[(rows["specimen"] == specimen) & (rows["pose"] == pose)]
     values = rows[list(STIFFNESS_COLUMNS)].to_numpy(float)

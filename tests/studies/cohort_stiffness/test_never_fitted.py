@@ -98,10 +98,10 @@ def test_the_rest_of_the_house_reads_the_empty_rows(tmp_path: Path) -> None:
     settings, cohort = study_of_kind(CohortStiffness, str(project.root), STUDY)
     rows.to_parquet(tmp_path / "stiffness.parquet")
     wanted = WantedFiles(project.root, tmp_path, "a", representation="per_joint")
-    document, words = exported(settings, cohort, wanted)
+    document, words, _ = exported(settings, cohort, wanted)
     assert "291" in document
     assert "6 of 9 as published" in words
-    csv, words = exported(settings, cohort, replace(wanted, point_mm=(0.0, 10.0, 0.0)))
+    csv, words, _ = exported(settings, cohort, replace(wanted, point_mm=(0.0, 10.0, 0.0)))
     told = pd.read_csv(StringIO(csv)).query("joint == 'L4L5' and row == column").set_index("row")
     assert told["stiffness"].notna().to_dict() == {
         **dict.fromkeys(("anterior", "superior", "right", "right_bending"), True),
