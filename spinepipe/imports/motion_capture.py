@@ -36,9 +36,6 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
 from spinepipe.studies.subjects import STANDARD_GRAVITY
 
-NEEDED = ("joints.csv or landmarks.csv", "marker_set.csv")
-"""What a study of tracked motions asks for besides what an import makes."""
-
 MADE = ("cohort.yaml", "specimens.csv", "subjects.csv", "trials.csv", "datapackage.json")
 
 
@@ -179,10 +176,6 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         copied[Path(one).name] = folder / one
     if problems:
         raise InputError(problems)
-    if lacking := [one for one in NEEDED if not set(one.split(" or ")) & set(copied)]:
-        sentences.append(f"A study of tracked motions needs {listed(lacking)} besides.")
-    if rows:
-        sentences.append(f"No study reads {listed(list(rows))} yet: they come along.")
     people = [
         (p.specimen, p.sex, *map(rounded, (p.age_years, 100.0 * p.height_m, p.mass_kg)))
         for p in settings.persons
