@@ -17,6 +17,7 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
 from spinepipe.imports.imported import (
     CARRIED,
+    AxesText,
     ImportedCohort,
     ImportSettings,
     all_forms,
@@ -78,7 +79,7 @@ class MotionCaptureSettings(ImportSettings):
     vertebrae: tuple[VertebraName, ...] = Field(
         default=BODIES, strict=False, description="names from caudal to cranial"
     )
-    axes: str = Field(
+    axes: AxesText = Field(
         description="what forwards, up and right are on the axes of all files, as in `x z -y`"
     )
     persons: tuple[Person, ...] = Field(strict=False, description="who was recorded")
@@ -111,13 +112,9 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
 
     for number, of in enumerate(settings.tables):
         problems += misnamed_columns(place(f"tables.{number}.columns"), of)
-    try:
-        turn = axes_of(settings.axes)
-    except ValueError as error:
-        allowed = "forwards, up and right on the axes of the files, as in 'x z -y'"
-        problems.append(InputProblem(*place("axes"), str(error), allowed, "correct it"))
     if problems:
         raise InputError(problems)
+    turn = axes_of(settings.axes)
     rows: dict[str, list[tuple[str, ...]]] = {of.table: [] for of in settings.tables}
     sentences, without = list[str](), {of.file: list[str]() for of in settings.tables}
     for index, trial in enumerate(settings.trials):
