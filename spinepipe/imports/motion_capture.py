@@ -106,10 +106,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     settings, problems = validate(MotionCaptureSettings, document)
     if settings is None:
         raise InputError(problems)
-
-    def place(key: str) -> Place:
-        return document.file, document.line_of(key), key
-
+    place = document.place_of
     for number, of in enumerate(settings.tables):
         problems += misnamed_columns(place(f"tables.{number}.columns"), of)
     if problems:

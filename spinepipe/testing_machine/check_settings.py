@@ -94,7 +94,7 @@ def _instruments(document: YamlDocument, mapping: MachineMapping) -> Iterator[In
 
 
 def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str) -> InputProblem:
-    return InputProblem(document.file, document.line_of(key), key, found, allowed, remedy)
+    return InputProblem(*document.place_of(key), found, allowed, remedy)
 
 
 def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
