@@ -113,7 +113,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     found, unread = dict[str, Landmarks](), dict[str, list[str]]()
     for number, of in zip(numbers, settings.files, strict=True):
         if not of.file or not of.specimen:
-            place = (document.file, document.line_of(f"files.{number}"), f"files.{number}")
+            place = document.place_of(f"files.{number}")
             remedy = "name `file` and `specimen`, or a `glob` with {specimen}"
             problems.append(InputProblem(*place, "a file of nobody", "files and whose", remedy))
             continue
@@ -131,13 +131,13 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
                 problems.append(InputProblem(*where, told, "each point once", remedy))
             else:
                 landmarks[key] = point
-    place = (document.file, document.line_of("files"), "files")
+    place = document.place_of("files")
     for specimen, landmarks in found.items():
         problems += _lacking(place, settings, specimen, landmarks, unread.get(specimen, []))
     surfaces = list[tuple[str, ...]]()
-    if (of := settings.surfaces) is not None:
-        place = (document.file, document.line_of("surfaces.file"), "surfaces.file")
-        surfaces, faults = _surfaces(folder, place, of, found, settings.vertebrae)
+    if (named := settings.surfaces) is not None:
+        place = document.place_of("surfaces.file")
+        surfaces, faults = _surfaces(folder, place, named, found, settings.vertebrae)
         problems += faults
     if problems:
         raise InputError(problems)

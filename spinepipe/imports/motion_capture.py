@@ -17,6 +17,7 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
 from spinepipe.imports.imported import (
     CARRIED,
+    AxesText,
     ImportedCohort,
     ImportSettings,
     all_forms,
@@ -35,9 +36,6 @@ from spinepipe.motion.skeleton import BODIES
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
 from spinepipe.studies.subjects import STANDARD_GRAVITY
-
-NEEDED = ("joints.csv or landmarks.csv", "marker_set.csv")
-"""What a study of tracked motions asks for besides what an import makes."""
 
 MADE = ("cohort.yaml", "specimens.csv", "subjects.csv", "trials.csv", "datapackage.json")
 
@@ -81,7 +79,7 @@ class MotionCaptureSettings(ImportSettings):
     vertebrae: tuple[VertebraName, ...] = Field(
         default=BODIES, strict=False, description="names from caudal to cranial"
     )
-    axes: str = Field(
+    axes: AxesText = Field(
         description="what forwards, up and right are on the axes of all files, as in `x z -y`"
     )
     persons: tuple[Person, ...] = Field(strict=False, description="who was recorded")
@@ -108,19 +106,12 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     settings, problems = validate(MotionCaptureSettings, document)
     if settings is None:
         raise InputError(problems)
-
-    def place(key: str) -> Place:
-        return document.file, document.line_of(key), key
-
+    place = document.place_of
     for number, of in enumerate(settings.tables):
         problems += misnamed_columns(place(f"tables.{number}.columns"), of)
-    try:
-        turn = axes_of(settings.axes)
-    except ValueError as error:
-        allowed = "forwards, up and right on the axes of the files, as in 'x z -y'"
-        problems.append(InputProblem(*place("axes"), str(error), allowed, "correct it"))
     if problems:
         raise InputError(problems)
+    turn = axes_of(settings.axes)
     rows: dict[str, list[tuple[str, ...]]] = {of.table: [] for of in settings.tables}
     sentences, without = list[str](), {of.file: list[str]() for of in settings.tables}
     for index, trial in enumerate(settings.trials):
@@ -179,10 +170,6 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         copied[Path(one).name] = folder / one
     if problems:
         raise InputError(problems)
-    if lacking := [one for one in NEEDED if not set(one.split(" or ")) & set(copied)]:
-        sentences.append(f"A study of tracked motions needs {listed(lacking)} besides.")
-    if rows:
-        sentences.append(f"No study reads {listed(list(rows))} yet: they come along.")
     people = [
         (p.specimen, p.sex, *map(rounded, (p.age_years, 100.0 * p.height_m, p.mass_kg)))
         for p in settings.persons

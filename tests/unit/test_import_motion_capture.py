@@ -210,13 +210,10 @@ def test_recordings_with_one_name_and_with_that_of_a_table_are_told_apart(tmp_pa
     document |= {"copied": ["marker_set.csv"]}
     trials[0]["file"], trials[1]["file"] = "a/motion.csv", "b/walk.csv"
     trials.append(trials[1] | {"trial": "again", "start_s": 0.04})
-    imported = read(made(tmp_path, document))
-    write(imported, tmp_path / "lab", replace=False)
+    write(read(made(tmp_path, document)), tmp_path / "lab", replace=False)
     further = cohorts.read(tmp_path / "lab", every_form()).further
     assert further["trials"]["file"].tolist() == ["p1_stand.csv", "p1_bend.csv", "p1_again.csv"]
     assert len(further["marker_set"]) == 3
-    needs = "A study of tracked motions needs joints.csv or landmarks.csv besides."
-    assert needs in imported.sentences
 
 
 def test_measured_lifts_are_what_their_files_make(tmp_path: Path) -> None:
