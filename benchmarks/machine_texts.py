@@ -25,8 +25,7 @@ mapping = MachineMapping.model_validate({{
     "motion": [{{"column": "A", "unit": "deg", "joint": "L4L5", "positive": "flexion"}}],
     "files": [{{"file": "big.txt", "specimen": "s01", "test": "flexion", "driving": "M"}}],
 }})
-recording, problems = read_recording(Path({path!r}), mapping.files[0], mapping)
-assert not problems, problems[0]
+read_recording(Path({path!r}), mapping.files[0], mapping)
 """
 
 

@@ -54,10 +54,10 @@ def _problem(model: type[BaseModel], document: YamlDocument, detail: ErrorDetail
     if detail["type"] == "missing":
         return InputProblem(*place, "nothing: the key is missing", meaning, f"add `{loc[-1]}:`")
     allowed = _allowed(detail)
+    if detail["type"] == "too_short":
+        allowed = f"at least {detail['ctx']['min_length']} of them"
     expected = detail.get("ctx", {}).get("expected", "")
     remedy = f"correct it ({meaning})" if meaning else "correct it"
-    if detail["type"] == "string_type" and isinstance(detail["input"], int | float):
-        remedy = "put it in quotes, as it is written: without them YAML makes no text of it"
     if detail["type"] == "literal_error":
         remedy = did_you_mean(str(detail["input"]), _quoted(expected), remedy)
     if detail["type"] == "string_type" and isinstance(detail["input"], int | float):

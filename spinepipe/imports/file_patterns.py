@@ -3,18 +3,12 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from glob import glob
-from itertools import islice
-from os.path import relpath
 from pathlib import Path, PurePath
 from typing import Any
 
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem, one_of
-
-MOST_LOOKED_AT = 5_000
-"""Files among which the nearest names are sought."""
 
 Fault = tuple[str, str, str]
 """What was found, what is allowed, and what to do."""
@@ -94,13 +88,7 @@ def _matches(
             yield f"{name}: {words}", "names that are read in one way", remedy
         yield {"file": name, **read}
     if not names:
-        base = star.partition("*")[0].rpartition("/")[0]
-        nearby = islice((folder / base).rglob("*"), MOST_LOOKED_AT)
-        files = [PurePath(relpath(one, folder)).as_posix() for one in nearby if one.is_file()]
-        near = get_close_matches(star, files, 3, 0.0)
-        allowed = f"a file's name; the nearest are {', '.join(near)}" if near else "a file's name"
-        remedy = "correct the pattern" if near else f"no file is in '{base or folder.name}': look"
-        yield "no file of this pattern", allowed, remedy
+        yield "no file of this pattern", f"files in {folder.name or '.'}", "correct the pattern"
 
 
 def natural(name: str) -> list[tuple[int, str]]:

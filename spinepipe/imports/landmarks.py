@@ -9,36 +9,30 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from math import inf
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field
 
+from spinepipe.cohort.check_geometry import LOWER_FACE, UPPER_FACE
 from spinepipe.cohort.cohort import FORM
 from spinepipe.documents.settings import validate
-from spinepipe.documents.text import MOST_CSV_BYTES, read_bytes, read_text
+from spinepipe.documents.text import MOST_CSV_BYTES, read_text
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
+from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.imports.file_patterns import with_files
 from spinepipe.imports.imported import ImportedCohort, ImportSettings, assembled, rounded
 from spinepipe.problems import InputError, InputProblem, did_you_mean
 from spinepipe.report.words import count
-
-LOWER_FACE, UPPER_FACE = "superior_endplate_centre", "inferior_endplate_centre"
-"""That of the lower and of the upper vertebra of a joint."""
-ALL_FOUR = (LOWER_FACE, UPPER_FACE, "left_pedicle_base", "right_pedicle_base")
 
 LPS = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
 """Anterior, superior and right (rows) in axes of a scanner to the left, posterior and superior."""
 RAS = LPS @ np.diag([-1.0, -1.0, 1.0])
 AXES = {"LPS": LPS, "RAS": RAS, "1": LPS, "0": RAS}
 MM_PER = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3}
-
-NEAR_MM = 10.0
-"""Landmarks lie on bone; the nearest corner of a coarse surface is some mm away."""
 
 POSTURE = (
     "The neutral pose is that of the scan (lying, as a rule), on the axes of the scanner: how the "
@@ -98,6 +92,8 @@ class PickedPoint:
     place: Array | None
 
 
+Place = tuple[str, int | None, str]
+
 Landmarks = dict[tuple[str, str], PickedPoint]
 """Points of a specimen by vertebra and landmark."""
 
@@ -117,7 +113,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     found, unread = dict[str, Landmarks](), dict[str, list[str]]()
     for number, of in zip(numbers, settings.files, strict=True):
         if not of.file or not of.specimen:
-            place = (document.file, document.line_of(f"files.{number}"), f"files.{number}")
+            place = document.place_of(f"files.{number}")
             remedy = "name `file` and `specimen`, or a `glob` with {specimen}"
             problems.append(InputProblem(*place, "a file of nobody", "files and whose", remedy))
             continue
@@ -135,10 +131,14 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
                 problems.append(InputProblem(*where, told, "each point once", remedy))
             else:
                 landmarks[key] = point
-    place = (document.file, document.line_of("files"), "files")
+    place = document.place_of("files")
     for specimen, landmarks in found.items():
         problems += _lacking(place, settings, specimen, landmarks, unread.get(specimen, []))
-    surfaces, told_of_surfaces = _surfaces(folder, document, settings, found, problems)
+    surfaces = list[tuple[str, ...]]()
+    if (named := settings.surfaces) is not None:
+        place = document.place_of("surfaces.file")
+        surfaces, faults = _surfaces(folder, place, named, found, settings.vertebrae)
+        problems += faults
     if problems:
         raise InputError(problems)
     picked = [(who, *key, point) for who, points in found.items() for key, point in points.items()]
@@ -149,7 +149,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         "landmarks": rows,
         "surfaces": surfaces,
     }
-    sentences = (*_sentences(found, unread), *told_of_surfaces, POSTURE)
+    sentences = (*_sentences(found, unread), POSTURE)
     files = ", ".join(dict.fromkeys(point.file for *_, point in picked))
     origins = {"landmarks": [(point.file, point.line) for *_, point in picked]}
     return assembled(settings, f"{files}. {POSTURE}", tables, sentences, origins)
@@ -218,7 +218,7 @@ def _meant(label: str, vertebra: str, settings: LandmarkSettings) -> tuple[str, 
 
 
 def _lacking(
-    place: tuple[str, int | None, str],
+    place: Place,
     settings: LandmarkSettings,
     specimen: str,
     points: Landmarks,
@@ -228,7 +228,7 @@ def _lacking(
     needed = dict[tuple[str, str], None]()
     for lower, upper in pairwise(settings.vertebrae):
         needed |= {(upper, UPPER_FACE): None, (lower, LOWER_FACE): None}
-        four = [[(one, name) for name in ALL_FOUR] for one in (lower, upper)]
+        four = [[(one, name) for name in FRAME_LANDMARKS] for one in (lower, upper)]
         needed |= dict.fromkeys(min(four, key=lambda keys: sum(k not in points for k in keys)))
     known = ["_".join(key) for key in points if key not in needed] + unread
     for vertebra in settings.vertebrae:
@@ -253,51 +253,17 @@ def _sentences(found: Mapping[str, Landmarks], unread: Mapping[str, list[str]]) 
 
 def _surfaces(
     folder: Path,
-    document: YamlDocument,
-    settings: LandmarkSettings,
+    place: Place,
+    of: Surfaces,
     found: Mapping[str, Landmarks],
-    problems: list[InputProblem],
-) -> tuple[list[tuple[str, ...]], list[str]]:
-    """Rows of surfaces.csv, and sentences on surfaces that landmarks are not near.
-
-    Those that are near with another unit or other axes alone are added to the problems.
-    """
-    rows, told = list[tuple[str, ...]](), list[str]()
-    if (of := settings.surfaces) is None:
-        return rows, told
-    for specimen, vertebra in [(a, b) for a in found for b in settings.vertebrae]:
+    vertebrae: Sequence[str],
+) -> tuple[list[tuple[str, ...]], list[InputProblem]]:
+    """Rows of surfaces.csv, and problems of files that are not there."""
+    rows, problems = list[tuple[str, ...]](), list[InputProblem]()
+    for specimen, vertebra in product(found, vertebrae):
         file = of.file.replace("{specimen}", specimen).replace("{vertebra}", vertebra)
         rows.append((specimen, vertebra, file, of.unit, of.axes))
-        data, faults = read_bytes(folder / file, file, MOST_CSV_BYTES)
-        problems += faults
-        corners = _corners(data)
-        picked = [p.place for (one, _), p in found[specimen].items() if one == vertebra]
-        # median over the landmarks of the distance to the nearest corner, however it is read
-        far = {
-            (unit, axes): float(np.median([np.linalg.norm(at - p, axis=1).min() for p in picked]))
-            for unit in ("mm", "cm", "m")
-            for axes in ("LPS", "RAS")
-            for at in (MM_PER[unit] * corners @ AXES[axes].T,)
-            if len(corners) and picked
-        }
-        best = min(far, key=far.__getitem__, default=(of.unit, of.axes))
-        if far.get((of.unit, of.axes), -inf) > NEAR_MM:
-            away = f"landmarks {far[of.unit, of.axes]:.0f} mm from the surface {file}"
-            place = (document.file, document.line_of("surfaces"), "surfaces")
-            remedy = f"did you mean `unit: {best[0]}` and `axes: {best[1]}`?"
-            if far[best] <= NEAR_MM:
-                allowed = f"at most {NEAR_MM:g} mm"
-                problems.append(InputProblem(*place, away, allowed, remedy))
-            else:
-                told.append(f"Look at {specimen}, {vertebra}: {away}.")
-    return rows, told
-
-
-def _corners(data: bytes) -> Array:
-    """(n, 3) corners of an STL file, binary or text; none where it is neither."""
-    triangle = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
-    number = int.from_bytes(data[80:84], "little")
-    if len(data) == 84 + number * triangle.itemsize:
-        return np.frombuffer(data, triangle, number, 84)["corners"].reshape(-1, 3).astype(float)
-    lines = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
-    return np.array(lines, dtype=float).reshape(-1, 3)
+        if not (folder / file).is_file():
+            allowed, remedy = "a surface of each vertebra", "correct `surfaces.file`"
+            problems.append(InputProblem(*place, f"no file {file}", allowed, remedy))
+    return rows, problems

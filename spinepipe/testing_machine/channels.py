@@ -7,11 +7,9 @@ about z, a force or translation to posterior a negative one along x: the axes of
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import SequenceMatcher
-from itertools import zip_longest
 from typing import Literal
 
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
+from spinepipe.problems import did_you_mean
 
 LOAD_COLUMNS = ("fx_n", "fy_n", "fz_n", "mx_nm", "my_nm", "mz_nm")
 """Columns of ``loads.csv`` that a channel can fill."""
@@ -53,63 +51,50 @@ class Direction:
 
     Attributes
     ----------
-    load, coordinate : column of ``loads.csv`` and joint coordinate along which it lies.
+    load, motion : column of ``loads.csv`` and of ``motion.csv`` along which it lies.
     sign : 1 where it is the positive direction of these, else -1.
-    turns : whether it is one of a moment and a rotation, not of a force and a translation.
     """
 
     load: str
-    coordinate: str
+    motion: str
     sign: int
-    turns: bool
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is one of a moment and a rotation, not of a force and a translation."""
+        return self.motion.endswith("_deg")
 
 
 DIRECTIONS: Mapping[str, Direction] = {
-    "anterior": Direction("fx_n", "anterior", 1, False),
-    "posterior": Direction("fx_n", "anterior", -1, False),
-    "superior": Direction("fy_n", "superior", 1, False),
-    "inferior": Direction("fy_n", "superior", -1, False),
-    "right": Direction("fz_n", "right", 1, False),
-    "left": Direction("fz_n", "right", -1, False),
-    "extension": Direction("mz_nm", "extension", 1, True),
-    "flexion": Direction("mz_nm", "extension", -1, True),
-    "right_bending": Direction("mx_nm", "right_bending", 1, True),
-    "left_bending": Direction("mx_nm", "right_bending", -1, True),
-    "left_rotation": Direction("my_nm", "left_rotation", 1, True),
-    "right_rotation": Direction("my_nm", "left_rotation", -1, True),
+    "anterior": Direction("fx_n", "anterior_mm", 1),
+    "posterior": Direction("fx_n", "anterior_mm", -1),
+    "superior": Direction("fy_n", "superior_mm", 1),
+    "inferior": Direction("fy_n", "superior_mm", -1),
+    "right": Direction("fz_n", "right_mm", 1),
+    "left": Direction("fz_n", "right_mm", -1),
+    "extension": Direction("mz_nm", "extension_deg", 1),
+    "flexion": Direction("mz_nm", "extension_deg", -1),
+    "right_bending": Direction("mx_nm", "right_bending_deg", 1),
+    "left_bending": Direction("mx_nm", "right_bending_deg", -1),
+    "left_rotation": Direction("my_nm", "left_rotation_deg", 1),
+    "right_rotation": Direction("my_nm", "left_rotation_deg", -1),
 }
 """Every direction by the word for it."""
-
-
-def column_of(coordinate: str) -> str:
-    """Column of ``motion.csv`` of a joint coordinate."""
-    return COORDINATE_COLUMNS[COORDINATES.index(coordinate)]
 
 
 def mistyped(name: str, names: Iterable[str], otherwise: str) -> str:
     """A remedy for an unknown column: the name that it is but for a slip of typing, if any.
 
-    Words of three letters and numbers tell axes and sides (`LB`, `Mz`, `Force2`), and so do first
-    and last letters: a name that differs there is another quantity, and is not offered.
+    Short words, first and last letters tell axes and sides (`LB`, `MomentZ`, `right`, `posterior`):
+    a name that differs there is another quantity, and is not offered.
     """
-    for other in names if _words(name) else ():
-        words = zip_longest(_words(name), _words(other), fillvalue="")
-        if all(
-            a == b
-            or (
-                min(len(a), len(b)) > 3
-                and (a[0], a[-1]) == (b[0], b[-1])
-                and SequenceMatcher(None, a, b).ratio() > 0.75
-            )
-            for a, b in words
-        ):
-            return f"did you mean '{other}'?"
-    return otherwise
+    return did_you_mean(name, [one for one in names if _sides(one) == _sides(name)], otherwise)
 
 
-def _words(name: str) -> list[str]:
-    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", name[:60])
-    return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", apart)]
+def _sides(name: str) -> list[str]:
+    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", name).lower()
+    words = re.findall(r"[^\W\d_]+|\d+", apart)
+    return [word if len(word) < 4 else word[0] + word[-1] for word in words]
 
 
 def factor_of(unit: str, positive: str) -> float:

@@ -7,7 +7,14 @@ from spinepipe.cohort.cohort import joint_names
 from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem, did_you_mean, one_of
-from spinepipe.testing_machine.channels import ANGLES, DIRECTIONS, FORCES, MOMENTS, mistyped
+from spinepipe.testing_machine.channels import (
+    ANGLES,
+    DIRECTIONS,
+    FORCES,
+    LOAD_COLUMNS,
+    MOMENTS,
+    mistyped,
+)
 from spinepipe.testing_machine.settings import (
     OF_A_FILE,
     LoadChannel,
@@ -18,7 +25,6 @@ from spinepipe.testing_machine.settings import (
 
 def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """What is wrong with the keys taken together, each problem at its line."""
-    yield from _fewest(document, mapping)
     yield from _names(document, mapping)
     keys = {key: key for key in OF_A_FILE}
     common = not mapping.files
@@ -54,8 +60,8 @@ def _of_file(
         yield _at(
             document, keys["load_point_mm"], "nothing", allowed, "add `load_point_mm: [x, y, z]`"
         )
-    yield from _directions(document, mapping, keys)
-    yield from _columns(document, mapping, keys)
+    yield from _channels(document, mapping, keys)
+    yield from _instruments(document, mapping)
     form = mapping.form
     if form.first_line is not None and form.first_line <= form.names_line:
         allowed = f"a line below the names, which are in line {form.names_line}"
@@ -66,20 +72,29 @@ def _of_file(
         yield _at(document, key, f"'{form.thousands}'", allowed, "correct one of them")
 
 
+def _instruments(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+    """Columns without which rotations and loads of a file cannot be converted."""
+    rotations = Counter(
+        one.joint for one in mapping.motion if mapping.rotations and DIRECTIONS[one.positive].turns
+    )
+    for joint, there in rotations.items():
+        if there < 3:
+            found = f"{there} of the three rotations of {joint}"
+            allowed = "all three: fewer are no rotation that could be told in another order"
+            remedy = "add them, or delete `rotations` if they are angles of z, x', y''"
+            yield _at(document, "rotations", found, allowed, remedy)
+    cell, loads = mapping.load_cell, {DIRECTIONS[one.positive].load for one in mapping.loads}
+    if cell is not None and cell.point_mm is not None and len(loads) < len(LOAD_COLUMNS):
+        found = f"no column for {', '.join(sorted(set(LOAD_COLUMNS) - loads))}"
+        allowed = "three forces and three moments, as moved moments depend on all"
+        yield _at(document, "load_cell.point_mm", found, allowed, "add them, or delete the key")
+    if cell is not None and cell.tare_s is not None and mapping.time is None:
+        remedy = "add `time:`, or delete the key"
+        yield _at(document, "load_cell.tare_s", "no time", "`time`", remedy)
+
+
 def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str) -> InputProblem:
-    return InputProblem(document.file, document.line_of(key), key, found, allowed, remedy)
-
-
-def _fewest(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
-    """Lists that must not be empty (a rule of pydantic would speak up for their bad items too)."""
-    fewest = {"vertebrae": 2, "files": 1}
-    for key, least in fewest.items():
-        there = len(getattr(mapping, key))
-        if there < least:
-            yield _at(document, key, f"{there} of them", f"at least {least}", "add what is missing")
-    if mapping.steps.levels is not None and not mapping.steps.levels:
-        remedy = "name levels, or delete the key"
-        yield _at(document, "steps.levels", "an empty list", "at least 1", remedy)
+    return InputProblem(*document.place_of(key), found, allowed, remedy)
 
 
 def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
@@ -120,65 +135,41 @@ def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
             key, found = "motion_files.markers.clusters", ", ".join(sorted(wrong))
             allowed = f"each of {', '.join(mapping.vertebrae)} (the first may be left out)"
             yield _at(document, key, f"{found} wrong or missing", allowed, "correct the names")
-        ways = [DIRECTIONS[way].coordinate for way in marks.axes]
+        ways = [DIRECTIONS[way].motion for way in marks.axes]
         if len(set(ways)) < len(ways):
             allowed = "an axis forwards, one upwards and one sidewards, each of either sign"
             yield _at(document, "motion_files.markers", "an axis twice", allowed, "correct `axes`")
-        if mapping.motion:
-            yield _at(document, "motion", "columns and markers", "one of them", "delete one")
+        for key in ("motion", "rotations"):
+            if getattr(mapping, key):
+                allowed = "one of them: rotations are those of the markers"
+                yield _at(document, key, "columns and markers", allowed, "delete it or the markers")
 
 
-def _directions(
+def _channels(
     document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
 ) -> Iterator[InputProblem]:
-    """A unit tells whether something turns or shifts; the direction must do so too."""
-    sides: tuple[tuple[str, tuple[LoadChannel | MotionChannel, ...]], ...] = (
-        ("loads", mapping.loads),
-        ("motion", mapping.motion),
-    )
-    for side, channels in sides:
-        for number, channel in enumerate(channels):
-            turns = channel.unit in MOMENTS or channel.unit in ANGLES
-            fit = tuple(word for word, one in DIRECTIONS.items() if one.turns == turns)
-            if channel.positive not in fit:
-                key = f"{keys[side]}.{number}.positive"
-                found = f"'{channel.positive}' in {channel.unit}"
-                yield _at(document, key, found, one_of(fit), "correct the direction or the unit")
-
-
-def _columns(
-    document: YamlDocument, mapping: MachineMapping, keys: Mapping[str, str]
-) -> Iterator[InputProblem]:
-    """Each column once, each quantity once; numbers only where there are no names."""
-    loads, motion, beside = keys["loads"], keys["motion"], mapping.motion_files
-    of_loads = [(f"{loads}.{n}.column", one.column) for n, one in enumerate(mapping.loads)]
-    of_motion = [(f"{motion}.{n}.column", one.column) for n, one in enumerate(mapping.motion)]
-    if mapping.time is not None:
-        of_loads.insert(0, (f"{keys['time']}.column", mapping.time.column))
-    files = [(mapping.form, of_loads + of_motion)]
-    if beside is not None:
-        files = [(mapping.form, of_loads), (beside.form, of_motion)]
-    for form, named in files:
-        times = Counter(column for _, column in named)
-        for key, column in named:
-            if times[column] > 1:
-                found = f"column {column!r} twice"
-                yield _at(document, key, found, "each column once", "correct one")
-            if form.names_line == 0 and isinstance(column, str):
-                allowed = "a number from 1, as names_line is 0"
-                yield _at(document, key, f"'{column}'", allowed, "tell the column's number")
-    meant: list[tuple[str, tuple[str, ...]]] = [
-        (f"{loads}.{n}.positive", (DIRECTIONS[one.positive].load,))
-        for n, one in enumerate(mapping.loads)
+    """Directions that do not fit their unit, and quantities that two columns give."""
+    channels: list[tuple[str, LoadChannel | MotionChannel, str]] = [
+        (f"{keys['loads']}.{number}.positive", one, DIRECTIONS[one.positive].load)
+        for number, one in enumerate(mapping.loads)
     ]
-    meant += [
-        (f"{motion}.{n}.positive", (one.joint, DIRECTIONS[one.positive].coordinate))
-        for n, one in enumerate(mapping.motion)
+    channels += [
+        (
+            f"{keys['motion']}.{number}.positive",
+            one,
+            f"{one.joint} {DIRECTIONS[one.positive].motion}",
+        )
+        for number, one in enumerate(mapping.motion)
     ]
-    again = Counter(quantity for _, quantity in meant)
-    for key, quantity in meant:
+    again = Counter(quantity for *_, quantity in channels)
+    for key, channel, quantity in channels:
+        turns = channel.unit in MOMENTS or channel.unit in ANGLES
+        fit = tuple(word for word, one in DIRECTIONS.items() if one.turns == turns)
+        if channel.positive not in fit:
+            found = f"'{channel.positive}' in {channel.unit}"
+            yield _at(document, key, found, one_of(fit), "correct the direction or the unit")
         if again[quantity] > 1:
-            found, allowed = f"{' '.join(quantity)} from two columns", "one column for each"
+            found, allowed = f"{quantity} from two columns", "one column for each"
             yield _at(document, key, found, allowed, "delete one of them or correct its direction")
 
 

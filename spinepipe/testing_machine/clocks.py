@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate, correlation_lags, savgol_filter
 
-from spinepipe.problems import InputProblem
-from spinepipe.testing_machine.channels import DIRECTIONS, column_of
+from spinepipe.problems import InputError, InputProblem
+from spinepipe.testing_machine.channels import DIRECTIONS
 from spinepipe.testing_machine.conversions import SHIFTS, joint_rotations
 from spinepipe.testing_machine.instruments import SYNC
-from spinepipe.testing_machine.recording import Recording, read_recording
+from spinepipe.testing_machine.recording import FEWEST_LINES, Recording, read_recording
 from spinepipe.testing_machine.settings import OF_A_FILE, MachineMapping, MotionChannel, TestFile
 
 Array = NDArray[np.float64]
@@ -32,13 +32,15 @@ peak, has more than the other of it.
 GAP = 3.0
 """Usual intervals without a reading that are too long for a straight line."""
 
-FEWEST_ROWS = 10
 
+def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
+    """The recording of a test, from one file or from two.
 
-def read_test(
-    folder: Path, of: TestFile, mapping: MachineMapping
-) -> tuple[Recording | None, list[InputProblem]]:
-    """The recording of a test, from one file or from two; None, and every problem, without one."""
+    Raises
+    ------
+    InputError
+        With every problem of both files, or of their clocks.
+    """
     beside = mapping.motion_files
     if beside is None or of.motion_file is None:
         return read_recording(folder / of.file, of, mapping)
@@ -61,12 +63,15 @@ def read_test(
     of_loads = {"motion": tuple(signal[:1])}
     of_motion = {"loads": (), "form": beside.form, "time": beside.time}
     of_motion |= {"motion": (*wanted, *signal[1:])}
-    loads, problems = read_recording(folder / of.file, of, mapping.model_copy(update=of_loads))
-    motion, faults = read_recording(
-        folder / other.file, other, mapping.model_copy(update=of_motion)
-    )
-    if loads is None or motion is None:
-        return None, [*problems, *faults]
+    found, problems = list[Recording](), list[InputProblem]()
+    for one, columns in ((of, of_loads), (other, of_motion)):
+        try:
+            found.append(read_recording(folder / one.file, one, mapping.model_copy(update=columns)))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    loads, motion = found
     time, seen = loads.time, motion.time
     if beside.rate_hz is not None:
         first = beside.form.first_line or beside.form.names_line + 1
@@ -75,31 +80,28 @@ def read_test(
     assert seen is not None
     jumps = [one.motion.pop((SYNC, SHIFTS[0]), None) for one in (loads, motion)]
     if markers is not None:
-        motion, problems = joint_rotations(motion, markers, mapping.vertebrae)
-        if problems:
-            return None, problems
+        motion = joint_rotations(motion, markers, mapping.vertebrae)
     clocks = (loads, time), (motion, seen)
     if of.shift_s is not None:
         return _together(*clocks, of.shift_s, "as told")
     # what the load drives goes its way; other motion may go either way
-    driven = {column_of(d.coordinate) for d in DIRECTIONS.values() if d.load == loads.driving}
+    driven = {d.motion for d in DIRECTIONS.values() if d.load == loads.driving}
     moved = [(one, name not in driven) for (_, name), one in motion.motion.items()]
     moved = [pair for pair in moved if not pair[1]] or moved
     load = loads.loads[loads.driving]
     if jumps[0] is not None and jumps[1] is not None:
         load, moved = jumps[0], [(jumps[1], False)]
-    found = [best_shift(time, load, seen, one, either) for one, either in moved]
-    seconds, likeness, next_best, width = max(found, key=lambda one: one[1])
+    shifts = [best_shift(time, load, seen, one, either) for one, either in moved]
+    seconds, likeness, next_best = max(shifts, key=lambda one: one[1])
     told = (
         f"found by rates of {'the signal' if beside.sync else 'load and motion'}, which correlate "
-        f"by {likeness:.2f}, by 99 % of that up to {width:.2g} s off, and by {next_best:.2f} of it "
-        "at the next best shift"
+        f"by {likeness:.2f}, and by {next_best:.2f} of that at the next best shift"
     )
     if likeness < LIKENESS or next_best > NEXT_BEST:
         allowed = f"a correlation of {LIKENESS:g}, and no more than {NEXT_BEST:g} of it elsewhere"
         remedy = "add `shift_s` to the file, or `sync` to `motion_files`"
         words = (f"a shift of {seconds:.3f} s, {told}", allowed, remedy)
-        return None, [InputProblem(of.file, None, "shift_s", *words)]
+        raise InputError([InputProblem(of.file, None, "shift_s", *words)])
     return _together(*clocks, seconds, told)
 
 
@@ -111,7 +113,7 @@ def _length(column: str | int, of: str, way: str = "anterior", unit: str = "mm")
 
 def _together(
     of_loads: tuple[Recording, Array], of_motion: tuple[Recording, Array], shift: float, told: str
-) -> tuple[Recording | None, list[InputProblem]]:
+) -> Recording:
     """Both on the rows of what was read more often, and on the clock of the motion."""
     (loads, time), (motion, seen) = of_loads, of_motion
     both = [(time + shift, loads), (seen, motion)]
@@ -121,11 +123,11 @@ def _together(
     gaps = np.diff(at)
     known = (on >= at[0]) & (on <= at[-1]) & (gaps[after - 1] <= GAP * np.median(gaps))
     rows = int(np.count_nonzero(known))
-    if rows < FEWEST_ROWS:
+    if rows < FEWEST_LINES:
         found = f"{rows} rows within the time of both files, at a shift of {shift:g} s"
         remedy = "correct it: from the first row of the motion to the first row of the loads"
-        allowed = f"at least {FEWEST_ROWS}"
-        return None, [InputProblem(loads.file, None, "shift_s", found, allowed, remedy)]
+        allowed = f"at least {FEWEST_LINES}"
+        raise InputError([InputProblem(loads.file, None, "shift_s", found, allowed, remedy)])
 
     def put(one: Recording, values: Array) -> Array:
         return values[known] if one is fast else np.asarray(np.interp(on[known], at, values))
@@ -144,19 +146,19 @@ def _together(
         finest=motion.finest,
         spikes=loads.spikes + motion.spikes,
         notes=(*loads.notes, *(f"{motion.file}: {one}" for one in motion.notes), note),
-    ), []
+    )
 
 
 def best_shift(
     time: Array, load: Array, other_time: Array, motion: Array, either: bool
-) -> tuple[float, float, float, float]:
+) -> tuple[float, float, float]:
     """Shift, s, at which the rate of ``motion`` is most like that of ``load``, or like its negative
     one if it may go ``either`` way.
 
     Returns
     -------
     The shift; the correlation there; the share of the peak that another shift has, beyond where it
-    has fallen to half; half the width at 99 % of the peak, s.
+    has fallen to half.
     """
     spans = [(time, load), (other_time, motion)]
     step = min(float(np.median(np.diff(at))) for at, _ in spans)
@@ -174,10 +176,9 @@ def best_shift(
     edge = int(np.searchsorted(low, top))
     left, right = (low[edge - 1] if edge else 0), (low[edge] if edge < len(low) else len(lags))
     elsewhere = float(np.r_[0.0, product[:left], product[right:]].max())
-    width = float(np.count_nonzero(product[left:right] > 0.99 * peak)) * step / 2
     # the top of the parabola through the peak and its neighbours
     before, after = (float(product[np.clip(top + n, 0, len(lags) - 1)]) for n in (-1, 1))
     bend = before - 2 * peak + after
     fine = (before - after) / bend / 2 if bend < 0 else 0.0
     shift = (lag + fine) * step + float(other_time[0] - time[0])
-    return shift, peak / power if power else 0.0, elsewhere / peak if peak > 0 else 1.0, width
+    return shift, peak / power if power else 0.0, elsewhere / peak if peak > 0 else 1.0

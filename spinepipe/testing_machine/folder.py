@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from spinepipe.cohort.cohort import joint_names
-from spinepipe.cohort.columns import COHORT_YAML
+from spinepipe.cohort.columns import TABLES
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.imports.file_patterns import with_files
-from spinepipe.imports.imported import ImportedCohort, csv_text, rounded
+from spinepipe.imports.imported import ImportedCohort, Rows, assembled, rounded
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
 from spinepipe.testing_machine.channels import (
@@ -21,24 +20,22 @@ from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     FORCES,
     LENGTHS,
-    LOAD_COLUMNS,
     MOMENTS,
     SECONDS,
-    column_of,
 )
 from spinepipe.testing_machine.check_settings import check_mapping
 from spinepipe.testing_machine.clocks import read_test
 from spinepipe.testing_machine.conversions import converted
 from spinepipe.testing_machine.conversions import sentences as of_conversions
-from spinepipe.testing_machine.load_steps import (
+from spinepipe.testing_machine.load_steps import ResampledTest, resample_test
+from spinepipe.testing_machine.precision import (
     ReadingPrecision,
-    ResampledTest,
+    declared_sd,
     reading_precision,
-    resample_test,
+    sd_sentence,
 )
 from spinepipe.testing_machine.recording import Recording
 from spinepipe.testing_machine.settings import MachineMapping
-from spinepipe.units import COORDINATE_COLUMNS
 
 BY_HAND = {
     "joints.csv": "joints.csv is a template: it has the first joint at the origin, all axes along "
@@ -51,13 +48,6 @@ SHOWN = 8
 """Rows of a file that `spinepipe import --show` shows."""
 
 LEVEL_APART_MM = 35.0
-NOT_READ = {"deg": 0.1, "mm": 0.1}
-"""SD that stands for a kind of reading that there is none of: the form asks for one."""
-
-_POINT = ("px_mm", "py_mm", "pz_mm")
-_FRAME = ("x_mm", "y_mm", "z_mm", "extension_deg", "right_bending_deg", "left_rotation_deg")
-
-Rows = list[Sequence[object]]
 
 
 @dataclass(frozen=True)
@@ -103,22 +93,21 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
         raise InputError(problems)
     recordings: dict[tuple[str, str], list[Recording]] = {}
     for of in mapping.files:
-        recording, faults = read_test(folder, of, mapping)
-        if recording is not None:
-            recording, faults = converted(recording, mapping)
-        problems += faults
-        if recording is not None and not faults:
+        try:
+            recording = converted(read_test(folder, of, mapping), mapping)
             recordings.setdefault((of.specimen, of.test), []).append(recording)
-    tests = []
+        except InputError as error:
+            problems += error.problems
     for group in recordings.values():
         problems += _not_the_same(group)
     if problems:
         raise InputError(problems)
+    tests = []
     for group in recordings.values():
-        test, faults = resample_test(group, mapping.steps, mapping.zeroed)
-        problems += faults
-        if test is not None:
-            tests.append(test)
+        try:
+            tests.append(resample_test(group, mapping.steps, mapping.zeroed))
+        except InputError as error:
+            problems += error.problems
     if problems:
         raise InputError(problems)
     sures = [reading_precision(tests, unit, mapping.zeroed) for unit in ("_deg", "_mm")]
@@ -142,19 +131,18 @@ def _not_the_same(group: Sequence[Recording]) -> Iterator[InputProblem]:
 def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     """As `read`, with the tables of the cohort folder."""
     tests = read(folder, document)
-    mapping = tests.mapping
-    return ImportedCohort(
-        name=mapping.cohort,
-        title=mapping.title,
-        files={
-            COHORT_YAML: _header(tests),
-            "specimens.csv": csv_text([("specimen",), *((name,) for name in _specimens(tests))]),
-            "joints.csv": csv_text(_joints(tests)),
-            "loads.csv": csv_text(_loads(tests)),
-            "motion.csv": csv_text(_motion(tests)),
-        },
+    tables: dict[str, Rows] = {
+        "specimens": [(name,) for name in _specimens(tests)],
+        "joints": _joints(tests),
+        "loads": _loads(tests),
+        "motion": _motion(tests),
+    }
+    cohort = assembled(
+        tests.mapping, _made_of(tests), tables, [*_sentences(tests)], {}, further=_header(tests)
+    )
+    return replace(
+        cohort,
         by_hand=BY_HAND,
-        sentences=tuple(_sentences(tests)),
         settings=document,
         made_by=_made_by(tests),
         units=(FORCES, MOMENTS, ANGLES, LENGTHS, SECONDS),
@@ -168,14 +156,14 @@ def _made_by(tests: ImportedTests) -> dict[tuple[str, str], list[str]]:
     """Keys of the settings that made each column, those of files of their own too."""
     mapping = tests.mapping
     made = {("loads", "vertebra"): ["loaded"], ("loads", "time_s"): ["time"]}
-    made |= {("loads", column): ["load_point_mm"] for column in _POINT}
+    made |= {("loads", f"p{axis}_mm"): ["load_point_mm"] for axis in "xyz"}
     for item, of in zip(tests.items, mapping.files, strict=True):
         own = mapping.of_file(of)
         for side in ("loads", "motion"):
             prefix = side if getattr(of, side) is None else f"files.{item}.{side}"
             for number, channel in enumerate(getattr(own, side)):
                 way = DIRECTIONS[channel.positive]
-                column = way.load if side == "loads" else column_of(way.coordinate)
+                column = way.load if side == "loads" else way.motion
                 made.setdefault((side, column), []).append(f"{prefix}.{number}")
     return {place: list(dict.fromkeys(keys)) for place, keys in made.items()}
 
@@ -196,8 +184,9 @@ def _sentences(tests: ImportedTests) -> Iterator[str]:
         yield from _of_test(test)
     mapping = tests.mapping
     yield from of_conversions({place for test in tests.tests for place in test.places}, mapping)
-    yield from _of_accuracy(tests)
-    yield f"SD of a reading: {sd_sentence(tests)}"
+    if mapping.accuracy is not None:
+        yield "The accuracy goes on to cohort.yaml; where it is larger than the SD, it counts."
+    yield f"SD of a reading: {sd_sentence(tests.rotation, tests.translation)}"
     if mapping.zeroed:
         yield "Readings count from those of step 0 of their cycle (zeroed_at_step_0: true)."
     else:
@@ -239,80 +228,29 @@ def _unit(one: Recording) -> str:
     return "N" if one.driving.endswith("_n") else "N m"
 
 
-def _header(tests: ImportedTests) -> str:
-    mapping = tests.mapping
+def _made_of(tests: ImportedTests) -> str:
     # a text of a YAML file has an end: of very many files the first
-    files = listed(dict.fromkeys(of.file for of in mapping.files), 50, None)
+    files = listed(dict.fromkeys(of.file for of in tests.mapping.files), 50, None)
     rows = np.concatenate([cycle.rows for test in tests.tests for cycle in test.cycles])
-    end = "" if mapping.source.rstrip().endswith(".") else "."
-    source = (
-        f"{mapping.source.rstrip()}{end} Made by `spinepipe import` of {files}: cycles cut at "
-        "reversals of the load, each reading by local regression on the load over "
-        f"{int(np.median(rows))} rows (median), loading and unloading apart. "
-        f"measurement_sd: {sd_sentence(tests)}"
+    return (
+        f"{files}: cycles cut at reversals of the load, each reading by local regression on the "
+        f"load over {int(np.median(rows))} rows (median), loading and unloading apart. "
+        f"measurement_sd: {sd_sentence(tests.rotation, tests.translation)}"
     )
-    document = {
-        "cohort": mapping.cohort,
-        "title": mapping.title,
-        "source": source,
-        "vertebrae": list(mapping.vertebrae),
-        "gravity": False,
+
+
+def _header(tests: ImportedTests) -> dict[str, object]:
+    """Keys of ``cohort.yaml`` that no other import has."""
+    mapping = tests.mapping
+    told = mapping.model_dump(include={"accuracy", "acknowledged_warnings"}, exclude_none=True)
+    return {
         "zeroed_at_step_0": mapping.zeroed,
         "measurement_sd": {
-            "rotation_deg": _declared(tests.rotation, "deg"),
-            "translation_mm": _declared(tests.translation, "mm"),
+            "rotation_deg": declared_sd(tests.rotation, "deg"),
+            "translation_mm": declared_sd(tests.translation, "mm"),
         },
+        **{key: value for key, value in told.items() if value},
     }
-    if mapping.accuracy is not None:
-        document["accuracy"] = mapping.accuracy.model_dump(exclude_none=True)
-    if mapping.acknowledged_warnings:
-        document["acknowledged_warnings"] = list(mapping.acknowledged_warnings)
-    return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110)
-
-
-def _declared(sure: ReadingPrecision | None, unit: str) -> float:
-    """The SD with two digits, rounded up."""
-    if sure is None or sure.sd == 0.0:
-        return NOT_READ[unit]
-    scale = 10.0 ** (1 - int(np.floor(np.log10(sure.sd))))
-    return float(f"{np.ceil(sure.sd * scale - 1e-9) / scale:.10g}")
-
-
-def sd_sentence(tests: ImportedTests) -> str:
-    """Where the declared SDs come from."""
-    words = []
-    for sure, unit in ((tests.rotation, "deg"), (tests.translation, "mm")):
-        if sure is None:
-            words.append(f"No motion in {unit} was read, {NOT_READ[unit]} stands for its SD.")
-        elif sure.sd == 0.0:
-            words.append(f"Readings in {unit} never change, {NOT_READ[unit]} stands for their SD.")
-        else:
-            between = (
-                "no cycle is repeated"
-                if np.isnan(sure.cycles)
-                else f"{sure.cycles:.2g} {unit} between cycles"
-            )
-            words.append(
-                f"{_declared(sure, unit):g} {unit}, the largest of {sure.regression:.2g} {unit} by "
-                f"what rows leave around the regression ({sure.row:.2g} for a single row), "
-                f"{between}, and {sure.finest:.2g} by the resolution of the files."
-            )
-    return " ".join(words)
-
-
-def _of_accuracy(tests: ImportedTests) -> Iterator[str]:
-    """Which is larger, what repeats show or what the instrument may be off."""
-    accuracy = tests.mapping.accuracy
-    for name, off in accuracy.model_dump(exclude_none=True).items() if accuracy else ():
-        unit = name.rpartition("_")[2]
-        if unit not in NOT_READ:
-            continue
-        sd = _declared(tests.rotation if unit == "deg" else tests.translation, unit)
-        which = "larger than" if off > sd else "not larger than"
-        yield (
-            f"Accuracy of the instrument, {name.rpartition('_')[0].replace('_', ' ')}: {off:g} "
-            f"{unit}, {which} the SD of a reading, {sd:g} {unit}: {max(off, sd):g} counts as noise."
-        )
 
 
 def _specimens(tests: ImportedTests) -> list[str]:
@@ -322,20 +260,16 @@ def _specimens(tests: ImportedTests) -> list[str]:
 def _joints(tests: ImportedTests) -> Rows:
     """A template: joints above each other, axes of ground."""
     joints = joint_names(tests.mapping.vertebrae)
-    origins = {one.joint: one.origin_mm for one in tests.mapping.motion_points}
-    rows: Rows = [("specimen", "joint", *_FRAME)]
-    for specimen in _specimens(tests):
-        for number, joint in enumerate(joints):
-            origin = origins.get(joint, (0, number * LEVEL_APART_MM, 0))
-            rows.append((specimen, joint, *(f"{value:g}" for value in origin), 0, 0, 0))
-    return rows
+    return [
+        (specimen, joint, 0, f"{number * LEVEL_APART_MM:g}", 0, 0, 0, 0)
+        for specimen in _specimens(tests)
+        for number, joint in enumerate(joints)
+    ]
 
 
 def _loads(tests: ImportedTests) -> Rows:
     vertebra = tests.mapping.loaded_vertebra
-    rows: Rows = [
-        ("specimen", "test", "cycle", "step", "vertebra", *LOAD_COLUMNS, *_POINT, "time_s")
-    ]
+    rows: Rows = []
     for test in tests.tests:
         for number, cycle in enumerate(test.cycles, start=1):
             point = tests.mapping.of_file(cycle.of).load_point_mm or ("", "", "")
@@ -349,7 +283,8 @@ def _loads(tests: ImportedTests) -> Rows:
 
 def _motion(tests: ImportedTests) -> Rows:
     joints = joint_names(tests.mapping.vertebrae)
-    rows: Rows = [("specimen", "test", "cycle", "step", "joint", *COORDINATE_COLUMNS)]
+    columns = TABLES["motion"].names[5:]
+    rows: Rows = []
     for test in tests.tests:
         at = {place: number for number, place in enumerate(test.places)}
         for number, cycle in enumerate(test.cycles, start=1):
@@ -357,7 +292,7 @@ def _motion(tests: ImportedTests) -> Rows:
                 for joint in joints:
                     cells = [
                         rounded(values[at[joint, name]]) if (joint, name) in at else ""
-                        for name in COORDINATE_COLUMNS
+                        for name in columns
                     ]
                     rows.append((test.specimen, test.test, number, step, joint, *cells))
     return rows

@@ -2,9 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
-FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+from spinepipe.cohort.cohort import FORM
+
 Point = Annotated[
     tuple[Annotated[float, Field(ge=-10_000, le=10_000)], ...],
     Field(min_length=3, max_length=3, strict=False),
@@ -28,29 +29,10 @@ class Rotations(BaseModel):
         description="body: about axes that the rotations before have turned (Euler, Cardan); "
         "space: about axes that stay",
     )
-    zero: Literal["neutral", "each_angle", "pose"] | None = Field(
-        default=None,
-        description="where rotations count from; neutral: as read; each_angle: each angle from its "
-        "first row (encoders); pose: from the pose of the first row (markers); null: as read, "
-        "refused where that makes a difference of 0.1 deg",
-    )
-
-
-class MotionPoint(BaseModel):
-    """A joint whose translations were read at another point than its origin."""
-
-    model_config = FORM
-
-    joint: str = Field(min_length=1, description="which joint")
-    read_at_mm: Point = Field(
-        description="point of the upper vertebra whose translations were read: anterior, superior, "
-        "to the right in ground, neutral pose"
-    )
-    origin_mm: Point = Field(description="the joint's origin, in the same way")
 
 
 class LoadCell(BaseModel):
-    """A cell that reads the loads, along its own axes and about its own centre."""
+    """A cell that reads the loads, along ground axes and about its own centre."""
 
     model_config = FORM
 
@@ -63,16 +45,8 @@ class LoadCell(BaseModel):
         description="its centre: anterior, superior, to the right in ground, neutral pose; moments "
         "are moved from there to `load_point_mm`; null: not moved",
     )
-    axes_deg: Point = Field(
-        default=(0.0, 0.0, 0.0),
-        description="extension, right bending, left rotation (z, x', y'') by which its axes are "
-        "turned against ground",
-    )
     tare_s: float | None = Field(
         default=None, gt=0, le=3600, description="the mean of the first so many seconds is no load"
-    )
-    tare_line: int | None = Field(
-        default=None, ge=1, description="instead: the readings in this line of a file are no load"
     )
 
 

@@ -1,9 +1,6 @@
-"""All cycles of a test on common load steps: each reading by local regression on the load.
+"""All cycles of a test on common load steps.
 
-At a level of the load a parabola is fitted to the rows of the branch whose load is near, the
-nearer the more they count (tricube weights; Cleveland 1979, J Am Stat Assoc 74, 829-836). Loading
-and unloading are branches of their own, so a loop stays a loop. What rows leave around the
-parabola, with what neighbouring rows share, tells the SD of the reading.
+Loading and unloading are branches of their own, so a loop stays a loop.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinepipe.decomposition import pinvh
-from spinepipe.problems import InputProblem
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
-from spinepipe.testing_machine.cycles import Branch, Cycle, Segmentation, segment
+from spinepipe.testing_machine.cycles import Cycle, Segmentation, segment
+from spinepipe.testing_machine.local_regression import read_at, sds_of
 from spinepipe.testing_machine.recording import Recording
 from spinepipe.testing_machine.settings import LoadSteps, TestFile
 
@@ -23,16 +20,6 @@ Array = NDArray[np.float64]
 Place = tuple[str, str]
 """Joint and column of ``motion.csv``."""
 
-
-ENOUGH_ROWS = 8
-"""The window around a level grows from half a step until it holds so many rows."""
-
-FOR_A_PARABOLA = 8
-"""With fewer rows a straight line is fitted."""
-
-FEWEST_ROWS = 3
-STRONGEST_CORRELATION = 0.98
-SINGULAR = 1e-10
 BEYOND = 0.02
 """Share of the range of a cycle by which a level may lie beyond the turn of a branch."""
 
@@ -84,28 +71,6 @@ class Step:
 
     level: float
     branch: int
-
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """What local regression says at one load step.
-
-    Attributes
-    ----------
-    values : (C,) reading of each quantity.
-    share : SD of a reading in SDs of a single row, where rows err by themselves.
-    left : (n, C) what is left of the rows near the level. freedom : n less what was fitted.
-    """
-
-    values: Array
-    share: float
-    left: Array
-    freedom: float
-
-    @property
-    def raw(self) -> Array:
-        """(C,) SD of a single row around the parabola."""
-        return np.sqrt((self.left**2).sum(axis=0) / self.freedom)
 
 
 def common_levels(
@@ -165,61 +130,20 @@ def _passed(cut: Segmentation, cycle: Cycle, step: Step, load: Array) -> bool:
     return bool(rows.min() - slack <= step.level <= rows.max() + slack)
 
 
-def read_at(
-    level: float, width: float, branch: Branch, load: Array, quantities: Array
-) -> Reading | None:
-    """Local regression of quantities (N, C) at a level of the load (N,), on one branch.
-
-    ``width``: the step between levels; None where the branch has fewer than three rows.
-    """
-    u, y = load[branch.rows] - level, quantities[branch.rows]
-    if len(u) < FEWEST_ROWS:
-        return None
-    # the window: half a step to either side, or as far as the eighth nearest row
-    enough = np.sort(np.abs(u))[min(ENOUGH_ROWS, len(u)) - 1]
-    reach = max(width / 2, 1.001 * float(enough))
-    near = np.abs(u) < reach
-    x, y = u[near] / reach, y[near]
-    # weighted least squares of a parabola in the load, tricube weights
-    weight = (1.0 - np.abs(x) ** 3) ** 3
-    degree = 2 if len(x) >= FOR_A_PARABOLA else 1
-    terms = x[:, None] ** np.arange(degree + 1)
-    inverse = pinvh(terms.T @ (weight[:, None] * terms), SINGULAR)
-    smoother = inverse @ (terms.T * weight)  # (p, n): coefficients of a parabola from the rows
-    coefficients = smoother @ y
-    # what is left, and the degrees of freedom: rows less the trace of the smoother
-    left = y - terms @ coefficients
-    freedom = max(len(x) - float(np.trace(smoother @ terms)), 1.0)
-    return Reading(coefficients[0], float(np.linalg.norm(smoother[0])), left, freedom)
-
-
-def sds_of(readings: Sequence[Reading]) -> Array:
-    """(T, C) SDs of readings, more where rows resemble their neighbours: by (1 + r) / (1 - r).
-
-    The correlation r of neighbouring rows is taken from all readings together.
-    """
-    # lag-1 autocorrelation r of what is left; an AR(1) series has (1 - r) / (1 + r) as many
-    # independent rows
-    power = sum((one.left**2).sum(axis=0) for one in readings)
-    product = sum((one.left[1:] * one.left[:-1]).sum(axis=0) for one in readings)
-    r = np.divide(product, power, out=np.zeros_like(power), where=power > 0)
-    r = np.clip(r, 0.0, STRONGEST_CORRELATION)
-    own = np.array([one.raw * one.share for one in readings])
-    return own * np.sqrt((1 + r) / (1 - r))
-
-
-def resample_test(
-    recordings: Sequence[Recording], steps: LoadSteps, zeroed: bool
-) -> tuple[ResampledTest | None, list[InputProblem]]:
+def resample_test(recordings: Sequence[Recording], steps: LoadSteps, zeroed: bool) -> ResampledTest:
     """The cycles of recordings of one test of one specimen, on steps that all of them reach.
 
     Parameters
     ----------
     zeroed : whether readings count from those of step 0 of their cycle.
+
+    Raises
+    ------
+    InputError
+        Where there is no cycle, where files are no repeats, or where a level is out of reach.
     """
-    problems = [found for one in recordings for found in _out_of_range(one, steps)]
-    if problems:
-        return None, problems
+    if problems := [found for one in recordings for found in _out_of_range(one, steps)]:
+        raise InputError(problems)
     cuts = [
         segment(
             *(one.loads[one.driving], steps.smallest_reversal),
@@ -233,14 +157,13 @@ def resample_test(
         for problem in _cut_problems(one, found, cuts[0])
     ]
     if problems:
-        return None, problems
+        raise InputError(problems)
     kept = [
         (one, cycle) for one, found in zip(recordings, cuts, strict=True) for _, cycle in found.kept
     ]
     cycles = [cycle for _, cycle in kept]
-    problems = list(_beyond(recordings[0], cuts[0], cycles, steps))
-    if problems:
-        return None, problems
+    if problems := list(_beyond(recordings[0], cuts[0], cycles, steps)):
+        raise InputError(problems)
     sides = common_levels(cuts[0], cycles, steps.per_side, steps.levels)
     first = recordings[0]
     places = tuple(first.motion)
@@ -248,20 +171,13 @@ def resample_test(
     for one, cycle in kept:
         planned = plan(cuts[0], sides, cycle, one.loads[one.driving])
         longest = max(longest, planned, key=len)
-        result = _resample(one, cycle, planned, zeroed)
-        if isinstance(result, InputProblem):
-            problems.append(result)
-        else:
-            done.append(result)
-    if problems:
-        return None, problems
+        done.append(_resample(one, cycle, planned, zeroed))
     levels = tuple(step.level for step in longest)
     of = first.of
-    made = ResampledTest(
+    return ResampledTest(
         of.specimen, of.test, first.driving, places, levels, tuple(done),
         tuple(recordings), tuple(cuts),
     )  # fmt: skip
-    return made, []
 
 
 def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[InputProblem]:
@@ -316,7 +232,7 @@ def _beyond(
 
 def _resample(
     one: Recording, cycle: Cycle, planned: Sequence[Step], zeroed: bool
-) -> ResampledCycle | InputProblem:
+) -> ResampledCycle:
     load = one.loads[one.driving]
     others = [name for name in one.loads if name != one.driving]
     columns = [*one.motion.values(), *(one.loads[name] for name in others)]
@@ -335,7 +251,8 @@ def _resample(
             line = int(one.lines[branch.first])
             found = f"{branch.last - branch.first + 1} lines on the way to or from a reversal"
             remedy = "record more often, or raise `steps.smallest_reversal`"
-            return InputProblem(one.file, line, one.driving, found, "at least 3", remedy)
+            where = (one.file, line, one.driving)
+            raise InputError([InputProblem(*where, found, "at least 3", remedy)])
         readings.append(reading)
     values = np.array([reading.values for reading in readings])
     n = len(one.motion)
@@ -367,60 +284,3 @@ def _times(regressed: Array, planned: Sequence[Step], cycle: Cycle, time: Array)
             told[place - 1] = time[before.last]
     told = np.maximum.accumulate(told)
     return told - told[0]
-
-
-@dataclass(frozen=True)
-class ReadingPrecision:
-    """How sure the readings of one kind (deg or mm) are; NaN where it cannot be told.
-
-    Attributes
-    ----------
-    row : SD of a single row of the recordings around the regression.
-    regression : SD of a reading after it. cycles : SD of a reading between repeats.
-    finest : SD that the resolution of the files makes at least.
-    """
-
-    row: float
-    regression: float
-    cycles: float
-    finest: float
-
-    @property
-    def sd(self) -> float:
-        """What is declared: the largest of what is known, as each leaves something out."""
-        return float(np.nanmax([self.regression, self.cycles, self.finest]))
-
-
-def reading_precision(
-    tests: Sequence[ResampledTest], unit: str, zeroed: bool
-) -> ReadingPrecision | None:
-    """Pooled over all readings whose column ends with this unit; None where there are none."""
-    of_rows, of_regression, of_cycles, finest = [], [], [], []
-    for test in tests:
-        for place, (joint, column) in enumerate(test.places):
-            if not column.endswith(unit):
-                continue
-            of_rows += [cycle.raw[:, place] for cycle in test.cycles]
-            of_regression += [cycle.sds[:, place] for cycle in test.cycles]
-            finest += [one.finest[joint, column] for one in test.recordings]
-            if len(test.cycles) > 1:
-                of_cycles.append(_between([c.motion[:, place] for c in test.cycles], zeroed))
-    if not of_rows:
-        return None
-    return ReadingPrecision(
-        _rms(np.concatenate(of_rows)),
-        _rms(np.concatenate(of_regression)),
-        _rms(np.concatenate(of_cycles)) if of_cycles else float("nan"),
-        max(finest) / np.sqrt(12.0),
-    )
-
-
-def _between(cycles: Sequence[Array], zeroed: bool) -> Array:
-    """(T,) SD of one reading between cycles; zeroed readings carry the error of step 0 as well."""
-    shortest = min(map(len, cycles))
-    sds = np.std([one[:shortest] for one in cycles], axis=0, ddof=1)
-    return sds[1:] / np.sqrt(2.0) if zeroed else sds
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -1,25 +1,24 @@
-"""The table in a machine's file: text, LabVIEW's .lvm, or a workbook (.xlsx), as rows of cells.
+"""The table in a machine's file: text or a workbook (.xlsx), as rows of cells.
 
 What a file is, its first bytes say, not its name. All become text in UTF-8.
 """
 
 import csv
 import io
-import re
 import warnings
 import zipfile
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
-from itertools import islice, takewhile
+from itertools import islice
 
 import numpy as np
 import openpyxl
 import pandas as pd
 from numpy.typing import NDArray
 
-from spinepipe.problems import InputProblem, one_of
+from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.testing_machine.settings import FileForm
 
 MOST_BYTES = 300_000_000
@@ -39,15 +38,11 @@ FOREIGN = {
     b"\xd0\xcf\x11\xe0": "an old workbook (.xls) or another binary document",
     b"MATLAB 5.0": "a .mat file of MATLAB",
     b"\x89HDF": "an HDF5 file (.mat, .h5)",
-    b"\x02P": "a .c3d file of motion capture",
-    b"\x1f\x8b": "a compressed file",
-    b"%PDF": "a PDF",
 }
 """What files are that are not read, by their first bytes."""
 
-READ = "text, a workbook (.xlsx) or LabVIEW's .lvm"
+READ = "text or a workbook (.xlsx)"
 EXPORT = "let the program that wrote it export text or .xlsx, see docs/import.md"
-LVM_END = "***End_of_Header***"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +51,9 @@ class RawTable:
 
     Attributes
     ----------
-    form : the form of the YAML, with what the file itself says of it.
+    form : the form of the YAML; tabs between cells of a workbook.
     names : of the columns, empty without. first : line of the first numbers.
-    text : the file, in UTF-8. notes : what the file itself said.
+    text : the file, in UTF-8.
     """
 
     form: FileForm
@@ -66,7 +61,6 @@ class RawTable:
     first: int
     width: int
     text: bytes
-    notes: tuple[str, ...] = ()
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Line and cells of every row of numbers that has any."""
@@ -136,15 +130,16 @@ def text_rows(form: FileForm, text: bytes) -> Iterator[tuple[int, list[str]]]:
         line = reader.line_num + 1
 
 
-def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProblem:
-    """The table in a file's bytes, or why there is none.
+def open_table(data: bytes, file: str, form: FileForm) -> RawTable:
+    """The table in a file's bytes.
 
     Raises
     ------
+    InputError
+        Where there is none.
     csv.Error
         Where rows are no table.
     """
-    notes: tuple[str, ...] = ()
     if data.startswith(b"PK"):
         try:
             with warnings.catch_warnings(action="ignore"):  # of styles and the like
@@ -155,17 +150,8 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProble
     else:
         text = _decoded(data, form)
     if not isinstance(text, str):
-        return InputProblem(file, None, None, *text)
-    if text.startswith("LabVIEW Measurement") and "names_line" not in form.model_fields_set:
-        told = _labview(text)
-        if isinstance(told, tuple):
-            line, found = told
-            remedy = "give each segment its own file, with the file's header"
-            return InputProblem(file, line, None, found, "one segment", remedy)
-        own = form.model_fields_set  # what the YAML says counts more than a header that is wrong
-        form = form.model_copy(update={key: told[key] for key in told.keys() - own})
-        notes = (f"its header is followed: separator {form.delimiter}, decimal {form.decimal}",)
-    table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode(), notes)
+        raise InputError([InputProblem(file, None, None, *text)])
+    table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode())
     head = islice(text_rows(form, table.text), form.names_line)
     names = next(([c.strip() for c in row] for line, row in head if line == form.names_line), [])
     while names and not names[-1]:
@@ -173,7 +159,7 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable | InputProble
     if form.names_line and not names:
         allowed = f"names of columns in line {form.names_line}"
         found = "no such line, or an empty one"
-        return InputProblem(file, None, None, found, allowed, "correct it")
+        raise InputError([InputProblem(file, None, None, found, allowed, "correct it")])
     width = max([len(names), *(len(row) for _, row in islice(table.rows(), LOOKED_AT))])
     return replace(table, names=names, width=width)
 
@@ -195,29 +181,6 @@ def _decoded(data: bytes, form: FileForm) -> str | tuple[str, str, str]:
     except UnicodeError:
         remedy = "set `form: {encoding: latin-1}` or utf-16, or save the file as UTF-8"
         return f"letters that are not {form.encoding}", of_yaml, remedy
-
-
-def _labview(text: str) -> dict[str, object] | tuple[int, str]:
-    """What the header of an .lvm file says of its form; line and words where it has segments.
-
-    A header of the file, one of each segment, then the names of its columns (National
-    Instruments, Specification for the LabVIEW Measurement File).
-    """
-    ends = [one.start() for one in re.finditer(re.escape(LVM_END), text)]
-    if len(ends) != 2:
-        starts = []
-        for end in ends[1:3]:  # a header begins where lines that begin with a word do
-            above = reversed(text[:end].splitlines()[-60:])
-            size = len(list(takewhile(lambda one: one[:1].isalpha(), above)))
-            starts.append(text.count("\n", 0, end) + 1 - size)
-        found = f"{len(ends) - 1} segments, the first of which begin in lines {starts}"
-        return starts[-1] if starts else 1, found
-    words = dict(re.findall(r"^(\w+)[\t,](,|[^\t,\r\n]*)", text[: ends[0]], re.MULTILINE))
-    return {
-        "delimiter": "comma" if words.get("Separator") == "Comma" else "tab",
-        "decimal": "comma" if words.get("Decimal_Separator") == "," else "point",
-        "names_line": text.count("\n", 0, ends[1]) + 2,
-    }
 
 
 def _sheet(data: bytes, form: FileForm) -> str | tuple[str, str, str]:

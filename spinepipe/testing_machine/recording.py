@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from scipy.signal import medfilt
 
 from spinepipe.documents.text import read_bytes
-from spinepipe.problems import InputProblem, one_of
+from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.report.words import count
 from spinepipe.testing_machine.channels import (
     DIRECTIONS,
     SECONDS,
-    column_of,
     factor_of,
     mistyped,
 )
@@ -82,32 +81,34 @@ class Recording:
     notes: tuple[str, ...] = ()
 
 
-def read_recording(
-    path: Path, of: TestFile, mapping: MachineMapping
-) -> tuple[Recording | None, list[InputProblem]]:
-    """Read one file; None, and every problem, where it cannot be used."""
+def read_recording(path: Path, of: TestFile, mapping: MachineMapping) -> Recording:
+    """Read one file.
+
+    Raises
+    ------
+    InputError
+        With every problem of the file.
+    """
     file = of.file
     if not path.is_file():
         allowed = "a file, told relative to the YAML"
-        return None, [InputProblem(file, None, None, "no such file", allowed, "correct the path")]
+        lacks = InputProblem(file, None, None, "no such file", allowed, "correct the path")
+        raise InputError([lacks])
     data, problems = read_bytes(path, file, MOST_BYTES)
     if problems:
-        return None, problems
+        raise InputError(problems)
     mapping = mapping.of_file(of)
     try:
-        table = open_table(data, file, mapping.form)
-        if isinstance(table, InputProblem):
-            return None, [table]
-        return _understood(table, of, mapping)
+        return _understood(open_table(data, file, mapping.form), of, mapping)
     except csv.Error as error:
         found = f"no table ({error})"
         remedy = "look at `form.delimiter`; open the file and save it anew"
-        return None, [InputProblem(file, None, None, found, "rows of cells", remedy)]
+        raise InputError(
+            [InputProblem(file, None, None, found, "rows of cells", remedy)]
+        ) from error
 
 
-def _understood(
-    table: RawTable, of: TestFile, mapping: MachineMapping
-) -> tuple[Recording | None, list[InputProblem]]:
+def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recording:
     channels: list[Channel] = [*mapping.loads, *mapping.motion]
     if mapping.time is not None:
         channels.insert(0, mapping.time)
@@ -121,13 +122,12 @@ def _understood(
             problems.append(
                 InputProblem(of.file, None, str(channel.column), found, allowed, remedy)
             )
-    notation = Notation(table.form.decimal, table.form.thousands)
-    lines, numbers, faults, notes = _numbers(table, of.file, there, notation, table.notes)
+    lines, numbers, faults = _numbers(table, of.file, there)
     problems += faults
     if len(lines) < FEWEST_LINES:
         found, allowed = f"{len(lines)} lines of numbers", f"at least {FEWEST_LINES}"
         remedy = "look whether `form.first_line` is right"
-        return None, [InputProblem(of.file, table.first, None, found, allowed, remedy)]
+        raise InputError([InputProblem(of.file, table.first, None, found, allowed, remedy)])
     time = None
     if mapping.time is not None and mapping.time.column in numbers:
         time = numbers[mapping.time.column]
@@ -136,20 +136,19 @@ def _understood(
         time = (time - time[0]) * SECONDS[mapping.time.unit]
         problems = [*_backwards(time, lines, of.file, str(mapping.time.column)), *problems]
     if problems:
-        return None, problems
+        raise InputError(problems)
     loads = {
         DIRECTIONS[one.positive].load: numbers[one.column] * factor_of(one.unit, one.positive)
         for one in mapping.loads
     }
     motion = {
-        (one.joint, column_of(DIRECTIONS[one.positive].coordinate)): numbers[one.column]
+        (one.joint, DIRECTIONS[one.positive].motion): numbers[one.column]
         * factor_of(one.unit, one.positive)
         for one in mapping.motion
     }
     every = [*loads.values(), *motion.values()]
     whole = np.all([np.isfinite(one) for one in every], axis=0)
-    if empty := int(np.count_nonzero(~whole)):
-        notes = (*notes, f"{count(empty, 'row')} with an empty cell left out")
+    empty = int(np.count_nonzero(~whole))
     sound = whole.copy()
     # a signal by which clocks are compared jumps and may
     read = [*loads.values(), *(one for (joint, _), one in motion.items() if joint != SYNC)]
@@ -157,7 +156,7 @@ def _understood(
     steps = {  # between readings that differ
         place: np.diff(np.unique(one[whole])) for place, one in motion.items()
     }
-    recording = Recording(
+    return Recording(
         file=of.file,
         of=of,
         lines=lines[sound],
@@ -167,9 +166,8 @@ def _understood(
         motion={place: values[sound] for place, values in sorted(motion.items())},
         finest={place: float(one.min()) if one.size else 0.0 for place, one in steps.items()},
         spikes=int(np.count_nonzero(whole & ~sound)),
-        notes=notes,
+        notes=(f"{count(empty, 'row')} with an empty cell left out",) if empty else (),
     )
-    return recording, []
 
 
 def _place(
@@ -189,6 +187,8 @@ def _place(
         return InputProblem(file, line, str(column), found, "each name once", remedy)
     known: Sequence[str] = names or [str(n + 1) for n in range(table.width)]
     remedy = "correct the name; look whether `form.names_line` is right"
+    if not names:
+        remedy = "tell the column's number, as `form.names_line` is 0"
     if len(names) == 1:
         remedy = f"is `form.delimiter` right? With {table.form.delimiter} the file has one column"
     free = [name for name in names if name not in {one.column for one in channels}]
@@ -200,10 +200,9 @@ def _numbers(
     table: RawTable,
     file: str,
     there: Sequence[tuple[Channel, int]],
-    notation: Notation,
-    notes: tuple[str, ...] = (),
-) -> tuple[Lines, dict[str | int, Array], list[InputProblem], tuple[str, ...]]:
-    """Lines, numbers by column, problems of cells that have none, and what is to be said."""
+) -> tuple[Lines, dict[str | int, Array], list[InputProblem]]:
+    """Lines, numbers by column, and problems of cells that have none."""
+    notation = Notation(table.form.decimal, table.form.thousands)
     clocks = [one.unit == "clock" for one, _ in there]
     places = [place for _, place in there]
     plain = notation.thousands is None and not any(clocks)
@@ -221,7 +220,7 @@ def _numbers(
         for at, gap in empty.items():
             bad[at] = np.setdiff1d(bad[at], gap)
     if not any(one.size for one in bad):
-        return lines, columns, [], notes
+        return lines, columns, []
     # once more through the rows: the first bad cell of each column, and how numbers are written
     first = {(int(one[0]), at): "" for at, one in enumerate(bad) if one.size}
 
@@ -234,11 +233,6 @@ def _numbers(
                     yield cell_at(row, place)
 
     able = notations_of(cells())
-    grouped = [one for one in able if one.decimal == notation.decimal and one.thousands]
-    readings = [{one.value(cell) for one in able} for cell in first.values()]
-    if grouped and notation.thousands is None and all(len(one) == 1 for one in readings):
-        told = f"numbers have a {grouped[0].thousands} between thousands"
-        return _numbers(table, file, there, grouped[0], (*notes, told))
     problems = []
     for (row, at), cell in first.items():
         channel = there[at][0]
@@ -254,7 +248,7 @@ def _numbers(
         problems.append(
             InputProblem(file, int(lines[row]), str(channel.column), found, allowed, what)
         )
-    return lines, columns, problems, notes
+    return lines, columns, problems
 
 
 def _backwards(time: Array, lines: Lines, file: str, column: str) -> Iterator[InputProblem]:

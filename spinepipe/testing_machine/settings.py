@@ -2,9 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, Field
 
-from spinepipe.cohort.cohort import Accuracy, Group, VertebraName
+from spinepipe.cohort.cohort import FORM, Accuracy, Group
+from spinepipe.imports.imported import ImportSettings, LineText
 from spinepipe.testing_machine.channels import (
     LoadUnit,
     MotionUnit,
@@ -14,15 +15,11 @@ from spinepipe.testing_machine.channels import (
 from spinepipe.testing_machine.instruments import (
     LoadCell,
     Markers,
-    MotionPoint,
     Point,
     Rotations,
 )
 
-FORM = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-_Text = Annotated[str, StringConstraints(min_length=1)]
-_Column = _Text | Annotated[int, Field(ge=1)]
+_Column = LineText | Annotated[int, Field(ge=1)]
 _Size = Annotated[float, Field(gt=0, le=20_000)]
 
 
@@ -39,8 +36,7 @@ class FileForm(BaseModel):
     )
     thousands: Literal["point", "comma", "space", "apostrophe"] | None = Field(
         default=None,
-        description="what stands between thousands; null: nothing, or what all numbers of a file "
-        "show beyond doubt",
+        description="what stands between thousands; null: nothing",
     )
     sheet: _Column | None = Field(
         default=None,
@@ -51,7 +47,7 @@ class FileForm(BaseModel):
         ge=0,
         le=10_000,
         description="line that holds the names of the columns, the first line is 1; 0: none does, "
-        "and columns are told by their number from 1; left out, an .lvm file tells it itself",
+        "and columns are told by their number from 1",
     )
     first_line: int | None = Field(
         default=None,
@@ -98,7 +94,7 @@ class MotionChannel(BaseModel):
 
     column: _Column = Field(description="name or number of the column")
     unit: MotionUnit = Field(description="unit of its numbers")
-    joint: _Text = Field(description="which joint moves")
+    joint: LineText = Field(description="which joint moves")
     positive: Towards = Field(description="where a positive number moves the upper vertebra")
 
 
@@ -137,14 +133,14 @@ class TestFile(BaseModel):
     __test__ = False  # not for pytest
     model_config = FORM
 
-    file: _Text = Field(description="its path, relative to this YAML")
-    glob: _Text | None = Field(
+    file: LineText = Field(description="its path, relative to this YAML")
+    glob: LineText | None = Field(
         default=None,
         description="instead of `file`: a pattern of paths with *, ? and **/; {specimen} and "
         "{test} in it tell these",
     )
-    specimen: _Text = Field(description="whose test it is")
-    test: _Text = Field(description="name of the load case")
+    specimen: LineText = Field(description="whose test it is")
+    test: LineText = Field(description="name of the load case")
     driving: _Column | None = Field(
         default=None,
         description="column of the load that goes up and down; may be left out where there is "
@@ -161,7 +157,7 @@ class TestFile(BaseModel):
     motion: tuple[MotionChannel, ...] | None = Field(
         default=None, strict=False, description="of this file, instead of all common ones"
     )
-    motion_file: _Text | None = Field(
+    motion_file: LineText | None = Field(
         default=None,
         description="file of its motion, if another; {stem} is the name of `file` without its end",
     )
@@ -192,6 +188,7 @@ class LoadSteps(BaseModel):
     levels: tuple[_Size, ...] | None = Field(
         default=None,
         strict=False,
+        min_length=1,
         description="sizes of the driving load instead, N or N m, without zero",
     )
     reference: float | None = Field(
@@ -214,22 +211,11 @@ OF_A_FILE = ("form", "time", "loads", "motion", "load_point_mm")
 """Keys that a file may have of its own."""
 
 
-class MachineMapping(BaseModel):
+class MachineMapping(ImportSettings):
     """The keys of the YAML that `spinepipe import` reads."""
-
-    model_config = FORM
 
     kind: Literal["testing_machine"] = Field(
         default="testing_machine", description="what the files are"
-    )
-    cohort: str = Field(
-        pattern=r"^[a-z0-9_]+$", description="name of the cohort folder that is made"
-    )
-    title: _Text = Field(description="one line that says what the cohort is")
-    source: _Text = Field(description="who tested what, when, how; licence")
-    vertebrae: tuple[VertebraName, ...] = Field(
-        strict=False,
-        description="names from caudal to cranial, the first is fixed to ground",
     )
     loaded: str | None = Field(
         default=None, description="vertebra on which the load acts; null: the most cranial"
@@ -272,11 +258,8 @@ class MachineMapping(BaseModel):
         description="order of three rotations; null: z, x', y'' (extension, right "
         "bending, left rotation, each about axes that those before have turned)",
     )
-    motion_points: tuple[MotionPoint, ...] = Field(
-        default=(), strict=False, description="joints whose translations are not of their origin"
-    )
     steps: LoadSteps = Field(default_factory=LoadSteps, description="load steps that are kept")
-    files: tuple[TestFile, ...] = Field(strict=False, description="the files")
+    files: tuple[TestFile, ...] = Field(strict=False, min_length=1, description="the files")
 
     @property
     def loaded_vertebra(self) -> str:

@@ -129,9 +129,9 @@ def test_tables_are_on_ground_axes_and_on_the_clock_of_markers(tmp_path: Path) -
         (("tables", 0, "acts_on"), "person", "correct `acts_on`"),
         (("tables", 0, "acts_on"), "upper", "one of person, plate"),
         (("tables", 0, "columns"), ["time_ms", "fx_n", "fy_n", "fz_n", "-", "-", "-"], "in kN?"),
-        (("tables", 0, "columns"), ["time_ms", "fx_n"], "found 7 cells; allowed: 2 numbers"),
+        (("tables", 0, "columns"), ["time_ms", "fx_n"], "found 7 cells; allowed: 2 cells"),
         (("tables", 1, "columns"), ["time_ms", "mx_nm", "my_nm", "fz_n"], "'fz_n'"),
-        (("tables", 0, "first_line"), 1, "plates_stand.txt, line 1: found 'a'"),
+        (("tables", 0, "first_line"), 1, "plates_stand.txt, line 1: found 2 cells"),
         (("tables", 1, "file"), "moment_{trial}.txt", "no file 'moment_{trial}.txt' of any trial"),
         (("axes",), "z y -x", "correct `axes`"),
         (("axes",), "x y -z", "one sign is wrong"),
@@ -210,13 +210,10 @@ def test_recordings_with_one_name_and_with_that_of_a_table_are_told_apart(tmp_pa
     document |= {"copied": ["marker_set.csv"]}
     trials[0]["file"], trials[1]["file"] = "a/motion.csv", "b/walk.csv"
     trials.append(trials[1] | {"trial": "again", "start_s": 0.04})
-    imported = read(made(tmp_path, document))
-    write(imported, tmp_path / "lab", replace=False)
+    write(read(made(tmp_path, document)), tmp_path / "lab", replace=False)
     further = cohorts.read(tmp_path / "lab", every_form()).further
     assert further["trials"]["file"].tolist() == ["p1_stand.csv", "p1_bend.csv", "p1_again.csv"]
     assert len(further["marker_set"]) == 3
-    needs = "A study of tracked motions needs joints.csv or landmarks.csv besides."
-    assert needs in imported.sentences
 
 
 def test_measured_lifts_are_what_their_files_make(tmp_path: Path) -> None:
