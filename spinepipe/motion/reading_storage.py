@@ -13,7 +13,8 @@ from spinepipe.effects.contract import Array
 from spinepipe.motion.reading_text import NumberBlock, cells_of, fault, text_of
 from spinepipe.motion.recording import check_file, numbered
 
-END = "endheader"
+END = re.compile(r"^[ \t\"]*endheader\b.*", re.IGNORECASE | re.MULTILINE)
+"""The line, with the cells that spreadsheets write behind it."""
 
 DEGREES = re.compile(r"^\s*inDegrees[\s=]+(yes|no)\b", re.IGNORECASE | re.MULTILINE)
 ROWS = re.compile(r"^\s*(?:nRows|datarows)[\s=]+(\d+)", re.IGNORECASE | re.MULTILINE)
@@ -52,15 +53,16 @@ def read_storage(path: Path, file: str | None = None) -> StorageTable:
     """
     name = file or path.name
     check_file(path, name)
-    head, _, rest = text_of(path, name).partition(END)
-    rest = rest[rest.find("\n") :] if "\n" in rest else ""  # spreadsheets write cells behind it
+    head, *behind = END.split(text_of(path, name), 1)
+    rest = "".join(behind)
     if not rest:
-        allowed = f"a header that ends with '{END}', then names of columns and numbers"
+        allowed = "a header that ends with 'endheader', then names of columns and numbers"
         raise fault(name, 1, None, "no header of a .sto or .mot", allowed, "export it again")
     # names stand in the first line that is not empty
     before = len(rest) - len(rest.lstrip("\r\n\t "))
     line = 1 + head.count("\n") + rest[:before].count("\n")
-    labels, _, body = rest[before:].partition("\n")
+    # rows may be indented: a table without times has no first cell that is empty
+    labels, _, body = re.sub(r"^[ \t]+", "", rest[before:], flags=re.MULTILINE).partition("\n")
     names = [label.strip('"') for label in cells_of(labels.rstrip())]
     if (first := next(iter(names), "")).lower() != "time":
         allowed = "'time' as the first column"

@@ -52,6 +52,14 @@ def test_headers_of_older_programs_are_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.values, [[1.0, 2.0], [3.0, 4.0]])
 
 
+def test_letters_of_the_header_s_end_and_indented_rows_do_not_matter(tmp_path: Path) -> None:
+    """Nor does the word in free text."""
+    head = ["my endheaders", *HEADER[:-1], "EndHeader\t\t"]
+    found = read_storage(write(tmp_path, [*head, *(f"\t{row}" for row in ROWS)]))
+    assert found.names == ("a", "b")
+    np.testing.assert_array_equal(found.values, [[1.0, 2.0], [3.0, 4.0]])
+
+
 def test_what_is_read_otherwise_is_told(tmp_path: Path) -> None:
     lines = [one.replace("nRows=2", "nRows=9") for one in HEADER]
     found = read_storage(write(tmp_path, [*lines, "time\ta\ta", *ROWS[1:]]))
