@@ -14,6 +14,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import SUBJECTS
+from spinepipe.studies.tracking import examine
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
 from spinepipe.studies.tracking.examine import repairs_of, warnings_of
 from spinepipe.studies.tracking.persons import person_of
@@ -420,6 +421,18 @@ def test_levels_without_markers_are_a_warning(tmp_path: Path) -> None:
     assert gaps[1].startswith("1 short gaps, most of T9")
     spare = "not in the set and ignored: T3_a, T3_b, T3_c, T5"
     assert next(iter(repairs_of(cohort, "a"))) == ("stance", spare)
+
+
+def test_check_says_what_was_put_right_while_reading(tmp_path: Path) -> None:
+    def miscount(files: Files) -> None:
+        text = str(files["stance.trc"])
+        frames = text.split("\n")[2].split("\t")[2]
+        files["stance.trc"] = text.replace(f"\t{frames}\t", "\t999\t", 1)
+
+    cohort = cohorts.read(write(tmp_path, miscount), (SUBJECTS, *FORMS))
+    words, _ = examine.told(asked(), cohort, tmp_path)
+    (line,) = words.split("\n")[1:]
+    assert f"{NAME}/stance.trc: NumFrames says 999 frames" in line
 
 
 def test_remarks_do_not_name_a_subject(tmp_path: Path) -> None:
