@@ -103,13 +103,13 @@ def _names(file: str, line: str, body: str, number: int) -> tuple[str, ...]:
     sign = separator_of(line)
     cells = [cell.strip() for cell in line.split(sign or None)]
     named = [name for name in cells[2:] if name]
-    if len(named) == 1:  # a tab before the names, and blanks between them
-        blanks = named[0].split()
-        named = blanks if len(blanks) == number else named
     rows = body.split("\n")
     between = separator_of(next((row for row in rows if row.strip()), ""))
     widths = (row.count(between) + 1 if between else len(row.split()) for row in rows)
     points = (max(widths) - 2) // 3
+    if len(named) <= 1:  # blanks between names, a tab before them
+        blanks = line.replace(sign or " ", " ").split()[2:]
+        named = blanks if len(blanks) == number <= points else named
     # a name stands above the first of its three columns, where all do and rows are wide enough
     placed = cells[2::3]
     while placed and not placed[-1]:

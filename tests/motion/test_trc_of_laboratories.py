@@ -164,10 +164,12 @@ def test_names_go_by_place_where_a_point_between_them_has_none(
     assert len(found.repaired) == 1
 
 
-def test_a_blank_within_a_name_parts_no_names(tmp_path: Path) -> None:
-    lines = lines_of(drawn(5, 2), ["Left Knee", "RK"])
-    lines[2] = lines[2].replace("\t2\t", "\t3\t")
-    with pytest.raises(InputError, match="2 names"):
+@pytest.mark.parametrize("labels", [["Left Knee", "RK"], ["Left Knee"]])
+def test_a_blank_within_a_name_parts_no_names(tmp_path: Path, labels: list[str]) -> None:
+    count = len(labels)
+    lines = lines_of(drawn(5, count), labels)
+    lines[2] = lines[2].replace(f"\t{count}\t", f"\t{count + 1}\t")
+    with pytest.raises(InputError, match=f"{count} names"):
         read_motion(write(tmp_path, lines))
 
 
