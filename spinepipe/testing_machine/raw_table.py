@@ -192,6 +192,33 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable:
     return replace(table, names=names, width=width)
 
 
+def first_lines(data: bytes, most: int) -> Iterator[tuple[int, str]]:
+    """Number and text of the lines that a file begins with; 0 and the name above those of a sheet.
+
+    Parameters
+    ----------
+    data : the file; of a text its start is enough. most : how many lines, of each sheet.
+    """
+    if data.startswith(b"PK"):
+        try:
+            book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
+            for sheet in book.worksheets:
+                yield 0, f"sheet {sheet.title}"
+                sheet.reset_dimensions()
+                rows = sheet.iter_rows(max_row=most, max_col=MOST_COLUMNS, values_only=True)
+                for number, row in enumerate(rows, start=1):
+                    yield number, "\t".join(_cell_text(one, "point") for one in row).rstrip()
+        except Exception as error:  # as in `open_table`
+            yield 0, f"a workbook that is damaged ({type(error).__name__})"
+        return
+    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if b"\0" in data and not wide:
+        yield 0, "no text"
+        return
+    text = data.decode("utf-16" if wide else "utf-8-sig", "replace")
+    yield from enumerate(text.splitlines()[:most], start=1)
+
+
 def _decoded(data: bytes, form: FileForm) -> str | tuple[str, str, str]:
     """The text of a file; else what was found, what is allowed, and what to do."""
     foreign = next((what for start, what in FOREIGN.items() if data.startswith(start)), None)

@@ -8,6 +8,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from unicodedata import normalize
 
@@ -35,7 +36,14 @@ from spinepipe.testing_machine.notation import (
     past_midnight,
     remedy,
 )
-from spinepipe.testing_machine.raw_table import MOST_BYTES, RawTable, cell_at, open_table
+from spinepipe.testing_machine.raw_table import (
+    LOOKED_AT,
+    MOST_BYTES,
+    RawTable,
+    cell_at,
+    open_table,
+    text_rows,
+)
 from spinepipe.testing_machine.settings import (
     LoadChannel,
     MachineMapping,
@@ -155,12 +163,14 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
     if problems:
         raise InputError(problems)
     loads = {
-        DIRECTIONS[one.positive].load: numbers[one.column] * factor_of(one.unit, one.positive)
+        # 0.0: a reading turned round is not -0
+        DIRECTIONS[one.positive].load: numbers[one.column] * factor_of(one.unit, one.positive) + 0.0
         for one in mapping.loads
     }
     motion = {
         (one.joint, DIRECTIONS[one.positive].motion): numbers[one.column]
         * factor_of(one.unit, one.positive)
+        + 0.0
         for one in mapping.motion
     }
     every = [*loads.values(), *motion.values()]
@@ -246,8 +256,25 @@ def _place(
     if table.form.delimiter == "space" and " " in str(column):
         remedy = "a name ends at a blank there: tell the column's number"
     free = [name for name in names if name not in {one.column for one in channels}]
-    remedy = mistyped(str(column), free, remedy)
+    remedy = (_where(table, channels) if names else "") or mistyped(str(column), free, remedy)
     return InputProblem(file, line, str(column), "no such column", one_of(known), remedy)
+
+
+def _where(table: RawTable, channels: Sequence[Channel]) -> str:
+    """The keys under which all names are found, if there is a line that has them."""
+    form = table.form
+    wanted = {_look(one.column) for one in channels if isinstance(one.column, str)}
+    others = () if table.workbook else ("comma", "semicolon", "tab")
+    for mark in dict.fromkeys((form.delimiter, *others)):
+        rows = text_rows(form.model_copy(update={"delimiter": mark}), table.text)
+        for line, cells in islice(rows, LOOKED_AT):
+            if wanted <= set(map(_look, cells)):
+                keys, doubt = f"delimiter: {mark}, ", "delimiter"
+                if mark == form.delimiter:
+                    keys, doubt = "", "names_line"
+                found = f"All names are found with `form: {{{keys}names_line: {line}}}`"
+                return f"is `form.{doubt}` right? {found}"
+    return ""
 
 
 def _look(name: str) -> str:

@@ -8,6 +8,7 @@ import io
 import unicodedata
 from pathlib import Path
 
+import numpy as np
 import openpyxl
 from sweeps import sweep
 from test_machine_files import LOAD, MOMENT, MOTION, TIME, read, refused, same, text
@@ -19,8 +20,14 @@ HEAD = "t,Moment,Angle"
 @sweep(
     "content, changes, says",
     [
-        (text().replace(",", ";"), {}, "is `form.delimiter` right? With comma the file has one"),
-        (f"rig 3\n\n{text()}", {}, "line 1, Moment: found no such column; allowed: one of rig 3"),
+        (text("Zeit,Kraft,Weg").replace(",", ";"), {}, "is `form.delimiter` right? With comma"),
+        (
+            text().replace(",", ";"),
+            {},
+            "are found with `form: {delimiter: semicolon, names_line: 1}`",
+        ),
+        (f"# rig 3\n\n{text()}", {}, "line 1, Moment: found no such column; allowed: one of # rig"),
+        (f"# rig 3\n\n{text()}", {}, "All names are found with `form: {names_line: 3}`"),
         (text("Zeit,Kraft,Weg"), {}, "line 1, t: found no such column; allowed: one of Zeit"),
         (text("t (s),M (Nm),A").replace(",", " "), {"form": SPACE}, "line 1, Moment"),
     ],
@@ -108,6 +115,12 @@ def test_names_that_look_the_same_are_the_same(tmp_path: Path, there: str, asked
         tmp_path, text(f"t,{there},{there} "), loads=loads, motion=[{**MOTION, "column": 1}]
     )
     assert "in columns 2 and 3" in told
+
+
+def test_a_reading_that_is_turned_round_has_no_zero_below_zero(tmp_path: Path) -> None:
+    (found,) = read(tmp_path, text(), loads=[{**LOAD, "positive": "flexion"}])
+    (moment,) = found.loads.values()
+    assert not np.signbit(moment[moment == 0.0]).any()
 
 
 def test_quotes_may_stand_after_a_blank(tmp_path: Path) -> None:
