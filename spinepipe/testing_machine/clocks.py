@@ -68,7 +68,11 @@ def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
         try:
             found.append(read_recording(folder / one.file, one, mapping.model_copy(update=columns)))
         except InputError as error:
-            problems += error.problems
+            # what is told of the form is told of the one that this file has
+            told = "`motion_files.form" if one is other else "`form"
+            problems += [
+                replace(each, remedy=each.remedy.replace("`form", told)) for each in error.problems
+            ]
     if problems:
         raise InputError(problems)
     loads, motion = found

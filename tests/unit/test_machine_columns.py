@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 from sweeps import sweep
-from test_machine_files import LOAD, MOMENT, MOTION, TIME, read, refused, same, text
+from test_machine_files import FILE, LOAD, MOMENT, MOTION, TIME, read, refused, same, text
 
 SPACE = {"delimiter": "space"}
 HEAD = "t,Moment,Angle"
@@ -38,6 +38,15 @@ def test_no_column_found_is_no_lack_of_lines(
     told = refused(tmp_path, content, **changes)
     assert says in told
     assert "first_line" not in told
+
+
+def test_a_camera_has_a_form_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "b.txt").write_text(text())
+    files = [{**FILE, "motion_file": "b.txt"}]
+    camera = {"rate_hz": 4, "form": {"delimiter": "tab"}}
+    told = refused(tmp_path, text(), files=files, motion_files=camera)
+    assert "is `motion_files.form.delimiter` right?" in told
+    assert "set" not in told
 
 
 def test_few_lines_and_a_wrong_name_are_told_together(tmp_path: Path) -> None:
