@@ -1,5 +1,6 @@
 """An OpenSim model as the tables of a cohort, and in plain sentences what was made of it."""
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from itertools import pairwise
@@ -216,7 +217,7 @@ def _not_read(osim: OsimDocument) -> Iterator[str]:
         for group in sets
         if group.tag not in ("BodySet", "JointSet", "MarkerSet")
         for one in group.iterfind("objects/*")
-        if not (one.tag.endswith(FORCES) and is_on(one))
+        if not (re.fullmatch("|".join(FORCES), one.tag) and is_on(one))
     )
     used = {one.findtext("wrap_object", "").strip() for one in osim.model.iter("PathWrap")}
     wraps = osim.model.iterfind(".//WrapObjectSet/objects/*")
