@@ -186,6 +186,14 @@ def test_without_masses_there_is_no_weight(tmp_path: Path) -> None:
     assert not cohorts.read(tmp_path / "osim").gravity
 
 
+def test_what_stands_for_no_mass_is_none(tmp_path: Path) -> None:
+    """As `spinepipe export` writes a cohort without bodies."""
+    text = GOOD.replace("<mass>9<", "<mass>0<").replace("<mass>2<", "<mass>0.001<")
+    found = imported(tmp_path, text.replace(".01 .02 .025 0 0 0", "1e-06 1e-06 1e-06 0 0 0"))
+    assert "bodies.csv" not in found.files
+    assert "Without mass, 1 g and 1e-6 kg m2 stand for none: L5." in found.sentences
+
+
 REFUSED: dict[str, tuple[str, dict[str, object], str]] = {
     "entities": (
         '<?xml version="1.0"?>\n<!DOCTYPE x [<!ENTITY e "e">]>\n<OpenSimDocument/>',

@@ -30,6 +30,7 @@ from spinepipe.imports.opensim_model.forces import FORCES, bushing_model, muscle
 from spinepipe.imports.opensim_model.settings import OsimSettings
 from spinepipe.imports.opensim_model.spine import OsimSpine
 from spinepipe.model import Body, RefusedModel
+from spinepipe.model.osim import TOKEN_INERTIA_KG_M2, TOKEN_MASS_KG
 from spinepipe.model.osim_parts import SIX
 from spinepipe.problems import InputError
 from spinepipe.report.words import count, listed
@@ -137,15 +138,17 @@ def _joints(spine: OsimSpine, specimen: str) -> Made:
 
 def _bodies(spine: OsimSpine, specimen: str) -> Made:
     """Vertebrae with all that is fixed to them; what moves in joints of its own is told."""
-    parts, loose, odd = (
-        defaultdict[str, list[Body]](list),
-        defaultdict[str, float](float),
-        list[str](),
-    )
+    parts, loose = defaultdict[str, list[Body]](list), defaultdict[str, float](float)
+    odd, tokens = list[str](), list[str]()
     for name in spine.document.placed:
         carrier = spine.carrier(name)
         body, is_possible = _body(spine, name)
         if carrier is None or body.mass <= 0.0:
+            continue
+        if body.mass == TOKEN_MASS_KG and np.allclose(
+            body.inertia, TOKEN_INERTIA_KG_M2, 0.0, 1e-15
+        ):
+            tokens.append(name)
             continue
         if not spine.is_fixed(name):
             loose[carrier] += body.mass
@@ -162,6 +165,8 @@ def _bodies(spine: OsimSpine, specimen: str) -> Made:
             inertia += one.inertia + one.mass * (off @ off * np.eye(3) - np.outer(off, off))
         rows.append((specimen, name, *cells([mass, *com * MM_PER_M]), *cells(inertia[SIX], 15)))
     told = [f"Inertia left out, none that a body can have: {listed(odd)}."] if odd else []
+    if tokens:
+        told.append(f"Without mass, 1 g and 1e-6 kg m2 stand for none: {listed(tokens)}.")
     if loose:
         masses = listed(f"{kg:.3g} kg by {name}" for name, kg in loose.items())
         told.append(f"Masses left out, carried on joints of their own: {masses}.")
