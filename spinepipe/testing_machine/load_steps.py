@@ -213,6 +213,17 @@ def _cut_problems(
         told = "cycles that go another way than those of the first file of this test"
         remedy = "give the test of this file another name"
         yield InputProblem(one.file, None, one.driving, told, "repeats of one test", remedy)
+    elif not all(
+        _passed(first, cycle, Step(first.reference, 0), one.loads[one.driving])
+        for _, cycle in found.kept
+    ):
+        told = f"cycles that begin at {found.reference:.3g}"
+        allowed = (
+            f"cycles that pass {first.reference:.3g}, where the first file of this test begins"
+        )
+        remedy = "give the test of this file another name, or set `steps.reference` to a load that "
+        remedy += "the cycles of all files pass"
+        yield InputProblem(one.file, None, one.driving, told, allowed, remedy)
 
 
 def _beyond(

@@ -131,6 +131,43 @@ def test_a_cycle_that_begins_beyond_its_reference_is_left_out(tmp_path: Path) ->
     )
 
 
+def through(*turns: float) -> np.ndarray:
+    """A load that goes from turn to turn, 40 rows each."""
+    return np.interp(np.arange(40 * (len(turns) - 1) + 1) / 40, np.arange(len(turns)), turns)
+
+
+def test_a_ramp_to_a_preload_is_no_cycle() -> None:
+    found = segment(through(0, -300, -800, -300, -800, -300, -800, -300, 0), 0.2, 0)
+    assert (found.reference, found.way, found.both_sides) == (-300, -1, False)
+    assert len(found.kept) == 3
+
+
+def test_the_reference_that_would_keep_a_cycle_is_named() -> None:
+    load = through(0, 7.5, 0.5, 7.5, 0.5, 7.5, 0.5)
+    found = segment(load, 0.2, 0)
+    assert [number for number, _ in found.left_out] == [2, 3]
+    assert "`steps.reference: 0.5`" in found.left_out[0][1]
+    assert len(segment(load, 0.2, 0, 0.5).kept) == 3
+
+
+@sweep("swings", [(0, 1.2, -1.2), (0, 1.2, 0)])
+def test_small_swings_before_the_first_cycle_are_not_of_it(swings: tuple[float, ...]) -> None:
+    (cycle,) = segment(through(*swings, 7.5, -7.5, 0), 0.2, 0).cycles
+    assert 56 < cycle.branches[0].first <= 80
+
+
+def test_a_repeat_that_does_not_reach_the_first_ones_reference_is_refused(tmp_path: Path) -> None:
+    files = [{**BASE["files"][0], "file": f"{name}.csv"} for name in "ba"]
+    time = np.arange(161.0)
+    load = through(2.5, 8, 2.5, 8, 2.5)
+    table(tmp_path / "b.csv", {"t": time, "M": load, "angle": load})
+    load = through(1, 8, 1, 8, 1)
+    found = read(tmp_path, {"t": time, "M": load, "angle": load}, files=files, steps={})
+    assert found.tests[0].levels[0] == 2.5
+    with pytest.raises(InputError, match=r"b.csv.*begin at 2.5.*pass 1, .*steps.reference"):
+        read(tmp_path, {"t": time, "M": load, "angle": load}, files=files[::-1], steps={})
+
+
 def test_one_way_is_not_there_and_back(tmp_path: Path) -> None:
     there = {name: values[:101] for name, values in swings().items()}
     assert "to 7.5 N m, one way." in said(read(tmp_path, {**there, "angle": there["M"]}))
