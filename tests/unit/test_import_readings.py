@@ -333,6 +333,26 @@ def test_a_shift_that_is_doubtful_is_refused(tmp_path: Path) -> None:
         read(tmp_path, columns, files=[file], motion_files=CAMERA)
 
 
+@sweep(
+    "shift, positive, says",
+    [
+        (-SHIFT, "extension", "about 2.3[^,]*, the told one with its sign turned"),
+        (4 * SHIFT, "extension", "about 2.3[^,]*: there rates"),
+        (SHIFT, "flexion", "look at `positive`"),
+        (None, "flexion", "look at `positive`"),
+    ],
+)
+def test_a_shift_or_a_direction_that_the_rates_contradict_is_refused(
+    tmp_path: Path, shift: float | None, positive: str, says: str
+) -> None:
+    columns = two_files(tmp_path, 4)
+    file = {**BASE["files"][0], "motion_file": "a_seen.csv", "shift_s": shift}
+    motion = [{**BASE["motion"][0], "positive": positive}]
+    with pytest.raises(InputError, match=says) as caught:
+        read(tmp_path, columns, files=[file], motion=motion, motion_files=CAMERA)
+    assert "add `shift_s`" not in str(caught.value)
+
+
 @sweep("shift", [-3.21, 0.0, 7.654])
 def test_the_best_shift_is_that_of_the_signals(shift: float) -> None:
     seen, read_at = np.arange(0.0, 60.0, 0.05), np.arange(0.0, 50.0, 0.02)
@@ -340,10 +360,10 @@ def test_the_best_shift_is_that_of_the_signals(shift: float) -> None:
     def bump(time: np.ndarray) -> np.ndarray:
         return np.exp(-(((time - 25.0) / 6.0) ** 2)) + np.exp(-(((time - 33.0) / 3.0) ** 2))
 
-    found, likeness, next_best = best_shift(read_at, bump(read_at + shift), seen, -bump(seen), True)
-    assert found == pytest.approx(shift, abs=0.01)
-    assert likeness > 0.99
-    assert next_best < 0.9
+    found = best_shift(read_at, bump(read_at + shift), seen, -bump(seen), True)
+    assert found.seconds == pytest.approx(shift, abs=0.01)
+    assert found.likeness > 0.99
+    assert found.next_best < 0.9
 
 
 def test_clusters_of_markers_turn_joints(tmp_path: Path) -> None:
