@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.testing_machine.channels import LOAD_COLUMNS
+from spinepipe.testing_machine.channels import DIRECTIONS, LOAD_COLUMNS
 from spinepipe.testing_machine.cycles import Cycle, Segmentation, segment
 from spinepipe.testing_machine.local_regression import read_at, sds_of
 from spinepipe.testing_machine.recording import Recording
@@ -22,6 +22,13 @@ Place = tuple[str, str]
 
 BEYOND = 0.02
 """Share of the range of a cycle by which a level may lie beyond the turn of a branch."""
+
+
+UNLIKE = 5.0
+"""Ratio of ranges of load, or of slopes of motion, that no two repeats of a test have."""
+
+FOLLOWS = 0.8
+"""Correlation of motion and load from which a slope says something."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,10 +158,13 @@ def resample_test(recordings: Sequence[Recording], steps: LoadSteps, zeroed: boo
         )
         for one in recordings
     ]
-    problems = [
+    problems = [p for one in recordings[1:] for p in _no_repeat(one, recordings[0])]
+    told = {one.file for one in problems}
+    problems += [
         problem
         for one, found in zip(recordings, cuts, strict=True)
         for problem in _cut_problems(one, found, cuts[0])
+        if problem.file not in told
     ]
     if problems:
         raise InputError(problems)
@@ -199,6 +209,29 @@ def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[InputProblem]:
             yield InputProblem(
                 one.file, None, one.driving, found, allowed, "correct `steps.reference`"
             )
+
+
+def _no_repeat(one: Recording, first: Recording) -> Iterator[InputProblem]:
+    """A file with loads or motion of another size or sign than the first one of its test."""
+    driving = first.driving
+    allowed = f"about what {first.file} has, as a repeat of its test"
+    remedy = "look at unit and `positive` of its columns, or give its test another name"
+    ranges = [float(np.ptp(it.loads[driving])) for it in (one, first)]
+    if max(ranges) >= UNLIKE * min(ranges):
+        found = "a range of {:.3g} where {:.3g} is usual".format(*ranges)
+        yield InputProblem(one.file, None, driving, found, allowed, remedy)
+        return
+    driven = {way.motion for way in DIRECTIONS.values() if way.load == driving}
+    for place in [p for p in one.motion if p[1] in driven] or one.motion:
+        slopes = []
+        for it in (one, first):
+            (load, _), (both, motion) = np.cov(it.loads[driving], it.motion[place])
+            follows = abs(both) > FOLLOWS * np.sqrt(load * motion)
+            slopes.append(float(both / load) if follows else np.nan)
+        sizes = np.abs(slopes)
+        if slopes[0] * slopes[1] < 0 or sizes.max() >= UNLIKE * sizes.min():
+            found = "{:.3g} for 1 of the load, where {:.3g} is usual".format(*slopes)
+            yield InputProblem(one.file, None, " ".join(place), found, allowed, remedy)
 
 
 def _cut_problems(

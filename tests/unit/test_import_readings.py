@@ -168,6 +168,26 @@ def test_a_repeat_that_does_not_reach_the_first_ones_reference_is_refused(tmp_pa
         read(tmp_path, {"t": time, "M": load, "angle": load}, files=files[::-1], steps={})
 
 
+@sweep(
+    "load, motion, says",
+    [
+        (1.0, -1.0, r"L4L5 extension_deg: found -0.6\d*"),
+        (1.0, 57.3, r"L4L5 extension_deg: found 38.\d*"),
+        (1000.0, 1.0, r"mz_nm: found a range of 1.6e\+04 where 16 is usual"),
+    ],
+)
+def test_a_repeat_of_another_sign_or_unit_is_refused(
+    tmp_path: Path, load: float, motion: float, says: str
+) -> None:
+    files = [{**BASE["files"][0], "file": f"{name}.csv"} for name in "ab"]
+    columns = {**swings(), "angle": swings()["M"] / 1.5}
+    table(
+        tmp_path / "b.csv", columns | {"M": load * columns["M"], "angle": motion * columns["angle"]}
+    )
+    with pytest.raises(InputError, match=says):
+        read(tmp_path, columns, files=files)
+
+
 def test_one_way_is_not_there_and_back(tmp_path: Path) -> None:
     there = {name: values[:101] for name, values in swings().items()}
     assert "to 7.5 N m, one way." in said(read(tmp_path, {**there, "angle": there["M"]}))
