@@ -25,7 +25,9 @@ BEYOND = 0.02
 
 
 UNLIKE = 5.0
-"""Ratio of ranges of load, or of slopes of motion, that no two repeats of a test have."""
+"""Ratio of ranges of load, or of slopes of motion, that no two repeats of a test have; nor has any
+load that is not driven so much more of a range.
+"""
 
 FOLLOWS = 0.8
 """Correlation of motion and load from which a slope says something."""
@@ -198,7 +200,14 @@ def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[InputProblem]:
         yield InputProblem(
             one.file, None, one.driving, found, "a load that goes up and down", remedy
         )
-    elif steps.reference is not None:
+        return
+    kind = one.driving.rpartition("_")[2]
+    most, other = max((float(np.ptp(one.loads[it])), it) for it in one.loads if it.endswith(kind))
+    if most >= UNLIKE * (high - low):
+        found = f"{one.driving} with a range of {high - low:.3g}, and {other} with {most:.3g}"
+        remedy = "correct `driving`, or the units of loads"
+        yield InputProblem(one.file, None, "driving", found, "the load that is driven", remedy)
+    if steps.reference is not None:
         start = float(np.copysign(steps.reference, low + high))
         slack = BEYOND * (high - low)
         if not low - slack <= start <= high + slack:

@@ -188,6 +188,14 @@ def test_a_repeat_of_another_sign_or_unit_is_refused(
         read(tmp_path, columns, files=files)
 
 
+def test_a_load_that_idles_does_not_drive(tmp_path: Path) -> None:
+    columns = {**swings(), "angle": swings()["M"], "idle": 0.1 * swings()["M"]}
+    loads = [*BASE["loads"], {"column": "idle", "unit": "N m", "positive": "right_bending"}]
+    files = [{**BASE["files"][0], "driving": "idle"}]
+    with pytest.raises(InputError, match=r"a.csv, driving: found mx_nm with .* 1.6, and mz_nm"):
+        read(tmp_path, columns, files=files, loads=loads)
+
+
 def test_one_way_is_not_there_and_back(tmp_path: Path) -> None:
     there = {name: values[:101] for name, values in swings().items()}
     assert "to 7.5 N m, one way." in said(read(tmp_path, {**there, "angle": there["M"]}))
