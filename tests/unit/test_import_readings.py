@@ -513,8 +513,13 @@ MARKERS = {"clusters": {"L4": ["a", "b", "c"]}}
         ({"motion_files": {"markers": MARKERS}, "files": [SEEN]}, "found columns and markers"),
         (
             {"motion_files": {"markers": {**MARKERS, "axes": ["right", "left", "superior"]}}},
-            "found an axis twice",
+            "found right, left, superior: an axis twice",
         ),
+        (
+            {"motion_files": {"markers": {**MARKERS, "axes": ["anterior", "superior", "left"]}}},
+            "or a left-handed frame",
+        ),
+        ({"files": [*BASE["files"], {**BASE["files"][0], "test": "b"}]}, "a.csv once more"),
         ({"motion_files": {"markers": {"clusters": {}}}}, "L4 wrong or missing"),
         ({"motion_files": {"rate_hz": 9}, "time": None, "files": [SEEN]}, "the column of time of"),
         ({"accuracy": {"flexion_deg": 1.0}}, "accuracy"),
