@@ -417,15 +417,24 @@ def test_clusters_of_markers_turn_joints(tmp_path: Path) -> None:
         "columns": "{marker}_{axis}",
         "axes": ["right", "superior", "posterior"],
     }
-    tests = read(
-        tmp_path,
-        {"t": time, "M": moment},
-        motion=[],
-        files=[{**BASE["files"][0], "motion_file": "seen.csv", "shift_s": 0.0}],
-        motion_files={"time": {"column": "t", "unit": "s"}, "markers": markers},
-    )
+    changes = {
+        "motion": [],
+        "files": [{**BASE["files"][0], "motion_file": "seen.csv", "shift_s": 0.0}],
+        "motion_files": {"time": {"column": "t", "unit": "s"}, "markers": markers},
+    }
+    tests = read(tmp_path, {"t": time, "M": moment}, **changes)
     found = [of(tests, f"{word}_deg")[3] for word in SIDES]
     np.testing.assert_allclose(found, [1.6 * 7.5, 0.9 * 7.5, -1.2 * 7.5], atol=0.02)
+    # one that is frozen all the time, and one that is lost from row 400 on
+    for since, line in ((0, r"\d+"), (400, "402")):
+        given = {name: values.copy() for name, values in columns.items()}
+        for axis in "XYZ":
+            given[f"b1_{axis}"][since:] = 0.0 if since else given[f"b1_{axis}"][0]
+        table(tmp_path / "seen.csv", {name.lower(): values for name, values in given.items()})
+        with pytest.raises(
+            InputError, match=f"seen.csv, line {line}: found markers of L4.*b1 most"
+        ):
+            read(tmp_path, {"t": time, "M": moment}, **changes)
 
 
 # --- loads and what the instrument is worth -------------------------------------------------------
