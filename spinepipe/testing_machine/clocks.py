@@ -97,9 +97,11 @@ def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
     whose = f"rates of {'the signal' if beside.sync else 'load and motion'}"
     likest = f"{whose} correlate by {best.likeness:.2f}"
     sure = best.likeness >= LIKENESS and best.next_best <= NEXT_BEST
-    if min(one.opposite for one in shifts) > 1.0:
+    if all(one.opposite > 1 / NEXT_BEST or one.as_told < -AS_TOLD for one in shifts):
         words = f"{whose} that are more alike with the sign of one of them turned"
-        remedy = "look at `positive` of loads and motion"
+        remedy = (
+            "look at `positive` of loads and motion or at `markers`, and at `time` or `rate_hz`"
+        )
         remedy = "take one that jumps the same way in both files" if beside.sync else remedy
         problem = words, "rates of one sign", remedy
     elif of.shift_s is not None and sure and best.as_told < AS_TOLD:
@@ -113,7 +115,11 @@ def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
             f"no shift that is sure: {likest} at best, by {best.next_best:.2f} of that elsewhere"
         )
         allowed = f"a correlation of {LIKENESS:g}, and no more than {NEXT_BEST:g} of it elsewhere"
-        problem = words, allowed, "add `shift_s` to the file, or `sync` to `motion_files`"
+        remedy = (
+            "look at `positive` of loads and motion; if it is right, add `shift_s` to the file, "
+        )
+        remedy += "or `sync` to `motion_files`"
+        problem = words, allowed, remedy
     elif of.shift_s is not None:
         told = f"as told; {likest} at {best.seconds:.3f} s"
         return _together(*clocks, of.shift_s, told)

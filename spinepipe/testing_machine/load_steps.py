@@ -311,8 +311,8 @@ def _resample(
     n = len(one.motion)
     loads = np.zeros((len(planned), len(LOAD_COLUMNS)))
     loads[:, LOAD_COLUMNS.index(one.driving)] = [step.level for step in planned]
-    for place, name in enumerate(others):
-        loads[:, LOAD_COLUMNS.index(name)] = values[:, n + place]
+    for number, name in enumerate(others):
+        loads[:, LOAD_COLUMNS.index(name)] = values[:, n + number]
     motion = values[:, :n] - values[0, :n] if zeroed else values[:, :n]
     return ResampledCycle(
         of=one.of,
