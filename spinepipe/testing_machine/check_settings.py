@@ -3,6 +3,8 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
 from spinepipe.documents.yaml_text import YamlDocument
@@ -20,6 +22,7 @@ from spinepipe.testing_machine.settings import (
     LoadChannel,
     MachineMapping,
     MotionChannel,
+    TestFile,
 )
 
 
@@ -102,12 +105,18 @@ def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputPro
     if mapping.loaded is not None and mapping.loaded not in moving:
         remedy = did_you_mean(mapping.loaded, moving, "load a vertebra that moves")
         yield _at(document, "loaded", f"'{mapping.loaded}'", one_of(moving), remedy)
+    seen = list[TestFile]()
     for number, of in enumerate(mapping.files):
         if (fault := folder_fault(of.specimen)) is not None:
             key = f"files.{number}.specimen"
             yield _at(document, key, fault, ALLOWED_FOLDER, "rename the specimen")
         if (fault := name_fault(of.test)) is not None:
             yield _at(document, f"files.{number}.test", fault, ALLOWED, "rename the test")
+        what = of.model_copy(update={"specimen": "", "test": "", "preconditioning_cycles": 0})
+        if what in seen:
+            found, allowed = f"{of.file} once more", "each file once, but for columns of its own"
+            yield _at(document, f"files.{number}.file", found, allowed, "delete it, or correct it")
+        seen.append(what)
 
 
 def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
@@ -135,10 +144,12 @@ def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
             key, found = "motion_files.markers.clusters", ", ".join(sorted(wrong))
             allowed = f"each of {', '.join(mapping.vertebrae)} (the first may be left out)"
             yield _at(document, key, f"{found} wrong or missing", allowed, "correct the names")
-        ways = [DIRECTIONS[way].motion for way in marks.axes]
-        if len(set(ways)) < len(ways):
-            allowed = "an axis forwards, one upwards and one sidewards, each of either sign"
-            yield _at(document, "motion_files.markers", "an axis twice", allowed, "correct `axes`")
+        ways = [DIRECTIONS[way] for way in marks.axes]
+        axes = [[way.sign * (way.load == f"f{axis}_n") for axis in "xyz"] for way in ways]
+        if np.linalg.det(axes) < 0.5:
+            found = f"{', '.join(marks.axes)}: an axis twice, or a left-handed frame"
+            allowed = "a right-handed frame, such as anterior, superior, right"
+            yield _at(document, "motion_files.markers.axes", found, allowed, "correct it")
         for key in ("motion", "rotations"):
             if getattr(mapping, key):
                 allowed = "one of them: rotations are those of the markers"

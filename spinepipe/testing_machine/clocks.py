@@ -5,7 +5,7 @@ the driving load and the motion that follows it best. What was read more seldom 
 rows of the other, along straight lines, where both were recorded.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,9 @@ LIKENESS, NEXT_BEST = 0.8, 0.9
 """A shift is refused where rates correlate by less than the one, or where another shift, off the
 peak, has more than the other of it.
 """
+
+AS_TOLD = 0.7
+"""Share of the peak that rates must have at a shift that is told; a motion that lags has more."""
 
 GAP = 3.0
 """Usual intervals without a reading that are too long for a straight line."""
@@ -85,8 +88,6 @@ def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
     if markers is not None:
         motion = joint_rotations(motion, markers, mapping.vertebrae)
     clocks = (loads, time), (motion, seen)
-    if of.shift_s is not None:
-        return _together(*clocks, of.shift_s, "as told")
     # what the load drives goes its way; other motion may go either way
     driven = {d.motion for d in DIRECTIONS.values() if d.load == loads.driving}
     moved = [(one, name not in driven) for (_, name), one in motion.motion.items()]
@@ -94,18 +95,41 @@ def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
     load = loads.loads[loads.driving]
     if jumps[0] is not None and jumps[1] is not None:
         load, moved = jumps[0], [(jumps[1], False)]
-    shifts = [best_shift(time, load, seen, one, either) for one, either in moved]
-    seconds, likeness, next_best = max(shifts, key=lambda one: one[1])
-    told = (
-        f"found by rates of {'the signal' if beside.sync else 'load and motion'}, which correlate "
-        f"by {likeness:.2f}, and by {next_best:.2f} of that at the next best shift"
-    )
-    if likeness < LIKENESS or next_best > NEXT_BEST:
+    shifts = [best_shift(time, load, seen, one, either, of.shift_s) for one, either in moved]
+    best = max(shifts, key=lambda one: one.likeness)
+    whose = f"rates of {'the signal' if beside.sync else 'load and motion'}"
+    likest = f"{whose} correlate by {best.likeness:.2f}"
+    sure = best.likeness >= LIKENESS and best.next_best <= NEXT_BEST
+    if all(one.opposite > 1 / NEXT_BEST or one.as_told < -AS_TOLD for one in shifts):
+        words = f"{whose} that are more alike with the sign of one of them turned"
+        remedy = (
+            "look at `positive` of loads and motion or at `markers`, and at `time` or `rate_hz`"
+        )
+        remedy = "take one that jumps the same way in both files" if beside.sync else remedy
+        problem = words, "rates of one sign", remedy
+    elif of.shift_s is not None and sure and best.as_told < AS_TOLD:
+        near = abs(best.seconds + of.shift_s) < abs(best.seconds) / 4
+        turned = ", the told one with its sign turned" if near else ""
+        words = f"{of.shift_s:g}, where they correlate by {best.as_told:.2f} of their best"
+        allowed = f"about {best.seconds:.3f}{turned}: there {likest}"
+        problem = words, allowed, "correct it: above 0 where the motion's file begins first"
+    elif of.shift_s is None and not sure:
+        words = (
+            f"no shift that is sure: {likest} at best, by {best.next_best:.2f} of that elsewhere"
+        )
         allowed = f"a correlation of {LIKENESS:g}, and no more than {NEXT_BEST:g} of it elsewhere"
-        remedy = "add `shift_s` to the file, or `sync` to `motion_files`"
-        words = (f"a shift of {seconds:.3f} s, {told}", allowed, remedy)
-        raise InputError([InputProblem(of.file, None, "shift_s", *words)])
-    return _together(*clocks, seconds, told)
+        remedy = (
+            "look at `positive` of loads and motion; if it is right, add `shift_s` to the file, "
+        )
+        remedy += "or `sync` to `motion_files`"
+        problem = words, allowed, remedy
+    elif of.shift_s is not None:
+        told = f"as told; {likest} at {best.seconds:.3f} s"
+        return _together(*clocks, of.shift_s, told)
+    else:
+        told = f"found: {likest}, and by {best.next_best:.2f} of that at the next best shift"
+        return _together(*clocks, best.seconds, told)
+    raise InputError([InputProblem(of.file, None, "shift_s", *problem)])
 
 
 def _length(column: str | int, of: str, way: str = "anterior", unit: str = "mm") -> MotionChannel:
@@ -153,16 +177,34 @@ def _together(
     )
 
 
+@dataclass(frozen=True)
+class BestShift:
+    """Where two rates are most alike.
+
+    Attributes
+    ----------
+    seconds : the shift. likeness : the correlation there.
+    next_best : share of the peak that another shift has, beyond where it has fallen to half.
+    opposite : that of the most negative correlation. as_told : that at the shift that is told.
+    """
+
+    seconds: float
+    likeness: float
+    next_best: float
+    opposite: float
+    as_told: float
+
+
 def best_shift(
-    time: Array, load: Array, other_time: Array, motion: Array, either: bool
-) -> tuple[float, float, float]:
+    time: Array,
+    load: Array,
+    other_time: Array,
+    motion: Array,
+    either: bool,
+    told: float | None = None,
+) -> BestShift:
     """Shift, s, at which the rate of ``motion`` is most like that of ``load``, or like its negative
     one if it may go ``either`` way.
-
-    Returns
-    -------
-    The shift; the correlation there; the share of the peak that another shift has, beyond where it
-    has fallen to half.
     """
     spans = [(time, load), (other_time, motion)]
     step = min(float(np.median(np.diff(at))) for at, _ in spans)
@@ -184,5 +226,14 @@ def best_shift(
     before, after = (float(product[np.clip(top + n, 0, len(lags) - 1)]) for n in (-1, 1))
     bend = before - 2 * peak + after
     fine = (before - after) / bend / 2 if bend < 0 else 0.0
-    shift = (lag + fine) * step + float(other_time[0] - time[0])
-    return shift, peak / power if power else 0.0, elsewhere / peak if peak > 0 else 1.0
+    start = float(other_time[0] - time[0])
+    asked = (
+        0.0 if told is None else float(np.interp((told - start) / step, lags, product, 0.0, 0.0))
+    )
+    shares = elsewhere, -float(product.min()), asked
+    nothing = peak <= 0 or not power
+    return BestShift(
+        (lag + fine) * step + start,
+        0.0 if nothing else peak / power,
+        *((1.0, 0.0, 0.0) if nothing else (share / peak for share in shares)),
+    )

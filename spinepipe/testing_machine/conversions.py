@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from spinepipe.decomposition import svd
 from spinepipe.frames import zxy_angles
 from spinepipe.problems import InputError, InputProblem
+from spinepipe.report.words import count
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
 from spinepipe.testing_machine.instruments import LoadCell, Markers, Rotations
 from spinepipe.testing_machine.recording import Recording
@@ -27,6 +28,11 @@ SHIFTS, TURNS = COORDINATE_COLUMNS[:3], COORDINATE_COLUMNS[3:]
 ABOUT = {"x": "right_bending_deg", "y": "left_rotation_deg", "z": "extension_deg"}
 THINNEST_MM = 1.0
 """A cluster whose markers are nearer than this (RMS) to a line does not tell how it turns about it.
+"""
+
+LOOSE, LOOSE_MM = 8.0, (0.5, 5.0)
+"""A cluster is no rigid body where what least squares leave of it is more than so many times what
+they leave in its best tenth of rows, but at least and at most so many mm (RMS).
 """
 
 
@@ -76,7 +82,7 @@ def joint_rotations(one: Recording, markers: Markers, vertebrae: tuple[str, ...]
     Raises
     ------
     InputError
-        Where the markers of a cluster lie on a line.
+        Where the markers of a cluster lie on a line, or do not stay a rigid body.
     """
     turned: dict[str, Array] = {}
     problems = []
@@ -93,6 +99,17 @@ def joint_rotations(one: Recording, markers: Markers, vertebrae: tuple[str, ...]
         u, _, v = svd(seen[0].T @ seen)
         u[..., -1] *= np.linalg.det(u @ v)[:, None]  # no mirror image
         turned[vertebra] = (u @ v).swapaxes(1, 2)
+        off = np.linalg.norm(seen - seen[0] @ u @ v, axis=2)  # (N, markers)
+        rms = np.sqrt((off**2).mean(axis=1))
+        most = float(np.clip(LOOSE * np.quantile(rms, 0.1), *LOOSE_MM))
+        if (loose := np.flatnonzero(rms > most)).size:
+            row = loose[0]
+            found = f"markers of {vertebra} that are {rms[row]:.2g} mm (RMS) off a rigid body, "
+            found += f"{names[int(off[row].argmax())]} most, in {count(loose.size, 'row')}"
+            place = one.file, int(one.lines[row]), None
+            remedy = "look for a marker that is lost, frozen or another one; empty its cells there "
+            remedy += "and set `empty_cells: left_out`, or name other markers"
+            problems.append(InputProblem(*place, found, f"at most {most:.2g} mm", remedy))
     if problems:
         raise InputError(problems)
     motion: dict[tuple[str, str], Array] = {}

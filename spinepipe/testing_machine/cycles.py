@@ -2,10 +2,12 @@
 
 The driving load is the one force (N) or moment (N m) that the machine drives. A reversal counts
 where the load goes back by more than a share of its range, so that noise makes none. A cycle begins
-where the load leaves the reference: zero, or, if the load never comes near zero, the end of its
-range at which it starts; or a size that the user gives. So a load that swings to both sides is cut
-where it passes the reference in the direction of the first swing, and one that stays on one side is
-cut at its reversals near the reference. The way out is from the reference to the first peak.
+where the load leaves the reference: zero, or, if the load never turns near zero, the end of the
+range of its turns that is nearer to its start; or a size that the user gives. What comes before the
+first turn and after the last one, as a ramp to a preload, tells no reference. So a load that swings
+to both sides is cut where it passes the reference in the direction of the first swing, and one that
+stays on one side is cut at its reversals near the reference. The way out is from the reference to
+the first peak.
 
 Where a machine holds the load at a turn, both branches have all rows of the hold, and its median is
 the peak: within the hold the extreme is where noise puts it.
@@ -78,14 +80,14 @@ class Cycle:
     branches : two for a load on one side (out, back), three for a load on both sides (out, across
         to the other side, back); fewer where the recording ends on the way. The last branch of a
         load on both sides goes on past the reference, as the first one of the next cycle.
-    late : whether the recording begins after it has left the reference.
+    late : load at which it begins where that is beyond the reference, else None.
     peaks : load (N or N m, as recorded) at the end of the way out and, of a load on both sides, of
         the way across.
     complete : whether it comes back to the reference, to within half of the smallest reversal.
     """
 
     branches: tuple[Branch, ...]
-    late: bool
+    late: float | None
     peaks: tuple[float, ...]
     complete: bool
 
@@ -135,9 +137,12 @@ def segment(
     asked : size (not below 0) of the load at which cycles begin; it is taken on the side of zero
         to which the range reaches farther. None: found from the load.
     """
-    low, high = float(load.min()), float(load.max())
+    low, high = ends = float(load.min()), float(load.max())
     least = smallest_reversal * (high - low)
     turns = reversals(load, least)
+    if len(turns) > 3:  # cycles turn at both ends: a ramp to a preload is none of them
+        inner = load[turns[1:-1]]
+        low, high = float(inner.min()), float(inner.max())
     # the reference: as asked, or zero if the range comes near it, or the end where the load starts
     if asked is not None:
         reference = float(np.copysign(asked, low + high))
@@ -145,7 +150,7 @@ def segment(
         reference = 0.0
     else:
         reference = low if abs(load[0] - low) < abs(load[0] - high) else high
-    reference = float(np.clip(reference, low, high))
+    reference = float(np.clip(reference, *ends))
     # to both sides if the range goes beyond the reference by more than a reversal on each; then the
     # first turn says which way is first, else the side on which the load is
     both = min(high - reference, reference - low) > least
@@ -154,11 +159,12 @@ def segment(
     branches = _branches(turns, load, least)
     cycles = _cycles(branches, way * (load - reference), reference, way, both, least)
     dropped = tuple(_left_out(cycles, reference, preconditioning))
-    return Segmentation(reference, way, low, high, both, len(turns) - 2, tuple(cycles), dropped)
+    return Segmentation(reference, way, *ends, both, len(turns) - 2, tuple(cycles), dropped)
 
 
 def reversals(load: Array, least: float) -> list[int]:
-    """Rows where the load turns back by more than ``least``, with the first and the last row.
+    """Rows where the load turns back by more than ``least``, with the row at which the first branch
+    begins and the last row.
 
     Parameters
     ----------
@@ -176,7 +182,14 @@ def reversals(load: Array, least: float) -> list[int]:
         elif way * (load[best] - load[row]) > least:
             turns.append(best)
             best, way = row, -way
-    return [*turns, len(load) - 1]
+    turns.append(len(load) - 1)
+    # small swings before the first branch are not read into it
+    away = load[: turns[1] + 1] * (1 if load[turns[1]] > load[0] else -1)
+    away = away - away.min()
+    lowest = np.flatnonzero(away <= STARTS * least)[-1]
+    swings = np.flatnonzero(away[:lowest] > 2 * STARTS * least)
+    turns[0] = int(swings[-1]) + 1 if swings.size else 0
+    return turns
 
 
 def _branches(turns: list[int], load: Array, least: float) -> list[Branch]:
@@ -226,7 +239,8 @@ def _cycles(
     for number, branch in enumerate(branches):
         if branch.way != way or way * (branch.end - reference) < least:
             continue
-        late = bool(out[branch.rows].min() > STARTS * least)
+        nearest = float(out[branch.rows].min())
+        late = reference + way * nearest if nearest > STARTS * least else None
         of_cycle = branches[number : number + (3 if both else 2)]
         # back at the reference, to within half a reversal: from above on one side (the second
         # branch), from below after the other side (the third)
@@ -259,7 +273,11 @@ def _left_out(
         axis=0,
     )
     for number, cycle in later:
-        if cycle.late:
+        if cycle.late is not None and number > 1:
+            why = "the load does not come back to the reference"
+            remedy = f"with `steps.reference: {abs(cycle.late):.3g}` it counts"
+            yield number, f"it begins at {cycle.late:.3g}, as {why}; {remedy}"
+        elif cycle.late is not None:
             yield number, "the recording begins after it has left the reference"
         elif some_complete and not cycle.complete:
             yield number, "the recording ends before it is back"

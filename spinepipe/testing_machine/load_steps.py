@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinepipe.problems import InputError, InputProblem
-from spinepipe.testing_machine.channels import LOAD_COLUMNS
+from spinepipe.testing_machine.channels import DIRECTIONS, LOAD_COLUMNS
 from spinepipe.testing_machine.cycles import Cycle, Segmentation, segment
 from spinepipe.testing_machine.local_regression import read_at, sds_of
 from spinepipe.testing_machine.recording import Recording
@@ -22,6 +22,15 @@ Place = tuple[str, str]
 
 BEYOND = 0.02
 """Share of the range of a cycle by which a level may lie beyond the turn of a branch."""
+
+
+UNLIKE = 5.0
+"""Ratio of ranges of load, or of slopes of motion, that no two repeats of a test have; nor has any
+load that is not driven so much more of a range.
+"""
+
+FOLLOWS = 0.8
+"""Correlation of motion and load from which a slope says something."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,10 +160,13 @@ def resample_test(recordings: Sequence[Recording], steps: LoadSteps, zeroed: boo
         )
         for one in recordings
     ]
-    problems = [
+    problems = [p for one in recordings[1:] for p in _no_repeat(one, recordings[0])]
+    told = {one.file for one in problems}
+    problems += [
         problem
         for one, found in zip(recordings, cuts, strict=True)
         for problem in _cut_problems(one, found, cuts[0])
+        if problem.file not in told
     ]
     if problems:
         raise InputError(problems)
@@ -188,7 +200,14 @@ def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[InputProblem]:
         yield InputProblem(
             one.file, None, one.driving, found, "a load that goes up and down", remedy
         )
-    elif steps.reference is not None:
+        return
+    kind = one.driving.rpartition("_")[2]
+    most, other = max((float(np.ptp(one.loads[it])), it) for it in one.loads if it.endswith(kind))
+    if most >= UNLIKE * (high - low):
+        found = f"{one.driving} with a range of {high - low:.3g}, and {other} with {most:.3g}"
+        remedy = "correct `driving`, or the units of loads"
+        yield InputProblem(one.file, None, "driving", found, "the load that is driven", remedy)
+    if steps.reference is not None:
         start = float(np.copysign(steps.reference, low + high))
         slack = BEYOND * (high - low)
         if not low - slack <= start <= high + slack:
@@ -199,6 +218,29 @@ def _out_of_range(one: Recording, steps: LoadSteps) -> Iterator[InputProblem]:
             yield InputProblem(
                 one.file, None, one.driving, found, allowed, "correct `steps.reference`"
             )
+
+
+def _no_repeat(one: Recording, first: Recording) -> Iterator[InputProblem]:
+    """A file with loads or motion of another size or sign than the first one of its test."""
+    driving = first.driving
+    allowed = f"about what {first.file} has, as a repeat of its test"
+    remedy = "look at unit and `positive` of its columns, or give its test another name"
+    ranges = [float(np.ptp(it.loads[driving])) for it in (one, first)]
+    if max(ranges) >= UNLIKE * min(ranges):
+        found = "a range of {:.3g} where {:.3g} is usual".format(*ranges)
+        yield InputProblem(one.file, None, driving, found, allowed, remedy)
+        return
+    driven = {way.motion for way in DIRECTIONS.values() if way.load == driving}
+    for place in [p for p in one.motion if p[1] in driven] or one.motion:
+        slopes = []
+        for it in (one, first):
+            (load, _), (both, motion) = np.cov(it.loads[driving], it.motion[place])
+            follows = abs(both) > FOLLOWS * np.sqrt(load * motion)
+            slopes.append(float(both / load) if follows else np.nan)
+        sizes = np.abs(slopes)
+        if slopes[0] * slopes[1] < 0 or sizes.max() >= UNLIKE * sizes.min():
+            found = "{:.3g} for 1 of the load, where {:.3g} is usual".format(*slopes)
+            yield InputProblem(one.file, None, " ".join(place), found, allowed, remedy)
 
 
 def _cut_problems(
@@ -213,6 +255,17 @@ def _cut_problems(
         told = "cycles that go another way than those of the first file of this test"
         remedy = "give the test of this file another name"
         yield InputProblem(one.file, None, one.driving, told, "repeats of one test", remedy)
+    elif not all(
+        _passed(first, cycle, Step(first.reference, 0), one.loads[one.driving])
+        for _, cycle in found.kept
+    ):
+        told = f"cycles that begin at {found.reference:.3g}"
+        allowed = (
+            f"cycles that pass {first.reference:.3g}, where the first file of this test begins"
+        )
+        remedy = "give the test of this file another name, or set `steps.reference` to a load that "
+        remedy += "the cycles of all files pass"
+        yield InputProblem(one.file, None, one.driving, told, allowed, remedy)
 
 
 def _beyond(
@@ -258,8 +311,8 @@ def _resample(
     n = len(one.motion)
     loads = np.zeros((len(planned), len(LOAD_COLUMNS)))
     loads[:, LOAD_COLUMNS.index(one.driving)] = [step.level for step in planned]
-    for place, name in enumerate(others):
-        loads[:, LOAD_COLUMNS.index(name)] = values[:, n + place]
+    for number, name in enumerate(others):
+        loads[:, LOAD_COLUMNS.index(name)] = values[:, n + number]
     motion = values[:, :n] - values[0, :n] if zeroed else values[:, :n]
     return ResampledCycle(
         of=one.of,

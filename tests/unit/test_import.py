@@ -231,7 +231,8 @@ def test_what_is_cut_off_or_falls_short_is_left_out_and_told() -> None:
 
 
 def test_cycles_of_several_files_of_a_test_are_repeats(tmp_path: Path) -> None:
-    path = written(tmp_path, files=DOCUMENT["files"] * 2)
+    path = written(tmp_path, files=[FILE, {**FILE, "file": "again.csv"}])
+    (tmp_path / "again.csv").write_bytes((tmp_path / "raw.csv").read_bytes())
     (test,) = read(path).tests
     assert len(test.cycles) == 6
 

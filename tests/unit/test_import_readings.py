@@ -131,6 +131,71 @@ def test_a_cycle_that_begins_beyond_its_reference_is_left_out(tmp_path: Path) ->
     )
 
 
+def through(*turns: float) -> np.ndarray:
+    """A load that goes from turn to turn, 40 rows each."""
+    return np.interp(np.arange(40 * (len(turns) - 1) + 1) / 40, np.arange(len(turns)), turns)
+
+
+def test_a_ramp_to_a_preload_is_no_cycle() -> None:
+    found = segment(through(0, -300, -800, -300, -800, -300, -800, -300, 0), 0.2, 0)
+    assert (found.reference, found.way, found.both_sides) == (-300, -1, False)
+    assert len(found.kept) == 3
+
+
+def test_the_reference_that_would_keep_a_cycle_is_named() -> None:
+    load = through(0, 7.5, 0.5, 7.5, 0.5, 7.5, 0.5)
+    found = segment(load, 0.2, 0)
+    assert [number for number, _ in found.left_out] == [2, 3]
+    assert "`steps.reference: 0.5`" in found.left_out[0][1]
+    assert len(segment(load, 0.2, 0, 0.5).kept) == 3
+
+
+@sweep("swings", [(0, 1.2, -1.2), (0, 1.2, 0)])
+def test_small_swings_before_the_first_cycle_are_not_of_it(swings: tuple[float, ...]) -> None:
+    (cycle,) = segment(through(*swings, 7.5, -7.5, 0), 0.2, 0).cycles
+    assert 56 < cycle.branches[0].first <= 80
+
+
+def test_a_repeat_that_does_not_reach_the_first_ones_reference_is_refused(tmp_path: Path) -> None:
+    files = [{**BASE["files"][0], "file": f"{name}.csv"} for name in "ba"]
+    time = np.arange(161.0)
+    load = through(2.5, 8, 2.5, 8, 2.5)
+    table(tmp_path / "b.csv", {"t": time, "M": load, "angle": load})
+    load = through(1, 8, 1, 8, 1)
+    found = read(tmp_path, {"t": time, "M": load, "angle": load}, files=files, steps={})
+    assert found.tests[0].levels[0] == 2.5
+    with pytest.raises(InputError, match=r"b.csv.*begin at 2.5.*pass 1, .*steps.reference"):
+        read(tmp_path, {"t": time, "M": load, "angle": load}, files=files[::-1], steps={})
+
+
+@sweep(
+    "load, motion, says",
+    [
+        (1.0, -1.0, r"L4L5 extension_deg: found -0.6\d*"),
+        (1.0, 57.3, r"L4L5 extension_deg: found 38.\d*"),
+        (1000.0, 1.0, r"mz_nm: found a range of 1.6e\+04 where 16 is usual"),
+    ],
+)
+def test_a_repeat_of_another_sign_or_unit_is_refused(
+    tmp_path: Path, load: float, motion: float, says: str
+) -> None:
+    files = [{**BASE["files"][0], "file": f"{name}.csv"} for name in "ab"]
+    columns = {**swings(), "angle": swings()["M"] / 1.5}
+    table(
+        tmp_path / "b.csv", columns | {"M": load * columns["M"], "angle": motion * columns["angle"]}
+    )
+    with pytest.raises(InputError, match=says):
+        read(tmp_path, columns, files=files)
+
+
+def test_a_load_that_idles_does_not_drive(tmp_path: Path) -> None:
+    columns = {**swings(), "angle": swings()["M"], "idle": 0.1 * swings()["M"]}
+    loads = [*BASE["loads"], {"column": "idle", "unit": "N m", "positive": "right_bending"}]
+    files = [{**BASE["files"][0], "driving": "idle"}]
+    with pytest.raises(InputError, match=r"a.csv, driving: found mx_nm with .* 1.6, and mz_nm"):
+        read(tmp_path, columns, files=files, loads=loads)
+
+
 def test_one_way_is_not_there_and_back(tmp_path: Path) -> None:
     there = {name: values[:101] for name, values in swings().items()}
     assert "to 7.5 N m, one way." in said(read(tmp_path, {**there, "angle": there["M"]}))
@@ -296,6 +361,26 @@ def test_a_shift_that_is_doubtful_is_refused(tmp_path: Path) -> None:
         read(tmp_path, columns, files=[file], motion_files=CAMERA)
 
 
+@sweep(
+    "shift, positive, says",
+    [
+        (-SHIFT, "extension", "about 2.3[^,]*, the told one with its sign turned"),
+        (4 * SHIFT, "extension", "about 2.3[^,]*: there rates"),
+        (SHIFT, "flexion", "look at `positive`"),
+        (None, "flexion", "look at `positive`"),
+    ],
+)
+def test_a_shift_or_a_direction_that_the_rates_contradict_is_refused(
+    tmp_path: Path, shift: float | None, positive: str, says: str
+) -> None:
+    columns = two_files(tmp_path, 8 if positive == "flexion" and shift else 4)
+    file = {**BASE["files"][0], "motion_file": "a_seen.csv", "shift_s": shift}
+    motion = [{**BASE["motion"][0], "positive": positive}]
+    with pytest.raises(InputError, match=says) as caught:
+        read(tmp_path, columns, files=[file], motion=motion, motion_files=CAMERA)
+    assert ("add `shift_s`" in str(caught.value)) == (shift is None)
+
+
 @sweep("shift", [-3.21, 0.0, 7.654])
 def test_the_best_shift_is_that_of_the_signals(shift: float) -> None:
     seen, read_at = np.arange(0.0, 60.0, 0.05), np.arange(0.0, 50.0, 0.02)
@@ -303,10 +388,10 @@ def test_the_best_shift_is_that_of_the_signals(shift: float) -> None:
     def bump(time: np.ndarray) -> np.ndarray:
         return np.exp(-(((time - 25.0) / 6.0) ** 2)) + np.exp(-(((time - 33.0) / 3.0) ** 2))
 
-    found, likeness, next_best = best_shift(read_at, bump(read_at + shift), seen, -bump(seen), True)
-    assert found == pytest.approx(shift, abs=0.01)
-    assert likeness > 0.99
-    assert next_best < 0.9
+    found = best_shift(read_at, bump(read_at + shift), seen, -bump(seen), True)
+    assert found.seconds == pytest.approx(shift, abs=0.01)
+    assert found.likeness > 0.99
+    assert found.next_best < 0.9
 
 
 def test_clusters_of_markers_turn_joints(tmp_path: Path) -> None:
@@ -332,15 +417,24 @@ def test_clusters_of_markers_turn_joints(tmp_path: Path) -> None:
         "columns": "{marker}_{axis}",
         "axes": ["right", "superior", "posterior"],
     }
-    tests = read(
-        tmp_path,
-        {"t": time, "M": moment},
-        motion=[],
-        files=[{**BASE["files"][0], "motion_file": "seen.csv", "shift_s": 0.0}],
-        motion_files={"time": {"column": "t", "unit": "s"}, "markers": markers},
-    )
+    changes = {
+        "motion": [],
+        "files": [{**BASE["files"][0], "motion_file": "seen.csv", "shift_s": 0.0}],
+        "motion_files": {"time": {"column": "t", "unit": "s"}, "markers": markers},
+    }
+    tests = read(tmp_path, {"t": time, "M": moment}, **changes)
     found = [of(tests, f"{word}_deg")[3] for word in SIDES]
     np.testing.assert_allclose(found, [1.6 * 7.5, 0.9 * 7.5, -1.2 * 7.5], atol=0.02)
+    # one that is frozen all the time, and one that is lost from row 400 on
+    for since, line in ((0, r"\d+"), (400, "402")):
+        given = {name: values.copy() for name, values in columns.items()}
+        for axis in "XYZ":
+            given[f"b1_{axis}"][since:] = 0.0 if since else given[f"b1_{axis}"][0]
+        table(tmp_path / "seen.csv", {name.lower(): values for name, values in given.items()})
+        with pytest.raises(
+            InputError, match=f"seen.csv, line {line}: found markers of L4.*b1 most"
+        ):
+            read(tmp_path, {"t": time, "M": moment}, **changes)
 
 
 # --- loads and what the instrument is worth -------------------------------------------------------
@@ -432,8 +526,13 @@ MARKERS = {"clusters": {"L4": ["a", "b", "c"]}}
         ),
         (
             {"motion_files": {"markers": {**MARKERS, "axes": ["right", "left", "superior"]}}},
-            "found an axis twice",
+            "found right, left, superior: an axis twice",
         ),
+        (
+            {"motion_files": {"markers": {**MARKERS, "axes": ["anterior", "superior", "left"]}}},
+            "or a left-handed frame",
+        ),
+        ({"files": [*BASE["files"], {**BASE["files"][0], "test": "b"}]}, "a.csv once more"),
         ({"motion_files": {"markers": {"clusters": {}}}}, "L4 wrong or missing"),
         ({"motion_files": {"rate_hz": 9}, "time": None, "files": [SEEN]}, "the column of time of"),
         ({"accuracy": {"flexion_deg": 1.0}}, "accuracy"),
