@@ -3,7 +3,7 @@
 import csv
 import os
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from dataclasses import replace as with_values
 from functools import cache
@@ -55,7 +55,7 @@ class ImportSettings(BaseModel):
     )
 
 
-_UNITS = {
+UNITS = {
     **{"mm": "mm", "deg": "deg", "n": "N", "nm": "N m", "s": "s"},
     **{"kg": "kg", "m": "m", "m2": "kg m2", "years": "years"},
 }
@@ -86,6 +86,7 @@ class ImportedCohort:
     settings : the file that says what the files are.
     made_by : dotted keys of the settings that made a column, by stem of the table and column; where
         they hold a mapping, its `unit`, `positive` and `column` are told by themselves.
+    tests_of : specimens and tests that such a key is of; not there: all.
     units : sizes of units that may stand there, by name; those of one quantity together.
     origins : of each row of a table, by stem: the file and line that it came from.
     first_rows : of each file as they were understood, by its name: names of columns, then cells.
@@ -99,6 +100,7 @@ class ImportedCohort:
     forms: tuple[TableForm, ...] = field(default=())
     settings: YamlDocument | None = None
     made_by: Mapping[tuple[str, str], Sequence[str]] = field(default_factory=dict)
+    tests_of: Mapping[str, Set[tuple[str, str]]] = field(default_factory=dict)
     units: Sequence[Mapping[str, float]] = ()
     origins: Mapping[str, Sequence[tuple[str, int | None]]] = field(default_factory=dict)
     first_rows: Mapping[str, Sequence[Sequence[object]]] = field(default_factory=dict)
@@ -239,7 +241,7 @@ def _descriptor(imported: ImportedCohort, folder: Path) -> str:
 def _shape(form: TableForm, text: str) -> Table:
     """What the columns of a file of a cohort are, in its own order; somebody's own are text."""
     declared: dict[str, Column] = {
-        one.name: with_values(one, unit=_UNITS.get(one.name.rpartition("_")[2], ""))
+        one.name: with_values(one, unit=UNITS.get(one.name.rpartition("_")[2], ""))
         for one in form.columns
     }
     header = next(csv.reader(StringIO(text)), [])

@@ -93,7 +93,11 @@ def exchanged(rows: list[dict[str, str]]) -> list[dict[str, str]]:
     [
         ({"motion": changed(MOTION, unit="rad")}, "motion.0.unit: found 'rad'", "suspected: deg"),
         ({"loads": changed(LOADS, unit="N mm")}, "loads.0.unit: found 'N mm'", "suspected: N m;"),
-        ({"loads": changed(LOADS, unit="N cm")}, "motion.0.unit", "or the unit of its load"),
+        (
+            {"loads": changed(LOADS, unit="N cm")},
+            "loads.0.unit",
+            "suspected: N m; correct loads.0.unit",
+        ),
         (
             {"motion": [{**MOTION[0], "positive": "flexion"}, MOTION[1]]},
             "motion.0.positive: found 'flexion'",
@@ -234,3 +238,41 @@ def test_show_of_a_file_that_nobody_foresaw_shows_its_first_lines(
     assert "1  torque_a,torque_b,a,b" in told
     assert "no text" in told
     assert not (tmp_path / "config").exists()
+
+
+def test_of_two_specimens_with_keys_of_their_own_the_wrong_ones_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = rig(tmp_path)
+    document = yaml.safe_load(path.read_text())
+    wrong = [{**MOTION[0], "positive": "flexion"}, MOTION[1]]
+    for one in document["files"]:
+        one["motion"] = wrong if one["specimen"] == "s02" else MOTION
+    path.write_text(yaml.dump({**document, "motion": []}, Dumper=_Plain, sort_keys=False))
+    assert run(tmp_path, path) == 1
+    told = capsys.readouterr().err
+    assert "files.2.motion.0.positive: found 'flexion'" in told
+    assert "the sign of files.2.motion.0.positive, or of loads.0.positive" in told
+    assert "files.0" not in told
+
+
+@sweep("wrong", [(0,), (1,), (0, 1)])
+def test_units_of_joints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: tuple[int, ...]
+) -> None:
+    """Radians told as degrees, of one joint or of both: each key is named."""
+    joints = [{**MOTION[0], "column": n, "joint": j} for n, j in (("a", "L4L5"), ("b", "L5S1"))]
+    path = rig(tmp_path, motion=joints, vertebrae=["S1", "L5", "L4"])
+    document = yaml.safe_load(path.read_text())
+    document |= {"files": document["files"][::2], "loads": LOADS[:1]}
+    path.write_text(yaml.dump(document, Dumper=_Plain, sort_keys=False))
+    for file in tmp_path.glob("s*flexion.csv"):
+        table = np.loadtxt(file, delimiter=",", skiprows=1)
+        table[:, 3] = table[:, 2] * 0.9
+        table[:, [2 + n for n in wrong]] *= np.pi / 180.0
+        np.savetxt(file, table, "%.6f", ",", header="torque_a,torque_b,a,b", comments="")
+    assert run(tmp_path, path) == 1
+    told = capsys.readouterr().err
+    named = ", ".join(f"motion.{n}.unit" for n in wrong)
+    assert f"suspected: rad; correct {named}" in told
+    assert len(wrong) > 1 or "loads.0" not in told
