@@ -145,7 +145,10 @@ def write(
             if isinstance(content, Path):
                 shutil.copyfile(content, new / name)
             elif name not in stay:
-                (new / name).write_text(content, encoding="utf-8")
+                meant = _meant(folder, imported) if name == COHORT_YAML else {}
+                stay += [f"{key}: true of {COHORT_YAML}" for key in meant]
+                text = _yaml(yaml.safe_load(content) | meant) if meant else content
+                (new / name).write_text(text, encoding="utf-8")
         (new / FILE).write_text(_descriptor(imported, new), encoding="utf-8")
         if look is not None:
             look(new)
@@ -162,6 +165,18 @@ def write(
     finally:
         shutil.rmtree(aside, ignore_errors=True)
     return stay
+
+
+def _meant(folder: Path, imported: ImportedCohort) -> Mapping[str, bool]:
+    """What somebody has said in the old ``cohort.yaml`` and files of a laboratory do not tell."""
+    path = folder / COHORT_YAML
+    old = yaml.safe_load(path.read_text(encoding="utf-8")) if path.is_file() else None
+    keys = ["made_up", "rebuilt", *(["gravity"] if "bodies.csv" not in imported.files else [])]
+    return {key: True for key in keys if isinstance(old, dict) and old.get(key) is True}
+
+
+def _yaml(header: Mapping[str, object]) -> str:
+    return yaml.safe_dump(dict(header), sort_keys=False, allow_unicode=True, width=110)
 
 
 def assembled(
@@ -193,11 +208,10 @@ def assembled(
         for stem, rows in tables.items()
         if rows
     }
-    text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=110)
     return ImportedCohort(
         settings.cohort,
         settings.title,
-        {COHORT_YAML: text, **texts, **copied},
+        {COHORT_YAML: _yaml(header), **texts, **copied},
         {"specimens.csv": ""},
         tuple(sentences),
         tuple(form for stem, form in forms.items() if stem not in TABLES),

@@ -9,6 +9,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from io import StringIO
 from math import isclose, log
 from operator import itemgetter
 from pathlib import Path
@@ -34,11 +35,14 @@ PARTS: Mapping[str, str] = {
 }
 """The key that is suspected, by warning; it is the unit for all others."""
 
+NOT_MEASURED = ("leave cells empty", "leave the cells empty", "look for a column filled down")
+"""How remedies begin that take a column out of the cohort."""
+
 SPEAKS_OF = {
     "loads": re.compile("torque|moment|force|load|couple|kraft|fuerza"),
-    "motion": re.compile("angle|rotation|displac|winkel|verschieb|dépl|ángulo|desplaz"),
+    "motion": re.compile("angle|rotation|disp|winkel|verschieb|dépl|ángulo|desplaz"),
 }
-"""Names of columns that tell what they hold, in small letters."""
+"""Names of columns that tell what they hold, in small letters, without remarks in brackets."""
 
 
 def write_judged(
@@ -71,6 +75,8 @@ def judge(imported: ImportedCohort, folder: Path) -> list[InputProblem]:
     """
     if exchanged := list(_against_names(imported)):
         raise InputError(exchanged)
+    if absent := list(_absent(imported, folder)):
+        raise InputError(absent)
     try:
         cohort = read(folder, every_form())
     except InputError as error:
@@ -110,13 +116,29 @@ def _once(problems: Iterable[InputProblem]) -> Iterator[InputProblem]:
         yield replace(first, others=first.others + len(others)) if others else first
 
 
+def _absent(imported: ImportedCohort, folder: Path) -> Iterator[InputProblem]:
+    """Specimens that a file which stayed, as it is edited by hand, has no rows of."""
+    for name in imported.by_hand:
+        made, there = imported.files.get(name), folder / name
+        if isinstance(made, str) and there.is_file():
+            of_both = [
+                [row.get("specimen") for row in csv.DictReader(StringIO(text))]
+                for text in (made, there.read_text("utf-8-sig", "replace"))
+            ]
+            for lacking in dict.fromkeys(one for one in of_both[0] if one not in of_both[1]):
+                place = (f"{folder.name}/{name}", None, "specimen", f"no row of '{lacking}'")
+                remedy = f"the file stays as it is, edited by hand: add {lacking} to it"
+                yield InputProblem(*place, "rows of every specimen of the settings", remedy)
+
+
 def _against_names(imported: ImportedCohort) -> Iterator[InputProblem]:
     """Loads whose column speaks of motion, and the reverse: exchanged they may look right."""
     document = imported.settings
     for (stem, _), keys in imported.made_by.items() if document is not None else ():
         for key in (f"{key}.column" for key in keys if stem in SPEAKS_OF):
             name = _value(document.data, key)  # type: ignore[union-attr]
-            said = {of for of, words in SPEAKS_OF.items() if words.search(str(name).lower())}
+            own = re.sub(r"[(\[].*?[)\]]", "", str(name)).lower()
+            said = {of for of, words in SPEAKS_OF.items() if words.search(own)}
             if said and stem not in said:
                 remedy = "exchange the columns of loads and motion, or name it by its number if it "
                 place = (document.file, document.line_of(key), key)  # type: ignore[union-attr]
@@ -152,6 +174,9 @@ def _at_settings(
     own = mends[0][1] if mends else _keys(imported, (stem, str(problem.column)), about)
     units = [name for name, _ in mends] or _units(imported, own[0], problem, warning)
     part = "column" if units == [] else part  # no other unit would do
+    if problem.remedy.startswith(NOT_MEASURED):
+        at = " and ".join(own)
+        problem = replace(problem, remedy=f"delete {at}, where the axis is blocked or not measured")
     keys = [_key(data, key, part) for key in own]
     if mends:
         ways = (

@@ -198,7 +198,9 @@ def test_a_folder_is_judged_as_it_would_be(
     before = {one.name: one.read_bytes() for one in folder.iterdir()}
     path.write_text(path.read_text().replace("specimen: s02", "specimen: '002'"))
     assert run(tmp_path, path, "--replace") == 1
-    assert "002" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    for name in ("specimens.csv", "joints.csv"):
+        assert f"rig/{name}, specimen: found no row of '002'" in told
     assert {one.name: one.read_bytes() for one in folder.iterdir()} == before
     assert [one.name for one in folder.parent.iterdir()] == ["rig"]
     for name in ("specimens.csv", "joints.csv"):
@@ -276,3 +278,85 @@ def test_units_of_joints(
     named = ", ".join(f"motion.{n}.unit" for n in wrong)
     assert f"suspected: rad; correct {named}" in told
     assert len(wrong) > 1 or "loads.0" not in told
+
+
+@sweep(
+    "old, new, told",
+    [
+        ("loads:\n- ", "loads:\n  ", "loads: found {'column'"),
+        (
+            "vertebrae:\n- L5\n- L4\n",
+            "vertebrae: L5\n",
+            "allowed: a list; begin each item with `- `",
+        ),
+        (
+            "title: made up",
+            "title: made up\ntime: Time",
+            "time: found 'Time'; allowed: keys; write",
+        ),
+        ("cohort: rig", "cohort: Rig", "allowed: a name of a-z, 0-9, _"),
+        (
+            "specimen: s02",
+            "specimen: 2024-01-31",
+            "found 2024-01-31; allowed: a valid string; put it in q",
+        ),
+        ("column: torque_a", "column: [1]", "loads.0.column: found [1]"),
+        (
+            "- L4\n",
+            "- 4L\n",
+            "vertebrae.1: found '4L'; allowed: a name of A-Z, a-z, 0-9 that begins",
+        ),
+    ],
+)
+def test_settings_of_the_wrong_form_are_told_in_words_of_a_yaml(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
+) -> None:
+    path = rig(tmp_path, loads=LOADS[:1] * 2)
+    document = path.read_text().replace(
+        "- column: torque_a\n  unit: N m\n  positive: extension\n", "", 1
+    )
+    assert old in document
+    path.write_text(document.replace(old, new))
+    assert run(tmp_path, path) == 1
+    said = capsys.readouterr().err
+    assert told in said
+    for word in ("tuple", "Tuple", "instance", "pattern", "constrained", "datetime"):
+        assert word not in said
+    assert "at least 2 of them" not in said
+
+
+def test_what_somebody_said_of_a_cohort_stays(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``made_up`` is no finding of files; rows that a study needs are asked for, not refused."""
+    path = rig(tmp_path)
+    assert run(tmp_path, path) == 0
+    folder = tmp_path / "config" / "cohorts" / "rig"
+    header = folder / "cohort.yaml"
+    header.write_text(header.read_text() + "made_up: true\n")
+    rows = "specimen,marker,vertebra,x_mm,y_mm,z_mm,weight,cluster\ns01,m,L4,-60,0,0,,\n"
+    (folder / "marker_set.csv").write_text(rows)
+    capsys.readouterr()
+    assert run(tmp_path, path, "--replace") == 0
+    said = capsys.readouterr().out
+    assert cohorts.read(folder).made_up
+    assert "made_up: true of cohort.yaml" in said
+    assert "0 markers of 's02' on S1" in said
+    assert "which studies that read this file ask for" in said
+
+
+def test_columns_may_name_the_other_side_in_passing_and_constant_ones_are_deleted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = rig(tmp_path, names={"a": "Flexion (unloaded)", "b": "Disp at load cell"})
+    path.write_text(
+        path.read_text().replace("column: a\n", "column: Flexion (unloaded)\n")
+        .replace("column: b\n", "column: Disp at load cell\n")
+    )  # fmt: skip
+    assert run(tmp_path, path) == 0
+    for file in tmp_path.glob("s*.csv"):
+        lines = file.read_text().splitlines()
+        cut = [",".join([*line.split(",")[:3], "0"]) for line in lines[1:]]
+        file.write_text("\n".join([lines[0], *cut]) + "\n")
+    assert run(tmp_path, path, "--replace") == 1
+    assert "delete motion.1, where" in capsys.readouterr().err
