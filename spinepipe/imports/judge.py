@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import read
+from spinepipe.cohort.columns import COHORT_YAML
 from spinepipe.documents.names import EVERYONE
 from spinepipe.documents.text import NUMBER
 from spinepipe.imports.imported import UNITS, ImportedCohort, write
@@ -147,7 +148,14 @@ def _against_names(imported: ImportedCohort) -> Iterator[InputProblem]:
 
 
 def _at_origin(imported: ImportedCohort, problem: InputProblem) -> InputProblem | None:
-    """The problem at the file and line that its row came from; None where none is known."""
+    """The problem at the file and line that its row came from; None where none is known.
+
+    Keys of ``cohort.yaml`` came from those of the same name.
+    """
+    document, key = imported.settings, str(problem.column)
+    in_header = problem.file.endswith(f"/{COHORT_YAML}") and document is not None
+    if document is not None and in_header and key.partition(".")[0] in document.data:
+        return replace(problem, file=document.file, row=document.line_of(key))
     rows = imported.origins.get(problem.file.rpartition("/")[2].removesuffix(".csv"), ())
     at = (problem.row or 0) - 2  # the header of a table is line 1
     if not 0 <= at < len(rows):

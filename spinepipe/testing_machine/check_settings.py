@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
+from spinepipe.cohort.checks import check_header
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
 from spinepipe.documents.yaml_text import YamlDocument
@@ -18,6 +19,7 @@ from spinepipe.testing_machine.settings import (
 
 def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """What is wrong with the keys taken together, each problem at its line."""
+    yield from check_header(document, mapping.cohort)
     yield from _names(document, mapping)
     keys = {key: key for key in OF_A_FILE}
     common = not mapping.files

@@ -15,6 +15,7 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cli import main
+from spinepipe.testing_machine.recording import _resolution
 
 DEG_PER_NM = 0.6
 PEAK = 7.5
@@ -360,3 +361,20 @@ def test_columns_may_name_the_other_side_in_passing_and_constant_ones_are_delete
         file.write_text("\n".join([lines[0], *cut]) + "\n")
     assert run(tmp_path, path, "--replace") == 1
     assert "delete motion.1, where" in capsys.readouterr().err
+
+
+def test_keys_of_the_cohort_are_told_where_they_are_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = rig(tmp_path, title="long " * 80)
+    assert run(tmp_path, path) == 1
+    assert "rig.yaml, line 2, title: found" in capsys.readouterr().err
+    path = rig(tmp_path, vertebrae=["L4", "L5"], motion=changed(MOTION, joint="L5L4"))
+    assert run(tmp_path, path) == 1
+    assert "rig.yaml, line 4, vertebrae: found 'L4' before 'L5'" in capsys.readouterr().err
+
+
+def test_rows_far_apart_do_not_make_a_file_coarse() -> None:
+    far = np.array([0.0, 0.6512, 1.3007, 1.9533, 2.6041])
+    assert _resolution(far) == pytest.approx(1e-4)
+    assert _resolution(np.repeat(far.round(1), 5)) == pytest.approx(0.6)
