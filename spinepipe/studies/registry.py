@@ -43,15 +43,15 @@ def every_form(complete: bool = False) -> tuple[TableForm, ...]:
 
     Parameters
     ----------
-    complete : whether they must have all rows that its studies need, which others do not ask for.
+    complete : whether each specimen must have the rows that studies of a kind need of it.
     """
     forms = {form.stem: form for kind in every_kind().values() for form in kind.forms}
-    return tuple(
-        form
-        if complete
-        else replace(form, rules=tuple(rule for rule in form.rules if not rule.at_least))
-        for form in forms.values()
-    )
+    if not complete:
+        forms = {
+            stem: replace(form, rules=tuple(one for one in form.rules if not one.of_each_specimen))
+            for stem, form in forms.items()
+        }
+    return tuple(forms.values())
 
 
 def files_of(study: Study, cohort: Cohort) -> StudyFiles:
