@@ -97,6 +97,11 @@ class Rule:
     allowed: str = ""
     remedy: str = ""
 
+    @property
+    def of_each_specimen(self) -> bool:
+        """Whether it asks for rows that a specimen may lack where no study needs them."""
+        return self.at_least > 0 and self.among == "specimens.specimen"
+
 
 @dataclass(frozen=True, eq=False)
 class TableForm:

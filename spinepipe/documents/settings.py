@@ -1,6 +1,8 @@
 """A document as settings: what a pydantic model finds wrong with it, told at its line and key."""
 
+import re
 from collections.abc import Iterator
+from datetime import date
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, Tag, ValidationError
@@ -12,6 +14,9 @@ from spinepipe.problems import InputProblem, did_you_mean, one_of
 
 MOST_TOLD = 100
 """Faults of one file that are told one by one."""
+
+_UNION = re.compile(r"constrained-\w+|function-.+\]|tuple\[.+\]|list\[.+\]")
+"""Pydantic's names of forms that a value may have, which are no keys."""
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -32,12 +37,19 @@ def validate(model: type[Model], document: YamlDocument) -> tuple[Model | None, 
 
 
 def _distinct(details: list[ErrorDetails]) -> Iterator[ErrorDetails]:
-    """One error per place: pydantic reports one for each member of a union."""
-    seen = set()
+    """One error per place: pydantic reports one for each member of a union, named at its end.
+
+    A list is not too short for an item that is wrong.
+    """
+    seen: set[tuple[int | str, ...]] = set()
     for detail in details:
-        if detail["loc"] not in seen:
-            seen.add(detail["loc"])
-            yield detail
+        loc = detail["loc"]
+        if _UNION.fullmatch(str(loc[-1] if loc else "")):
+            loc = loc[:-1]
+        within = any(other["loc"][: len(loc)] == loc != other["loc"] for other in details)
+        if loc not in seen and not (detail["type"] == "too_short" and within):
+            seen.add(loc)
+            yield {**detail, "loc": loc}
 
 
 def _problem(model: type[BaseModel], document: YamlDocument, detail: ErrorDetails) -> InputProblem:
@@ -54,13 +66,21 @@ def _problem(model: type[BaseModel], document: YamlDocument, detail: ErrorDetail
     if detail["type"] == "missing":
         return InputProblem(*place, "nothing: the key is missing", meaning, f"add `{loc[-1]}:`")
     allowed = _allowed(detail)
-    if detail["type"] == "too_short":
-        allowed = f"at least {detail['ctx']['min_length']} of them"
+    for kind, size in (("too_short", "min_length"), ("too_long", "max_length")):
+        if detail["type"] == kind:
+            end = "at least" if kind == "too_short" else "at most"
+            allowed = f"{end} {detail['ctx'][size]} of them"
     expected = detail.get("ctx", {}).get("expected", "")
     remedy = f"correct it ({meaning})" if meaning else "correct it"
+    if detail["type"] in ("tuple_type", "list_type"):
+        allowed, remedy = "a list", f"begin each item with `- ` ({meaning})"
+    if detail["type"] in ("model_type", "dict_type", "model_attributes_type"):
+        allowed, remedy = "keys", f"write keys below it, each with its value ({meaning})"
+    if detail["type"] == "string_pattern_mismatch":
+        allowed = _signs(str(detail["ctx"]["pattern"]))
     if detail["type"] == "literal_error":
         remedy = did_you_mean(str(detail["input"]), _quoted(expected), remedy)
-    if detail["type"] == "string_type" and isinstance(detail["input"], int | float):
+    if detail["type"] == "string_type" and isinstance(detail["input"], int | float | date):
         remedy = "put it in quotes, so that it is a text"  # 12 and 1e3 may be names
     return InputProblem(*place, _shown(detail["input"]), allowed, remedy)
 
@@ -143,9 +163,20 @@ def _allowed(detail: ErrorDetails) -> str:
     return message
 
 
+def _signs(pattern: str) -> str:
+    """What a name may be made of, in words."""
+    found = re.fullmatch(r"\^(?:\[([\w-]+)\])?\[([\w-]+)\][+*]\$", pattern)
+    if found is None:
+        return f"a text of the form {pattern}"
+    ranges = [", ".join(re.findall(r"\w-\w|\w", part or "")) for part in found.groups()]
+    return f"a name of {ranges[1]}" + (f" that begins with one of {ranges[0]}" if found[1] else "")
+
+
 def _quoted(expected: str) -> list[str]:
     return expected.split("'")[1::2]
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, date):
+        return str(value)
     return "nothing" if value is None else repr(value)

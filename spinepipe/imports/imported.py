@@ -3,7 +3,7 @@
 import csv
 import os
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from dataclasses import replace as with_values
 from functools import cache
@@ -70,7 +70,7 @@ class ImportSettings(CohortTitle):
     )
 
 
-_UNITS = {
+UNITS = {
     **{"mm": "mm", "deg": "deg", "n": "N", "nm": "N m", "s": "s"},
     **{"kg": "kg", "m": "m", "m2": "kg m2", "years": "years"},
 }
@@ -101,6 +101,7 @@ class ImportedCohort:
     settings : the file that says what the files are.
     made_by : dotted keys of the settings that made a column, by stem of the table and column; where
         they hold a mapping, its `unit`, `positive` and `column` are told by themselves.
+    tests_of : specimens and tests that such a key is of; not there: all.
     units : sizes of units that may stand there, by name; those of one quantity together.
     origins : of each row of a table, by stem: the file and line that it came from.
     first_rows : of each file as they were understood, by its name: names of columns, then cells.
@@ -114,6 +115,7 @@ class ImportedCohort:
     forms: tuple[TableForm, ...] = field(default=())
     settings: YamlDocument | None = None
     made_by: Mapping[tuple[str, str], Sequence[str]] = field(default_factory=dict)
+    tests_of: Mapping[str, Set[tuple[str, str]]] = field(default_factory=dict)
     units: Sequence[Mapping[str, float]] = ()
     origins: Mapping[str, Sequence[tuple[str, int | None]]] = field(default_factory=dict)
     first_rows: Mapping[str, Sequence[Sequence[object]]] = field(default_factory=dict)
@@ -158,7 +160,10 @@ def write(
             if isinstance(content, Path):
                 shutil.copyfile(content, new / name)
             elif name not in stay:
-                (new / name).write_text(content, encoding="utf-8")
+                meant = _meant(folder, imported) if name == COHORT_YAML else {}
+                stay += [f"{key}: true of {COHORT_YAML}" for key in meant]
+                text = _yaml(yaml.safe_load(content) | meant) if meant else content
+                (new / name).write_text(text, encoding="utf-8")
         (new / FILE).write_text(_descriptor(imported, new), encoding="utf-8")
         if look is not None:
             look(new)
@@ -175,6 +180,18 @@ def write(
     finally:
         shutil.rmtree(aside, ignore_errors=True)
     return stay
+
+
+def _meant(folder: Path, imported: ImportedCohort) -> Mapping[str, bool]:
+    """What somebody has said in the old ``cohort.yaml`` and files of a laboratory do not tell."""
+    path = folder / COHORT_YAML
+    old = yaml.safe_load(path.read_text(encoding="utf-8")) if path.is_file() else None
+    keys = ["made_up", "rebuilt", *(["gravity"] if "bodies.csv" not in imported.files else [])]
+    return {key: True for key in keys if isinstance(old, dict) and old.get(key) is True}
+
+
+def _yaml(header: Mapping[str, object]) -> str:
+    return yaml.safe_dump(dict(header), sort_keys=False, allow_unicode=True, width=110)
 
 
 def assembled(
@@ -206,11 +223,10 @@ def assembled(
         for stem, rows in tables.items()
         if rows
     }
-    text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True, width=110)
     return ImportedCohort(
         settings.cohort,
         settings.title,
-        {COHORT_YAML: text, **texts, **copied},
+        {COHORT_YAML: _yaml(header), **texts, **copied},
         {"specimens.csv": ""},
         tuple(sentences),
         tuple(form for stem, form in forms.items() if stem not in TABLES),
@@ -254,7 +270,7 @@ def _descriptor(imported: ImportedCohort, folder: Path) -> str:
 def _shape(form: TableForm, text: str) -> Table:
     """What the columns of a file of a cohort are, in its own order; somebody's own are text."""
     declared: dict[str, Column] = {
-        one.name: with_values(one, unit=_UNITS.get(one.name.rpartition("_")[2], ""))
+        one.name: with_values(one, unit=UNITS.get(one.name.rpartition("_")[2], ""))
         for one in form.columns
     }
     header = next(csv.reader(StringIO(text)), [])

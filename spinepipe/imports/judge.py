@@ -7,19 +7,26 @@ name of the column) is theirs to mend; it stops the import, certain or not, unle
 import csv
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import isclose
+from io import StringIO
+from math import isclose, log
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 from spinepipe.cohort import read
+from spinepipe.cohort.columns import COHORT_YAML
+from spinepipe.documents.names import EVERYONE
 from spinepipe.documents.text import NUMBER
-from spinepipe.imports.imported import ImportedCohort, write
+from spinepipe.imports.imported import UNITS, ImportedCohort, write
+from spinepipe.plausibility.score import is_plausible
+from spinepipe.plausibility.warnings.response import LOAD_COLUMNS, MOTION_COLUMNS
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.plausibility import suspicions
 from spinepipe.studies.registry import every_form
+from spinepipe.units import COORDINATES
 
 PARTS: Mapping[str, str] = {
     **dict.fromkeys(("test_against_load", "joints_against_load"), "positive"),
@@ -29,11 +36,14 @@ PARTS: Mapping[str, str] = {
 }
 """The key that is suspected, by warning; it is the unit for all others."""
 
+NOT_MEASURED = ("leave cells empty", "leave the cells empty", "look for a column filled down")
+"""How remedies begin that take a column out of the cohort."""
+
 SPEAKS_OF = {
     "loads": re.compile("torque|moment|force|load|couple|kraft|fuerza"),
-    "motion": re.compile("angle|rotation|displac|winkel|verschieb|dépl|ángulo|desplaz"),
+    "motion": re.compile("angle|rotation|disp|winkel|verschieb|dépl|ángulo|desplaz"),
 }
-"""Names of columns that tell what they hold, in small letters."""
+"""Names of columns that tell what they hold, in small letters, without remarks in brackets."""
 
 
 def write_judged(
@@ -66,6 +76,8 @@ def judge(imported: ImportedCohort, folder: Path) -> list[InputProblem]:
     """
     if exchanged := list(_against_names(imported)):
         raise InputError(exchanged)
+    if absent := list(_absent(imported, folder)):
+        raise InputError(absent)
     try:
         cohort = read(folder, every_form())
     except InputError as error:
@@ -88,6 +100,11 @@ def judge(imported: ImportedCohort, folder: Path) -> list[InputProblem]:
             rest.append(one.with_switch if one.certain else one.problem)
     if stops:
         raise InputError(_once(stops))
+    try:
+        read(folder, every_form(complete=True))
+    except InputError as error:  # a study that needs these rows refuses to run without them
+        asked = "which studies that read this file ask for; others do not"
+        rest += [replace(one, remedy=f"{one.remedy}, {asked}") for one in error.problems]
     return rest
 
 
@@ -100,6 +117,21 @@ def _once(problems: Iterable[InputProblem]) -> Iterator[InputProblem]:
         yield replace(first, others=first.others + len(others)) if others else first
 
 
+def _absent(imported: ImportedCohort, folder: Path) -> Iterator[InputProblem]:
+    """Specimens that a file which stayed, as it is edited by hand, has no rows of."""
+    for name in imported.by_hand:
+        made, there = imported.files.get(name), folder / name
+        if isinstance(made, str) and there.is_file():
+            of_both = [
+                [row.get("specimen") for row in csv.DictReader(StringIO(text))]
+                for text in (made, there.read_text("utf-8-sig", "replace"))
+            ]
+            for lacking in dict.fromkeys(one for one in of_both[0] if one not in of_both[1]):
+                place = (f"{folder.name}/{name}", None, "specimen", f"no row of '{lacking}'")
+                remedy = f"the file stays as it is, edited by hand: add {lacking} to it"
+                yield InputProblem(*place, "rows of every specimen of the settings", remedy)
+
+
 def _against_names(imported: ImportedCohort) -> Iterator[InputProblem]:
     """Loads whose column speaks of motion, and the reverse: exchanged they may look right."""
     document = imported.settings
@@ -108,7 +140,8 @@ def _against_names(imported: ImportedCohort) -> Iterator[InputProblem]:
     for (stem, _), keys in imported.made_by.items():
         for key in (f"{key}.column" for key in keys if stem in SPEAKS_OF):
             name = _value(document.data, key)
-            said = {of for of, words in SPEAKS_OF.items() if words.search(str(name).lower())}
+            own = re.sub(r"[(\[].*?[)\]]", "", str(name)).lower()
+            said = {of for of, words in SPEAKS_OF.items() if words.search(own)}
             if said and stem not in said:
                 remedy = "exchange the columns of loads and motion, or name it by its number if it "
                 found, allowed = f"{name!r} in {stem}", f"a column of {stem}"
@@ -117,7 +150,14 @@ def _against_names(imported: ImportedCohort) -> Iterator[InputProblem]:
 
 
 def _at_origin(imported: ImportedCohort, problem: InputProblem) -> InputProblem | None:
-    """The problem at the file and line that its row came from; None where none is known."""
+    """The problem at the file and line that its row came from; None where none is known.
+
+    Keys of ``cohort.yaml`` came from those of the same name.
+    """
+    document, key = imported.settings, str(problem.column)
+    in_header = problem.file.endswith(f"/{COHORT_YAML}") and document is not None
+    if document is not None and in_header and key.partition(".")[0] in document.data:
+        return replace(problem, file=document.file, row=document.line_of(key))
     rows = imported.origins.get(problem.file.rpartition("/")[2].removesuffix(".csv"), ())
     at = (problem.row or 0) - 2  # the header of a table is line 1
     if not 0 <= at < len(rows):
@@ -138,19 +178,28 @@ def _at_settings(
     if not named or document is None:
         return None
     data = document.data
-    joint = _joint(folder / f"{stem}.csv", problem.row)
-    own = [key for key in named if _value(data, f"{key}.joint") in (None, joint)] or named
-    units = _units(imported, str(_value(data, f"{own[0]}.unit")), problem.found, warning)
+    about = warning or _row(folder / f"{stem}.csv", problem.row)
     part = PARTS.get(warning.name, "unit") if warning is not None else "unit"
+    mends = [] if warning is None else _units_of_both(imported, warning)
+    own = mends[0][1] if mends else _keys(imported, (stem, str(problem.column)), about)
+    units = [name for name, _ in mends] or _units(imported, own[0], problem, warning)
     part = "column" if units == [] else part  # no other unit would do
+    if problem.remedy.startswith(NOT_MEASURED):
+        at = " and ".join(own)
+        problem = replace(problem, remedy=f"delete {at}, where the axis is blocked or not measured")
     keys = [_key(data, key, part) for key in own]
-    if units is None:
+    if mends:
+        ways = (
+            f"{name}; correct {', '.join(_key(data, k, part) for k in of)}" for name, of in mends
+        )
+        remedy = f"suspected: {', or '.join(ways)}"
+    elif units is None:
         # the words of the remedy, with keys of the settings in the place of columns of the cohort
         remedy = re.sub(rf" in (?:{re.escape(folder.name)}/)?\w+\.csv", "", problem.remedy)
-        for (_, column), others in imported.made_by.items():
-            remedy = re.sub(rf"\b{column}\b", _key(data, others[0], part), remedy)
+        for place in imported.made_by:
+            others = " and ".join(_key(data, key, part) for key in _keys(imported, place, about))
+            remedy = re.sub(rf"\b{place[1]}\b", others, remedy)
         remedy = remedy if keys[0] in remedy else f"{remedy}; correct {', '.join(keys)}"
-        remedy += " or the unit of its load" if stem == "motion" and part == "unit" else ""
     else:
         suspected = " or ".join(units) or "another column"
         remedy = f"suspected: {suspected}; correct {', '.join(keys)}"
@@ -162,9 +211,36 @@ def _at_settings(
     return InputProblem(*document.place_of(keys[0]), found, problem.allowed, remedy)
 
 
+def _keys(
+    imported: ImportedCohort, place: tuple[str, str], about: PlausibilityWarning | Mapping[str, str]
+) -> Sequence[str]:
+    """Keys that made a column of what a finding or a row is about; all where that is not known."""
+    told: list[Sequence[str]] = []
+    for name in ("specimen", "test", "joint"):
+        one = about.get(name) if isinstance(about, Mapping) else getattr(about, f"{name}s")
+        told.append([one] if isinstance(one, str) and one != EVERYONE else one or ())
+    specimens, tests, joints = told
+    named = imported.made_by.get(place, ())
+    return [
+        key
+        for key in named
+        if _fits(_value(imported.settings.data, f"{key}.joint"), joints)
+        and any(
+            _fits(specimen, specimens) and _fits(test, tests)
+            for specimen, test in imported.tests_of.get(key, ((None, None),))
+        )
+    ] or named
+
+
+def _fits(name: str | None, names: Sequence[str]) -> bool:
+    return name is None or not names or name in names
+
+
 def _key(data: Any, key: str, part: str) -> str:
     """The part of what a key holds, or the key itself where it has no such part."""
-    return key if _value(data, f"{key}.{part}") is None else f"{key}.{part}"
+    of_markers = {"positive": "axes", "column": "clusters"}.get(part, part)
+    names = (f"{key}.{part}", f"{key}.{of_markers}")
+    return next((name for name in names if _value(data, name) is not None), key)
 
 
 def _value(data: Any, key: str) -> Any:
@@ -177,29 +253,56 @@ def _value(data: Any, key: str) -> Any:
     return data
 
 
-def _joint(path: Path, line: int | None) -> str | None:
-    """The joint of a line of a table that has one line for each row."""
+def _row(path: Path, line: int | None) -> Mapping[str, str]:
+    """The cells of a line of a table that has one line for each row."""
     if line is None or not path.is_file():
-        return None
+        return {}
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
-    return dict(zip(rows[0], rows[line - 1], strict=False)).get("joint")
+    return dict(zip(rows[0], rows[line - 1], strict=False))
+
+
+def _group(imported: ImportedCohort, key: str, column: str) -> tuple[str, Mapping[str, float]]:
+    """The unit that a key tells, and those that may stand there."""
+    told = str(_value(imported.settings and imported.settings.data, f"{key}.unit"))
+    unit = UNITS.get(column.rpartition("_")[2])
+    return told, next((one for one in imported.units if told in one and unit in one), {})
+
+
+def _units_of_both(
+    imported: ImportedCohort, warning: PlausibilityWarning
+) -> list[tuple[str, Sequence[str]]]:
+    """Units of the motion or of its load that would explain their ratio, with their keys."""
+    pairs = [(MOTION_COLUMNS[one], LOAD_COLUMNS[one]) for one in COORDINATES]
+    pair = next((one for one in pairs if warning.problem.column in one), ())
+    found = []
+    for stem, column in zip(("motion", "loads"), pair, strict=False):
+        keys = _keys(imported, (stem, column), warning)
+        told, group = _group(imported, keys[0], column) if keys else ("", {})
+        for size, name in {size: name for name, size in reversed(group.items())}.items():
+            times = size / group[told] if stem == "motion" else group[told] / size
+            ratio = (warning.over_expected or 0.0) * times
+            if times != 1.0 and is_plausible(ratio):
+                found.append((stem == "loads", abs(log(ratio)), name, keys))
+    # one joint alone has no load of its own
+    found = [one for one in found if not (one[0] and warning.joints)]
+    return [(name, keys) for *_, name, keys in sorted(found, key=itemgetter(0, 1))]
 
 
 def _units(
-    imported: ImportedCohort, told: str, found: str, warning: PlausibilityWarning | None
+    imported: ImportedCohort, key: str, problem: InputProblem, warning: PlausibilityWarning | None
 ) -> list[str] | None:
     """Units that would mend the numbers of a column; None where no unit is behind it.
 
     Those of the warning's factor beside what is told; smaller ones where a number is out of range.
     """
-    units = next((group for group in imported.units if told in group), {})
+    told, units = _group(imported, key, str(problem.column))
     if warning is None:
-        if not units or NUMBER.fullmatch(found.strip("'")) is None:
+        if not units or NUMBER.fullmatch(problem.found.strip("'")) is None:
             return None
         smaller = {size: name for name, size in reversed(list(units.items())) if size < units[told]}
         return list(smaller.values())
-    if warning.factor is None:
+    if warning.factor is None or warning.over_expected is not None:
         return None
     wanted = units.get(told, 0.0) * warning.factor
     return [name for name, size in units.items() if isclose(size, wanted, rel_tol=0.05)][:1] or None

@@ -5,6 +5,7 @@ does not follow all kinds.
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -37,10 +38,20 @@ def every_kind() -> dict[str, Kind]:
     return {name: kind_of(name) for name in kind_names()}
 
 
-def every_form() -> tuple[TableForm, ...]:
-    """Files that some kind reads besides those of every cohort, each once."""
-    forms = (form for kind in every_kind().values() for form in kind.forms)
-    return tuple({form.stem: form for form in forms}.values())
+def every_form(complete: bool = False) -> tuple[TableForm, ...]:
+    """Files that some kind reads besides those of every cohort, each once.
+
+    Parameters
+    ----------
+    complete : whether each specimen must have the rows that studies of a kind need of it.
+    """
+    forms = {form.stem: form for kind in every_kind().values() for form in kind.forms}
+    if not complete:
+        forms = {
+            stem: replace(form, rules=tuple(one for one in form.rules if not one.of_each_specimen))
+            for stem, form in forms.items()
+        }
+    return tuple(forms.values())
 
 
 def files_of(study: Study, cohort: Cohort) -> StudyFiles:

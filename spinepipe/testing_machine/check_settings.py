@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from spinepipe.cohort.checks import check_header
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
 from spinepipe.documents.yaml_text import YamlDocument
@@ -28,6 +29,7 @@ from spinepipe.testing_machine.settings import (
 
 def check_mapping(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
     """What is wrong with the keys taken together, each problem at its line."""
+    yield from check_header(document, mapping.cohort)
     yield from _names(document, mapping)
     keys = {key: key for key in OF_A_FILE}
     common = not mapping.files

@@ -1,9 +1,11 @@
 """A testing machine's files as the tables of a cohort, and in plain sentences what was done."""
 
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -144,7 +146,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         cohort,
         by_hand=BY_HAND,
         settings=document,
-        made_by=_made_by(tests),
+        **_made_by(tests),
         units=(FORCES, MOMENTS, ANGLES, LENGTHS, SECONDS),
         first_rows={
             one.file: list(_first_rows(one)) for test in tests.tests for one in test.recordings
@@ -152,11 +154,14 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     )
 
 
-def _made_by(tests: ImportedTests) -> dict[tuple[str, str], list[str]]:
-    """Keys of the settings that made each column, those of files of their own too."""
+def _made_by(tests: ImportedTests) -> dict[str, Any]:
+    """`made_by` and `tests_of`: keys that made each column, those of files of their own too."""
     mapping = tests.mapping
     made = {("loads", "vertebra"): ["loaded"], ("loads", "time_s"): ["time"]}
     made |= {("loads", f"p{axis}_mm"): ["load_point_mm"] for axis in "xyz"}
+    tests_of: dict[str, set[tuple[str, str]]] = defaultdict(set)
+    if mapping.motion_files is not None and mapping.motion_files.markers is not None:
+        made |= {("motion", way.motion): ["motion_files.markers"] for way in DIRECTIONS.values()}
     for item, of in zip(tests.items, mapping.files, strict=True):
         own = mapping.of_file(of)
         for side in ("loads", "motion"):
@@ -165,7 +170,9 @@ def _made_by(tests: ImportedTests) -> dict[tuple[str, str], list[str]]:
                 way = DIRECTIONS[channel.positive]
                 column = way.load if side == "loads" else way.motion
                 made.setdefault((side, column), []).append(f"{prefix}.{number}")
-    return {place: list(dict.fromkeys(keys)) for place, keys in made.items()}
+                tests_of[made[side, column][-1]].add((of.specimen, of.test))
+    keys = {place: list(dict.fromkeys(keys)) for place, keys in made.items()}
+    return {"made_by": keys, "tests_of": tests_of}
 
 
 def _first_rows(one: Recording) -> Iterator[Sequence[object]]:

@@ -58,6 +58,9 @@ Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
 Channel = TimeChannel | LoadChannel | MotionChannel
 
+STANDING = 0.1
+"""Share of rows that read as the one before them, where an instrument counts in steps."""
+
 WINDOW = 5
 JUMP = 0.1
 """Share of the range of a column by which a row must jump away to be left out."""
@@ -84,7 +87,7 @@ class Recording:
     time : (N,) s from the first row, None where no column is mapped.
     loads : (N,) by column of ``loads.csv``. driving : which of them goes up and down.
     motion : (N,) by joint and column of ``motion.csv``.
-    finest : smallest step between two readings of each motion, 0 where all are equal.
+    finest : resolution of the readings of each motion, 0 where all are equal.
     spikes : rows left out, in which a reading jumps away from those before and behind.
     notes : what else is to be said of it.
     """
@@ -182,9 +185,6 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
     # a signal by which clocks are compared jumps and may
     read = [*loads.values(), *(one for (joint, _), one in motion.items() if joint != SYNC)]
     sound[whole] = ~np.any([_jumps(one[whole]) for one in read], axis=0)
-    steps = {  # between readings that differ
-        place: np.diff(np.unique(one[whole])) for place, one in motion.items()
-    }
     return Recording(
         file=of.file,
         of=of,
@@ -194,7 +194,7 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
         loads={name: values[sound] for name, values in sorted(loads.items())},
         driving=DIRECTIONS[mapping.driving(of).positive].load if mapping.loads else "",
         motion={place: values[sound] for place, values in sorted(motion.items())},
-        finest={place: float(one.min()) if one.size else 0.0 for place, one in steps.items()},
+        finest={place: _resolution(one[whole]) for place, one in motion.items()},
         spikes=int(np.count_nonzero(whole & ~sound)),
         notes=(f"{count(empty, 'row')} with an empty cell left out",) if empty else (),
     )
@@ -364,3 +364,14 @@ def _jumps(values: Array) -> NDArray[np.bool_]:
     away = np.abs(values - usual)
     steps = float(np.quantile(np.abs(np.diff(usual)), 0.95))
     return away > max(JUMP * float(np.ptp(usual)), 3.0 * steps, 10.0 * float(np.median(away)))
+
+
+def _resolution(readings: Array) -> float:
+    """Smallest step of readings that stand still from row to row, else the last decimal of all.
+
+    Where rows are far apart, so are readings, however fine they are.
+    """
+    steps = np.diff(np.unique(readings))
+    if steps.size and np.mean(np.diff(readings) == 0.0) > STANDING:
+        return float(steps.min())
+    return float(np.gcd.reduce(np.rint(1e6 * steps).astype(np.int64))) * 1e-6

@@ -16,6 +16,7 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cli import main
+from spinepipe.testing_machine.recording import _resolution
 
 DEG_PER_NM = 0.6
 PEAK = 7.5
@@ -94,7 +95,11 @@ def exchanged(rows: list[dict[str, str]]) -> list[dict[str, str]]:
     [
         ({"motion": changed(MOTION, unit="rad")}, "motion.0.unit: found 'rad'", "suspected: deg"),
         ({"loads": changed(LOADS, unit="N mm")}, "loads.0.unit: found 'N mm'", "suspected: N m;"),
-        ({"loads": changed(LOADS, unit="N cm")}, "motion.0.unit", "or the unit of its load"),
+        (
+            {"loads": changed(LOADS, unit="N cm")},
+            "loads.0.unit",
+            "suspected: N m; correct loads.0.unit",
+        ),
         (
             {"motion": [{**MOTION[0], "positive": "flexion"}, MOTION[1]]},
             "motion.0.positive: found 'flexion'",
@@ -195,7 +200,9 @@ def test_a_folder_is_judged_as_it_would_be(
     before = {one.name: one.read_bytes() for one in folder.iterdir()}
     path.write_text(path.read_text().replace("specimen: s02", "specimen: '002'"))
     assert run(tmp_path, path, "--replace") == 1
-    assert "002" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    for name in ("specimens.csv", "joints.csv"):
+        assert f"rig/{name}, specimen: found no row of '002'" in told
     assert {one.name: one.read_bytes() for one in folder.iterdir()} == before
     assert [one.name for one in folder.parent.iterdir()] == ["rig"]
     for name in ("specimens.csv", "joints.csv"):
@@ -251,3 +258,140 @@ def test_show_of_what_is_not_read_has_matches_cameras_and_workbooks(
     assert "s01_a.csv, as it stands:\n    1  Zeit,Kraft\n" in told
     for line in ("       sheet Sheet", "    1  Marker → 1.5", "       sheet Notes"):
         assert f"{line}\n" in told
+
+
+def test_of_two_specimens_with_keys_of_their_own_the_wrong_ones_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = rig(tmp_path)
+    document = yaml.safe_load(path.read_text())
+    wrong = [{**MOTION[0], "positive": "flexion"}, MOTION[1]]
+    for one in document["files"]:
+        one["motion"] = wrong if one["specimen"] == "s02" else MOTION
+    path.write_text(yaml.dump({**document, "motion": []}, Dumper=_Plain, sort_keys=False))
+    assert run(tmp_path, path) == 1
+    told = capsys.readouterr().err
+    assert "files.2.motion.0.positive: found 'flexion'" in told
+    assert "the sign of files.2.motion.0.positive, or of loads.0.positive" in told
+    assert "files.0" not in told
+
+
+@sweep("wrong", [(0,), (1,), (0, 1)])
+def test_units_of_joints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: tuple[int, ...]
+) -> None:
+    """Radians told as degrees, of one joint or of both: each key is named."""
+    joints = [{**MOTION[0], "column": n, "joint": j} for n, j in (("a", "L4L5"), ("b", "L5S1"))]
+    path = rig(tmp_path, motion=joints, vertebrae=["S1", "L5", "L4"])
+    document = yaml.safe_load(path.read_text())
+    document |= {"files": document["files"][::2], "loads": LOADS[:1]}
+    path.write_text(yaml.dump(document, Dumper=_Plain, sort_keys=False))
+    for file in tmp_path.glob("s*flexion.csv"):
+        table = np.loadtxt(file, delimiter=",", skiprows=1)
+        table[:, 3] = table[:, 2] * 0.9
+        table[:, [2 + n for n in wrong]] *= np.pi / 180.0
+        np.savetxt(file, table, "%.6f", ",", header="torque_a,torque_b,a,b", comments="")
+    assert run(tmp_path, path) == 1
+    told = capsys.readouterr().err
+    named = ", ".join(f"motion.{n}.unit" for n in wrong)
+    assert f"suspected: rad; correct {named}" in told
+    assert len(wrong) > 1 or "loads.0" not in told
+
+
+@sweep(
+    "old, new, told",
+    [
+        ("loads:\n- ", "loads:\n  ", "loads: found {'column'"),
+        (
+            "vertebrae:\n- L5\n- L4\n",
+            "vertebrae: L5\n",
+            "allowed: a list; begin each item with `- `",
+        ),
+        (
+            "title: made up",
+            "title: made up\ntime: Time",
+            "time: found 'Time'; allowed: keys; write",
+        ),
+        ("cohort: rig", "cohort: Rig", "allowed: a name of a-z, 0-9, _"),
+        (
+            "specimen: s02",
+            "specimen: 2024-01-31",
+            "found 2024-01-31; allowed: a valid string; put it in q",
+        ),
+        ("column: torque_a", "column: [1]", "loads.0.column: found [1]"),
+        (
+            "- L4\n",
+            "- 4L\n",
+            "vertebrae.1: found '4L'; allowed: a name of A-Z, a-z, 0-9 that begins",
+        ),
+    ],
+)
+def test_settings_of_the_wrong_form_are_told_in_words_of_a_yaml(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
+) -> None:
+    path = rig(tmp_path, loads=LOADS[:1] * 2)
+    document = path.read_text().replace(
+        "- column: torque_a\n  unit: N m\n  positive: extension\n", "", 1
+    )
+    assert old in document
+    path.write_text(document.replace(old, new))
+    assert run(tmp_path, path) == 1
+    said = capsys.readouterr().err
+    assert told in said
+    for word in ("tuple", "Tuple", "instance", "pattern", "constrained", "datetime"):
+        assert word not in said
+    assert "at least 2 of them" not in said
+
+
+def test_what_somebody_said_of_a_cohort_stays(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``made_up`` is no finding of files; rows that a study needs are asked for, not refused."""
+    path = rig(tmp_path)
+    assert run(tmp_path, path) == 0
+    folder = tmp_path / "config" / "cohorts" / "rig"
+    header = folder / "cohort.yaml"
+    header.write_text(header.read_text() + "made_up: true\n")
+    rows = "specimen,marker,vertebra,x_mm,y_mm,z_mm,weight,cluster\ns01,m,L4,-60,0,0,,\n"
+    (folder / "marker_set.csv").write_text(rows)
+    capsys.readouterr()
+    assert run(tmp_path, path, "--replace") == 0
+    said = capsys.readouterr().out
+    assert cohorts.read(folder).made_up
+    assert "made_up: true of cohort.yaml" in said
+    assert "0 markers of 's02' on S1" in said
+    assert "which studies that read this file ask for" in said
+
+
+def test_columns_may_name_the_other_side_in_passing_and_constant_ones_are_deleted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = rig(tmp_path, names={"a": "Flexion (unloaded)", "b": "Disp at load cell"})
+    path.write_text(
+        path.read_text().replace("column: a\n", "column: Flexion (unloaded)\n")
+        .replace("column: b\n", "column: Disp at load cell\n")
+    )  # fmt: skip
+    assert run(tmp_path, path) == 0
+    for file in tmp_path.glob("s*.csv"):
+        lines = file.read_text().splitlines()
+        cut = [",".join([*line.split(",")[:3], "0"]) for line in lines[1:]]
+        file.write_text("\n".join([lines[0], *cut]) + "\n")
+    assert run(tmp_path, path, "--replace") == 1
+    assert "delete motion.1, where" in capsys.readouterr().err
+
+
+def test_keys_of_the_cohort_are_told_where_they_are_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = rig(tmp_path, title="long " * 80)
+    assert run(tmp_path, path) == 1
+    assert "rig.yaml, line 2, title: found" in capsys.readouterr().err
+    path = rig(tmp_path, vertebrae=["L4", "L5"], motion=changed(MOTION, joint="L5L4"))
+    assert run(tmp_path, path) == 1
+    assert "rig.yaml, line 4, vertebrae: found 'L4' before 'L5'" in capsys.readouterr().err
+
+
+def test_rows_far_apart_do_not_make_a_file_coarse() -> None:
+    far = np.array([0.0, 0.6512, 1.3007, 1.9533, 2.6041])
+    assert _resolution(far) == pytest.approx(1e-4)
+    assert _resolution(np.repeat(far.round(1), 5)) == pytest.approx(0.6)

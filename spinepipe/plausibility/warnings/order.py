@@ -76,7 +76,16 @@ def order(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> OrderFindings:
         first = dict(zip(("specimen", "test"), places[0], strict=True))
         cell = TableCell(key.stem, first_row(cohort, key.stem, **first), key.column)
         words = {"tests": tests_of(places), **key.names}
-        warnings.append(warn(cohort, key.warning, cell, whose=dict(places), **words))
+        warnings.append(
+            warn(
+                cohort,
+                key.warning,
+                cell,
+                whose=dict(places),
+                of_tests=[test for _, test in places],
+                **words,
+            )
+        )
     return OrderFindings(
         tuple(warnings), frozenset(place for places in told.values() for place in places)
     )

@@ -205,7 +205,10 @@ def _absurd(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
         if len(beyond):
             more = f" and {len(beyond) - 1} more so large" if len(beyond) > 1 else ""
             place, value = TableCell("motion", beyond[0], column), motion.loc[beyond[0], column]
-            yield warn(cohort, "reading_absurd", place, value=value, more=more, limit=limit)
+            own = [motion.loc[beyond[0], "joint"]]
+            yield warn(
+                cohort, "reading_absurd", place, of_joints=own, value=value, more=more, limit=limit
+            )
 
 
 def _step_0(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
@@ -252,6 +255,7 @@ def _slips(cohort: Cohort, stem: str, table: pd.DataFrame, columns: Sequence[str
                     group="loads" if stem == "loads" else "motion",
                     whose=[specimen],
                     test=test,
+                    of_joints=[table.loc[row, "joint"]] if "joint" in table else (),
                     value=value,
                     next=next_one,
                     mended=value / 10.0,

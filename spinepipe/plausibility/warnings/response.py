@@ -144,18 +144,27 @@ def _responses(cohort: Cohort, cycles: Sequence[LoadedCycle]) -> Iterator[_Respo
 
 def _sizes(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWarning]:
     """Motion that is too large or too small for its load, grouped by what may be behind it."""
-    found: dict[tuple[str, MistakeHypothesis | None], list[tuple[str, str, float]]] = defaultdict(
-        list
+    found: dict[tuple[str, MistakeHypothesis | None, str], list[tuple[str, str, float, float]]] = (
+        defaultdict(list)
     )
     for specimen in cohort.specimen_names:
         own = [one for one in told if one.answer.specimen == specimen]
-        for (_, test, coordinate), ratio, unit in _of_specimen(own):
-            found[coordinate, unit].append((specimen, test, ratio))
-    for (coordinate, unit), places in found.items():
+        seen = set()
+        for place, ratio, size, unit in _of_specimen(own):
+            found[place[2], unit, ""].append((*place[:2], ratio, size))
+            seen.add(place)
+        for one in own:
+            unit = None if one.place in seen else _of_one_joint(one)
+            place = (*one.place[:2], abs(one.ratio), abs(one.ratio))
+            if unit is not None and place not in found[one.place[2], unit, one.joint]:
+                found[one.place[2], unit, one.joint].append(place)
+    for (coordinate, unit, joint), places in found.items():
         of_loads = unit is not None and unit.table == "loads"
         stem, names = ("loads", LOAD_COLUMNS) if of_loads else ("motion", MOTION_COLUMNS)
         column = names[coordinate]
-        row = first_row(cohort, stem, filled=column, specimen=places[0][0], test=places[0][1])
+        where = dict(zip(("specimen", "test"), places[0], strict=False))
+        where |= {"joint": joint} if joint and stem == "motion" else {}
+        row = first_row(cohort, stem, filled=column, **where)
         yield warn(
             cohort,
             "motion_over_expected",
@@ -164,14 +173,17 @@ def _sizes(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
             factor=unit and (1.0 / unit.factor if of_loads else unit.factor),
             whose=[name for name, *_ in places],
             tests=tests_of(places),
-            motion=MOTION_COLUMNS[coordinate],
-            ratio=geometric_mean([ratio for *_, ratio in places]),
+            of_tests=[test for _, test, *_ in places],
+            of_joints=[joint] if joint else (),
+            over_expected=geometric_mean([size for *_, size in places]),
+            motion=MOTION_COLUMNS[coordinate] + (f" of {joint}" if joint else ""),
+            ratio=geometric_mean([ratio for *_, ratio, _ in places]),
         )
 
 
 def _of_specimen(
     told: Sequence[_Response],
-) -> Iterator[tuple[tuple[str, str, str], float, MistakeHypothesis | None]]:
+) -> Iterator[tuple[tuple[str, str, str], float, float, MistakeHypothesis | None]]:
     """Tests and coordinates of a specimen whose joints move too far or too little in the median.
 
     A unit of loads or angles is mostly of all tests: where it explains all of them better, those
@@ -189,9 +201,16 @@ def _of_specimen(
         for place, ones in of_place.items():
             beyond = typical([one.beyond for one in ones])
             if shared is not None:
-                yield place, together, shared
+                yield place, together, together, shared
             elif not is_plausible(beyond):
-                yield place, beyond, unit_like(sizes[place], place[2])
+                yield place, beyond, sizes[place], unit_like(sizes[place], place[2])
+
+
+def _of_one_joint(one: _Response) -> MistakeHypothesis | None:
+    """The unit that a joint has wrong beside joints that move as they should, if so large a one."""
+    unit = None if is_plausible(one.beyond) else unit_like(abs(one.ratio), one.place[2])
+    far = unit is not None and unit.table == "motion" and abs(log(unit.factor)) > log(50.0)
+    return unit if far else None
 
 
 def _shared(together: float, sizes: Sequence[float]) -> MistakeHypothesis | None:
@@ -225,6 +244,7 @@ def _signs(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
             test=test,
             column=column,
             joints=", ".join(named),
+            of_joints=named,
             load=f"{LOAD_COLUMNS[coordinate]} in {file_of(cohort, 'loads')}",
         )
 

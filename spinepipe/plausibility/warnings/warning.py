@@ -27,6 +27,8 @@ class PlausibilityWarning:
     group : what can be meant though it looks wrong: ``acknowledged_warnings`` in cohort.yaml.
     certain : it cannot be right; no run starts with it unless the cohort says that it is meant.
     name : its row in `warnings.csv`. factor : of all numbers of its column that would mend it.
+    specimens, tests, joints : that it is about; none: all that have the column.
+    over_expected : motion over that of its load, where a unit of either may be behind it.
     """
 
     problem: InputProblem
@@ -34,6 +36,10 @@ class PlausibilityWarning:
     certain: bool = False
     name: str = ""
     factor: float | None = None
+    specimens: tuple[str, ...] = ()
+    tests: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    over_expected: float | None = None
 
     @property
     def with_switch(self) -> InputProblem:
@@ -84,6 +90,9 @@ def warn(
     group: Group | None = None,
     factor: float | None = None,
     whose: Iterable[object] = (),
+    of_tests: Iterable[str] = (),
+    of_joints: Iterable[str] = (),
+    over_expected: float | None = None,
     **values: object,
 ) -> PlausibilityWarning:
     """The warning of a row of `warnings.csv`, about a place in the tables of a cohort.
@@ -92,10 +101,14 @@ def warn(
     ----------
     remedy, certain, group : in place of those of the row. factor : of the numbers of the column
         that would mend it, if a unit is behind it. whose : specimens, ``{whose}`` in texts.
+    of_tests, of_joints : that it is about, where ``{test}`` and ``{joint}`` do not tell them.
     values : what the texts have in braces besides; ``{range}`` is that of the same name.
     """
     text = _texts()[name]
-    values["whose"] = of_specimens(dict.fromkeys(map(str, whose)), cohort.specimen_names)
+    specimens = tuple(dict.fromkeys(map(str, whose)))
+    tests = tuple(of_tests) or ((str(values["test"]),) if "test" in values else ())
+    joints = tuple(of_joints) or ((str(values["joint"]),) if "joint" in values else ())
+    values["whose"] = of_specimens(specimens, cohort.specimen_names)
     if has_range(name):
         values.setdefault("range", usual(name))
     problem = InputProblem(
@@ -107,7 +120,8 @@ def warn(
         text["remedy"].format(**values) if remedy is None else remedy,
     )
     sure = text["certain"] == "yes" if certain is None else certain
-    return PlausibilityWarning(problem, group or text["group"], sure, name, factor)
+    about = (specimens, tests, joints, over_expected)
+    return PlausibilityWarning(problem, group or text["group"], sure, name, factor, *about)
 
 
 def file_of(cohort: Cohort, stem: str) -> str:
