@@ -155,9 +155,9 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
         if mapping.time.unit == "clock":
             time = past_midnight(time)
         elif SERIAL_DAYS[0] < time[0] < SERIAL_DAYS[1] and np.ptp(time) < SHORT_DAYS:
-            place = (of.file, int(lines[0]), str(mapping.time.column))
-            found = f"{time[0]:.10g}, and all within {np.ptp(time):.2g}: days since 1900"
-            problems.append(InputProblem(*place, found, "seconds, ms or min", AS_TIME))
+            words = f"{time[0]:.10g}, and all within {np.ptp(time):.2g}: days since 1900"
+            told = (words, "seconds, ms or min", AS_TIME)
+            problems.append(InputProblem(of.file, int(lines[0]), str(mapping.time.column), *told))
         time = (time - time[0]) * SECONDS[mapping.time.unit]
         problems = [*_backwards(time, lines, of.file, str(mapping.time.column)), *problems]
     if problems:
