@@ -278,7 +278,7 @@ def test_of_two_signs_of_the_scale_the_file_s_size_tells_the_right_one(
 def test_a_count_that_is_off_by_one_is_told(tmp_path: Path) -> None:
     found = read_motion(written(tmp_path, Made(numbers={"FRAMES": 4.0})))
     assert len(found.time_s) == 3
-    assert "the file has room for 3 frames" in found.repaired[0]
+    assert "the file's size fits 3" in found.repaired[0]
 
 
 def test_padding_of_the_last_block_is_no_frame(tmp_path: Path) -> None:
