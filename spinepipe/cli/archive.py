@@ -27,6 +27,7 @@ from spinepipe.schema.datapackage import FILE
 from spinepipe.studies import read as studies
 from spinepipe.studies.base_model import made_by
 from spinepipe.studies.study import STUDIES, Study
+from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import read_metadata
 
 _CODE = Path(__file__).resolve().parents[2]
@@ -91,6 +92,10 @@ def run(options: argparse.Namespace) -> int:
         of_tables = [root / path for path in results if path.endswith(".parquet")]
         tables = {path.stem: read_metadata(path) for path in of_tables}
         told = descriptor_of(study, expected.cohort, root / files.folder)
+        # written beside the page, of what the tables say
+        beside = f"{files.folder}/{CONCLUSIONS.name}.parquet"
+        if (root / beside).is_file():
+            packed[beside] = (root / beside).read_bytes()
         elsewhere = set(_packages(study))
         for path in _inputs(expected):
             shown = os.path.normpath(str(path).removeprefix(f"{root}/"))

@@ -16,6 +16,7 @@ from spinepipe.studies.exports import Exported, problem
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.registry import PACKAGE, every_kind, files_of, kind_of
 from spinepipe.studies.study import Study
+from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import read_frame
 
 
@@ -106,6 +107,7 @@ def _write_tables(study: Study, cohort: Cohort, options: argparse.Namespace) -> 
     """Write the tables that are there, and what their columns are."""
     files, folder = files_of(study, cohort), options.tables
     paths = [options.root / path for path in files.table_files(files.tables)]
+    paths.append((options.root / files.page()).with_name(f"{CONCLUSIONS.name}.parquet"))
     found = [path for path in paths if path.is_file()]
     if not found:
         allowed, remedy = "a computed study", f"run `snakemake -j2 {files.page()}` first"
@@ -114,6 +116,7 @@ def _write_tables(study: Study, cohort: Cohort, options: argparse.Namespace) -> 
         with appearing(folder / f"{path.stem}.csv") as temporary:
             read_frame(path).to_csv(temporary, index=False)
     with appearing(folder / FILE) as temporary:
-        temporary.write_text(descriptor_of(study, cohort, folder, ".csv"), encoding="utf-8")
+        told = descriptor_of(study, cohort, folder, ".csv", (CONCLUSIONS,))
+        temporary.write_text(told, encoding="utf-8")
     print(f"{folder}: {count(len(found), 'table')}, explained in {FILE}")
     return 0

@@ -3,10 +3,11 @@
 import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from spinepipe import cohort as cohorts
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.files import appearing
+from spinepipe.imports.file_patterns import with_files
 from spinepipe.imports.imported import write
 from spinepipe.imports.judge import judge, write_judged
 from spinepipe.imports.registry import read, read_settings
@@ -16,8 +17,9 @@ from spinepipe.report.specimen_page import specimen_page
 from spinepipe.report.words import listed
 from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS
+from spinepipe.testing_machine.raw_table import MOST_BYTES, first_lines
 
-RAW_LINES, RAW_WIDTH = 8, 100
+RAW_FILES, RAW_LINES, RAW_WIDTH = 10, 8, 100
 """What is shown of a file that is not understood."""
 
 
@@ -69,8 +71,7 @@ def _show(path: Path, root: Path) -> int:
         imported = read(path)
     except InputError as error:
         print(error)
-        files = settings.data.get("files")
-        _print_raw(files if isinstance(files, list) else (), path.parent)
+        _print_raw(settings, path.parent)
         return 1
     for file, rows in imported.first_rows.items():
         cells = [[f"{c:.6g}" if isinstance(c, float) else str(c) for c in row] for row in rows]
@@ -102,15 +103,18 @@ def _show(path: Path, root: Path) -> int:
     return 0
 
 
-def _print_raw(files: Any, folder: Path) -> None:
-    """The first lines of files that nothing could read, tabs as arrows; ``files`` of settings."""
-    named = (one.get("file") for one in files if isinstance(one, dict))
-    for name in dict.fromkeys(str(name) for name in named):
-        if not (folder / name).is_file():
-            continue
+def _print_raw(settings: YamlDocument, folder: Path) -> None:
+    """The first lines of files that nothing could read, tabs as arrows."""
+    items = with_files(folder, settings, ("specimen", "test"))[0].data.get("files")
+    names: list[str] = []
+    for one in items if isinstance(items, list) else ():
+        if isinstance(one, dict):
+            stem = Path(str(one.get("file"))).stem
+            names += [str(one.get("file")), str(one.get("motion_file")).replace("{stem}", stem)]
+    for name in [one for one in dict.fromkeys(names) if (folder / one).is_file()][:RAW_FILES]:
         print(f"\n{name}, as it stands:")
         with (folder / name).open("rb") as file:
             start = file.read(RAW_LINES * 1000)
-        lines = ["no text"] if b"\0" in start else start.decode("utf-8", "replace").splitlines()
-        for number, line in enumerate(lines[:RAW_LINES], start=1):
-            print(f"{number:5}  {line.replace(chr(9), ' → ')[:RAW_WIDTH]}")
+            start += file.read(MOST_BYTES) if start.startswith(b"PK") else b""
+        for number, line in first_lines(start, RAW_LINES):
+            print(f"{number or '':5}  {line.replace(chr(9), ' → ')[:RAW_WIDTH]}")

@@ -95,6 +95,12 @@ class Accuracy(BaseModel):
         return np.array([told.get(own, told.get(kind, np.nan)) for own, kind in named])
 
 
+def sd_of_reading(sd: MeasurementSd | None, accuracy: Accuracy | None) -> "Array":
+    """(6,) mm and deg: of each coordinate the larger, NaN where neither tells it."""
+    most = np.full(6, np.nan) if accuracy is None else accuracy.each()
+    return most if sd is None else np.fmax([sd.translation_mm] * 3 + [sd.rotation_deg] * 3, most)
+
+
 class CohortHeader(BaseModel):
     """The keys of ``cohort.yaml``."""
 
@@ -209,15 +215,13 @@ class Cohort:
 
         None where neither tells all coordinates. A study may state another ``measurement_sd``.
         """
-        sd, most = stated or self.measurement_sd, self.accuracy_sd
-        if sd is not None:
-            most = np.fmax([sd.translation_mm] * 3 + [sd.rotation_deg] * 3, most)
+        most = sd_of_reading(stated or self.measurement_sd, self.accuracy)
         return most if np.isfinite(most).all() else None
 
     @property
     def accuracy_sd(self) -> Array:
         """(6,) mm and deg, NaN where it is not told."""
-        return np.full(6, np.nan) if self.accuracy is None else self.accuracy.each()
+        return sd_of_reading(None, self.accuracy)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from spinepipe.cohort.checks import (
     check_supports,
     usable_vertebrae,
 )
-from spinepipe.cohort.cohort import Cohort, CohortHeader
+from spinepipe.cohort.cohort import Cohort, CohortHeader, sd_of_reading
 from spinepipe.cohort.columns import COHORT_YAML, TABLES
 from spinepipe.cohort.draft import Draft, number_of_applied_loads
 from spinepipe.cohort.zeroing import check_zeroing, common_zeroing
@@ -249,7 +249,8 @@ def _cohort(
 ) -> Cohort:
     final = {stem: _final(table) for stem, table in tables.items() if stem in TABLES}
     numbered = _numbered(final.get("motion"))
-    motion, zeroed = common_zeroing(numbered, header.zeroed_at_step_0, header.measurement_sd)
+    sd = sd_of_reading(header.measurement_sd, header.accuracy)
+    motion, zeroed = common_zeroing(numbered, header.zeroed_at_step_0, sd)
     return Cohort(
         name=header.cohort,
         title=header.title,

@@ -100,6 +100,8 @@ def _tried(points: Points) -> Iterator[tuple[str, str, Callable[[Points], Points
     """Words, column and what undoes each mistake."""
     for words, column, undone in column_mistakes(XYZ):
         yield words, column, _of_each(undone)
+    scanner = "x_mm and z_mm of the other sign, as where axes LPS are called RAS"
+    yield scanner, XYZ[0], _of_each(_moved([0, 1, 2], np.array([-1.0, 1.0, -1.0])))
     yield "landmarks of left and right exchanged", "landmark", _renamed("left", "right")
     faces = "landmarks of superior and inferior endplates exchanged"
     yield faces, "landmark", _renamed("superior", "inferior")

@@ -13,9 +13,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.cohort.draft import Draft
 from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.effects.contract import Array
 from spinepipe.problems import InputProblem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS
 
@@ -65,14 +65,14 @@ def _without_start(motion: pd.DataFrame, named: Sequence[str]) -> Iterator[tuple
 
 
 def common_zeroing(
-    motion: pd.DataFrame | None, zeroed: bool | Sequence[str], sd: MeasurementSd | None = None
+    motion: pd.DataFrame | None, zeroed: bool | Sequence[str], sd: Array | None = None
 ) -> tuple[pd.DataFrame | None, bool]:
     """Motion whose tests are all zeroed or none, and which; what a mean left is subtracted.
 
     Parameters
     ----------
     motion : rows of the format, cycles numbered. zeroed : all tests or none, or the names of some.
-    sd : of one reading; without it nothing is taken for what a mean left.
+    sd : (6,) of one reading, NaN: not told; then nothing is taken for what a mean left.
     """
     if motion is None or zeroed is False:
         return motion, False
@@ -83,9 +83,6 @@ def common_zeroing(
     at_start = values.where(motion["step"] == 0)
     start = at_start.groupby([motion[name] for name in _PLACE]).transform("first")
     # of a zeroed test only what a mean leaves: more than that is for the plausibility checks
-    sds = [
-        0.0 if sd is None else sd.rotation_deg if name.endswith("_deg") else sd.translation_mm
-        for name in COORDINATE_COLUMNS
-    ]
-    left = start.where(start.abs() <= MOST_LEFT * np.array(sds), 0.0)
+    most = MOST_LEFT * (np.zeros(len(COORDINATE_COLUMNS)) if sd is None else np.nan_to_num(sd))
+    left = start.where(start.abs() <= most, 0.0)
     return motion.assign(**(values - start.where(~named, left))), True

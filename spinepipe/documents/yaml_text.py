@@ -46,6 +46,10 @@ class YamlDocument:
             key = key.rpartition(".")[0]
         return self.lines.get(key)
 
+    def place_of(self, key: str) -> tuple[str, int | None, str]:
+        """File, line and key, as problems tell them."""
+        return self.file, self.line_of(key), key
+
 
 def read_yaml(path: Path, file: str) -> tuple[YamlDocument | None, list[InputProblem]]:
     """Read a YAML file of keys and values, None when it is none.

@@ -14,13 +14,14 @@ from typing import Annotated
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints
 
 from spinepipe.cohort.cohort import FORM, VertebraName
 from spinepipe.cohort.columns import COHORT_YAML, TABLES
 from spinepipe.documents.form import TableForm, read_forms
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.frames import Pose, zxy_angles
+from spinepipe.motion.reading import axes_of
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
@@ -40,7 +41,16 @@ def all_forms() -> Mapping[str, TableForm]:
 LineText = Annotated[str, StringConstraints(min_length=1)]
 
 
-class ImportSettings(BaseModel):
+def _axes(text: str) -> str:
+    axes_of(text)
+    return text
+
+
+AxesText = Annotated[str, AfterValidator(_axes)]
+"""What forwards, up and right are on the axes of files, as in `x z -y`."""
+
+
+class CohortTitle(BaseModel):
     """What every settings file of an import says of the cohort that is made."""
 
     model_config = FORM
@@ -48,6 +58,11 @@ class ImportSettings(BaseModel):
     cohort: str = Field(pattern=r"^[a-z0-9_]+$", description="name of the folder that is made")
     title: LineText = Field(description="one line that says what the cohort is")
     source: LineText = Field(description="who measured what, when, how; licence")
+
+
+class ImportSettings(CohortTitle):
+    """The same, and the vertebrae, where no file tells them."""
+
     vertebrae: tuple[VertebraName, ...] = Field(
         strict=False,
         min_length=2,

@@ -103,14 +103,16 @@ def _once(problems: Iterable[InputProblem]) -> Iterator[InputProblem]:
 def _against_names(imported: ImportedCohort) -> Iterator[InputProblem]:
     """Loads whose column speaks of motion, and the reverse: exchanged they may look right."""
     document = imported.settings
-    for (stem, _), keys in imported.made_by.items() if document is not None else ():
+    if document is None:
+        return
+    for (stem, _), keys in imported.made_by.items():
         for key in (f"{key}.column" for key in keys if stem in SPEAKS_OF):
-            name = _value(document.data, key)  # type: ignore[union-attr]
+            name = _value(document.data, key)
             said = {of for of, words in SPEAKS_OF.items() if words.search(str(name).lower())}
             if said and stem not in said:
                 remedy = "exchange the columns of loads and motion, or name it by its number if it "
-                place = (document.file, document.line_of(key), key)  # type: ignore[union-attr]
                 found, allowed = f"{name!r} in {stem}", f"a column of {stem}"
+                place = document.place_of(key)
                 yield InputProblem(*place, found, allowed, f"{remedy}is the right one")
 
 
@@ -157,8 +159,7 @@ def _at_settings(
     stands = _value(data, keys[0])
     found = problem.found if warning else f"{problem.column} {problem.found}"
     found = found if isinstance(stands, dict | list) else f"{stands!r}, and {found}"
-    place = (document.file, document.line_of(keys[0]), keys[0])
-    return InputProblem(*place, found, problem.allowed, remedy)
+    return InputProblem(*document.place_of(keys[0]), found, problem.allowed, remedy)
 
 
 def _key(data: Any, key: str, part: str) -> str:

@@ -110,15 +110,16 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     settings, faults = validate(LandmarkSettings, expanded)
     if settings is None or problems:
         raise InputError([*problems, *faults])
-    found, unread = dict[str, Landmarks](), dict[str, list[str]]()
+    found, unread, broken = dict[str, Landmarks](), dict[str, list[str]](), set[str]()
     for number, of in zip(numbers, settings.files, strict=True):
         if not of.file or not of.specimen:
-            place = (document.file, document.line_of(f"files.{number}"), f"files.{number}")
+            place = document.place_of(f"files.{number}")
             remedy = "name `file` and `specimen`, or a `glob` with {specimen}"
             problems.append(InputProblem(*place, "a file of nobody", "files and whose", remedy))
             continue
         points, faults = read_points(folder / of.file, of.file)
         problems += faults
+        broken |= {of.specimen} if faults else set()
         landmarks = found.setdefault(of.specimen, {})
         for point in points:
             key = _meant(point.label, of.vertebra, settings)
@@ -131,13 +132,13 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
                 problems.append(InputProblem(*where, told, "each point once", remedy))
             else:
                 landmarks[key] = point
-    place = (document.file, document.line_of("files"), "files")
-    for specimen, landmarks in found.items():
-        problems += _lacking(place, settings, specimen, landmarks, unread.get(specimen, []))
+    place = document.place_of("files")
+    for specimen in [one for one in found if one not in broken]:
+        problems += _lacking(place, settings, specimen, found[specimen], unread.get(specimen, []))
     surfaces = list[tuple[str, ...]]()
-    if (of := settings.surfaces) is not None:
-        place = (document.file, document.line_of("surfaces.file"), "surfaces.file")
-        surfaces, faults = _surfaces(folder, place, of, found, settings.vertebrae)
+    if (named := settings.surfaces) is not None:
+        place = document.place_of("surfaces.file")
+        surfaces, faults = _surfaces(folder, place, named, found, settings.vertebrae)
         problems += faults
     if problems:
         raise InputError(problems)
@@ -165,7 +166,7 @@ def read_points(path: Path, file: str) -> tuple[list[PickedPoint], list[InputPro
     text, problems = read_text(path, file, MOST_CSV_BYTES)
     points = list[PickedPoint]()
     try:
-        raw = () if problems else (_of_fcsv if path.suffix == ".fcsv" else _of_json)(text)
+        raw = () if problems else (_of_fcsv if path.suffix.lower() == ".fcsv" else _of_json)(text)
         for line, label, axes, unit, place, status in raw:
             if axes not in AXES or unit not in MM_PER:
                 allowed = f"axes LPS or RAS, in {', '.join(MM_PER)}"

@@ -4,6 +4,7 @@ Files of markers are copied as they are. Tables beside them are put on their clo
 """
 
 from collections.abc import Iterator, Mapping
+from itertools import product
 from math import nan
 from pathlib import Path
 from typing import Literal
@@ -17,6 +18,7 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
 from spinepipe.imports.imported import (
     CARRIED,
+    AxesText,
     ImportedCohort,
     ImportSettings,
     all_forms,
@@ -35,9 +37,6 @@ from spinepipe.motion.skeleton import BODIES
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
 from spinepipe.studies.subjects import STANDARD_GRAVITY
-
-NEEDED = ("joints.csv or landmarks.csv", "marker_set.csv")
-"""What a study of tracked motions asks for besides what an import makes."""
 
 MADE = ("cohort.yaml", "specimens.csv", "subjects.csv", "trials.csv", "datapackage.json")
 
@@ -81,7 +80,7 @@ class MotionCaptureSettings(ImportSettings):
     vertebrae: tuple[VertebraName, ...] = Field(
         default=BODIES, strict=False, description="names from caudal to cranial"
     )
-    axes: str = Field(
+    axes: AxesText = Field(
         description="what forwards, up and right are on the axes of all files, as in `x z -y`"
     )
     persons: tuple[Person, ...] = Field(strict=False, description="who was recorded")
@@ -108,19 +107,12 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     settings, problems = validate(MotionCaptureSettings, document)
     if settings is None:
         raise InputError(problems)
-
-    def place(key: str) -> Place:
-        return document.file, document.line_of(key), key
-
+    place = document.place_of
     for number, of in enumerate(settings.tables):
         problems += misnamed_columns(place(f"tables.{number}.columns"), of)
-    try:
-        turn = axes_of(settings.axes)
-    except ValueError as error:
-        allowed = "forwards, up and right on the axes of the files, as in 'x z -y'"
-        problems.append(InputProblem(*place("axes"), str(error), allowed, "correct it"))
     if problems:
         raise InputError(problems)
+    turn = axes_of(settings.axes)
     rows: dict[str, list[tuple[str, ...]]] = {of.table: [] for of in settings.tables}
     sentences, without = list[str](), {of.file: list[str]() for of in settings.tables}
     for index, trial in enumerate(settings.trials):
@@ -150,7 +142,9 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
                 rows[of.table] += _rows(of, trial, part, values)
             times = next(iter(parts.values()))["time_s"]
             shift = place(f"trials.{index}.shift_s")
-            problems += _other_clock(shift, file, times, (begin, end), trial)
+            columns = place(f"tables.{number}.columns")
+            unit = list(_other_unit(columns, file, times, end - begin, of))
+            problems += unit or _other_clock(shift, file, times, (begin, end), trial)
             if of.table == "force_plates" and trial.kind == "stance":
                 problems += _other_weight(place(f"tables.{number}"), file, parts, trial, settings)
     for number, of in enumerate(settings.tables):
@@ -179,10 +173,6 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         copied[Path(one).name] = folder / one
     if problems:
         raise InputError(problems)
-    if lacking := [one for one in NEEDED if not set(one.split(" or ")) & set(copied)]:
-        sentences.append(f"A study of tracked motions needs {listed(lacking)} besides.")
-    if rows:
-        sentences.append(f"No study reads {listed(list(rows))} yet: they come along.")
     people = [
         (p.specimen, p.sex, *map(rounded, (p.age_years, 100.0 * p.height_m, p.mass_kg)))
         for p in settings.persons
@@ -214,6 +204,17 @@ def _rows(
         yield tuple((fixed | cells).get(name, "") for name in CARRIED[of.table].names)
 
 
+def _other_unit(
+    place: Place, file: str, times: Array, markers_s: float, of: RecordedTable
+) -> Iterator[InputProblem]:
+    """A table that in the other unit of time is about as long as its markers."""
+    unit, per = ("s", 1e3) if "time_ms" in of.columns else ("ms", 1e-3)
+    took = float(np.ptp(times))
+    if 0.5 * markers_s < per * took < 2.0 * markers_s:
+        found, allowed = f"{took:g} s in {file}", f"about the {markers_s:g} s of its markers"
+        yield InputProblem(*place, found, allowed, f"is its time in {unit}? correct the column")
+
+
 def _other_clock(
     place: Place, file: str, times: Array, of_markers: tuple[float, float], trial: Trial
 ) -> Iterator[InputProblem]:
@@ -232,11 +233,11 @@ def _other_weight(
 ) -> Iterator[InputProblem]:
     """Plates that bear who stands on them once a sign, a unit or an axis is another."""
     kg = next((p.mass_kg for p in settings.persons if p.specimen == trial.specimen), nan)
-    shares = {
-        axis: sum(float(np.mean(one.get(f"f{axis}_n", nan))) for one in parts.values())
-        / (kg * STANDARD_GRAVITY)
-        for axis in "xyz"
-    }
+    shares = dict.fromkeys("xyz", 0.0)
+    for axis, one in product("xyz", parts.values()):
+        force = one.get(f"f{axis}_n", np.zeros(0))
+        read = force[np.isfinite(force)]
+        shares[axis] += float(read.sum()) / max(len(read), 1) / (kg * STANDARD_GRAVITY)
     for axis, factor, remedy in (
         ("y", -1.0, "do they act on the other side? correct `acts_on`"),
         ("y", 1e3, "are they in kN? correct `columns`"),

@@ -72,13 +72,22 @@ class RecordedTable(BaseModel):
 
 
 def misnamed_columns(place: Place, of: RecordedTable) -> Iterator[InputProblem]:
-    """Names of columns that such a table has not, and loads that are not told on what they act."""
+    """Names of columns that such a table has not or has twice; loads not told on what they act."""
+    meant = list[tuple[str, str]]()
     allowed = [name for name, (ours, _) in QUANTITIES.items() if ours in CARRIED[of.table].names]
     for text in [one for one in of.columns if one != "-"]:
         part, _, name = text.rpartition(".")
         if name not in allowed or bool(part) > (of.table == "force_plates"):
             remedy = did_you_mean(name, allowed, "write `-` where a column is not read")
             yield InputProblem(*place, f"'{text}'", one_of(allowed), remedy)
+            continue
+        ours = QUANTITIES[name][0]
+        if any(
+            ours == other and ("" in (part, of_part) or part == of_part) for of_part, other in meant
+        ):
+            remedy = "correct it, or write `-` where a column is not read"
+            yield InputProblem(*place, f"'{text}', which is told twice", "each column once", remedy)
+        meant.append((part, ours))
     if not {"time_s", "time_ms"} & set(of.columns) and not of.is_c3d:
         yield InputProblem(*place, "no column of time", "time_s or time_ms", "name it")
     if of.table in SIDES and of.acts_on not in SIDES[of.table]:
@@ -96,7 +105,8 @@ def read_recorded_table(path: Path, file: str, of: RecordedTable, turn: Array) -
     Raises
     ------
     InputError
-        Of a row of another width, of a cell that is no number, and where there is nothing.
+        Of a row of another width, of a cell that is no number, of times that are empty or run
+        backwards, and where there is nothing.
     """
     parts = _plates(path, file) if of.is_c3d else _columns(path, file, of)
     if not parts or not all(len(values["time_s"]) for values in parts.values()):
@@ -128,6 +138,8 @@ def _columns(path: Path, file: str, of: RecordedTable) -> Parts:
             if text != "-" and whose in ("", part):
                 ours, per = QUANTITIES[name]
                 values[ours] = per * column
+                if ours == "time_s":
+                    block.check_times(values[ours], text, may_stand=True)
     return parts
 
 

@@ -57,6 +57,6 @@ def _kind(document: YamlDocument) -> str:
     kind = document.data.get("kind", TESTING_MACHINE)
     if not isinstance(kind, str) or kind not in KINDS:
         remedy = did_you_mean(str(kind), KINDS, "correct it")
-        place = (document.file, document.line_of("kind"), "kind")
+        place = document.place_of("kind")
         raise InputError([InputProblem(*place, f"{kind!r}", one_of(KINDS), remedy)])
     return kind

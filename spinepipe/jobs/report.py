@@ -5,6 +5,7 @@ says nothing that the tables and their code do not, so no digest holds it and no
 """
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +21,7 @@ from spinepipe.report.forms.chart import Drawing
 from spinepipe.report.page.comparison import AGAINST, comparison, paper_of
 from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import listed
+from spinepipe.schema import Table
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import PACKAGE, files_of, kind_of
 from spinepipe.studies.study import Study
@@ -104,13 +106,19 @@ def _write_page(
         write(told, folder / f"{CONCLUSIONS.name}.parquet", metadata)
 
 
-def descriptor_of(study: Study, cohort: Cohort, folder: Path, ending: str = ".parquet") -> str:
+def descriptor_of(
+    study: Study,
+    cohort: Cohort,
+    folder: Path,
+    ending: str = ".parquet",
+    also: Sequence[Table] = (),
+) -> str:
     """What the tables are that a study has in a folder by now, as a Data Package."""
     has = files_of(study, cohort).tables
     shapes = [
         (shape, f"{shape.name}{ending}")
-        for shape in kind_of(study.kind).tables
-        if shape.name in has and (folder / f"{shape.name}{ending}").is_file()
+        for shape in (*(one for one in kind_of(study.kind).tables if one.name in has), *also)
+        if (folder / f"{shape.name}{ending}").is_file()
     ]
     title = f"Results of the study {study.study} ({study.kind}) of the cohort {cohort.name}"
     return descriptor(study.study, title, shapes)

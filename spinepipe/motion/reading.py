@@ -14,7 +14,12 @@ from spinepipe.effects.contract import Array
 from spinepipe.motion.reading_c3d import read_c3d
 from spinepipe.motion.reading_text import read_csv
 from spinepipe.motion.reading_trc import read_trc
-from spinepipe.motion.recording import MarkerRecording, check_file, numbered, without_subjects
+from spinepipe.motion.recording import (
+    MOST_RECORDING_BYTES,
+    MarkerRecording,
+    numbered,
+    without_subjects,
+)
 from spinepipe.problems import InputError, InputProblem
 
 DEFAULT_AXES = "x y z"
@@ -91,10 +96,13 @@ def read_motion(
     turn = axes_of(axes)
     name = file or path.name
     reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        found, allowed = f"a file '{path.suffix}'", f"a file of motion: {', '.join(READERS)}"
+    if reader is None or not path.is_file():
+        found = "no such file" if reader else f"a file '{path.suffix}'"
+        allowed = f"a file of motion: {', '.join(READERS)}"
         raise InputError([InputProblem(name, None, None, found, allowed, "correct the name")])
-    check_file(path, name)
+    if (size := path.stat().st_size) > MOST_RECORDING_BYTES:
+        found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_RECORDING_BYTES / 1e6:g} MB"
+        raise InputError([InputProblem(name, None, None, found, allowed, "crop it")])
     raw = reader(path, name)
     # frames from start to end, of which either may be open
     start, end = (nan if time_s is None else time_s for time_s in (start_s, end_s))

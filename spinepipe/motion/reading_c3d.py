@@ -44,10 +44,12 @@ SLOWEST, FASTEST = 1.0, 100_000.0
 """Frames a second that are taken for possible."""
 
 COUNT_ENDS = 65_535
-"""Largest number of 16 bits. Longer recordings have it as number of frames, which tells nothing."""
+"""Largest number of 16 bits. Longer recordings have it as number of frames, which tells nothing, or
+begin to count again at nought."""
 
 BELIEVED_SCALE = "header and POINT:SCALE differ in sign; the file's size fits {}"
 BELIEVED_ANALOG = "header and ANALOG:USED differ; the file's size fits {} numbers a frame"
+BELIEVED_FRAMES = "{} frames are told; the file's size fits {}, which were read"
 
 AGAIN = "export the motion again"
 
@@ -121,13 +123,8 @@ class C3dFile:
         used = self.numbers("ANALOG", "USED")
         if used and (told := int(used[0]) * max(self.samples, 1)) != self.header_analog:
             analog.append(told)
-        every, left = list(product(scales, analog)), len(self.data) - self.start
-        fits = [
-            one
-            for one in every
-            if any(0 <= left - n * self.bytes_of_frame(*one) < BLOCK for n in self.frames_told)
-        ]
-        return every if len(every) == 1 else fits
+        every = list(product(scales, analog))
+        return every if len(every) == 1 else [one for one in every if self.fitting(*one)]
 
     @property
     def scale(self) -> float:
@@ -143,49 +140,63 @@ class C3dFile:
         """Bytes of a frame: four numbers a marker, and the analog channels."""
         return (4 if scale < 0.0 else 2) * (4 * self.points + analog)
 
+    def trial_end(self, end: str) -> int:
+        """Number of the first or last frame (``START`` or ``END``) by TRIAL; 0: it tells none."""
+        # two 16-bit words, the lower first: enough for any recording
+        words = self.numbers("TRIAL", f"ACTUAL_{end}_FIELD")[:2]
+        return int(sum(word * (COUNT_ENDS + 1.0) ** k for k, word in enumerate(words)))
+
+    @property
+    def begin(self) -> int:
+        """Number of the first frame, by TRIAL where the header's is a full counter or its rest."""
+        told, rest = self.trial_end("START"), max(self.first, 1)
+        goes_on = rest == COUNT_ENDS or (told - rest) % (COUNT_ENDS + 1) == 0
+        return told if told > rest and goes_on else rest
+
     @cached_property
     def frames_told(self) -> set[int]:
-        """How many frames the file tells: by TRIAL alone, else by header and POINT.
-
-        One number where they agree, two where they do not, none where neither tells it: a count of
-        `COUNT_ENDS` is a full counter and tells nothing.
-        """
-        # TRIAL has two 16-bit words for each end, the lower first: enough for any recording
-        start, end = (self.numbers("TRIAL", f"ACTUAL_{end}_FIELD")[:2] for end in ("START", "END"))
-        if end and sum(end) > 0.0:
-            of_start, of_end = (
-                sum(word * 65_536.0**k for k, word in enumerate(words))
-                for words in (start or [float(max(self.first, 1))], end)
-            )
-            return {int(of_end - of_start + 1)}
-        told = list[float]()
+        """How many frames TRIAL, header and POINT tell; full counters tell nothing."""
+        told = [0.0]
+        if self.trial_end("END"):
+            told.append(self.trial_end("END") - (self.trial_end("START") or self.begin) + 1)
         if self.last < COUNT_ENDS:
-            told.append(self.last - self.first + 1)
+            told.append((self.last - self.first + 1) % (COUNT_ENDS + 1))
         if (frames := self.number("FRAMES")) is not None and np.isfinite(frames):
             told.append(frames)
-        return {int(one) for one in told if 0 < one < COUNT_ENDS or one > COUNT_ENDS}
+        return {int(one) for one in told if one > 0 and one != COUNT_ENDS}
 
-    @cached_property
-    def room(self) -> int:
+    def room(self, scale: float, analog: int) -> int:
         """Frames for which there are bytes; 0 where they would begin within the parameters."""
-        size, left = self.bytes_of_frame(self.scale, self.analog), len(self.data) - self.start
-        return left // size if size and self.start >= self.behind else 0
+        size = self.bytes_of_frame(scale, analog)
+        return (len(self.data) - self.start) // size if size and self.start >= self.behind else 0
+
+    def fitting(self, scale: float, analog: int) -> set[int]:
+        """Numbers of frames that are told and fill the file up to less than a block.
+
+        What is told may have lost a multiple of 65,536.
+        """
+        room, size = self.room(scale, analog), self.bytes_of_frame(scale, analog)
+        left = len(self.data) - self.start
+        pairs = [(room - (room - told) % (COUNT_ENDS + 1), told) for told in self.frames_told]
+        return {one for one, told in pairs if one >= told and left - one * size < BLOCK}
 
     @cached_property
     def frames(self) -> int:
-        """Number of frames, as told; where nothing tells it, as many as there is room for.
+        """Number of frames, as told and as the file's size agrees with; else as there is room for.
 
-        The last block of a file is filled up with noughts, which are no frames. Files that tell
-        two numbers are refused.
+        The last block of a file is filled up with noughts, which are no frames. 0: what is told
+        differs, and its size fits none or several.
         """
-        if told := self.frames_told:
-            return next(iter(told))
-        if not self.room:
+        fitting, room = self.fitting(*self.layouts[0]), self.room(*self.layouts[0])
+        if len(fitting) == 1 or (not fitting and len(self.frames_told) == 1):
+            return next(iter(fitting or self.frames_told))
+        if not room:
             return 0
         last_block = self.data[max(self.start, len(self.data) - BLOCK + 1) :]
         noughts = len(last_block) - len(last_block.rstrip(b"\0"))
         filled = len(self.data) - self.start - noughts
-        return min(self.room, -(-filled // self.bytes_of_frame(self.scale, self.analog)))
+        whole = min(room, -(-filled // self.bytes_of_frame(*self.layouts[0])))
+        return whole if whole in fitting or not self.frames_told else 0
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -195,6 +206,9 @@ class C3dFile:
             found.append(BELIEVED_SCALE.format("reals" if self.scale < 0.0 else "whole numbers"))
         if self.analog != self.header_analog:
             found.append(BELIEVED_ANALOG.format(self.analog))
+        if self.frames_told - {self.frames}:
+            told = " and ".join(map(str, sorted(self.frames_told)))
+            found.append(BELIEVED_FRAMES.format(told, self.frames))
         return tuple(found)
 
     def cells(self) -> NDArray[np.float32] | NDArray[np.int16]:
@@ -207,7 +221,7 @@ class C3dFile:
     def time_s(self, samples: int = 1) -> NDArray[np.float64]:
         """(F samples,) s, 0 at frame 1 of the recording; so many samples a frame."""
         number = np.arange(self.frames * samples) / samples
-        found: NDArray[np.float64] = (max(self.first - 1, 0) + number) / self.rate
+        found: NDArray[np.float64] = (self.begin - 1 + number) / self.rate
         return found
 
 
@@ -281,16 +295,18 @@ def _contradictions(whole: C3dFile, markers: bool) -> Iterator[tuple[str, str, s
         found = f"{whole.points} markers in the header{told}"
         yield "POINT:USED", found, "at least one, the same twice"
         return
-    frames = whole.frames_told
-    if len(frames) > 1:
+    frames, room = whole.frames_told, whole.room(*whole.layouts[0])
+    if len(frames) > 1 and not whole.frames:
         found = f"{' frames and '.join(map(str, sorted(frames)))} frames"
-        yield "POINT:FRAMES", found, "the same in header and parameters"
-    elif whole.first > whole.last:
+        yield "POINT:FRAMES", found, "the same in header and parameters, or what fills the file"
+    elif whole.first > whole.last and (whole.last - whole.first + 1 - whole.frames) % (
+        COUNT_ENDS + 1
+    ):
         found = f"frames from {whole.first} to {whole.last}"
         yield "POINT:FRAMES", found, "a first frame before the last"
-    elif not whole.frames or whole.frames > whole.room:
+    elif not whole.frames or whole.frames > room:
         told = f" of {next(iter(frames))}" if frames else ""
-        found = f"room for {whole.room}{told} frames"
+        found = f"room for {room}{told} frames"
         yield "POINT:FRAMES", found, "all that are told; the file may be cut off"
 
 
@@ -315,7 +331,7 @@ def parse_c3d(data: bytes) -> C3dFile:
     # the header, by bytes: four 16-bit words from 2, the scale at 12, first block of frames at 16,
     # samples a frame at 18, the rate at 20
     words = numbers_at(data, WORD, 2, 9, processor).tolist()
-    points, analog, first, last, block, samples = (*words[:4], *words[7:])
+    (points, analog, first, last), (block, samples) = words[:4], words[7:]
     scale, _, rate = numbers_at(data, REAL, 12, 3, processor).tolist()
     # parameters end where frames begin, if that is behind them, or else with the file
     frames = (block - 1) * BLOCK

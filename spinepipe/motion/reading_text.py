@@ -122,8 +122,8 @@ class NumberBlock:
         """Line of a row, counted from 0."""
         return next(line for k, (line, _) in enumerate(self.rows()) if k == row)
 
-    def check_times(self, times: Array, name: str, may_stand: bool = False) -> None:
-        """Refuse times (F,) s of a column that do not grow; two that are equal may be allowed.
+    def check_times(self, times: Array, name: str) -> None:
+        """Refuse times (F,) s of a column that do not grow.
 
         Raises
         ------
@@ -132,8 +132,7 @@ class NumberBlock:
         """
         for k in np.flatnonzero(np.isnan(times))[:1].tolist():
             raise fault(self.file, self.line(k), name, "nothing", "a time", "fill it in")
-        steps = np.diff(times)
-        for k in np.flatnonzero(steps < 0.0 if may_stand else steps <= 0.0)[:1].tolist():
+        for k in np.flatnonzero(np.diff(times) <= 0.0)[:1].tolist():
             found, remedy = f"{times[k + 1]:g} s after {times[k]:g} s", "correct the time"
             raise fault(self.file, self.line(k + 1), name, found, "times that grow", remedy)
 

@@ -4,6 +4,7 @@ Cells stand between tabs, as the makers write it, or between commas, semicolons 
 people edit files with does. Three empty cells, or three noughts: a marker was not seen.
 """
 
+from collections import deque
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
@@ -30,6 +31,8 @@ RATE_DIFFERS = 0.01
 HEADER = ("DataRate", "NumFrames", "NumMarkers", "Units")
 
 SPARE_CELLS = "points without a name behind the markers are left out"
+NO_LINE_END = "the last line has no end; its last number may be cut off"
+DATA_RATE = "times are from DataRate, the column has {}"
 
 
 def read_trc(path: Path, file: str) -> MarkerRecording:
@@ -49,20 +52,25 @@ def read_trc(path: Path, file: str) -> MarkerRecording:
         found, allowed = "no header of a .trc", "PathFileType and four more lines, then frames"
         raise fault(file, 1, None, found, allowed, "export the motion again")
     told = _header(file, lines)
-    names = _names(file, lines, body, int(float(told["NumMarkers"])))
+    names = _names(file, lines[NAMES_LINE - 1], body, int(float(told["NumMarkers"])))
     columns = ["Frame#", "Time", *(name for name in names for _ in "xyz")]
     block = NumberBlock(
         file, body, AXES_LINE + 1, len(columns), columns.__getitem__, True, 3, "frame"
     )
     numbers, spare = block.numbers()
     repaired = [SPARE_CELLS] if spare else []
-    if len(numbers) != (wanted := int(float(told["NumFrames"]))) or not len(numbers):
-        if not len(numbers) or not _is_whole(block):
-            found = f"{len(numbers)} frames" + (", the last of them not whole" * bool(len(numbers)))
-            allowed = f"{wanted}, as NumFrames says, and more than none"
-            remedy = "export the motion again, or correct NumFrames"
-            raise fault(file, VALUES_LINE, "NumFrames", found, allowed, remedy)
+    wanted = int(float(told["NumFrames"]))
+    counted = len(numbers) == wanted
+    whole = bool(len(numbers)) and _is_whole(block, counted)
+    if whole is False:
+        found = f"{len(numbers)} frames" + (", the last of them not whole" * bool(len(numbers)))
+        allowed = f"{wanted} whole frames, as NumFrames says, and more than none"
+        remedy = "export the motion again, or correct NumFrames"
+        raise fault(file, VALUES_LINE, "NumFrames", found, allowed, remedy)
+    if not counted:
         repaired.append(f"NumFrames says {wanted} frames, {len(numbers)} are there and were read")
+    if whole is None:
+        repaired.append(NO_LINE_END)
     time_s, from_rate = _times(block, numbers[:, 1].copy(), float(told["DataRate"]))
     places = numbers[:, 2:].reshape(len(numbers), len(names), 3)
     places *= unit_of(file, VALUES_LINE, "Units", told["Units"])
@@ -87,50 +95,69 @@ def _header(file: str, lines: Sequence[str]) -> dict[str, str]:
     return told
 
 
-def _names(file: str, lines: Sequence[str], body: str, number: int) -> tuple[str, ...]:
-    """As many names as NumMarkers says, whatever parts them; empty: a marker without a name."""
-    line = lines[NAMES_LINE - 1]
-    by_sign = [name for name in cells_of(line)[2:] if name]
-    by_blanks = line.replace(separator_of(line) or " ", " ").split()[2:]
-    for names in (by_sign, by_blanks):
-        if len(names) == number:
-            return tuple(names)
-    # in the order of the columns, where rows have places for as many
-    row = next((row for row in body.split("\n", 2)[:2] if row.strip()), "")
-    cells = [cell.strip() for cell in line.split(separator_of(line) or None)]
-    wide = row.rstrip("\r\n").count(separator_of(row) or "\n") + 1
-    if len(by_sign) < number and wide >= 2 + 3 * number:
-        placed = cells[2::3][:number]
-        at_places = len([name for name in placed if name]) == len(by_sign)
-        names = placed if at_places else by_sign
+def _names(file: str, line: str, body: str, number: int) -> tuple[str, ...]:
+    """Names in the order of the columns, whatever parts them; empty: a marker without a name.
+
+    NumMarkers counts those that have a name, or all.
+    """
+    sign = separator_of(line)
+    cells = [cell.strip() for cell in line.split(sign or None)]
+    named = [name for name in cells[2:] if name]
+    rows = body.split("\n")
+    between = separator_of(next((row for row in rows if row.strip()), ""))
+    widths = (row.count(between) + 1 if between else len(row.split()) for row in rows)
+    points = (max(widths) - 2) // 3
+    if len(named) <= 1:  # blanks between names, a tab before them
+        blanks = line.replace(sign or " ", " ").split()[2:]
+        named = blanks if len(blanks) == number <= points else named
+    # a name stands above the first of its three columns, where all do and rows are wide enough
+    placed = cells[2::3]
+    while placed and not placed[-1]:
+        placed.pop()
+    at_places = [name for name in placed if name] == named and len(placed) <= points
+    names = placed if at_places else named
+    if len(named) == number or len(names) <= number <= points:
         return (*names, *[""] * (number - len(names)))
-    found, allowed = f"{len(by_sign)} names", f"{number}, as NumMarkers says"
+    found, allowed = f"{len(named)} names", f"{number}, as NumMarkers says"
     remedy = "correct NumMarkers, or the line of names"
     raise fault(file, NAMES_LINE, None, found, allowed, remedy)
 
 
-def _is_whole(block: NumberBlock) -> bool:
-    """Whether the last row has as many cells as the one before it, and its last cell all digits.
+def _is_whole(block: NumberBlock, counted: bool) -> bool | None:
+    """Whether the file does not break off within its last row; None: nothing tells it.
 
-    A NumFrames that was left behind by an editor does no harm; a file that breaks off does. The
-    last cell is whole with a line end behind it, or as many decimals as the others of the row.
+    A row is whole with a line end behind it, or as many decimals in its last cell as in all others
+    of two rows. One that NumFrames does not count has as many cells as the row before it, too.
     """
-    rows = block.text.rstrip("\n").rsplit("\n", 2)[-2:]
+    rows = [row for _, row in deque(block.rows(), 2)]
     sign = block.separator
-    counts = {row.count(sign) if sign else len(row.split()) for row in rows}
-    decimals = [len(cell.partition(".")[2]) for cell in rows[-1].split(sign or None)]
-    last = block.text.endswith("\n") or decimals[-1] == max(decimals[2:])
-    return last and len(counts) == 1
+    ended = not block.text.endswith(rows[-1])
+    if counted and ended:
+        return True
+    if len({len(row.split(sign or None)) for row in rows}) > 1:
+        return False
+    *others, last = (cell for row in rows for cell in row.split(sign or None)[2:])
+    if ended or not last.strip():
+        return ended or not "".join(others[-2:]).strip()
+    decimals = {len(cell.partition(".")[2]) for cell in others if cell.strip()}
+    if 0 < len(last.partition(".")[2]) == max(decimals, default=0):
+        return True
+    return None if decimals == {0} or (counted and len(decimals) > 1) else False
 
 
 def _times(block: NumberBlock, column: Array, rate: float) -> tuple[Array, tuple[str, ...]]:
     """Times (F,) s, and what was repaired."""
     if not np.any(np.isfinite(column) & (column != 0.0)) and len(column) > 1:
-        return np.arange(len(column)) / rate, ("times are from DataRate, the column has none",)
+        return np.arange(len(column)) / rate, (DATA_RATE.format("none"),)
+    rounding = 10.0 ** -_decimals(block)
+    by_rate = column[0] + np.arange(len(column)) / rate
+    # rounded so that neighbours may be equal: two decimals at 120 Hz
+    if rounding * rate > 1.0 and np.abs(column - by_rate).max() < 1.001 * rounding:
+        return by_rate, (DATA_RATE.format("too few decimals"),)
     block.check_times(column, "Time")
     # half of the last digit is lost at either end: files have times of three decimals at 60 Hz
     lasts, wanted = float(column[-1] - column[0]), (len(column) - 1) / rate
-    if abs(lasts - wanted) > RATE_DIFFERS * wanted + 10.0 ** -_decimals(block):
+    if abs(lasts - wanted) > RATE_DIFFERS * wanted + rounding:
         step = lasts / (len(column) - 1)
         found = f"{rate:g} frames a second, and times {step:g} s apart"
         remedy = "correct DataRate or the column Time"

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,22 +48,6 @@ class MarkerRecording:
     def __post_init__(self) -> None:
         for array in (self.time_s, self.places, self.seen):
             array.flags.writeable = False
-
-
-def check_file(path: Path, file: str) -> None:
-    """Refuse a recording that is not there, or larger than any is read.
-
-    Raises
-    ------
-    InputError
-        Which of the two.
-    """
-    if not path.is_file():
-        allowed, remedy = "a file of motion", "correct the name"
-        raise InputError([InputProblem(file, None, None, "no such file", allowed, remedy)])
-    if (size := path.stat().st_size) > MOST_RECORDING_BYTES:
-        found, allowed = f"{size / 1e6:.0f} MB", f"at most {MOST_RECORDING_BYTES / 1e6:g} MB"
-        raise InputError([InputProblem(file, None, None, found, allowed, "crop it")])
 
 
 def recording_from(

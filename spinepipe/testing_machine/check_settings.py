@@ -9,7 +9,14 @@ from spinepipe.cohort.cohort import joint_names
 from spinepipe.documents.names import ALLOWED, ALLOWED_FOLDER, folder_fault, name_fault
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem, did_you_mean, one_of
-from spinepipe.testing_machine.channels import ANGLES, DIRECTIONS, FORCES, MOMENTS, mistyped
+from spinepipe.testing_machine.channels import (
+    ANGLES,
+    DIRECTIONS,
+    FORCES,
+    LOAD_COLUMNS,
+    MOMENTS,
+    mistyped,
+)
 from spinepipe.testing_machine.settings import (
     OF_A_FILE,
     LoadChannel,
@@ -57,6 +64,7 @@ def _of_file(
             document, keys["load_point_mm"], "nothing", allowed, "add `load_point_mm: [x, y, z]`"
         )
     yield from _channels(document, mapping, keys)
+    yield from _instruments(document, mapping)
     form = mapping.form
     if form.first_line is not None and form.first_line <= form.names_line:
         allowed = f"a line below the names, which are in line {form.names_line}"
@@ -67,8 +75,29 @@ def _of_file(
         yield _at(document, key, f"'{form.thousands}'", allowed, "correct one of them")
 
 
+def _instruments(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
+    """Columns without which rotations and loads of a file cannot be converted."""
+    rotations = Counter(
+        one.joint for one in mapping.motion if mapping.rotations and DIRECTIONS[one.positive].turns
+    )
+    for joint, there in rotations.items():
+        if there < 3:
+            found = f"{there} of the three rotations of {joint}"
+            allowed = "all three: fewer are no rotation that could be told in another order"
+            remedy = "add them, or delete `rotations` if they are angles of z, x', y''"
+            yield _at(document, "rotations", found, allowed, remedy)
+    cell, loads = mapping.load_cell, {DIRECTIONS[one.positive].load for one in mapping.loads}
+    if cell is not None and cell.point_mm is not None and len(loads) < len(LOAD_COLUMNS):
+        found = f"no column for {', '.join(sorted(set(LOAD_COLUMNS) - loads))}"
+        allowed = "three forces and three moments, as moved moments depend on all"
+        yield _at(document, "load_cell.point_mm", found, allowed, "add them, or delete the key")
+    if cell is not None and cell.tare_s is not None and mapping.time is None:
+        remedy = "add `time:`, or delete the key"
+        yield _at(document, "load_cell.tare_s", "no time", "`time`", remedy)
+
+
 def _at(document: YamlDocument, key: str, found: str, allowed: str, remedy: str) -> InputProblem:
-    return InputProblem(document.file, document.line_of(key), key, found, allowed, remedy)
+    return InputProblem(*document.place_of(key), found, allowed, remedy)
 
 
 def _names(document: YamlDocument, mapping: MachineMapping) -> Iterator[InputProblem]:
@@ -121,8 +150,10 @@ def _motion_files(document: YamlDocument, mapping: MachineMapping) -> Iterator[I
             found = f"{', '.join(marks.axes)}: an axis twice, or a left-handed frame"
             allowed = "a right-handed frame, such as anterior, superior, right"
             yield _at(document, "motion_files.markers.axes", found, allowed, "correct it")
-        if mapping.motion:
-            yield _at(document, "motion", "columns and markers", "one of them", "delete one")
+        for key in ("motion", "rotations"):
+            if getattr(mapping, key):
+                allowed = "one of them: rotations are those of the markers"
+                yield _at(document, key, "columns and markers", allowed, "delete it or the markers")
 
 
 def _channels(

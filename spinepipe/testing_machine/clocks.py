@@ -71,14 +71,17 @@ def read_test(folder: Path, of: TestFile, mapping: MachineMapping) -> Recording:
         try:
             found.append(read_recording(folder / one.file, one, mapping.model_copy(update=columns)))
         except InputError as error:
-            problems += error.problems
+            # what is told of the form is told of the one that this file has
+            told = "`motion_files.form" if one is other else "`form"
+            problems += [
+                replace(each, remedy=each.remedy.replace("`form", told)) for each in error.problems
+            ]
     if problems:
         raise InputError(problems)
     loads, motion = found
     time, seen = loads.time, motion.time
     if beside.rate_hz is not None:
-        first = beside.form.first_line or beside.form.names_line + 1
-        seen = (motion.lines - first) / beside.rate_hz
+        seen = motion.rows / beside.rate_hz
     assert time is not None
     assert seen is not None
     jumps = [one.motion.pop((SYNC, SHIFTS[0]), None) for one in (loads, motion)]
@@ -164,6 +167,7 @@ def _together(
     return replace(
         loads,
         lines=fast.lines[known],
+        rows=fast.rows[known],
         time=on[known] - on[known][0],
         loads={name: put(loads, values) for name, values in loads.loads.items()},
         motion={place: put(motion, values) for place, values in motion.motion.items()},

@@ -37,34 +37,12 @@ they leave in its best tenth of rows, but at least and at most so many mm (RMS).
 
 
 def converted(one: Recording, mapping: MachineMapping) -> Recording:
-    """The recording in the cohort's terms.
-
-    Raises
-    ------
-    InputError
-        Where it lacks what the settings ask for.
-    """
-    rotations, cell = mapping.rotations, mapping.load_cell
-    lacks = [
-        *(_lacking_rotations(one) if rotations is not None else ()),
-        *(_lacking_loads(one, cell) if cell is not None else ()),
-    ]
-    if lacks:
-        raise InputError([InputProblem(one.file, None, *lack) for lack in lacks])
-    if rotations is not None:
-        one = _in_our_order(one, rotations, mapping.zeroed)
-    return one if cell is None else _applied(one, cell, mapping.of_file(one.of).load_point_mm)
-
-
-def _lacking_rotations(one: Recording) -> Iterator[tuple[str, str, str, str]]:
-    """Key, what was found, what is allowed, remedy."""
-    for joint in dict.fromkeys(joint for joint, _ in one.motion):
-        there = sum((joint, name) in one.motion for name in TURNS)
-        if there in (1, 2):
-            found = f"{there} of the three rotations of {joint}"
-            allowed = "all three: fewer are no rotation that could be told in another order"
-            remedy = "add them, or delete `rotations` if they are angles of z, x', y''"
-            yield "rotations", found, allowed, remedy
+    """The recording in the cohort's terms."""
+    if mapping.rotations is not None:
+        one = _in_our_order(one, mapping.rotations, mapping.zeroed)
+    if mapping.load_cell is not None:
+        one = _applied(one, mapping.load_cell, mapping.of_file(one.of).load_point_mm)
+    return one
 
 
 def _in_our_order(one: Recording, rotations: Rotations, zeroed: bool) -> Recording:
@@ -140,16 +118,6 @@ def joint_rotations(one: Recording, markers: Markers, vertebrae: tuple[str, ...]
         angles = np.degrees(zxy_angles(below.swapaxes(1, 2) @ turned[upper]))
         motion |= {(upper + lower, name): angles[:, n] for n, name in enumerate(TURNS)}
     return replace(one, motion=motion, finest=dict.fromkeys(motion, 0.0))
-
-
-def _lacking_loads(one: Recording, cell: LoadCell) -> Iterator[tuple[str, str, str, str]]:
-    """Key, what was found, what is allowed, remedy."""
-    missing = ", ".join(name for name in LOAD_COLUMNS if name not in one.loads)
-    if missing and cell.point_mm is not None:
-        allowed = "three forces and three moments, as moved moments depend on all"
-        yield "load_cell", f"no column for {missing}", allowed, "add them, or delete `point_mm`"
-    if cell.tare_s is not None and one.time is None:
-        yield "load_cell.tare_s", "no time", "`time`", "add `time:`, or delete the key"
 
 
 def _applied(one: Recording, cell: LoadCell, point: tuple[float, ...] | None) -> Recording:

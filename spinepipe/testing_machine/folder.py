@@ -131,7 +131,7 @@ def _not_the_same(group: Sequence[Recording]) -> Iterator[InputProblem]:
 def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     """As `read`, with the tables of the cohort folder."""
     tests = read(folder, document)
-    tables = {
+    tables: dict[str, Rows] = {
         "specimens": [(name,) for name in _specimens(tests)],
         "joints": _joints(tests),
         "loads": _loads(tests),

@@ -304,8 +304,8 @@ def _resample(
             line = int(one.lines[branch.first])
             found = f"{branch.last - branch.first + 1} lines on the way to or from a reversal"
             remedy = "record more often, or raise `steps.smallest_reversal`"
-            place = (one.file, line, one.driving)
-            raise InputError([InputProblem(*place, found, "at least 3", remedy)])
+            where = (one.file, line, one.driving)
+            raise InputError([InputProblem(*where, found, "at least 3", remedy)])
         readings.append(reading)
     values = np.array([reading.values for reading in readings])
     n = len(one.motion)

@@ -17,7 +17,11 @@ _CLOCK = re.compile(
     r"([0-9]{1,3}):([0-9]{2}):([0-9]{2}(?:[.,][0-9]*)?)Z?"
 )
 _UNIT = re.compile(r"[+-]?[0-9][0-9.,eE+-]*\s*[A-Za-zµμ°%][^0-9]*[0-9]?")
+LOST = re.compile(r"[-+]?(nan(\(ind\))?|#?n/?a|#nv|null|-*)", re.IGNORECASE)
+"""Cells for a reading that there is not."""
+
 CLOCK = "clock times such as 12:34:56.7 or 2024-01-31 12:34:56.7, in `time: {unit: clock}`"
+AS_TIME = "in the spreadsheet format the cells as time, and set `time: {unit: clock}`"
 DAY = 86_400.0
 
 
@@ -109,7 +113,8 @@ def remedy(cell: str, now: Notation, able: Sequence[Notation], time_unit: str) -
     """
     if time_unit == "clock":
         is_number = any(one.pattern.fullmatch(cell) for one in NOTATIONS)
-        return "set its `unit` to s, ms or min" if is_number else f"let the machine write {CLOCK}"
+        to_unit = f"set its `unit` to s, ms or min; where they are days since 1900, {AS_TIME}"
+        return to_unit if is_number else f"let the machine write {CLOCK}"
     if now.pattern.fullmatch(cell):
         return "correct it: no measured number is that large"
     if time_unit and not np.isnan(clock_seconds(cell)):
@@ -126,7 +131,7 @@ def remedy(cell: str, now: Notation, able: Sequence[Notation], time_unit: str) -
             "numbers of this file are written in several ways, so that no `form` reads all of "
             "them: let the machine write it again with one decimal sign, or correct the cells"
         )
-    if time_unit and re.search("[0-9][:/.-][0-9]", cell):
+    if time_unit and re.search("[0-9]:[0-9]|[0-9][/.-][0-9]+[/.-][0-9]", cell):
         return f"let the machine write seconds, or {CLOCK}"
     if _UNIT.fullmatch(cell):
         return "take units out of the cells, each has one number; `unit:` tells the unit"

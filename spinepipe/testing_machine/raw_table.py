@@ -53,7 +53,7 @@ class RawTable:
     ----------
     form : the form of the YAML; tabs between cells of a workbook.
     names : of the columns, empty without. first : line of the first numbers.
-    text : the file, in UTF-8.
+    text : the file, in UTF-8. workbook : whether cells stand in columns, whatever is beside them.
     """
 
     form: FileForm
@@ -61,16 +61,42 @@ class RawTable:
     first: int
     width: int
     text: bytes
+    workbook: bool = False
 
-    def rows(self) -> Iterator[tuple[int, list[str]]]:
-        """Line and cells of every row of numbers that has any."""
-        every = text_rows(self.form, self.text)
-        return (one for one in every if one[0] >= self.first and any(map(str.strip, one[1])))
+    def rows(self) -> Iterator[tuple[int, int, list[str]]]:
+        """Line, number from 0, and cells of every row of numbers that has any.
+
+        A row of empty cells has a number, as a frame in which a camera saw nothing; a blank line
+        has none.
+        """
+        number = -1
+        for line, cells in text_rows(self.form, self.text):
+            if line >= self.first and (len(cells) > 1 or any(map(str.strip, cells))):
+                number += 1
+                if any(map(str.strip, cells)):
+                    yield line, number, cells
+
+    def misfit(self) -> tuple[int, list[str]] | None:
+        """Line and cells of the first row with more cells than names, or fewer between blanks."""
+        if self.workbook or not self.names:
+            return None
+        mark = None if self.form.delimiter == "space" else MARKS[self.form.delimiter].encode()
+        ends, most = b" \r\n" + (mark or b""), len(self.names)
+        below = self.text.splitlines()[self.first - 1 :]
+        widths = {len(line.rstrip(ends).split(mark)) for line in below}
+        if max(widths, default=0) <= most and (mark or widths <= {0, most}):
+            return None
+        # marks in quotes are none
+        for line, _, cells in self.rows():
+            there = sum(map(bool, map(str.strip, cells)))
+            if there > most or (mark is None and there != most):
+                return line, cells
+        return None
 
     def columns(
         self, places: Sequence[int], values: Sequence[Callable[[str], float]], plain: bool
-    ) -> tuple[NDArray[np.int64], list[NDArray[np.float64]]]:
-        """(N,) line of each row, and (N,) numbers of each place, NaN where a cell has none.
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], list[NDArray[np.float64]]]:
+        """(N,) line and number of each row, (N,) readings of each place, NaN where it has none.
 
         Parameters
         ----------
@@ -78,14 +104,15 @@ class RawTable:
         plain : whether all are plain numbers, which the bulk reader can try.
         """
         if plain and (bulk := self._bulk(places)) is not None:
-            return np.arange(self.first, self.first + len(bulk)), list(bulk.T)
-        lines, columns = array("q"), [array("d") for _ in places]
+            return np.arange(self.first, self.first + len(bulk)), np.arange(len(bulk)), [*bulk.T]
+        lines, numbers, columns = array("q"), array("q"), [array("d") for _ in places]
         rows = self.rows()
         while chunk := list(islice(rows, AT_ONCE)):
-            lines.extend(line for line, _ in chunk)
+            lines.extend(line for line, _, _ in chunk)
+            numbers.extend(number for _, number, _ in chunk)
             for place, value, column in zip(places, values, columns, strict=True):
-                column.extend(value(cell_at(row, place)) for _, row in chunk)
-        return np.array(lines, dtype=np.int64), [np.array(one) for one in columns]
+                column.extend(value(cell_at(row, place)) for *_, row in chunk)
+        return np.array(lines), np.array(numbers), [np.array(one) for one in columns]
 
     def _bulk(self, places: Sequence[int]) -> NDArray[np.float64] | None:
         """(N, C) by pandas' reader in C; None where it is not all plain, as it tells no places."""
@@ -123,7 +150,7 @@ def text_rows(form: FileForm, text: bytes) -> Iterator[tuple[int, list[str]]]:
     if form.delimiter == "space":
         yield from ((number, line.split()) for number, line in enumerate(lines, start=1))
         return
-    reader = csv.reader(lines, delimiter=MARKS[form.delimiter])
+    reader = csv.reader(lines, delimiter=MARKS[form.delimiter], skipinitialspace=True)
     line = 1
     for row in reader:
         yield line, row
@@ -140,7 +167,8 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable:
     csv.Error
         Where rows are no table.
     """
-    if data.startswith(b"PK"):
+    workbook = data.startswith(b"PK")
+    if workbook:
         try:
             with warnings.catch_warnings(action="ignore"):  # of styles and the like
                 text = _sheet(data, form)
@@ -151,7 +179,7 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable:
         text = _decoded(data, form)
     if not isinstance(text, str):
         raise InputError([InputProblem(file, None, None, *text)])
-    table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode())
+    table = RawTable(form, [], form.first_line or form.names_line + 1, 0, text.encode(), workbook)
     head = islice(text_rows(form, table.text), form.names_line)
     names = next(([c.strip() for c in row] for line, row in head if line == form.names_line), [])
     while names and not names[-1]:
@@ -160,8 +188,35 @@ def open_table(data: bytes, file: str, form: FileForm) -> RawTable:
         allowed = f"names of columns in line {form.names_line}"
         found = "no such line, or an empty one"
         raise InputError([InputProblem(file, None, None, found, allowed, "correct it")])
-    width = max([len(names), *(len(row) for _, row in islice(table.rows(), LOOKED_AT))])
+    width = max([len(names), *(len(row) for *_, row in islice(table.rows(), LOOKED_AT))])
     return replace(table, names=names, width=width)
+
+
+def first_lines(data: bytes, most: int) -> Iterator[tuple[int, str]]:
+    """Number and text of the lines that a file begins with; 0 and the name above those of a sheet.
+
+    Parameters
+    ----------
+    data : the file; of a text its start is enough. most : how many lines, of each sheet.
+    """
+    if data.startswith(b"PK"):
+        try:
+            book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
+            for sheet in book.worksheets:
+                yield 0, f"sheet {sheet.title}"
+                sheet.reset_dimensions()
+                rows = sheet.iter_rows(max_row=most, max_col=MOST_COLUMNS, values_only=True)
+                for number, row in enumerate(rows, start=1):
+                    yield number, "\t".join(_cell_text(one, "point") for one in row).rstrip()
+        except Exception as error:  # as in `open_table`
+            yield 0, f"a workbook that is damaged ({type(error).__name__})"
+        return
+    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if b"\0" in data and not wide:
+        yield 0, "no text"
+        return
+    text = data.decode("utf-16" if wide else "utf-8-sig", "replace")
+    yield from enumerate(text.splitlines()[:most], start=1)
 
 
 def _decoded(data: bytes, form: FileForm) -> str | tuple[str, str, str]:

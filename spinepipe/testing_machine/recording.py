@@ -5,9 +5,12 @@ first of them, with how many more there are: a machine writes thousands of lines
 """
 
 import csv
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
+from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +27,23 @@ from spinepipe.testing_machine.channels import (
 )
 from spinepipe.testing_machine.instruments import SYNC
 from spinepipe.testing_machine.notation import (
+    AS_TIME,
+    LOST,
+    NOTATIONS,
     Notation,
     clock_seconds,
     notations_of,
     past_midnight,
     remedy,
 )
-from spinepipe.testing_machine.raw_table import MOST_BYTES, RawTable, cell_at, open_table
+from spinepipe.testing_machine.raw_table import (
+    LOOKED_AT,
+    MOST_BYTES,
+    RawTable,
+    cell_at,
+    open_table,
+    text_rows,
+)
 from spinepipe.testing_machine.settings import (
     LoadChannel,
     MachineMapping,
@@ -49,6 +62,11 @@ WINDOW = 5
 JUMP = 0.1
 """Share of the range of a column by which a row must jump away to be left out."""
 
+SERIAL_DAYS, SHORT_DAYS = (30_000, 60_000), 0.5
+"""Days since 1900 of 1982 to 2064, and longer than any test."""
+
+BELOW_UNITS = "set `form: {first_line:"
+
 FEWEST_LINES = 10
 """Of a test with a way up and a way down; below that nothing can be told from noise."""
 
@@ -61,6 +79,8 @@ class Recording:
     ----------
     file : its name in messages. of : what the YAML says of it.
     lines : (N,) line of each row, as an editor shows it.
+    rows : (N,) number of each among those of the file, from 0: blank lines are none, those left
+        out are.
     time : (N,) s from the first row, None where no column is mapped.
     loads : (N,) by column of ``loads.csv``. driving : which of them goes up and down.
     motion : (N,) by joint and column of ``motion.csv``.
@@ -71,7 +91,8 @@ class Recording:
 
     file: str
     of: TestFile
-    lines: NDArray[np.int64]
+    lines: Lines
+    rows: Lines
     time: Array | None
     loads: dict[str, Array]
     driving: str
@@ -122,33 +143,41 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
             problems.append(
                 InputProblem(of.file, None, str(channel.column), found, allowed, remedy)
             )
-    lines, numbers, faults = _numbers(table, of.file, there)
-    problems += faults
+    if not there:
+        raise InputError(problems)
+    lines, rows, numbers, faults = _numbers(table, of.file, there)
+    problems += [*_misfits(table, of.file, channels, faults), *faults]
     if len(lines) < FEWEST_LINES:
-        found, allowed = f"{len(lines)} lines of numbers", f"at least {FEWEST_LINES}"
-        remedy = "look whether `form.first_line` is right"
-        raise InputError([InputProblem(of.file, table.first, None, found, allowed, remedy)])
+        raise InputError([*problems, _too_few(of.file, table.first, len(lines))])
     time = None
     if mapping.time is not None and mapping.time.column in numbers:
         time = numbers[mapping.time.column]
         if mapping.time.unit == "clock":
             time = past_midnight(time)
+        elif SERIAL_DAYS[0] < time[0] < SERIAL_DAYS[1] and np.ptp(time) < SHORT_DAYS:
+            place = (of.file, int(lines[0]), str(mapping.time.column))
+            found = f"{time[0]:.10g}, and all within {np.ptp(time):.2g}: days since 1900"
+            problems.append(InputProblem(*place, found, "seconds, ms or min", AS_TIME))
         time = (time - time[0]) * SECONDS[mapping.time.unit]
         problems = [*_backwards(time, lines, of.file, str(mapping.time.column)), *problems]
     if problems:
         raise InputError(problems)
     loads = {
-        DIRECTIONS[one.positive].load: numbers[one.column] * factor_of(one.unit, one.positive)
+        # 0.0: a reading turned round is not -0
+        DIRECTIONS[one.positive].load: numbers[one.column] * factor_of(one.unit, one.positive) + 0.0
         for one in mapping.loads
     }
     motion = {
         (one.joint, DIRECTIONS[one.positive].motion): numbers[one.column]
         * factor_of(one.unit, one.positive)
+        + 0.0
         for one in mapping.motion
     }
     every = [*loads.values(), *motion.values()]
     whole = np.all([np.isfinite(one) for one in every], axis=0)
     empty = int(np.count_nonzero(~whole))
+    if len(lines) - empty < FEWEST_LINES:
+        raise InputError([_too_few(of.file, table.first, len(lines) - empty)])
     sound = whole.copy()
     # a signal by which clocks are compared jumps and may
     read = [*loads.values(), *(one for (joint, _), one in motion.items() if joint != SYNC)]
@@ -160,6 +189,7 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
         file=of.file,
         of=of,
         lines=lines[sound],
+        rows=rows[sound],
         time=None if time is None else time[sound],
         loads={name: values[sound] for name, values in sorted(loads.items())},
         driving=DIRECTIONS[mapping.driving(of).positive].load if mapping.loads else "",
@@ -170,6 +200,35 @@ def _understood(table: RawTable, of: TestFile, mapping: MachineMapping) -> Recor
     )
 
 
+def _too_few(file: str, line: int, rows: int) -> InputProblem:
+    remedy = "look whether `form.first_line` is right"
+    allowed = f"at least {FEWEST_LINES}"
+    return InputProblem(file, line, None, count(rows, "line of numbers"), allowed, remedy)
+
+
+def _misfits(
+    table: RawTable, file: str, channels: Sequence[Channel], faults: Sequence[InputProblem]
+) -> Iterator[InputProblem]:
+    """The first row that has other cells than the names say: columns may be shifted."""
+    misfit = table.misfit()
+    if misfit is None or any(one.remedy.startswith(BELOW_UNITS) for one in faults):
+        return
+    line, cells = misfit
+    remedy = "give each column one name, or tell columns by their number"
+    if table.form.delimiter == "space":
+        remedy = f"names may have no blanks: {remedy}"
+    if table.form.delimiter == "comma" and all(re.fullmatch("[+-]?[0-9]*", c) for c in cells):
+        remedy = (
+            "are decimals set off by commas? Then let the machine put semicolons or tabs between "
+            "cells, or quotes around them. Else set `form: {names_line: 0, first_line: "
+            f"{table.first}}}` and tell columns by their number"
+        )
+    elif all(isinstance(one.column, int) for one in channels):
+        return
+    found = f"{count(len(table.names), 'name')}, {count(len(cells), 'cell')}"
+    yield InputProblem(file, line, None, found, "a name for each cell", remedy)
+
+
 def _place(
     table: RawTable, file: str, column: str | int, channels: Sequence[Channel]
 ) -> int | InputProblem:
@@ -178,6 +237,9 @@ def _place(
     if isinstance(column, int) and column <= table.width:
         return column - 1
     places = [number for number, name in enumerate(names, start=1) if name == column]
+    if not places:
+        looks = _look(str(column))
+        places = [number for number, name in enumerate(names, start=1) if _look(name) == looks]
     if len(places) == 1:
         return places[0] - 1
     if places:
@@ -191,41 +253,65 @@ def _place(
         remedy = "tell the column's number, as `form.names_line` is 0"
     if len(names) == 1:
         remedy = f"is `form.delimiter` right? With {table.form.delimiter} the file has one column"
+    if table.form.delimiter == "space" and " " in str(column):
+        remedy = "a name ends at a blank there: tell the column's number"
     free = [name for name in names if name not in {one.column for one in channels}]
-    remedy = mistyped(str(column), free, remedy)
+    remedy = (_where(table, channels) if names else "") or mistyped(str(column), free, remedy)
     return InputProblem(file, line, str(column), "no such column", one_of(known), remedy)
+
+
+def _where(table: RawTable, channels: Sequence[Channel]) -> str:
+    """The keys under which all names are found, if there is a line that has them."""
+    form = table.form
+    wanted = {_look(one.column) for one in channels if isinstance(one.column, str)}
+    others = () if table.workbook else ("comma", "semicolon", "tab")
+    for mark in dict.fromkeys((form.delimiter, *others)):
+        rows = text_rows(form.model_copy(update={"delimiter": mark}), table.text)
+        for line, cells in islice(rows, LOOKED_AT):
+            if wanted <= set(map(_look, cells)):
+                keys, doubt = f"delimiter: {mark}, ", "delimiter"
+                if mark == form.delimiter:
+                    keys, doubt = "", "names_line"
+                found = f"All names are found with `form: {{{keys}names_line: {line}}}`"
+                return f"is `form.{doubt}` right? {found}"
+    return ""
+
+
+def _look(name: str) -> str:
+    """A name without what nobody sees: kinds of blanks, of micro signs, of composed letters."""
+    return " ".join(normalize("NFKC", name).split())
 
 
 def _numbers(
     table: RawTable,
     file: str,
     there: Sequence[tuple[Channel, int]],
-) -> tuple[Lines, dict[str | int, Array], list[InputProblem]]:
-    """Lines, numbers by column, and problems of cells that have none."""
+) -> tuple[Lines, Lines, dict[str | int, Array], list[InputProblem]]:
+    """Lines, rows, numbers by column, and problems of cells that have none."""
     notation = Notation(table.form.decimal, table.form.thousands)
     clocks = [one.unit == "clock" for one, _ in there]
     places = [place for _, place in there]
     plain = notation.thousands is None and not any(clocks)
     values = [clock_seconds if clock else notation.value for clock in clocks]
-    lines, numbers = table.columns(places, values, plain)
+    lines, rows, numbers = table.columns(places, values, plain)
     columns = {one.column: values for (one, _), values in zip(there, numbers, strict=True)}
     bad = [np.flatnonzero(~np.isfinite(one)) for one in numbers]
     if table.form.empty_cells == "left_out":
         gaps = [at for at, (one, _) in enumerate(there) if isinstance(one, MotionChannel)]
-        empty = {at: list[int]() for at in gaps if bad[at].size}
-        for number, (_, texts) in enumerate(table.rows() if empty else ()):
+        empty = {at: list[int]() for at in gaps if 0 < bad[at].size < len(lines)}
+        for number, (_, _, texts) in enumerate(table.rows() if empty else ()):
             for at, gap in empty.items():
-                if not cell_at(texts, places[at]):
+                if LOST.fullmatch(cell_at(texts, places[at])):
                     gap.append(number)
         for at, gap in empty.items():
             bad[at] = np.setdiff1d(bad[at], gap)
     if not any(one.size for one in bad):
-        return lines, columns, []
+        return lines, rows, columns, []
     # once more through the rows: the first bad cell of each column, and how numbers are written
     first = {(int(one[0]), at): "" for at, one in enumerate(bad) if one.size}
 
     def cells() -> Iterator[str]:
-        for number, (_, row) in enumerate(table.rows()):
+        for number, (_, _, row) in enumerate(table.rows()):
             for at, place in enumerate(places):
                 if (number, at) in first:
                     first[number, at] = cell_at(row, place)
@@ -233,6 +319,8 @@ def _numbers(
                     yield cell_at(row, place)
 
     able = notations_of(cells())
+    # rows at the top without any number
+    units = int(np.isfinite(numbers).any(axis=0).argmax())
     problems = []
     for (row, at), cell in first.items():
         channel = there[at][0]
@@ -245,10 +333,18 @@ def _numbers(
         what = remedy(
             cell, notation, able, channel.unit if isinstance(channel, TimeChannel) else ""
         )
+        if not cell and bad[at].size == len(lines):
+            what = "leave the column out"
+            if table.workbook:
+                what = "open and save it in a spreadsheet program, which stores values of formulas"
+            elif isinstance(channel, TimeChannel):
+                what = "leave `time` out: the machine wrote none"
+        elif bad[at].size == units and not any(n.pattern.fullmatch(cell) for n in NOTATIONS):
+            what = f"{BELOW_UNITS} {lines[units]}}}`: no numbers stand above"
         problems.append(
             InputProblem(file, int(lines[row]), str(channel.column), found, allowed, what)
         )
-    return lines, columns, problems
+    return lines, rows, columns, problems
 
 
 def _backwards(time: Array, lines: Lines, file: str, column: str) -> Iterator[InputProblem]:

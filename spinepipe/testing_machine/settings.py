@@ -61,8 +61,8 @@ class FileForm(BaseModel):
     )
     empty_cells: Literal["refused", "left_out"] = Field(
         default="refused",
-        description="left_out: rows in which a motion has an empty cell are left out, as where a "
-        "camera loses a marker; how many is said",
+        description="left_out: rows in which a motion has an empty cell, NaN or #N/A are left out, "
+        "as where a camera loses a marker; how many is said",
     )
 
 
@@ -115,7 +115,10 @@ class MotionFiles(BaseModel):
     form: FileForm = Field(default_factory=FileForm, description="how it writes its files")
     time: TimeChannel | None = Field(default=None, description="its column of time")
     rate_hz: float | None = Field(
-        default=None, gt=0, le=100_000, description="or frames a second, each in a line"
+        default=None,
+        gt=0,
+        le=100_000,
+        description="or frames a second, each in a row; blank lines are none",
     )
     sync: Sync | None = Field(
         default=None,

@@ -196,6 +196,9 @@ def test_what_does_not_hold_together_is_told(data: bytes, says: str) -> None:
         parse_c3d(data)
 
 
+FULL = {"last": 65_535}
+
+
 def problem_of(folder: Path, made: Made | bytes) -> InputProblem:
     with pytest.raises(InputError) as caught:
         read_motion(written(folder, made))
@@ -212,12 +215,12 @@ def problem_of(folder: Path, made: Made | bytes) -> InputProblem:
         ({"numbers": {"USED": 3.0}}, "USED", "2 markers in the header, 3 in its parameters"),
         ({"numbers": {"USED": 1.0}}, "USED", "2 markers in the header, 1 in its parameters"),
         ({"header": {"points": 0}}, "USED", "0 markers in the header"),
-        ({"numbers": {"FRAMES": 5.0}}, "FRAMES", "3 frames and 5 frames"),
+        ({"numbers": {"FRAMES": 5.0}, "frames": 2}, "FRAMES", "3 frames and 5 frames"),
         ({"header": {"first": 14}}, "FRAMES", "frames from 14 to 13"),
         ({"frames": 2}, "FRAMES", "room for 2 of 3 frames"),
         ({"header": {"block": 2}}, "FRAMES", "room for 0 of 3 frames"),
-        ({"trial": ((11, 0), (15, 0))}, "FRAMES", "room for 3 of 5 frames"),
-        ({"trial": ((1, 0), (1, 1))}, "FRAMES", "room for 3 of 65537 frames"),
+        ({"trial": ((11, 0), (15, 0)), "header": FULL}, "FRAMES", "room for 3 of 5 frames"),
+        ({"trial": ((1, 0), (1, 1)), "header": FULL}, "FRAMES", "room for 3 of 65537 frames"),
     ],
 )
 def test_contradictions_are_told_with_both_sides(
@@ -272,12 +275,49 @@ def test_of_two_signs_of_the_scale_the_file_s_size_tells_the_right_one(
     )
 
 
+def test_a_count_that_is_off_by_one_is_told(tmp_path: Path) -> None:
+    found = read_motion(written(tmp_path, Made(numbers={"FRAMES": 4.0})))
+    assert len(found.time_s) == 3
+    assert "the file has room for 3 frames" in found.repaired[0]
+
+
 def test_padding_of_the_last_block_is_no_frame(tmp_path: Path) -> None:
     """36 bytes a frame: 14 would fit into the padding."""
     full = {"header": {"first": 1, "last": 65_535}, "frames": 70_000, "padding": 511}
     assert len(read_motion(written(tmp_path, Made(**full))).time_s) == 70_000
     made = Made(**full, trial=((1, 0), (4464, 1)))
     assert len(read_motion(written(tmp_path, made)).time_s) == 70_000
+
+
+@pytest.mark.parametrize(
+    ("changed", "frames"),
+    [
+        ({"trial": ((11, 0), (15, 0))}, 30),
+        ({"trial": ((11, 0), (12, 0))}, 30),
+        ({"numbers": {"FRAMES": 29.0}, "padding": 200}, 30),
+        ({"numbers": {"FRAMES": 31.0}, "padding": 200}, 30),
+        ({"header": {"first": 1, "last": 4464}, "numbers": {"FRAMES": 4464.0}}, 70_000),
+    ],
+)
+def test_of_several_numbers_of_frames_the_file_s_size_tells_the_right_one(
+    tmp_path: Path, changed: dict[str, Any], frames: int
+) -> None:
+    """A counter of 16 bits begins again at nought; padding is less than a block."""
+    made = replace(Made(header={"last": 40}, frames=frames), **changed)
+    found = read_motion(written(tmp_path, made))
+    assert len(found.time_s) == frames
+    assert f"the file's size fits {frames}, which were read" in found.repaired[0]
+
+
+@pytest.mark.parametrize("first", [65_535, 4465, 65_530])
+def test_a_crop_begins_where_the_trial_says_beyond_16_bits(tmp_path: Path, first: int) -> None:
+    start = 65_530 if first == 65_530 else 70_001
+    last = 65_535 if first == 65_535 else (start + 2) % 65_536
+    trial = tuple((one % 65_536, one // 65_536) for one in (start, start + 2))
+    made = Made(header={"first": first, "last": last}, trial=(trial[0], trial[1]))
+    found = read_motion(written(tmp_path, made))
+    np.testing.assert_allclose(found.time_s, np.arange(start - 1, start + 2) / 50.0)
+    assert not found.repaired
 
 
 def test_reading_of_parameters_ends_with_their_section() -> None:

@@ -15,7 +15,6 @@ import pytest
 from spinepipe.motion.reading import read_motion
 from spinepipe.motion.reading_c3d import open_c3d
 from spinepipe.motion.reading_plates import read_force_plates
-from spinepipe.motion.reading_storage import read_storage
 from spinepipe.motion.recording import M_PER
 from spinepipe.problems import InputError
 
@@ -31,16 +30,13 @@ def files(*suffixes: str) -> Iterator[Path]:
     yield from (one for one in sorted(Path(FOLDER).rglob("*")) if one.suffix.lower() in suffixes)
 
 
-@pytest.mark.parametrize("suffix", [".trc", ".c3d", ".sto", ".mot"])
+@pytest.mark.parametrize("suffix", [".trc", ".c3d"])
 def test_every_file_is_read_or_refused_in_a_sentence(suffix: str) -> None:
     count, refused = 0, []
     for path in files(suffix):
         count += 1
         try:
-            if suffix in (".sto", ".mot"):
-                read_storage(path)
-            else:
-                read_motion(path)
+            read_motion(path)
         except InputError as error:
             refused.append(f"{path.name}: {error.problems[0]}")
     assert len(refused) <= REFUSED_AT_MOST * count, "\n".join(refused)

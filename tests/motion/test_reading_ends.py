@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from c3d_of_ezc3d import write_c3d
 
-from spinepipe.motion import reading_text, recording
+from spinepipe.motion import reading, reading_text
 from spinepipe.motion.reading import axes_of, read_motion
 from spinepipe.motion.recording import recording_from
 from spinepipe.problems import InputError, InputProblem
@@ -36,9 +36,9 @@ def problem_of(path: Path, **asked: object) -> InputProblem:
 def test_a_file_is_read_up_to_its_most_bytes(tmp_path: Path, monkeypatch) -> None:
     path = frames(tmp_path)
     size = path.stat().st_size
-    monkeypatch.setattr(recording, "MOST_RECORDING_BYTES", size)
+    monkeypatch.setattr(reading, "MOST_RECORDING_BYTES", size)
     assert len(read_motion(path).time_s) == 5
-    monkeypatch.setattr(recording, "MOST_RECORDING_BYTES", size - 1)
+    monkeypatch.setattr(reading, "MOST_RECORDING_BYTES", size - 1)
     assert problem_of(path).remedy == "crop it"
 
 

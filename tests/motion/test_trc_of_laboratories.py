@@ -127,9 +127,12 @@ def test_a_stale_number_of_frames_is_told(tmp_path: Path, told: int, there: int)
         assert found.repaired == (f"NumFrames says {told} frames, {there} are there and were read",)
 
 
+@pytest.mark.parametrize("told", [9, 6])
 @pytest.mark.parametrize("lost", [2, 9, 20])
-def test_a_file_that_breaks_off_within_a_row_is_refused(tmp_path: Path, lost: int) -> None:
-    lines = lines_of(drawn(6, 2), ["T1", "L3"], told=9)
+def test_a_file_that_breaks_off_within_a_row_is_refused(
+    tmp_path: Path, lost: int, told: int
+) -> None:
+    lines = lines_of(drawn(6, 2), ["T1", "L3"], told=told)
     with pytest.raises(InputError, match="the last of them not whole"):
         read_motion(write(tmp_path, [*lines[:-1], lines[-1][:-lost]], ""))
 
@@ -146,6 +149,49 @@ def test_numbers_without_a_name_are_kept_apart(tmp_path: Path) -> None:
     found = read_motion(write(tmp_path, lines))
     np.testing.assert_allclose(1e3 * found.places, places[:, :2], atol=1e-9)
     assert found.repaired == ("points without a name behind the markers are left out",)
+
+
+@pytest.mark.parametrize("counted", [2, 3])
+def test_names_go_by_place_where_a_point_between_them_has_none(
+    tmp_path: Path, counted: int
+) -> None:
+    places = drawn(5, 3)
+    lines = lines_of(places, ["T1", "", "L3"])
+    lines[2] = lines[2].replace("\t3\t", f"\t{counted}\t")
+    found = read_motion(write(tmp_path, lines))
+    assert found.names == ("T1", "unnamed#1", "L3")
+    np.testing.assert_allclose(1e3 * found.places, places, atol=1e-9)
+    assert len(found.repaired) == 1
+
+
+@pytest.mark.parametrize("labels", [["Left Knee", "RK"], ["Left Knee"]])
+def test_a_blank_within_a_name_parts_no_names(tmp_path: Path, labels: list[str]) -> None:
+    count = len(labels)
+    lines = lines_of(drawn(5, count), labels)
+    lines[2] = lines[2].replace(f"\t{count}\t", f"\t{count + 1}\t")
+    with pytest.raises(InputError, match=f"{count} names"):
+        read_motion(write(tmp_path, lines))
+
+
+def test_the_last_line_may_have_no_end_where_nothing_is_lost(tmp_path: Path) -> None:
+    """Numbers without noughts behind them do not tell whether the last one is whole."""
+    lines = lines_of(np.round(drawn(5, 2)), ["T1", "L3"])
+    lines = [line.replace(".0000", "") for line in lines]
+    assert "may be cut off" in read_motion(write(tmp_path, lines, "")).repaired[0]
+    assert not read_motion(write(tmp_path, lines)).repaired
+
+
+@pytest.mark.parametrize(("rate", "decimals"), [(120.0, 2), (240.0, 2), (100.0, 1)])
+def test_times_too_coarse_for_frames_are_from_the_rate(
+    tmp_path: Path, rate: float, decimals: int
+) -> None:
+    lines = lines_of(drawn(50, 1), ["T1"], rate=rate, decimals=decimals)
+    found = read_motion(write(tmp_path, lines))
+    np.testing.assert_allclose(found.time_s, np.arange(50) / rate)
+    assert "too few decimals" in found.repaired[0]
+    del lines[20:40]
+    with pytest.raises(InputError, match="times that grow"):
+        read_motion(write(tmp_path, lines))
 
 
 def test_a_cell_that_is_no_number_is_found_in_rows_of_any_length(tmp_path: Path) -> None:

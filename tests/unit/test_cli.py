@@ -25,10 +25,12 @@ from cohort_edge_cases import A
 from mistaken_cohorts import good
 from study_cases import STUDY, Size, project, results
 
+from spinepipe import tables
 from spinepipe.cli import doctor, main
 from spinepipe.cli.engine import relative_error
 from spinepipe.jobs import digest
 from spinepipe.studies.registry import every_kind
+from spinepipe.studies.tables import CONCLUSIONS
 from tests.generators import ais_films
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -382,6 +384,12 @@ def test_tables_are_exported_as_csv(tmp_path: Path, run: Run) -> None:
                 cells = (one[name].astype(object).fillna("").tolist() for one in (read, table))
                 assert next(cells) == next(cells)
         assert set(read["specimen"]) == {"001", "002"}
+    tables.write(
+        tables.from_rows(CONCLUSIONS, []), tmp_path / "results" / STUDY / "conclusions.parquet", {}
+    )
+    _, out, _ = run("--root", tmp_path, "export", STUDY, "--tables", folder)
+    assert "4 tables" in out
+    assert "conclusions.csv" in (folder / "datapackage.json").read_text()
 
 
 def test_engine_agrees_with_the_closed_form() -> None:

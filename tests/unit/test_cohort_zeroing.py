@@ -12,7 +12,7 @@ from cohort_cases import Change, swap, text, write
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.cohort import MeasurementSd
+from spinepipe.cohort.cohort import Accuracy, MeasurementSd, sd_of_reading
 from spinepipe.cohort.zeroing import common_zeroing
 from spinepipe.problems import InputError, InputProblem
 
@@ -108,13 +108,19 @@ def test_a_number_is_no_list_of_tests(tmp_path: Path) -> None:
     assert problem.allowed == "true, false, or a list of tests"
 
 
-@pytest.mark.parametrize(("sd", "first"), [(0.01, [0.0, 2.0]), (0.003, [0.015, 2.015])])
-def test_what_a_mean_of_readings_leaves_is_subtracted(sd: float, first: list[float]) -> None:
+@pytest.mark.parametrize(
+    ("sd", "accuracy", "first"),
+    [(0.01, None, [0.0, 2.0]), (0.003, None, [0.015, 2.015]), (0.003, 0.1, [0.0, 2.0])],
+)
+def test_what_a_mean_of_readings_leaves_is_subtracted(
+    sd: float, accuracy: float | None, first: list[float]
+) -> None:
     """0.015 deg is within 4 SD of one reading or not; then it is left for the checks to refuse."""
     rows = {"specimen": "a", "test": "x", "joint": "L3L4", "step": [0, 1], "cycle": 1}
     blank = dict.fromkeys(cohorts.columns.TABLES["motion"].names[5:], np.nan)
     motion = pd.DataFrame(rows | blank | {"extension_deg": [0.015, 2.015]})
-    declared = MeasurementSd(rotation_deg=sd, translation_mm=1.0)
+    stated = MeasurementSd(rotation_deg=sd, translation_mm=1.0)
+    declared = sd_of_reading(stated, Accuracy(rotation_deg=accuracy))
     found, together = common_zeroing(motion, True, declared)
     assert found is not None
     assert together is True

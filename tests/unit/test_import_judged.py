@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import openpyxl
 import pytest
 import yaml
 from sweeps import sweep
@@ -234,3 +235,19 @@ def test_show_of_a_file_that_nobody_foresaw_shows_its_first_lines(
     assert "1  torque_a,torque_b,a,b" in told
     assert "no text" in told
     assert not (tmp_path / "config").exists()
+
+
+def test_show_of_what_is_not_read_has_matches_cameras_and_workbooks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "s01_a.csv").write_bytes("Zeit,Kraft\n0,1\n".encode("utf-16"))
+    book = openpyxl.Workbook()
+    book.active.append(["Marker", 1.5])
+    book.create_sheet("Notes").append(["by hand"])
+    book.save(tmp_path / "s01_a_seen.xlsx")
+    files = [{"glob": "{specimen}_{test}.csv", "motion_file": "{stem}_seen.xlsx"}]
+    assert run(tmp_path, rig(tmp_path, files=files, motion_files={"rate_hz": 20}), "--show") == 1
+    told = capsys.readouterr().out
+    assert "s01_a.csv, as it stands:\n    1  Zeit,Kraft\n" in told
+    for line in ("       sheet Sheet", "    1  Marker → 1.5", "       sheet Notes"):
+        assert f"{line}\n" in told

@@ -157,17 +157,18 @@ def test_all_that_lacks_is_told_at_once(tmp_path: Path) -> None:
         (lambda t: t.replace("= RAS", "= RAS\n# CoordinateSystem = LPS"), "axes 'LPS and RAS'"),
         (lambda t: t.replace("# CoordinateSystem = RAS\n", ""), "axes ''"),
         (lambda t: t.replace(",736.0,", ",x,").replace(",748.0,", ",x,"), "does not write"),
-        (lambda t: t.replace("= RAS", "= LPS"), "points the wrong way"),
+        (lambda t: t.replace("= RAS", "= LPS"), "as where axes LPS are called RAS"),
     ],
 )
 def test_doubtful_points_are_refused(
     tmp_path: Path, change: Callable[[str], str], told: str
 ) -> None:
     text = fcsv({k: RAS(p) for k, p in SPINE.items()})
-    (tmp_path / "a.fcsv").write_text(change(text))
-    found = refused(settings(tmp_path, files=[{"file": "a.fcsv", "specimen": "s01"}]))
+    (tmp_path / "a.FCSV").write_text(change(text))
+    found = refused(settings(tmp_path, files=[{"file": "a.FCSV", "specimen": "s01"}]))
     assert told in found
-    assert "a.fcsv" in found
+    assert "a.FCSV" in found
+    assert found.count("without") == 0
 
 
 def test_surfaces_are_named_and_stay_where_they_are(tmp_path: Path) -> None:

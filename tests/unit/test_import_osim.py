@@ -41,6 +41,7 @@ MODEL = f"""<Model name="m"><gravity>0 -9.81 0</gravity>
  <socket_child_frame>/bodyset/other</socket_child_frame></WeldJoint>
 </objects></JointSet>
 <ForceSet><objects><CoordinateActuator name="x"/><CoordinateActuator name="y"/>
+<FunctionBasedBushingForce/>
 <BushingForce name="off"><appliesForce>false</appliesForce>
  <socket_frame1>/bodyset/L5</socket_frame1></BushingForce></objects></ForceSet>
 <MarkerSet><objects><Marker name="SACR"><socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
@@ -70,7 +71,8 @@ def test_what_is_not_read_is_counted(tmp_path: Path) -> None:
     told = imported(tmp_path).sentences
     assert "2 vertebrae: S1 is pelvis, L5 is L5." in told
     counts = "1 BushingForce, 2 CoordinateActuator, 1 CoordinateCouplerConstraint"
-    assert f"Not read: {counts}, 1 WrapCylinder that no path uses." in told
+    more = "1 FunctionBasedBushingForce, 1 WrapCylinder that no path uses"
+    assert f"Not read: {counts}, {more}." in told
     assert "Masses left out, carried on joints of their own: 3 kg by L5." in told
 
 
@@ -99,6 +101,31 @@ def test_a_body_between_two_vertebrae_is_told(tmp_path: Path) -> None:
     found = imported(tmp_path, vertebrae="{S1: pelvis, T1: rib}")
     words = "Bodies lie between vertebrae, the joint is the upper one: T1S1 (L5)."
     assert words in found.sentences
+
+
+def test_a_prescribed_coordinate_stands_where_it_is_prescribed(tmp_path: Path) -> None:
+    """Two joints, each with a coordinate of this name, as version 4 may have them."""
+    pin = '<Coordinate name="r"><default_value>.1</default_value></Coordinate>'
+    kept = (
+        '<Coordinate name="r"><default_value>.2</default_value><prescribed>true</prescribed>'
+        "<prescribed_function><Constant><value>.3</value></Constant></prescribed_function>"
+    )
+    text = GOOD.replace('<Coordinate name="r"/>', pin).replace(
+        '<Coordinate name="a"/><Coordinate name="b"/>',
+        f'<Coordinate name="a"/><Coordinate name="b"/>{kept}</Coordinate>',
+    )
+    table = str(imported(tmp_path, text).files["joints.csv"]).splitlines()
+    assert float(table[1].split(",")[5]) == pytest.approx(np.degrees(0.3))
+
+
+def test_a_chain_from_the_top_down_is_turned(tmp_path: Path) -> None:
+    """L5 on ground carries the pelvis; the joint's frame is where it was."""
+    text = GOOD.replace("/bodyset/pelvis</socket_child", "/bodyset/L5</socket_child", 1)
+    text = text.replace("frame>low<", "frame>/bodyset/L5<", 1)
+    text = text.replace("/bodyset/L5</socket_child_frame>\n <coordinates>",
+        "low</socket_child_frame>\n <coordinates>", 1)  # fmt: skip
+    found = imported(tmp_path, text)
+    assert found.files["joints.csv"].splitlines()[1] == "m,L5S1,0,0,0,0,0,0"
 
 
 def muscle(name: str, *points: str, more: str = "") -> str:
@@ -157,6 +184,14 @@ def test_without_masses_there_is_no_weight(tmp_path: Path) -> None:
     found = imported(tmp_path, changed("<mass>2</mass>", "<mass>0</mass>"))
     write(found, tmp_path / "osim", replace=False)
     assert not cohorts.read(tmp_path / "osim").gravity
+
+
+def test_what_stands_for_no_mass_is_none(tmp_path: Path) -> None:
+    """As `spinepipe export` writes a cohort without bodies."""
+    text = GOOD.replace("<mass>9<", "<mass>0<").replace("<mass>2<", "<mass>0.001<")
+    found = imported(tmp_path, text.replace(".01 .02 .025 0 0 0", "1e-06 1e-06 1e-06 0 0 0"))
+    assert "bodies.csv" not in found.files
+    assert "Without mass, 1 g and 1e-6 kg m2 stand for none: L5." in found.sentences
 
 
 REFUSED: dict[str, tuple[str, dict[str, object], str]] = {

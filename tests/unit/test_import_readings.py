@@ -521,6 +521,10 @@ MARKERS = {"clusters": {"L4": ["a", "b", "c"]}}
         ({"files": [{**SEEN, "shift_s": 1}]}, "one way to compare their clocks"),
         ({"motion_files": {"markers": MARKERS}, "files": [SEEN]}, "found columns and markers"),
         (
+            {"motion_files": {"markers": MARKERS}, "motion": [], "rotations": {"order": "xyz"}},
+            "rotations: found columns and markers",
+        ),
+        (
             {"motion_files": {"markers": {**MARKERS, "axes": ["right", "left", "superior"]}}},
             "found right, left, superior: an axis twice",
         ),

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import openpyxl
+import opensim
 import pytest
 import yaml
 from hypothesis import given, settings
@@ -193,17 +194,31 @@ def test_the_bulk_reader_takes_no_cell_that_the_exact_one_refuses(rows) -> None:
     form = raw_table.FileForm(delimiter="semicolon")
     table = raw_table.open_table(content.encode(), "a", form)
     value = Notation("point").value
-    lines, exact = table.columns([0, 1], [value, value], plain=False)
-    bulk_lines, bulk = table.columns([0, 1], [value, value], plain=True)
+    lines, rows, exact = table.columns([0, 1], [value, value], plain=False)
+    bulk_lines, bulk_rows, bulk = table.columns([0, 1], [value, value], plain=True)
     np.testing.assert_array_equal(lines, bulk_lines)
+    np.testing.assert_array_equal(rows, bulk_rows)
     np.testing.assert_array_equal(exact, bulk)
 
 
 def test_plain_text_goes_the_fast_way() -> None:
     table = raw_table.open_table(text().encode(), "a", raw_table.FileForm())
-    lines, numbers = table.columns([1, 0], [lambda _: np.nan] * 2, plain=True)
+    lines, rows, numbers = table.columns([1, 0], [lambda _: np.nan] * 2, plain=True)
     np.testing.assert_array_equal(numbers, [MOMENT, TIME])
-    assert (lines[0], lines[-1]) == (2, ROWS + 1)
+    assert (lines[0], lines[-1], rows[0], rows[-1]) == (2, ROWS + 1, 0, ROWS - 1)
+
+
+def test_a_table_that_opensim_writes(tmp_path: Path) -> None:
+    table = opensim.TimeSeriesTable()
+    table.setColumnLabels(["Moment", "Angle"])
+    for time, *row in zip(TIME.tolist(), MOMENT.tolist(), ANGLE.tolist(), strict=True):
+        table.appendRow(time, opensim.RowVector(row))
+    table.addTableMetaDataString("inDegrees", "yes")
+    opensim.STOFileAdapter().write(table, str(tmp_path / "a.txt"))
+    head = (tmp_path / "a.txt").read_text().partition("endheader")[0]
+    form = {"delimiter": "tab", "names_line": head.count("\n") + 2}
+    (one,) = read(tmp_path, form=form, time={"column": "time", "unit": "s"})
+    assert same(one)
 
 
 def test_workbooks(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from cohort_cases import Change, swap
+from cohort_cases import Change, swap, text
 from cohort_cases import write as write_small
 from fresh_mistakes import FRESH
 from mistaken_cases import MISTAKES, XYZ
@@ -207,6 +207,23 @@ def test_step_0_against_the_flag(name: str, column: str, tmp_path: Path) -> None
     found = [one for one in suspicions(cohorts.read(folder)) if one.group == "zeroing"]
     assert [one.certain for one in found] == [column != "step"]
     assert found[0].problem.file == f"{name}/motion.csv"
+
+
+def test_what_a_mean_left_is_no_last_step_that_stands_first(tmp_path: Path) -> None:
+    """In a loop that ends at 0; the error of a reading that is stated does not explain it."""
+    angles = enumerate((0.5, 2, 3, 1, 0))
+    loop = "".join(f"a,flexion,1,{step},L3L4,{angle}\n" for step, angle in angles)
+    loads = "".join(
+        f"a,flexion,{step},L2,0,0,0,0,0,{moment}\n" for step, moment in enumerate((0, 1, 2, 1, 0))
+    )
+    files = (
+        swap("cohort.yaml", "zeroed_at_step_0: false", "zeroed_at_step_0: true"),
+        text("motion.csv", f"specimen,test,cycle,step,joint,extension_deg\n{loop}"),
+        text("loads.csv", f"specimen,test,step,vertebra,fx_n,fy_n,fz_n,mx_nm,my_nm,mz_nm\n{loads}"),
+    )
+    cohort = cohorts.read(write_small(tmp_path / "small", *files))
+    (problem,) = [one.problem for one in suspicions(cohort) if one.group == "zeroing"]
+    assert "measurement_sd" in problem.remedy
 
 
 def test_vertebrae_of_other_names_are_not_judged(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ joint within the body that it carries, and tell bodies by name. A property that 
 has OpenSim's own default. Constraints are not solved.
 """
 
+import re
 from collections.abc import Iterator
 from posixpath import join, normpath
 from typing import NamedTuple
@@ -61,7 +62,7 @@ class OsimDocument:
     Attributes
     ----------
     model : its element. problems : faults met so far; whoever reads on adds to them.
-    bodies : elements by name. values : default of each coordinate, m or rad.
+    bodies : elements by name.
     placed : pose in ground of each body that could be placed. below : for each of those but ground,
         the joint that it was placed by and the body on its other side.
     """
@@ -88,19 +89,15 @@ class OsimDocument:
             self._frames[f"/{GROUND}"] = Element("Ground", name=GROUND)
         every = self._frames.values()
         self.bodies = {one.get("name", ""): one for one in every if one.tag != _OFFSET}
-        self.values = {
-            one.get("name", ""): float(self.numbers(one, "default_value", (0.0,))[0])
-            for one in model.iter("Coordinate")
-        }
         self.placed, self.below = {GROUND: _HERE}, dict[str, tuple[OsimJoint, str]]()
         joints = list(self._joints())
         while sum(map(self._place, joints)):
             pass
 
     def objects(self, group: str, kind: str) -> Iterator[Element]:
-        """Objects of a set of the model that end so and are not switched off."""
+        """Objects of a set of the model whose tags match and that are not switched off."""
         every = self.model.iterfind(f"{group}/objects/*")
-        return (one for one in every if one.tag.endswith(kind) and is_on(one))
+        return (one for one in every if re.fullmatch(kind, one.tag) and is_on(one))
 
     def name(self, at: Element) -> str:
         """Of an element, which must be one that a table may have."""
@@ -113,6 +110,15 @@ class OsimDocument:
         """Note a fault of an element."""
         place = (self.file, int(at.get(LINE, "1")), f"{at.tag} {at.get('name', '')}, {key}")
         self.problems.append(InputProblem(*place, found, allowed, remedy))
+
+    def stand_on(self, body: str) -> None:
+        """Turn `below` round from a body to ground: it stands on nothing then, ground on it."""
+        way = list[tuple[str, OsimJoint, str]]()
+        while body in self.below:
+            joint, lower = self.below.pop(body)
+            way.append((lower, joint, body))
+            body = lower
+        self.below |= {lower: (joint, upper) for lower, joint, upper in way}
 
     def numbers(self, at: Element, key: str, default: tuple[float, ...]) -> Array:
         """Numbers of a property, as many as by default; any number of them where that is empty."""
@@ -149,10 +155,10 @@ class OsimDocument:
         on = self.frame(at, old)
         return on and (on[0], self._pose(at, *pose)) if pose else on
 
-    def function(self, at: Element, inputs: list[float]) -> float | None:
-        """Value of the function of an axis; None: of a form that is not read."""
-        found, scale = next((of for of in at if of.get("name") == "function"), None), 1.0
-        found = at.find("function/*") if found is None else found
+    def function(self, at: Element, key: str, inputs: list[float]) -> float | None:
+        """Value of a function of an element; None: of a form that is not read."""
+        found, scale = next((of for of in at if of.get("name") == key), None), 1.0
+        found = at.find(f"{key}/*") if found is None else found
         while found is not None and found.tag == "MultiplierFunction":
             scale *= float(self.numbers(found, "scale", (1.0,))[0])
             found = found.find("function/*")
@@ -189,7 +195,7 @@ class OsimDocument:
                     self._frames[child.get(_PATH, "")] = child
 
     def _joints(self) -> Iterator[OsimJoint]:
-        every = [(joint, "") for joint in self.objects("JointSet", "Joint")]
+        every = [(joint, "") for joint in self.objects("JointSet", r"\w*Joint")]
         for body, element in self.bodies.items():
             every += [(joint, body) for joint in element.iterfind("Joint/*")]
         at = ("location_in_parent", "orientation_in_parent")
@@ -203,23 +209,31 @@ class OsimDocument:
                 name = joint.get("name", "")
                 yield OsimJoint(name, parent, child, self._motion(joint), moves)
 
+    def _value(self, of: Element) -> float | None:
+        """Of a coordinate in the default pose, m or rad: as it is prescribed, unless locked."""
+        told = [of.findtext(key, "").strip() == "true" for key in ("prescribed", "locked")]
+        if told == [True, False]:
+            return self.function(of, "prescribed_function", [0.0])
+        return float(self.numbers(of, "default_value", (0.0,))[0])
+
     def _motion(self, joint: Element) -> Pose | None:
         """Pose of the child's frame in that of the parent: body-fixed turns, then a shift."""
         if joint.findtext("reverse", "").strip() == "true":
             return None
-        names = [one.get("name", "") for one in joint.iter("Coordinate")]
+        values = {one.get("name", ""): self._value(one) for one in joint.iter("Coordinate")}
         steps: list[tuple[bool, Array, float | None]] = []
         if joint.tag == "CustomJoint":
             for one in sorted(joint.iter("TransformAxis"), key=lambda one: one.get("name", "")):
-                inputs = [self.values.get(n, 0.0) for n in one.findtext("coordinates", "").split()]
+                inputs = [values.get(n, 0.0) for n in one.findtext("coordinates", "").split()]
                 axis = self.numbers(one, "axis", (1.0, 0.0, 0.0))
                 axis /= np.linalg.norm(axis) or 1.0
-                amount = self.function(one, inputs)
+                known = [value for value in inputs if value is not None]
+                amount = self.function(one, "function", known) if known == inputs else None
                 steps.append((one.get("name", "").startswith("rotation"), axis, amount))
         elif joint.tag in _COORDINATES:
-            for letter, name in zip(_COORDINATES[joint.tag], names, strict=False):
+            for letter, value in zip(_COORDINATES[joint.tag], values.values(), strict=False):
                 axis = np.eye(3)["xyz".index(letter.lower())]
-                steps.append((letter.isupper(), axis, self.values[name]))
+                steps.append((letter.isupper(), axis, value))
         else:
             return None
         turned, shift = Rotation.identity(), np.zeros(3)

@@ -1,5 +1,6 @@
 """An OpenSim model as the tables of a cohort, and in plain sentences what was made of it."""
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from itertools import pairwise
@@ -29,6 +30,7 @@ from spinepipe.imports.opensim_model.forces import FORCES, bushing_model, muscle
 from spinepipe.imports.opensim_model.settings import OsimSettings
 from spinepipe.imports.opensim_model.spine import OsimSpine
 from spinepipe.model import Body, RefusedModel
+from spinepipe.model.osim import TOKEN_INERTIA_KG_M2, TOKEN_MASS_KG
 from spinepipe.model.osim_parts import SIX
 from spinepipe.problems import InputError
 from spinepipe.report.words import count, listed
@@ -136,15 +138,17 @@ def _joints(spine: OsimSpine, specimen: str) -> Made:
 
 def _bodies(spine: OsimSpine, specimen: str) -> Made:
     """Vertebrae with all that is fixed to them; what moves in joints of its own is told."""
-    parts, loose, odd = (
-        defaultdict[str, list[Body]](list),
-        defaultdict[str, float](float),
-        list[str](),
-    )
+    parts, loose = defaultdict[str, list[Body]](list), defaultdict[str, float](float)
+    odd, tokens = list[str](), list[str]()
     for name in spine.document.placed:
         carrier = spine.carrier(name)
         body, is_possible = _body(spine, name)
         if carrier is None or body.mass <= 0.0:
+            continue
+        if body.mass == TOKEN_MASS_KG and np.allclose(
+            body.inertia, TOKEN_INERTIA_KG_M2, 0.0, 1e-15
+        ):
+            tokens.append(name)
             continue
         if not spine.is_fixed(name):
             loose[carrier] += body.mass
@@ -161,6 +165,8 @@ def _bodies(spine: OsimSpine, specimen: str) -> Made:
             inertia += one.inertia + one.mass * (off @ off * np.eye(3) - np.outer(off, off))
         rows.append((specimen, name, *cells([mass, *com * MM_PER_M]), *cells(inertia[SIX], 15)))
     told = [f"Inertia left out, none that a body can have: {listed(odd)}."] if odd else []
+    if tokens:
+        told.append(f"Without mass, 1 g and 1e-6 kg m2 stand for none: {listed(tokens)}.")
     if loose:
         masses = listed(f"{kg:.3g} kg by {name}" for name, kg in loose.items())
         told.append(f"Masses left out, carried on joints of their own: {masses}.")
@@ -216,7 +222,7 @@ def _not_read(osim: OsimDocument) -> Iterator[str]:
         for group in sets
         if group.tag not in ("BodySet", "JointSet", "MarkerSet")
         for one in group.iterfind("objects/*")
-        if not (one.tag.endswith(FORCES) and is_on(one))
+        if not (re.fullmatch("|".join(FORCES), one.tag) and is_on(one))
     )
     used = {one.findtext("wrap_object", "").strip() for one in osim.model.iter("PathWrap")}
     wraps = osim.model.iterfind(".//WrapObjectSet/objects/*")

@@ -27,8 +27,8 @@ from spinepipe.muscles.trunk import SIDES
 from spinepipe.report.words import count, listed
 from spinepipe.units import MM_PER_M
 
-FORCES = MUSCLE, BUSHING_FORCE = "Muscle", "BushingForce"
-"""Ends of the names of OpenSim's forces that are read, such as Thelen2003Muscle."""
+FORCES = MUSCLE, BUSHING_FORCE = r"\w*Muscle", "BushingForce"
+"""Tags of OpenSim's forces that are read, such as Thelen2003Muscle."""
 
 _KINDS = ("PathPoint", "ConditionalPathPoint")
 _GROUPS = {**GROUPS, "E0": "external_oblique", "TR": "transversus_abdominis"}

@@ -56,9 +56,19 @@ class OsimSpine:
         ]
         spine = cls(document, chosen, axes_of(settings.axes))
         order = sorted(chosen, key=lambda name: len(spine.down(chosen[name])))
-        if not problems:
+
+        def faults() -> list[InputProblem]:
             header = YamlDocument(told.file, {"vertebrae": order}, told.lines)
-            problems = [replace(one, remedy=named) for one in check_header(header, "")]
+            return [replace(one, remedy=named) for one in check_header(header, "")]
+
+        if not problems and (problems := faults()):
+            order.reverse()  # a chain from the top down
+            if not faults():
+                ends = (chosen[order[0]], chosen[order[-1]])
+                low, high = (spine.ground(end).origin[1] for end in ends)
+                if low < high:
+                    problems = []
+                    document.stand_on(chosen[order[0]])
         for lower, upper in pairwise(order):
             if not problems and chosen[lower] not in spine.down(chosen[upper]):
                 found, allowed = f"{upper} that does not stand on {lower}", "a chain of bodies"

@@ -38,6 +38,9 @@ CYCLES = 6
 ZERO = 1e-6
 """deg, mm: what rounding leaves of a reading less itself."""
 
+PART_OF_LARGEST = 0.2
+"""Of the largest reading: a last step that stands first has more, what a mean leaves has less."""
+
 SHARE_OF_SD = 0.2
 """Of the SD of a reading: at least eight readings that are all smaller have no such error."""
 
@@ -216,6 +219,8 @@ def _step_0(cohort: Cohort, motion: pd.DataFrame) -> Warnings:
             last = motion.groupby(_CYCLE, sort=False)["step"].transform("max") == motion["step"]
             end = motion.loc[last, READ].abs()
             turned = bool(end.notna().any(axis=None) and not (end > ZERO).any(axis=None))
+            # a loop ends at 0 as well, and what a mean leaves is no end of a loop
+            turned &= start.loc[row, column] > PART_OF_LARGEST * motion[column].abs().max()
             name = "step_0_at_the_end" if turned else "step_0_not_zero"
             yield warn(
                 cohort, name, TableCell("motion", row, column), value=motion.loc[row, column]

@@ -24,6 +24,7 @@ from spinepipe.studies.scoliosis.films import (
     by_reading,
     film_readings,
     run_around,
+    uncrossed,
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -62,8 +63,10 @@ def check_scoliosis(
             film = rows[rows["position"] == position]
             place = _FilmPlace(file, patient, position)
             faults = list(_film(cohort, place, film))
+            around = run_around(rows)  # which `plausibility` tells
+            faults += [] if around else _corners(place, film)
             yield from faults
-            if not faults and not run_around(film):  # which `plausibility` tells
+            if not faults and not around:
                 shapes[position] = Film(*film_readings(film, cohort.vertebrae).mean(axis=0))
                 yield from _tilts(place, film, cohort.vertebrae, shapes[position])
         # then what films of one patient say of each other
@@ -128,6 +131,17 @@ def _film(cohort: Cohort, place: _FilmPlace, rows: pd.DataFrame) -> Iterator[Inp
         centre = reading[list(CENTRE)].notna().all(axis=1)
         if centre.all() and not whole.all():
             yield from _lowest(cohort, place, reading)
+
+
+def _corners(place: _FilmPlace, rows: pd.DataFrame) -> Iterator[InputProblem]:
+    """Corners that are not in their order, which would make any centre and tilt."""
+    if len(wrong := uncrossed(rows)):
+        found = f"diagonals that do not cross inside {', '.join(dict.fromkeys(wrong['vertebra']))}"
+        allowed = "upper_left across from lower_right, upper_right across from lower_left"
+        remedy = (
+            "corners listed around the vertebra? exchange the two that are in the wrong columns"
+        )
+        yield place.problem(int(wrong.index[0]), CORNERS[4], found, allowed, remedy)
 
 
 def _lowest(cohort: Cohort, place: _FilmPlace, reading: pd.DataFrame) -> Iterator[InputProblem]:

@@ -152,13 +152,7 @@ def film_of_rows(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> Film:
 def _of_corners(rows: pd.DataFrame) -> Film:
     """Centre where the diagonals cross, tilt of the line through the centres of the endplates."""
     corner = corners(rows)
-    start, across = corner["upper_left"], corner["lower_right"] - corner["upper_left"]
-    other, back = corner["upper_right"], corner["lower_left"] - corner["upper_right"]
-    # start + share across = other + s back, by Cramer's rule; the middle of a diagonal where they
-    # are parallel, as those of corners in another order are, which `plausibility` tells
-    turn = _cross(across, back)
-    share = np.full(len(turn), 0.5)
-    np.divide(_cross(other - start, back), turn, out=share, where=turn != 0.0)
+    start, across, share, _ = _diagonals(corner)
     centre = start + share[:, None] * across
     # twice the line from the centre of the lower endplate to that of the upper one
     axis = (corner["upper_left"] + corner["upper_right"]) - (
@@ -175,6 +169,29 @@ def corners(rows: pd.DataFrame) -> dict[str, Array]:
         for end in ("upper", "lower")
         for side in ("left", "right")
     }
+
+
+def _diagonals(corner: dict[str, Array]) -> tuple[Array, Array, Array, Array]:
+    """One diagonal's begin and way (V, 2), and the share (V,) of it and the other to the crossing.
+
+    Nought and nought where they are parallel.
+    """
+    start, across = corner["upper_left"], corner["lower_right"] - corner["upper_left"]
+    other, back = corner["upper_right"], corner["lower_left"] - corner["upper_right"]
+    # start + share across = other + s back, by Cramer's rule
+    turn = _cross(across, back)
+    shares = np.zeros((2, len(turn)))
+    for share, way in zip(shares, (back, across), strict=True):
+        np.divide(_cross(other - start, way), turn, out=share, where=turn != 0.0)
+    return start, across, *shares
+
+
+def uncrossed(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows with all corners, but not in their order: the diagonals do not cross inside."""
+    rows = rows[rows[list(CORNERS)].notna().all(axis=1)]
+    *_, one, other = _diagonals(corners(rows))
+    found: pd.DataFrame = rows[(np.minimum(one, other) <= 0.0) | (np.maximum(one, other) >= 1.0)]
+    return found
 
 
 def run_around(rows: pd.DataFrame) -> bool:

@@ -15,6 +15,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.motion.marker_groups import rigid_rotations, runs
 from spinepipe.motion.skeleton import PELVIS, MarkerSet, MarkerTrial
 from spinepipe.problems import InputProblem
+from spinepipe.studies.tracking.trials import STANCE
 from spinepipe.units import MM_PER_M
 
 LONGEST_GAP_S = 0.5
@@ -132,23 +133,42 @@ def _gaps(look: LoadedTrial) -> Iterator[InputProblem]:
 
 
 def _frozen(look: LoadedTrial) -> Iterator[InputProblem]:
-    """Markers that stand still while their neighbours move: gaps filled with the last place."""
+    """Markers that stand still while their neighbours move: gaps filled with the last place.
+
+    All of them together: a picture that stood still.
+    """
     times, places, seen = look.trial.time_s, look.trial.places, look.trial.seen
+    markers, names = look.markers, look.markers.names
     apart = np.linalg.norm(look.neutral[:, None] - look.neutral[None, :], axis=-1)
-    near = np.argsort(apart, axis=1, kind="stable")[:, 1 : NEIGHBOURS + 1]
     still = np.linalg.norm(np.diff(places, axis=0), axis=-1) < STILL_M
     still &= seen[1:] & seen[:-1]
-    for k, name in enumerate(look.markers.names):
+    step = np.median(np.diff(times))
+    allowed = f"places that were measured; gaps of at most {LONGEST_GAP_S:g} s"
+    remedy = "leave the cells empty where the marker was not seen, or crop the trial"
+    # a stance may be one picture; elsewhere no frame is the same as the one before it
+    every = (still == (seen[1:] & seen[:-1])).all(axis=1) & still.any(axis=1)
+    for begin, last in runs(every & (look.trial.kind != STANCE)):
+        if (lasts := times[last + 1] - times[begin] + step) > LONGEST_GAP_S:
+            found = f"all markers stand still in {look.frames(begin, last + 1)}, {lasts:.2f} s"
+            yield look.in_motion(None, found, allowed, "crop the trial, or export it again")
+    for k, name in enumerate(names):
+        cluster = np.array([bool(one) and one == markers.cluster[k] for one in markers.cluster])
         for begin, last in runs(still[:, k]):
             frames = slice(begin, last + 2)
-            lasts = times[last + 1] - times[begin] + np.median(np.diff(times))
-            went = np.linalg.norm(places[frames, near[k]] - places[begin, near[k]], axis=-1)
-            far = (went * (seen[frames, near[k]] & seen[begin, near[k]])).max(axis=0)
-            if lasts > LONGEST_GAP_S and np.median(far) > MOVES_M:
+            lasts = times[last + 1] - times[begin] + step
+            if lasts <= LONGEST_GAP_S:
+                continue
+            # neighbours that are not lost with it: of no rigid cluster with it, nor frozen on
+            # another body
+            lost = still[begin : last + 1].all(axis=0) & (markers.body != markers.body[k])
+            order = np.argsort(np.where(lost | cluster, np.inf, apart[k]), kind="stable")
+            near = [one for one in order.tolist() if one != k and not (lost | cluster)[one]]
+            near = near[:NEIGHBOURS]
+            went = np.linalg.norm(places[frames, near] - places[begin, near], axis=-1)
+            far = (went * (seen[frames, near] & seen[begin, near])).max(axis=0)
+            if near and np.median(far) > MOVES_M:
                 found = f"stands still in {look.frames(begin, last + 1)}, {lasts:.2f} s"
-                found += f", while {', '.join(look.markers.names[one] for one in near[k])} move"
-                allowed = f"places that were measured; gaps of at most {LONGEST_GAP_S:g} s"
-                remedy = "leave the cells empty where the marker was not seen, or crop the trial"
+                found += f", while {', '.join(names[one] for one in near)} move"
                 yield look.in_motion(name, found, allowed, remedy)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.marker_groups import rigidity, runs
 from spinepipe.motion.scaling import SEGMENTS
 from spinepipe.motion.skeleton import BODIES, MarkerSet, MarkerTrial
+from spinepipe.problems import InputProblem
 from spinepipe.studies.tracking.persons import (
     ScaledPerson,
     TrackedPerson,
@@ -54,6 +56,17 @@ def run(root: str, study: str, specimen: str, clusters: str, remarks: str, sizes
     write(from_rows(CLUSTERS, rigid), clusters, made_by)
     write(from_rows(REMARKS, noted), remarks, made_by)
     write(from_rows(SIZES, list(size_rows(specimen, found))), sizes, made_by)
+
+
+def told(_study: Tracking, cohort: Cohort, _root: Path) -> tuple[str, tuple[InputProblem, ...]]:
+    """What `spinepipe check` says of files of motion: what was put right, a line for each file."""
+    rows = [row for name in cohort.specimen_names for row in trial_rows(cohort, name)]
+    repaired = {
+        f"{cohort.name}/{row['file']}": read_recording(row, cohort.name, cohort.folder).repaired
+        for row in rows
+    }
+    lines = [f"\n      {file}: {'; '.join(texts)}" for file, texts in repaired.items() if texts]
+    return f"put right while reading:{''.join(lines)}" if lines else "", ()
 
 
 def warnings_of(person: TrackedPerson) -> Iterator[Remark]:

@@ -239,5 +239,6 @@ KIND = Kind(
     ),
     exports="opensim:exported",
     forms=(SUBJECTS, *FORMS),
+    told_by_check="examine:told",
     doubts="plausibility:doubts",
 )

@@ -5,8 +5,10 @@ the film, the vertebra or what to do.
 """
 
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from scoliosis_cases import STUDY, write_shipped
@@ -126,6 +128,29 @@ def test_a_fault_is_told_with_its_film_and_remedy(
     found = told(tmp_path, sound, change)
     assert found
     assert any(all(word in line for word in words) for line in found), "\n".join(found)
+
+
+@sweep("positions, vertebrae", [(["erect"], ["T8"]), (["erect"], None), (["traction"], ["L4"])])
+def test_corners_listed_around_a_vertebra_are_told_before_tilts(
+    tmp_path: Path, sound: Path, positions: list[str], vertebrae: list[str] | None
+) -> None:
+    """Bodies 40 mm wide and 24 mm high, of which some have the lower corners exchanged."""
+
+    def cornered(table: pd.DataFrame) -> pd.DataFrame:
+        turn = np.deg2rad(table["orientation_deg"])
+        wrong = on(table, *positions) & (
+            table["vertebra"].isin(vertebrae) if vertebrae else table["vertebra"].notna()
+        )
+        for end, side in product((1, -1), (1, -1)):
+            across = np.where(wrong & (end < 0), -20.0, 20.0) * side
+            name = f"{'upper' if end > 0 else 'lower'}_{'left' if side > 0 else 'right'}"
+            table[f"{name}_y_mm"] = table["y_mm"] + across * np.cos(turn) + 12 * end * np.sin(turn)
+            table[f"{name}_z_mm"] = table["z_mm"] - across * np.sin(turn) + 12 * end * np.cos(turn)
+        return table.drop(columns=list(CENTRE))
+
+    (line,) = told(tmp_path, sound, cornered)
+    assert f"film {positions[0]}: diagonals that do not cross inside" in line
+    assert vertebrae is None or f"inside {vertebrae[0]};" in line
 
 
 def test_neutral_and_traction_may_be_missing(tmp_path: Path, sound: Path) -> None:

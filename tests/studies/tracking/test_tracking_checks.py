@@ -14,6 +14,7 @@ from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.subjects import SUBJECTS
+from spinepipe.studies.tracking import examine
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
 from spinepipe.studies.tracking.examine import repairs_of, warnings_of
 from spinepipe.studies.tracking.persons import person_of
@@ -242,13 +243,14 @@ def swayed(marker: str, mm: float) -> Spoil:
     return on("flexion_extension", sway)
 
 
-def frozen(marker: str, begin: int, end: int) -> Spoil:
-    """The last place is held, as recorders fill gaps."""
+def held(begin: int, end: int, *markers: str) -> Spoil:
+    """The last place is held, as recorders fill gaps; no marker: of all."""
 
-    def freeze(motion: Motion) -> None:
-        motion.of(marker)[begin - 1 : end] = motion.of(marker)[begin - 1]
+    def hold(motion: Motion) -> None:
+        for marker in markers or motion.names:
+            motion.of(marker)[begin - 1 : end] = motion.of(marker)[begin - 1]
 
-    return on("flexion_extension", freeze)
+    return on("flexion_extension", hold)
 
 
 # about, what is done, the marker that must be named, what is found, and a piece of the remedy
@@ -256,7 +258,7 @@ MOTIONS: list[tuple[str, Spoil, str | None, str] | tuple[str, Spoil, str | None,
     ("gap", lost("T5", 11, 25), "T5", "frames 11 to 25 (0.500 to 1.200 s)", "fill"),
     (
         "frozen",
-        frozen("T5", 11, 30),
+        held(11, 30, "T5"),
         *("T5", "stands still in frames 11 to 30 (0.500 to 1.450 s), 1.00 s, while", "empty"),
     ),
     ("twice", renamed("T12", "T9"), "T9", "more than one marker of this name", "rename"),
@@ -301,21 +303,21 @@ def test_faults_of_markers_are_named(case: tuple[Any, ...], tmp_path: Path) -> N
     assert any(found in p.found and "".join(remedy) in p.remedy for p in named), problems
 
 
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        frozen("T5", 11, 20),
-        on(
-            "flexion_extension",
-            lambda motion: motion.places.__setitem__(slice(10, 30), motion.places[10]),
-        ),
-    ],
-    ids=["half a second", "all stand still"],
-)
-def test_what_stands_still_for_a_moment_or_with_all_is_not_frozen(
-    spoil: Spoil, tmp_path: Path
-) -> None:
-    assert not any("stands still" in problem.found for problem in told(tmp_path, spoilt=(spoil,)))
+def test_what_stands_still_for_half_a_second_is_not_frozen(tmp_path: Path) -> None:
+    found = told(tmp_path, spoilt=(held(11, 20),))
+    assert not any("still" in problem.found for problem in found)
+
+
+def test_a_cluster_that_stands_still_is_told_by_other_bodies(tmp_path: Path) -> None:
+    """Also where the next marker outside is lost with it."""
+    lost_ones = ("T7_a", "T7_b", "T7_c", "T9")
+    found = told(tmp_path, spoilt=(held(11, 30, *lost_ones),))
+    assert {one.column for one in found if "stands still" in one.found} == set(lost_ones)
+
+
+def test_all_markers_together_that_stand_still_are_told_once(tmp_path: Path) -> None:
+    (problem,) = told(tmp_path, spoilt=(held(11, 30),))
+    assert problem.found.startswith("all markers stand still in frames 11 to 30 (0.500 to 1.450 s)")
 
 
 @pytest.mark.parametrize(
@@ -419,6 +421,18 @@ def test_levels_without_markers_are_a_warning(tmp_path: Path) -> None:
     assert gaps[1].startswith("1 short gaps, most of T9")
     spare = "not in the set and ignored: T3_a, T3_b, T3_c, T5"
     assert next(iter(repairs_of(cohort, "a"))) == ("stance", spare)
+
+
+def test_check_says_what_was_put_right_while_reading(tmp_path: Path) -> None:
+    def miscount(files: Files) -> None:
+        text = str(files["stance.trc"])
+        frames = text.split("\n")[2].split("\t")[2]
+        files["stance.trc"] = text.replace(f"\t{frames}\t", "\t999\t", 1)
+
+    cohort = cohorts.read(write(tmp_path, miscount), (SUBJECTS, *FORMS))
+    words, _ = examine.told(asked(), cohort, tmp_path)
+    (line,) = words.split("\n")[1:]
+    assert f"{NAME}/stance.trc: NumFrames says 999 frames" in line
 
 
 def test_remarks_do_not_name_a_subject(tmp_path: Path) -> None:
