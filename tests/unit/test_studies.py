@@ -97,7 +97,7 @@ ALONE = [
     Case("all weights zero", "{anterior: 10, superior: 1, right: 0}", "{anterior: 0, superior: 0, right: 0, extension: 0}", 8, "calibration.weights", "at least one weight"),
     Case("bounds of one", None, "  bound_factor: 1", 9, "calibration.bound_factor", "greater than 1"),
     Case("no start", None, "  starts: 0", 9, "calibration.starts", "greater than or equal to 1"),
-    Case("calibration is a list", STUDY[STUDY.index("calibration"):], "calibration: [1]\n", 6, "calibration", "dictionary"),
+    Case("calibration is a list", STUDY[STUDY.index("calibration"):], "calibration: [1]\n", 6, "calibration", "write keys below it"),
 ]
 
 WITH_COHORT = [

@@ -216,7 +216,7 @@ CASES = [
     Case("unknown specimen", None, "specimens: [a, c]", 17, "specimens.1", "unknown specimen 'c'"),
     Case("unknown level", None, "level_stiffness: {L4L5: {extension_nm_per_rad: 1, right_bending_nm_per_rad: 1, left_rotation_nm_per_rad: 1}}", 17, "level_stiffness.L4L5", "unknown joint 'L4L5'"),
     Case("word for a stiffness", None, "stiffness: fited", 17, "stiffness", "did you mean 'fitted'?"),
-    Case("list for a stiffness", None, "stiffness: [1]", 17, "stiffness", "a valid dictionary"),
+    Case("list for a stiffness", None, "stiffness: [1]", 17, "stiffness", "write keys below it"),
     Case("unknown key of stiffness", None, "stiffness: {extensoin_nm_per_rad: 20}", 17, "stiffness.extensoin_nm_per_rad", "did you mean 'extension_nm_per_rad'?"),
     Case("stiffness of zero", None, "stiffness: {extension_nm_per_rad: 0}", 17, "stiffness.extension_nm_per_rad", "greater than or equal to 0.0001"),
     Case("levels beside fitted", None, "stiffness: fitted\nlevel_stiffness: {L3L4: {extension_nm_per_rad: 1, right_bending_nm_per_rad: 1, left_rotation_nm_per_rad: 1}}", 18, "level_stiffness", "which all joints of a specimen share"),
