@@ -69,8 +69,7 @@ def _problem(model: type[BaseModel], document: YamlDocument, detail: ErrorDetail
     for kind, size in (("too_short", "min_length"), ("too_long", "max_length")):
         if detail["type"] == kind:
             end = "at least" if kind == "too_short" else "at most"
-            number = detail["ctx"][size]
-            allowed = f"{end} {number} item{'' if number == 1 else 's'}"
+            allowed = f"{end} {detail['ctx'][size]} of them"
     expected = detail.get("ctx", {}).get("expected", "")
     remedy = f"correct it ({meaning})" if meaning else "correct it"
     if detail["type"] in ("tuple_type", "list_type"):

@@ -323,7 +323,7 @@ def test_settings_of_the_wrong_form_are_told_in_words_of_a_yaml(
     assert told in said
     for word in ("tuple", "Tuple", "instance", "pattern", "constrained", "datetime"):
         assert word not in said
-    assert "at least 2 items" not in said
+    assert "at least 2 of them" not in said
 
 
 def test_what_somebody_said_of_a_cohort_stays(

@@ -210,7 +210,7 @@ CASES = [
     Case("no output", None, "outputs: {motion: [], joint_load: []}", 17, "outputs", "at least one output"),
     Case("output twice", None, "outputs: {motion: [right, right]}", 17, "outputs.motion", "'right' stands there twice"),
     Case("all failed allowed", None, "most_failed: 1", 17, "most_failed", "less than 1"),
-    Case("name with a space", "name: height", "name: my height", 15, "factors.9.name", "pattern"),
+    Case("name with a space", "name: height", "name: my height", 15, "factors.9.name", "a name of A-Z, a-z, 0-9, _"),
     Case("samples no power of two", "samples: 64", "samples: 100", 4, "design.samples", "take 64 or 128"),
     Case("unknown test", None, "tests: [flexon]", 17, "tests.0", "did you mean 'flexion'?"),
     Case("unknown specimen", None, "specimens: [a, c]", 17, "specimens.1", "unknown specimen 'c'"),
