@@ -230,7 +230,7 @@ def test_every_field_of_a_study_is_described() -> None:
     [
         ("studies: [prob]\n", "studies.0", "did you mean 'probe'"),
         ("studies: []\n", "studies", "at least 1 of them"),
-        ("studies: probe\n", "studies", "tuple"),
+        ("studies: probe\n", "studies", "a list"),
         ("study: [probe]\n", "study", "did you mean 'studies'"),
         ("studies: [probe]\nfull: [probe]\n", "full.0", "again"),
         ("studies: [probe]\nstudies: [probe]\n", "studies", "the same key twice"),
