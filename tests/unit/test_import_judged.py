@@ -395,3 +395,44 @@ def test_rows_far_apart_do_not_make_a_file_coarse() -> None:
     far = np.array([0.0, 0.6512, 1.3007, 1.9533, 2.6041])
     assert _resolution(far) == pytest.approx(1e-4)
     assert _resolution(np.repeat(far.round(1), 5)) == pytest.approx(0.6)
+
+
+def test_axes_of_a_camera_are_told_at_its_markers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two axes turned round turn the rotation about a third."""
+    time = np.arange(len(cycles())) / 10.0
+    turn = np.radians(DEG_PER_NM * cycles())
+    camera = [time]
+    for x, y, z in ((30.0, 0.0, 0.0), (-20.0, 5.0, 25.0), (-20.0, 0.0, -25.0)):
+        camera += [x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)]
+        camera.append(np.full_like(turn, z))
+    names = ",".join(["t", *(f"{m} {axis}" for m in "abc" for axis in "xyz")])
+    np.savetxt(tmp_path / "seen.csv", np.transpose(camera), "%.5f", ",", header=names, comments="")
+    np.savetxt(
+        tmp_path / "load.csv",
+        np.transpose([time, cycles()]),
+        "%.5f",
+        ",",
+        header="t,m",
+        comments="",
+    )
+    clock = {"column": "t", "unit": "s"}
+    for axes, told in (
+        (["anterior", "superior", "right"], None),
+        (["posterior", "superior", "left"], "motion_files.markers.axes"),
+        (["anterior", "inferior", "left"], "motion_files.markers.axes"),
+    ):
+        markers = {"clusters": {"L4": ["a", "b", "c"]}, "axes": axes}
+        file = {"file": "load.csv", "motion_file": "seen.csv", "shift_s": 0.0}
+        document = {
+            **{"cohort": "rig", "title": "made up", "source": "none", "vertebrae": ["L5", "L4"]},
+            **{"time": clock, "loads": [{**LOADS[0], "column": "m"}]},
+            "motion_files": {"time": clock, "markers": markers},
+            "files": [{**file, "specimen": "s01", "test": "extension_flexion"}],
+        }
+        path = tmp_path / "rig.yaml"
+        path.write_text(yaml.dump(document, Dumper=_Plain, sort_keys=False))
+        status = run(tmp_path, path, "--replace")
+        said = capsys.readouterr().err
+        assert (status == 0) if told is None else (told in said), said

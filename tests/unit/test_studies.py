@@ -79,7 +79,7 @@ ALONE = [
     Case("one pose", "poses: 20", "poses: 1", 4, "poses", "greater than or equal to 2"),
     Case("too many poses", "poses: 20", "poses: 20001", 4, "poses", "less than or equal to 20000"),
     Case("negative seed", None, "seed: -1", 9, "seed", "greater than or equal to 0"),
-    Case("no tests", "[flexion]", "[]", 5, "tests", "at least 1 item"),
+    Case("no tests", "[flexion]", "[]", 5, "tests", "at least 1 of them"),
     Case("test twice", "[flexion]", "[flexion, flexion]", 5, "tests", "'flexion' stands there twice"),
     Case("SD of zero", None, "landmark_sd_mm: 0", 9, "landmark_sd_mm", "greater than 0"),
     Case("NaN", None, "landmark_sd_mm: .nan", 9, "landmark_sd_mm", "finite"),
@@ -91,13 +91,13 @@ ALONE = [
     Case("no time", None, "settle_time_s: 0", 9, "settle_time_s", "greater than 0"),
     Case("unknown coordinate", "superior]", "flexion]", 7, "calibration.free.1", "'extension'"),
     Case("coordinate twice", "superior]", "extension]", 7, "calibration.free", "'extension' stands there twice"),
-    Case("nothing free", "[extension, superior]", "[]", 7, "calibration.free", "at least 1 item"),
+    Case("nothing free", "[extension, superior]", "[]", 7, "calibration.free", "at least 1 of them"),
     Case("unknown grouping", None, "  grouping: per_level", 9, "calibration.grouping", "'per_specimen' or 'per_joint'"),
     Case("weight of nothing", "anterior: 10", "pitch: 10", 8, "calibration.weights.pitch", "unknown key"),
     Case("all weights zero", "{anterior: 10, superior: 1, right: 0}", "{anterior: 0, superior: 0, right: 0, extension: 0}", 8, "calibration.weights", "at least one weight"),
     Case("bounds of one", None, "  bound_factor: 1", 9, "calibration.bound_factor", "greater than 1"),
     Case("no start", None, "  starts: 0", 9, "calibration.starts", "greater than or equal to 1"),
-    Case("calibration is a list", STUDY[STUDY.index("calibration"):], "calibration: [1]\n", 6, "calibration", "dictionary"),
+    Case("calibration is a list", STUDY[STUDY.index("calibration"):], "calibration: [1]\n", 6, "calibration", "write keys below it"),
 ]
 
 WITH_COHORT = [
@@ -229,8 +229,8 @@ def test_every_field_of_a_study_is_described() -> None:
     "content, key, says",
     [
         ("studies: [prob]\n", "studies.0", "did you mean 'probe'"),
-        ("studies: []\n", "studies", "at least 1 item"),
-        ("studies: probe\n", "studies", "tuple"),
+        ("studies: []\n", "studies", "at least 1 of them"),
+        ("studies: probe\n", "studies", "a list"),
         ("study: [probe]\n", "study", "did you mean 'studies'"),
         ("studies: [probe]\nfull: [probe]\n", "full.0", "again"),
         ("studies: [probe]\nstudies: [probe]\n", "studies", "the same key twice"),

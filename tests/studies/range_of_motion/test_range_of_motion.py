@@ -349,7 +349,7 @@ def test_all_that_does_not_fit_is_told_at_once(tmp_path: Path) -> None:
 
 FAULTS = (
     ("virtual_tests: {tests: [flexon]}\n", "virtual_tests.tests.0", "'flexion'"),
-    ("virtual_tests: {tests: []}\n", "virtual_tests.tests", "at least 1 item"),
+    ("virtual_tests: {tests: []}\n", "virtual_tests.tests", "at least 1 of them"),
     ("virtual_tests: {moment_nm: 0}\n", "virtual_tests.moment_nm", "greater than 0"),
     ("virtual_tests: {steps: 0}\n", "virtual_tests.steps", "greater than or equal to 1"),
     ("tests: [flexion]\n", "tests", "virtual_tests, which name their own tests"),
