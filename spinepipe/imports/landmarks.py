@@ -136,9 +136,9 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     for specimen in [one for one in found if one not in broken]:
         problems += _lacking(place, settings, specimen, found[specimen], unread.get(specimen, []))
     surfaces = list[tuple[str, ...]]()
-    if (of := settings.surfaces) is not None:
+    if (stl := settings.surfaces) is not None:
         place = (document.file, document.line_of("surfaces.file"), "surfaces.file")
-        surfaces, faults = _surfaces(folder, place, of, found, settings.vertebrae)
+        surfaces, faults = _surfaces(folder, place, stl, found, settings.vertebrae)
         problems += faults
     if problems:
         raise InputError(problems)
