@@ -221,10 +221,11 @@ def _keys(
         told.append([one] if isinstance(one, str) and one != EVERYONE else one or ())
     specimens, tests, joints = told
     named = imported.made_by.get(place, ())
+    data = imported.settings.data if imported.settings is not None else {}
     return [
         key
         for key in named
-        if _fits(_value(imported.settings.data, f"{key}.joint"), joints)
+        if _fits(_value(data, f"{key}.joint"), joints)
         and any(
             _fits(specimen, specimens) and _fits(test, tests)
             for specimen, test in imported.tests_of.get(key, ((None, None),))
@@ -279,7 +280,7 @@ def _units_of_both(
     for stem, column in zip(("motion", "loads"), pair, strict=False):
         keys = _keys(imported, (stem, column), warning)
         told, group = _group(imported, keys[0], column) if keys else ("", {})
-        for size, name in {size: name for name, size in reversed(group.items())}.items():
+        for size, name in {size: name for name, size in reversed(list(group.items()))}.items():
             times = size / group[told] if stem == "motion" else group[told] / size
             ratio = (warning.over_expected or 0.0) * times
             if times != 1.0 and is_plausible(ratio):
