@@ -155,14 +155,14 @@ def _sizes(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
             seen.add(place)
         for one in own:
             unit = None if one.place in seen else _of_one_joint(one)
-            place = (*one.place[:2], abs(one.ratio), abs(one.ratio))
-            if unit is not None and place not in found[one.place[2], unit, one.joint]:
-                found[one.place[2], unit, one.joint].append(place)
+            alone = (*one.place[:2], abs(one.ratio), abs(one.ratio))
+            if unit is not None and alone not in found[one.place[2], unit, one.joint]:
+                found[one.place[2], unit, one.joint].append(alone)
     for (coordinate, unit, joint), places in found.items():
         of_loads = unit is not None and unit.table == "loads"
         stem, names = ("loads", LOAD_COLUMNS) if of_loads else ("motion", MOTION_COLUMNS)
         column = names[coordinate]
-        where = dict(zip(("specimen", "test"), places[0], strict=False))
+        where = {"specimen": places[0][0], "test": places[0][1]}
         where |= {"joint": joint} if joint and stem == "motion" else {}
         row = first_row(cohort, stem, filled=column, **where)
         yield warn(
