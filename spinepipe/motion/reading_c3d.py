@@ -296,7 +296,13 @@ def _contradictions(whole: C3dFile, markers: bool) -> Iterator[tuple[str, str, s
         yield "POINT:USED", found, "at least one, the same twice"
         return
     frames, room = whole.frames_told, whole.room(*whole.layouts[0])
-    if len(frames) > 1 and not whole.frames:
+    header, point = whole.last - whole.first + 1, whole.number("FRAMES") or 0.0
+    counts = bool(point) and COUNT_ENDS not in (whole.last, point) and not whole.trial_end("END")
+    # one frame off, or a counter that began again, is settled by the size; more is of another file
+    if counts and abs(point - header) > 1 and (point - header) % (COUNT_ENDS + 1):
+        found = f"{header} frames and {point:g} frames"
+        yield "POINT:FRAMES", found, "the same in header and parameters"
+    elif len(frames) > 1 and not whole.frames:
         found = f"{' frames and '.join(map(str, sorted(frames)))} frames"
         yield "POINT:FRAMES", found, "the same in header and parameters, or what fills the file"
     elif whole.first > whole.last and (whole.last - whole.first + 1 - whole.frames) % (

@@ -215,6 +215,7 @@ def problem_of(folder: Path, made: Made | bytes) -> InputProblem:
         ({"numbers": {"USED": 3.0}}, "USED", "2 markers in the header, 3 in its parameters"),
         ({"numbers": {"USED": 1.0}}, "USED", "2 markers in the header, 1 in its parameters"),
         ({"header": {"points": 0}}, "USED", "0 markers in the header"),
+        ({"numbers": {"FRAMES": 5.0}}, "FRAMES", "3 frames and 5 frames"),
         ({"numbers": {"FRAMES": 5.0}, "frames": 2}, "FRAMES", "3 frames and 5 frames"),
         ({"header": {"first": 14}}, "FRAMES", "frames from 14 to 13"),
         ({"frames": 2}, "FRAMES", "room for 2 of 3 frames"),
