@@ -56,7 +56,7 @@ def to_arrow(table: Table, columns: Mapping[str, Sequence[Any]], **same: Any) ->
     BadTable
         For a missing or extra column, an empty, infinite or out-of-range cell, or a double key.
     """
-    n = max(map(len, columns.values()), default=0)
+    n = max((len(columns[name]) for name in columns), default=0)
     columns = {**columns, **{name: pa.repeat(value, n) for name, value in same.items()}}
     if set(columns) != set(table.names):
         raise BadTable(f"{table.name}: columns differ: {sorted(set(columns) ^ set(table.names))}")

@@ -1,7 +1,7 @@
 """Points picked in 3D Slicer (`.mrk.json`, `.fcsv`) as the landmarks of a cohort.
 
-Formats by Slicer's developer guide, "Markups": a `.mrk.json` that does not tell them has axes LPS
-and mm; older `.fcsv` tell their axes by a number.
+Formats by Slicer's developer guide on its lists of points: a `.mrk.json` that does not tell them
+has axes LPS and mm; older `.fcsv` tell their axes by a number.
 """
 
 import csv

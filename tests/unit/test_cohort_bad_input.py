@@ -63,7 +63,7 @@ COHORT_YAML_CASES = [
     Case("missing key", line(YAML, 5, None), YAML, None, "gravity", "add `gravity:`"),
     Case("wrong type", line(YAML, 5, "gravity: 9.81"), YAML, 5, "gravity", "9.81"),
     Case("other name", line(YAML, 1, "cohort: big"), YAML, 1, "cohort", "the folder's name, 'small'"),
-    Case("bad name", line(YAML, 1, "cohort: Small!"), YAML, 1, "cohort", "[a-z0-9_]+", 2),
+    Case("bad name", line(YAML, 1, "cohort: Small!"), YAML, 1, "cohort", "a name of a-z, 0-9, _", 2),
     Case("no title", line(YAML, 2, "title: ''"), YAML, 2, "title", "at least 1 character"),
     Case("SD of zero", swap(YAML, "deg: 0.1", "deg: 0"), YAML, 8, "measurement_sd.rotation_deg", "greater than 0"),
     Case("half an SD", line(YAML, 9, None), YAML, 7, "measurement_sd.translation_mm", "missing"),

@@ -420,8 +420,11 @@ def test_axes_of_a_camera_are_told_at_its_markers(
     clock = {"column": "t", "unit": "s"}
     for axes, told in (
         (["anterior", "superior", "right"], None),
-        (["posterior", "superior", "left"], "motion_files.markers.axes"),
-        (["anterior", "inferior", "left"], "motion_files.markers.axes"),
+        (
+            ["posterior", "superior", "left"],
+            "look at `positive` of loads and motion or at `markers`",
+        ),
+        (["anterior", "right", "inferior"], "motion_files.markers"),
     ):
         markers = {"clusters": {"L4": ["a", "b", "c"]}, "axes": axes}
         file = {"file": "load.csv", "motion_file": "seen.csv", "shift_s": 0.0}

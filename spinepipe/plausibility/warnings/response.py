@@ -43,6 +43,9 @@ from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, to_si
 USUAL_SD = 0.1
 """SD of one reading, deg and mm, of a cohort that does not tell its own."""
 
+ALONE = 1.6
+"""How far the motion of one joint may be from that of a wrong unit, as a factor."""
+
 LOAD_COLUMNS = {
     **{name: f"m{axis}_nm" for name, axis in zip(DRIVEN, "xyz", strict=True)},
     **{name: f"f{axis}_n" for name, axis in zip(PUSHED, "xyz", strict=True)},
@@ -154,7 +157,7 @@ def _sizes(cohort: Cohort, told: Sequence[_Response]) -> Iterator[PlausibilityWa
             found[place[2], unit, ""].append((*place[:2], ratio, size))
             seen.add(place)
         for one in own:
-            unit = None if one.place in seen else _of_one_joint(one)
+            unit = None if one.place in seen else _of_one_joint(one, own)
             alone = (*one.place[:2], abs(one.ratio), abs(one.ratio))
             if unit is not None and alone not in found[one.place[2], unit, one.joint]:
                 found[one.place[2], unit, one.joint].append(alone)
@@ -206,11 +209,17 @@ def _of_specimen(
                 yield place, beyond, sizes[place], unit_like(sizes[place], place[2])
 
 
-def _of_one_joint(one: _Response) -> MistakeHypothesis | None:
-    """The unit that a joint has wrong beside joints that move as they should, if so large a one."""
+def _of_one_joint(one: _Response, own: Sequence[_Response]) -> MistakeHypothesis | None:
+    """The unit of angles that a joint has wrong beside joints of its test that move as they should.
+
+    A fused joint moves little too: against the others the factor itself must be there.
+    """
+    others = [abs(o.ratio) for o in own if o.place == one.place and o.joint != one.joint]
     unit = None if is_plausible(one.beyond) else unit_like(abs(one.ratio), one.place[2])
-    far = unit is not None and unit.table == "motion" and abs(log(unit.factor)) > log(50.0)
-    return unit if far else None
+    if unit is None or not others or unit.table != "motion" or abs(log(unit.factor)) <= log(50.0):
+        return None
+    off = abs(log(abs(one.ratio) / typical(others))) - abs(log(unit.factor))
+    return unit if abs(off) < log(ALONE) else None
 
 
 def _shared(together: float, sizes: Sequence[float]) -> MistakeHypothesis | None:
