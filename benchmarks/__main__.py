@@ -271,11 +271,7 @@ def memory_part() -> None:
     about = _about()
     lines = _head("Memory", about)
     lines += ["", "| a process, and all it did | MiB |", "|---|---|"]
-    rows = []
-    for one in processes():
-        rows.append(asdict(one))
-        lines.append(f"| {one.what} | {one.peak_mib:.0f} |")
-        print(lines[-1], flush=True)
+    rows = _told(lines, processes(), lambda one: f"| {one.what} | {one.peak_mib:.0f} |")
     _write("memory", lines, {"machine": about, "processes": rows})
 
 
@@ -290,14 +286,14 @@ def machine_texts_part() -> None:
         "| text | MB | rows | CPU s | wall s | MiB |",
         "|---|---|---|---|---|---|",
     ]
-    rows = []
-    for row in machine_texts.readings():
-        rows.append(asdict(row))
-        lines.append(
+    rows = _told(
+        lines,
+        machine_texts.readings(),
+        lambda row: (
             f"| {row.what} | {row.megabytes:.0f} | {row.rows:,} | {row.cpu_s:.1f} "
             f"| {row.wall_s:.1f} | {row.peak_mib:.0f} |"
-        )
-        print(lines[-1], flush=True)
+        ),
+    )
     _write("machine_texts", lines, {"machine": about, "readings": rows})
 
 
@@ -436,11 +432,11 @@ def recordings_part() -> None:
         "| file | MB | CPU s | peak MiB |",
         "|---|---|---|---|",
     ]
-    rows = []
-    for row in recordings.reads():
-        rows.append(asdict(row))
-        lines.append(f"| {row.what} | {row.mb:.0f} | {row.seconds:.1f} | {row.peak_mib:.0f} |")
-        print(lines[-1], flush=True)
+    rows = _told(
+        lines,
+        recordings.reads(),
+        lambda row: f"| {row.what} | {row.mb:.0f} | {row.seconds:.1f} | {row.peak_mib:.0f} |",
+    )
     _write("recordings", lines, {"machine": about, "rows": rows})
 
 
@@ -493,15 +489,28 @@ def lost_fits_parts() -> None:
         "| cost over exact, median | runs, median |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    rows = []
-    for row in lost_fits.counts():
-        rows.append(asdict(row))
-        lines.append(
-            f"| {row.method} | {row.fits} | {row.claim_success} | {row.all_near} | {row.any_near} "
-            f"| {row.arrived} | {row.cost_ratio_median:.2f} | {row.runs_median:.0f} |"
-        )
-        print(lines[-1], flush=True)
+    rows = _told(
+        lines,
+        lost_fits.counts(),
+        lambda row: (
+            f"| {row.method} | {row.fits} | {row.claim_success} | {row.all_near} "
+            f"| {row.any_near} | {row.arrived} | {row.cost_ratio_median:.2f} "
+            f"| {row.runs_median:.0f} |"
+        ),
+    )
     _write("lost_fits", lines, {"machine": about, "counts": rows})
+
+
+def _told(
+    lines: list[str], found: Iterable[Any], line: Callable[[Any], str]
+) -> list[dict[str, Any]]:
+    """Rows of a table, each printed as soon as it is measured and put behind ``lines``."""
+    rows = []
+    for one in found:
+        rows.append(asdict(one))
+        lines.append(line(one))
+        print(lines[-1], flush=True)
+    return rows
 
 
 def _about() -> dict[str, str]:

@@ -28,7 +28,7 @@ def check_header(document: YamlDocument, folder: str) -> Iterator[InputProblem]:
     """Problems of ``cohort.yaml`` which its schema cannot see."""
     name = document.data.get("cohort")
     if isinstance(name, str) and name != folder:
-        place = (document.file, document.line_of("cohort"), "cohort")
+        place = document.place_of("cohort")
         remedy = "rename the folder or change the key"
         if not COHORT_NAME.fullmatch(folder):
             remedy = "rename the folder: names of cohorts are of a-z, 0-9 and _"
@@ -48,7 +48,7 @@ def usable_vertebrae(document: YamlDocument) -> tuple[str, ...]:
 
 
 def _chain_problems(document: YamlDocument, names: list[str], count: int) -> Iterator[InputProblem]:
-    place = (document.file, document.line_of("vertebrae"), "vertebrae")
+    place = document.place_of("vertebrae")
     if count < 2:
         found = f"{count} vertebra{'' if count == 1 else 'e'}"
         yield InputProblem(*place, found, "at least 2", "list every vertebra, caudal to cranial")

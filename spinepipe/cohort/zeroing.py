@@ -38,7 +38,7 @@ def check_zeroing(draft: Draft, document: YamlDocument | None) -> Iterator[Input
     known = set(tests.known)
     for name in named:
         if isinstance(name, str) and name not in known:
-            place = (document.file, document.line_of(KEY), KEY)
+            place = document.place_of(KEY)
             allowed = f"a test of motion.csv: {tests.allowed}"
             yield InputProblem(*place, f"'{name}'", allowed, tests.remedy(name))
     if not known.intersection(name for name in named if isinstance(name, str)):

@@ -90,7 +90,7 @@ def _no_such_form(document: YamlDocument, key: str, detail: ErrorDetails) -> Inp
     context = detail.get("ctx", {})
     (name,) = _quoted(context["discriminator"])
     key = f"{key}.{name}"
-    place = (document.file, document.line_of(key), key)
+    place = document.place_of(key)
     if detail["type"] == "union_tag_not_found":
         found, allowed = "nothing: the key is missing", "a form, which decides on the other keys"
         return InputProblem(*place, found, allowed, f"add `{name}:`")

@@ -41,7 +41,7 @@ from spinepipe.studies.subjects import STANDARD_GRAVITY
 MADE = ("cohort.yaml", "specimens.csv", "subjects.csv", "trials.csv", "datapackage.json")
 
 
-class Person(BaseModel):
+class RecordedPerson(BaseModel):
     """A person."""
 
     model_config = FORM
@@ -83,7 +83,7 @@ class MotionCaptureSettings(ImportSettings):
     axes: AxesText = Field(
         description="what forwards, up and right are on the axes of all files, as in `x z -y`"
     )
-    persons: tuple[Person, ...] = Field(strict=False, description="who was recorded")
+    persons: tuple[RecordedPerson, ...] = Field(strict=False, description="who was recorded")
     trials: tuple[Trial, ...] = Field(strict=False, description="recordings of markers")
     tables: tuple[RecordedTable, ...] = Field(
         default=(), strict=False, description="tables beside them"

@@ -28,7 +28,7 @@ from spinepipe.effects import Effect, Parameter, TriedValues, create, registered
 from spinepipe.imports.imported import all_forms
 from spinepipe.imports.landmarks import LandmarkSettings
 from spinepipe.imports.motion_capture import MotionCaptureSettings
-from spinepipe.imports.opensim_model.settings import OsimSettings
+from spinepipe.imports.opensim_model.spine import OsimSettings
 from spinepipe.model.file import ModelFile
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
 from spinepipe.reference.licences import licences

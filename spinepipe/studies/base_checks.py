@@ -11,7 +11,6 @@ from spinepipe.effects import EffectKind, create
 from spinepipe.model.file import EffectEntry, ModelFile, effects_for, read_model
 from spinepipe.problems import InputError, InputProblem, Spelling
 from spinepipe.studies.base_model import BUSHING, made_by
-from spinepipe.studies.places import at
 
 KEY = "base.model"
 LAWS = (EffectKind.JOINT_LAW, EffectKind.PATH)
@@ -48,7 +47,7 @@ class BaseCheck:
         maker = made_by(path, root)
         if maker == study.study:
             allowed = "a model file that this study does not write itself"
-            yield InputProblem(*at(document, KEY), name, allowed, "copy it to another folder")
+            yield InputProblem(*document.place_of(KEY), name, allowed, "copy it to another folder")
         elif path.is_file():
             remade = f"; or delete the file, and study {maker} makes it anew" if maker else ""
             for problem in self._of_file(path, name, cohort, maker):
@@ -56,7 +55,7 @@ class BaseCheck:
         elif maker is None:
             allowed = "a model file, or a result of another study in config/studies"
             remedy = "correct the path (it begins at the folder of the Snakefile) or add the file"
-            yield InputProblem(*at(document, KEY), f"no file '{name}'", allowed, remedy)
+            yield InputProblem(*document.place_of(KEY), f"no file '{name}'", allowed, remedy)
 
     def _of_file(
         self, path: Path, name: str, cohort: Cohort, maker: str | None

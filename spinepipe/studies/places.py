@@ -11,11 +11,6 @@ from spinepipe.problems import InputProblem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
 
 
-def at(document: YamlDocument, key: str) -> tuple[str, int | None, str]:
-    """File, line and key of a setting."""
-    return document.file, document.line_of(key), key
-
-
 def unknown_tests(
     document: YamlDocument, tests: Sequence[str] | None, known: Sequence[str]
 ) -> Iterator[InputProblem]:
@@ -23,7 +18,7 @@ def unknown_tests(
     spelling = Spelling(known, "delete it or add its loads")
     for index, name in enumerate(tests or ()):
         if name not in known:
-            place = at(document, f"tests.{index}")
+            place = document.place_of(f"tests.{index}")
             found, remedy = f"unknown test '{name}'", spelling.remedy(name)
             yield InputProblem(*place, found, spelling.allowed, remedy)
 
@@ -40,7 +35,7 @@ def unknown_names(
     spelling = Spelling(known, "delete it or correct its name")
     for index, name in enumerate(names or ()):
         if name not in known:
-            place = at(document, f"{key}.{index}")
+            place = document.place_of(f"{key}.{index}")
             found, remedy = f"unknown {what} '{name}'", spelling.remedy(name)
             yield InputProblem(*place, found, spelling.allowed, remedy)
 
@@ -52,7 +47,7 @@ def unknown_levels(
     spelling = Spelling(joints, "delete it or correct its name")
     for name in levels:
         if name not in joints:
-            place = at(document, f"level_stiffness.{name}")
+            place = document.place_of(f"level_stiffness.{name}")
             found, remedy = f"unknown joint '{name}'", spelling.remedy(name)
             yield InputProblem(*place, found, spelling.allowed, remedy)
 

@@ -59,7 +59,7 @@ def load(path: Path, root: Path) -> tuple[YamlDocument | None, Study | None, lis
     problems += faults
     name = document.data.get("study")
     if isinstance(name, str) and name != path.stem:
-        place = (document.file, document.line_of("study"), "study")
+        place = document.place_of("study")
         found, allowed = f"'{name}'", f"the file's name, '{path.stem}'"
         problems.append(InputProblem(*place, found, allowed, "rename the file or change the key"))
     return document, study, problems
@@ -95,10 +95,10 @@ def _validated(document: YamlDocument) -> tuple[Study | None, list[InputProblem]
     near = closest("kind", map(str.casefold, document.data))
     if "kind" not in document.data and near is not None:
         near = next(key for key in document.data if key.casefold() == near)
-        place = (document.file, document.line_of(near), near)
+        place = document.place_of(near)
         remedy = "did you mean 'kind'? it decides which other keys are allowed"
         return None, [InputProblem(*place, "an unknown key", "kind", remedy)]
-    place = (document.file, document.line_of("kind"), "kind")
+    place = document.place_of("kind")
     found = "nothing: the key is missing" if kind is None else repr(kind)
     otherwise = "the kind decides which other keys are allowed"
     remedy = did_you_mean(str(kind), kind_names(), otherwise)
@@ -178,7 +178,7 @@ def _misfits(
 
 def _held(document: YamlDocument, study: Study, cohort: Cohort) -> InputProblem:
     """A rig in the cohort of a study that would leave it out."""
-    place = (document.file, document.line_of("cohort"), "cohort")
+    place = document.place_of("cohort")
     found = f"cohort '{cohort.name}', whose rig fixes joint coordinates (supports.csv)"
     holding = [name for name in kind_names() if kind_of(name).holds]
     allowed = f"studies of kind {', '.join(holding)}: {study.kind} knows no rig"
@@ -203,7 +203,7 @@ def _cohort(
             found = f"'{name}', a folder whose name no cohort can have"
             remedy = "rename it with a-z, 0-9 and _ alone, in its cohort.yaml and here too"
         allowed = f"{one_of(known)}, or the path of a folder"
-        place = (document.file, document.line_of("cohort"), "cohort")
+        place = document.place_of("cohort")
         return None, [InputProblem(*place, found, allowed, remedy)]
     try:
         return read_cohort(folder, _further(document)), []
@@ -304,7 +304,7 @@ def _unknown_names(selection: Selection, document: YamlDocument, root: Path) -> 
     spelling = Spelling(known, f"add a file of that name to {STUDIES.as_posix()}")
     for key in ("studies", "full"):
         for index, name in enumerate(getattr(selection, key)):
-            place = (document.file, document.line_of(f"{key}.{index}"), f"{key}.{index}")
+            place = document.place_of(f"{key}.{index}")
             if name in seen:
                 problems.append(InputProblem(*place, f"'{name}' again", "each once", "delete one"))
             elif name not in known:

@@ -17,7 +17,7 @@ from spinepipe.frames import zxy_angles
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count
 from spinepipe.testing_machine.channels import LOAD_COLUMNS
-from spinepipe.testing_machine.instruments import LoadCell, Markers, Rotations
+from spinepipe.testing_machine.instruments import LoadCell, MarkerClusters, Rotations
 from spinepipe.testing_machine.recording import Recording
 from spinepipe.testing_machine.settings import MachineMapping
 from spinepipe.units import COORDINATE_COLUMNS
@@ -75,7 +75,9 @@ def _zxy(told: Array, rotations: Rotations, zeroed: bool) -> Array:
     return np.degrees(zxy_angles(turned.as_matrix()))
 
 
-def joint_rotations(one: Recording, markers: Markers, vertebrae: tuple[str, ...]) -> Recording:
+def joint_rotations(
+    one: Recording, markers: MarkerClusters, vertebrae: tuple[str, ...]
+) -> Recording:
     """The recording with rotations of joints, from the pose of its first row, in the place of
     markers; those of a cluster are of least squares (Kabsch 1976, Acta Cryst A32, 922-923).
 

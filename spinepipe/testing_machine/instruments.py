@@ -50,7 +50,7 @@ class LoadCell(BaseModel):
     )
 
 
-class Markers(BaseModel):
+class MarkerClusters(BaseModel):
     """Markers of a camera, in clusters on the vertebrae."""
 
     model_config = FORM

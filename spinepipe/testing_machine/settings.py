@@ -14,7 +14,7 @@ from spinepipe.testing_machine.channels import (
 )
 from spinepipe.testing_machine.instruments import (
     LoadCell,
-    Markers,
+    MarkerClusters,
     Point,
     Rotations,
 )
@@ -125,7 +125,7 @@ class MotionFiles(BaseModel):
         description="signal in both files by which clocks are compared; null: `shift_s`, else the "
         "rates of load and motion",
     )
-    markers: Markers | None = Field(
+    markers: MarkerClusters | None = Field(
         default=None, description="markers whose motion is wanted, in the place of `motion`"
     )
 

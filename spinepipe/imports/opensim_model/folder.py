@@ -27,8 +27,7 @@ from spinepipe.imports.imported import (
 )
 from spinepipe.imports.opensim_model.document import ORIGIN, OsimDocument, is_on
 from spinepipe.imports.opensim_model.forces import FORCES, bushing_model, muscle_tables
-from spinepipe.imports.opensim_model.settings import OsimSettings
-from spinepipe.imports.opensim_model.spine import OsimSpine
+from spinepipe.imports.opensim_model.spine import OsimSettings, OsimSpine
 from spinepipe.model import Body, RefusedModel
 from spinepipe.model.osim import TOKEN_INERTIA_KG_M2, TOKEN_MASS_KG
 from spinepipe.model.osim_parts import SIX

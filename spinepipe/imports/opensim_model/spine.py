@@ -4,13 +4,17 @@ import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Literal
+
+from pydantic import Field
 
 from spinepipe.cohort.checks import check_header
+from spinepipe.cohort.cohort import VertebraName
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
 from spinepipe.frames import Pose
+from spinepipe.imports.imported import AxesText, CohortTitle
 from spinepipe.imports.opensim_model.document import GROUND, OsimDocument
-from spinepipe.imports.opensim_model.settings import OsimSettings
 from spinepipe.motion.reading import axes_of
 from spinepipe.problems import InputError, InputProblem, one_of
 
@@ -21,6 +25,26 @@ _VERTEBRA = re.compile(
     r"(l|t|c|lumbar|thoracic|cervical|lumb|thor|cerv)_?(\d{1,2})(_?(body|vert\w*))?"
 )
 _JOINT = re.compile(r"([SLTC]\d{1,2})([SLTC]\d{1,2})")
+
+
+class OsimSettings(CohortTitle):
+    """The keys of the YAML that says what is what in a model."""
+
+    kind: Literal["opensim_model"] = Field(description="what the file is")
+    file: str = Field(min_length=1, description="the .osim, relative to this YAML")
+    specimen: str | None = Field(
+        default=None, description="what the specimen is called; null: as the model"
+    )
+    vertebrae: dict[VertebraName, str] | None = Field(
+        default=None,
+        description="bodies that are vertebrae, such as `{S1: pelvis, L5: lumbar5}`, and no "
+        "others; null: those whose names say so",
+    )
+    axes: AxesText = Field(
+        default="x y z",
+        description="what forwards, up and right are in the axes of the model, as in `x z -y` "
+        "where z is up and y to the left",
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +71,7 @@ class OsimSpine:
             Where there are none, or they are no chain.
         """
         chosen, placed = settings.vertebrae or _by_name(document), document.placed
-        place = (told.file, told.line_of("vertebrae"), "vertebrae")
+        place = told.place_of("vertebrae")
         named = "name them under `vertebrae:`, such as {S1: pelvis, L5: lumbar5}"
         problems = [
             InputProblem(*place, f"'{body}'", f"a placed body: {one_of(placed)}", named)

@@ -23,7 +23,7 @@ from spinepipe.studies.cohort_stiffness.settings import (
     SEXES,
     CohortStiffness,
 )
-from spinepipe.studies.places import at, readings, unknown_levels, unknown_tests
+from spinepipe.studies.places import readings, unknown_levels, unknown_tests
 from spinepipe.units import ROTATIONS
 
 
@@ -51,7 +51,7 @@ def check_cohort_stiffness(
         name = "neutral_zone_below_nm_per_deg"
         found = f"threshold without {name}" if lacks else f"{below:g}, and no threshold asked for"
         allowed = f"both, neutral_zone: threshold and {name}, or neither"
-        key = at(document, "neutral_zone" if lacks else name)
+        key = document.place_of("neutral_zone" if lacks else name)
         yield InputProblem(*key, found, allowed, "give both, or choose another definition")
 
 
@@ -63,7 +63,7 @@ def _tests(
         found = f"cohort '{cohort.name}', which has no motion.csv"
         allowed = "a cohort with loads.csv and motion.csv: stiffness is fitted to motion"
         remedy = "choose another cohort, or a study of kind range_of_motion"
-        yield InputProblem(*at(document, "cohort"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("cohort"), found, allowed, remedy)
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
     for name in study.tests or cohort.tests:
@@ -84,14 +84,14 @@ def _measured(
         if name in cohort.tests and name not in set(measured["test"]):
             found = f"test '{name}', which has no motion"
             allowed = f"tests with readings of {one_of(study.free)} of a specimen at least"
-            place = at(document, f"tests.{index}")
+            place = document.place_of(f"tests.{index}")
             yield InputProblem(*place, found, allowed, "delete it or add its motion")
     for specimen in cohort.specimen_names:
         if specimen not in set(measured["specimen"]):
             found = f"no motion of specimen '{specimen}' in any chosen test"
             allowed = f"readings of {one_of(study.free)} of every specimen in one test at least"
             remedy = "choose more tests, or leave the specimen out of the cohort"
-            yield InputProblem(*at(document, "tests"), found, allowed, remedy)
+            yield InputProblem(*document.place_of("tests"), found, allowed, remedy)
 
 
 def _levels(
@@ -110,11 +110,11 @@ def _levels(
         names, verb = " and ".join(chosen), "is" if len(chosen) == 1 else "are"
         allowed = f"a value for every joint of the cohort, as {names} {verb} among representations"
         remedy = f"add them, or leave {names} out of representations"
-        yield InputProblem(*at(document, "level_stiffness"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("level_stiffness"), found, allowed, remedy)
     elif "representations" in asked and not set(study.free) & set(ROTATIONS):
         allowed = f"{one_of(ROTATIONS)} among them, as published levels differ in rotations alone"
         remedy = f"free a rotation, or leave {' and '.join(chosen)} out of representations"
-        yield InputProblem(*at(document, "free"), ", ".join(study.free), allowed, remedy)
+        yield InputProblem(*document.place_of("free"), ", ".join(study.free), allowed, remedy)
 
 
 def _cost(document: YamlDocument, study: CohortStiffness, cohort: Cohort) -> Iterator[InputProblem]:
@@ -123,12 +123,12 @@ def _cost(document: YamlDocument, study: CohortStiffness, cohort: Cohort) -> Ite
         found = "null, and the cohort has none"
         allowed = "SDs of one reading, here or in cohort.yaml, for cost: measurement_sd"
         remedy = "fill them in, or choose cost: published"
-        yield InputProblem(*at(document, "measurement_sd"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("measurement_sd"), found, allowed, remedy)
     others = [name for name in study.free if name not in ROTATIONS]
     if study.cost == "published" and others:
         allowed = f"{one_of(ROTATIONS)} with cost: published, which has no translations"
         remedy = "free rotations only, or choose cost: measurement_sd"
-        yield InputProblem(*at(document, "free"), ", ".join(others), allowed, remedy)
+        yield InputProblem(*document.place_of("free"), ", ".join(others), allowed, remedy)
 
 
 def _covariates(
@@ -141,7 +141,7 @@ def _covariates(
             found = f"'{name}', which {cohort.folder.name}/specimens.csv has of no specimen"
             allowed = "covariates that are known of the specimens"
             remedy = "fill in the column, or delete it here"
-            yield InputProblem(*at(document, f"covariates.{index}"), found, allowed, remedy)
+            yield InputProblem(*document.place_of(f"covariates.{index}"), found, allowed, remedy)
     if "sex" not in (study.covariates or ()):
         return
     for specimen, sex in zip(cohort.specimens["specimen"], cohort.specimens["sex"], strict=True):
@@ -159,23 +159,23 @@ def _nuisances(document: YamlDocument, study: CohortStiffness) -> Iterator[Input
         found = "null" if sds is None else "0 mm and 0 deg"
         allowed = f"an SD above 0, as {', '.join(asked)} needs"
         remedy = "write nuisance: {centre_mm: 3, axes_deg: 3}, or leave it out of representations"
-        yield InputProblem(*at(document, "nuisance"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("nuisance"), found, allowed, remedy)
     if sds is not None and not asked:
         found = f"SDs, and none of {', '.join(NUISANCE)} among representations"
         allowed = "one of them, as no other fits errors of centres and axes"
         remedy = f"add {NUISANCE[-1]} to representations, or delete nuisance"
-        yield InputProblem(*at(document, "nuisance"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("nuisance"), found, allowed, remedy)
     for name in asked:
         plain = named(name).without_nuisances
         if plain not in study.representations:
             found, allowed = f"{name} without {plain}", f"{plain} too, which it is compared with"
-            place = at(document, "representations")
+            place = document.place_of("representations")
             yield InputProblem(*place, found, allowed, f"add {plain}, or leave {name} out")
     if asked and study.cost == "published":
         found = f"published, and {', '.join(asked)} among representations"
         allowed = "cost: measurement_sd, as priors are weighed against readings in their SDs"
         remedy = "choose cost: measurement_sd, or leave them out of representations"
-        yield InputProblem(*at(document, "cost"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("cost"), found, allowed, remedy)
 
 
 def check_one_stiffening(
@@ -198,4 +198,4 @@ def check_one_stiffening(
         found = f"{one_of(asked)}, and {STIFFENING_EFFECT} in the base model too"
         allowed = "one of them: two laws that scale one bushing cannot be told apart"
         remedy = "leave these representations out, or take the effect out of the model file"
-        yield InputProblem(*at(document, "representations"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("representations"), found, allowed, remedy)

@@ -8,7 +8,7 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects import registered
 from spinepipe.problems import InputProblem, Spelling, one_of
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.places import at, measured_columns, readings, repeated, unknown_tests
+from spinepipe.studies.places import measured_columns, readings, repeated, unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, ROTATIONS, TRANSLATIONS
 
 
@@ -26,7 +26,7 @@ def check_discrepancy(
         found = f"cohort '{cohort.name}', which has no motion.csv"
         allowed = "a cohort with loads.csv and motion.csv: what a model lacks shows in motion"
         remedy = "choose another cohort, or a study of kind range_of_motion"
-        yield InputProblem(*at(document, "cohort"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("cohort"), found, allowed, remedy)
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
     yield from _measured(document, study, cohort)
@@ -42,7 +42,7 @@ def _effects(document: YamlDocument, study: Discrepancy) -> Iterator[InputProble
     for index, name in enumerate(study.effects or ()):
         if name in known:
             continue
-        place = at(document, f"effects.{index}")
+        place = document.place_of(f"effects.{index}")
         found, remedy = f"unknown effect '{name}'", spelling.remedy(name)
         if name in registered():
             found = f"'{name}', which does not say how it may be tried"
@@ -56,7 +56,7 @@ def _measured(document: YamlDocument, study: Discrepancy, cohort: Cohort) -> Ite
     for index, name in enumerate(study.tests or ()):
         if name in cohort.tests and name not in set(rows["test"]):
             found = f"test '{name}', which has no motion"
-            place = at(document, f"tests.{index}")
+            place = document.place_of(f"tests.{index}")
             allowed = "tests with readings of a specimen at least"
             yield InputProblem(*place, found, allowed, "delete it or add its motion")
     for specimen in cohort.specimen_names:
@@ -64,7 +64,7 @@ def _measured(document: YamlDocument, study: Discrepancy, cohort: Cohort) -> Ite
             found = f"no motion of specimen '{specimen}' in any chosen test"
             allowed = "readings of every specimen in one test at least"
             remedy = "choose more tests or coordinates, or leave the specimen out of the cohort"
-            yield InputProblem(*at(document, "tests"), found, allowed, remedy)
+            yield InputProblem(*document.place_of("tests"), found, allowed, remedy)
 
 
 def _coordinates(
@@ -76,7 +76,7 @@ def _coordinates(
     known = [names[column] for column in present]
     for index, name in enumerate(study.coordinates or ()):
         if name not in known:
-            place = at(document, f"coordinates.{index}")
+            place = document.place_of(f"coordinates.{index}")
             found = f"'{name}', which was not measured in the chosen tests"
             yield InputProblem(
                 *place, found, one_of(known), "delete it, or add its column to motion"
@@ -93,7 +93,7 @@ def _loads_of_a_rig(
         found = "SDs of motion beside loads of a rig that were measured (supports.csv)"
         allowed = "null: cohort.yaml says the SDs of motion and of loads together"
         remedy = "set measurement_sd in cohort.yaml, and take it out here"
-        yield InputProblem(*at(document, "measurement_sd"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("measurement_sd"), found, allowed, remedy)
 
 
 def _noise(document: YamlDocument, study: Discrepancy, cohort: Cohort) -> Iterator[InputProblem]:
@@ -108,5 +108,5 @@ def _noise(document: YamlDocument, study: Discrepancy, cohort: Cohort) -> Iterat
             found = f"null; the cohort has none, and no {kind} was read in two cycles of a test"
             allowed = "SDs of one reading, here or in cohort.yaml, or repeated cycles in motion.csv"
             remedy = "set measurement_sd: {rotation_deg: 0.1, translation_mm: 0.1} to what is known"
-            yield InputProblem(*at(document, "measurement_sd"), found, allowed, remedy)
+            yield InputProblem(*document.place_of("measurement_sd"), found, allowed, remedy)
             return

@@ -15,7 +15,6 @@ from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import frame_landmarks, given_joints, moved_by
 from spinepipe.studies.parts import AUTO
 from spinepipe.studies.places import (
-    at,
     measured_columns,
     readings,
     unknown_levels,
@@ -62,14 +61,14 @@ def check_sensitivity_design(
         what = f"{len(study.factors)} factors, compared as {len(compared)}"
         allowed = f"at least {FEWEST} factors or groups: one alone has nothing to be compared with"
         yield InputProblem(
-            *at(document, "factors"), what, allowed, "add factors, or split the group"
+            *document.place_of("factors"), what, allowed, "add factors, or split the group"
         )
 
 
 def _samples(document: YamlDocument, study: GlobalSensitivity) -> Iterator[InputProblem]:
     """Numbers that the methods ask for."""
     design = study.design
-    n, place = design.samples, at(document, "design.samples")
+    n, place = design.samples, document.place_of("design.samples")
     if design.method == "sobol" and n & (n - 1):
         below = 2 ** int(log2(n))
         remedy = f"take {below} or {2 * below}"
@@ -84,7 +83,7 @@ def _samples(document: YamlDocument, study: GlobalSensitivity) -> Iterator[Input
         allowed = "an even number: steps of half the levels must stay on the grid"
         levels = str(design.levels)
         yield InputProblem(
-            *at(document, "design.levels"), levels, allowed, "take one more or one less"
+            *document.place_of("design.levels"), levels, allowed, "take one more or one less"
         )
 
 
@@ -93,7 +92,7 @@ def _indices(document: YamlDocument, study: GlobalSensitivity) -> Iterator[Input
     there = INDICES[Method(study.design.method)]
     for number, index in enumerate(study.indices or ()):
         if index not in there:
-            place = at(document, f"indices.{number}")
+            place = document.place_of(f"indices.{number}")
             allowed = f"with method {study.design.method}: {one_of(there)}"
             yield InputProblem(*place, index, allowed, "delete it, or choose another method")
 
@@ -106,11 +105,11 @@ def _names(document: YamlDocument, study: GlobalSensitivity) -> Iterator[InputPr
         key = f"factors.{number}.name" if factor.name else f"factors.{number}"
         if name == DUMMY and study.dummy:
             allowed = f"any other name: '{DUMMY}' is the factor that changes nothing"
-            yield InputProblem(*at(document, key), f"'{name}'", allowed, "rename it")
+            yield InputProblem(*document.place_of(key), f"'{name}'", allowed, "rename it")
         if name in seen:
             found = f"'{name}', the name of factor {seen[name] + 1} as well"
             remedy = "delete one, or give one a `name:` of its own"
-            yield InputProblem(*at(document, key), found, "each name once", remedy)
+            yield InputProblem(*document.place_of(key), found, "each name once", remedy)
         seen.setdefault(name, number)
 
 
@@ -120,7 +119,7 @@ def _groups(document: YamlDocument, study: GlobalSensitivity) -> Iterator[InputP
     for number, factor in enumerate(study.factors):
         if factor.group is None:
             continue
-        place = at(document, f"factors.{number}.group")
+        place = document.place_of(f"factors.{number}.group")
         if factor.group in labels:
             allowed = "a name that no factor has"
             yield InputProblem(*place, f"'{factor.group}'", allowed, "rename the group")
@@ -138,7 +137,7 @@ def _tests(
         found = f"cohort '{cohort.name}', which has no loads.csv"
         allowed = "a cohort with loads.csv: the study moves specimens in its tests"
         yield InputProblem(
-            *at(document, "cohort"), found, allowed, "add loads, or take another cohort"
+            *document.place_of("cohort"), found, allowed, "add loads, or take another cohort"
         )
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
@@ -151,7 +150,7 @@ def _tests(
             found = f"no load of specimen '{specimen}' in any chosen test"
             remedy = "choose more tests, or leave the specimen out"
             allowed = "a load of every chosen specimen in one chosen test at least"
-            yield InputProblem(*at(document, "tests"), found, allowed, remedy)
+            yield InputProblem(*document.place_of("tests"), found, allowed, remedy)
 
 
 def _motion(
@@ -169,10 +168,14 @@ def _motion(
                 remedy = f"{otherwise}, or choose other specimens and tests"
                 whose = "every chosen specimen in one chosen test at least"
                 allowed = f"{word} with measured motion of {whose}"
-                yield InputProblem(*at(document, key), f"{word}, and {missing}", allowed, remedy)
+                yield InputProblem(
+                    *document.place_of(key), f"{word}, and {missing}", allowed, remedy
+                )
     if study.is_fitted and study.level_stiffness:
         found = "levels of their own with stiffness: fitted, which all joints of a specimen share"
-        yield InputProblem(*at(document, "level_stiffness"), found, "none of them", "delete it")
+        yield InputProblem(
+            *document.place_of("level_stiffness"), found, "none of them", "delete it"
+        )
     if study.is_fitted or study.outputs.stiffness:
         yield from _weights(document, study, cohort)
 
@@ -198,14 +201,14 @@ def _weights(
     columns = measured_columns(read)
     weights = zip(COORDINATE_COLUMNS, study.calibration.weights.in_order(), strict=True)
     if columns and not any(weight for name, weight in weights if name in columns):
-        place = at(document, "calibration.weights")
+        place = document.place_of("calibration.weights")
         found = "no weight on anything that was measured"
         yield InputProblem(
             *place, found, f"a weight on {one_of(columns)}", "weigh what was measured"
         )
     elif AUTO in study.calibration.free:
         found = "auto, and no coordinate was both loaded and measured"
-        place = at(document, "calibration.free")
+        place = document.place_of("calibration.free")
         yield InputProblem(
             *place, found, "coordinates that were", "name some, or choose other tests"
         )
@@ -245,13 +248,13 @@ def _bodies(
         found = f"{change.of.value} in cohort '{cohort.name}', which has no bodies.csv"
         allowed = "factors of bodies in a cohort that lists them"
         yield InputProblem(
-            *at(document, key), found, allowed, "delete the factor, or add bodies.csv"
+            *document.place_of(key), found, allowed, "delete the factor, or add bodies.csv"
         )
         return
     if not cohort.gravity:
         found = f"{change.of.value} in cohort '{cohort.name}' without gravity: it would do nothing"
         allowed = "factors of bodies where gravity is true: in equilibrium bodies only weigh"
-        yield InputProblem(*at(document, key), found, allowed, "delete the factor")
+        yield InputProblem(*document.place_of(key), found, allowed, "delete the factor")
     rows = zip(cohort.bodies["specimen"], cohort.bodies["vertebra"], strict=True)
     listed = set(rows)
     asked = [name for name in change.at or moving if name in moving]
@@ -260,7 +263,7 @@ def _bodies(
         found = f"no body in bodies.csv for {', '.join(missing[:5])}"
         allowed = "bodies that the cohort lists, of all chosen specimens"
         yield InputProblem(
-            *at(document, place), found, allowed, "leave them out, or add their bodies"
+            *document.place_of(place), found, allowed, "leave them out, or add their bodies"
         )
 
 
@@ -283,7 +286,7 @@ def _loads(
         found = f"{change.of.value}, but no {what} acts in any chosen test: it would do nothing"
         allowed = f"{change.of.value} in tests with a {what}"
         yield InputProblem(
-            *at(document, key), found, allowed, "delete the factor, or choose other tests"
+            *document.place_of(key), found, allowed, "delete the factor, or choose other tests"
         )
 
 
@@ -302,12 +305,12 @@ def check_landmark(
         found = f"a landmark in cohort '{cohort.name}', which has no landmarks.csv"
         allowed = "landmarks of a cohort that has them"
         remedy = "use joint_centre and joint_axes, or take another cohort"
-        yield InputProblem(*at(document, key), found, allowed, remedy)
+        yield InputProblem(*document.place_of(key), found, allowed, remedy)
         return
     if vertebra not in cohort.vertebrae:
         known = cohort.vertebrae
         remedy = did_you_mean(vertebra, known, "correct its name")
-        place = at(document, f"{key}.vertebra")
+        place = document.place_of(f"{key}.vertebra")
         yield InputProblem(*place, f"unknown vertebra '{vertebra}'", one_of(known), remedy)
     if change.landmark not in FRAME_LANDMARKS:
         # a landmark that makes no frame may be moved as far as one likes
@@ -317,7 +320,9 @@ def check_landmark(
             change.landmark, FRAME_LANDMARKS, "correct its name, or delete the factor"
         )
         found = f"landmark '{change.landmark}', {why}"
-        yield InputProblem(*at(document, f"{key}.landmark"), found, one_of(FRAME_LANDMARKS), remedy)
+        yield InputProblem(
+            *document.place_of(f"{key}.landmark"), found, one_of(FRAME_LANDMARKS), remedy
+        )
     elif vertebra in cohort.vertebrae:
         yield from _of_specimens(document, key, change, cohort, specimens)
 
@@ -339,12 +344,14 @@ def _of_specimens(
     if without:
         found = f"{what}, which landmarks.csv does not have of {', '.join(without[:5])}"
         allowed = "a landmark of all chosen specimens"
-        yield InputProblem(*at(document, f"{key}.landmark"), found, allowed, "delete the factor")
+        yield InputProblem(
+            *document.place_of(f"{key}.landmark"), found, allowed, "delete the factor"
+        )
     if idle:
         found = f"{what}, on which no joint frame of {', '.join(idle[:5])} hangs"
         allowed = "a landmark of a frame that joints.csv does not give: it would do nothing"
         remedy = "delete the factor, or use joint_centre and joint_axes"
-        yield InputProblem(*at(document, key), found, allowed, remedy)
+        yield InputProblem(*document.place_of(key), found, allowed, remedy)
 
 
 _CHECKS: dict[Of, Callable[..., Iterator[InputProblem]]] = {

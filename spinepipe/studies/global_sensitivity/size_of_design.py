@@ -10,7 +10,6 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem
 from spinepipe.studies.global_sensitivity.settings import GlobalSensitivity
 from spinepipe.studies.global_sensitivity.start import asked_tests
-from spinepipe.studies.places import at
 
 RESULTS = "results"
 MEMINFO = Path("/proc/meminfo")
@@ -117,7 +116,7 @@ def _short(
         return
     runs = f"{size.runs:,} runs per specimen and {size.response_rows:,} rows of responses"
     found = f"{runs}: about {_read(needed)} of {what}"
-    place = at(document, "design.samples")
+    place = document.place_of("design.samples")
     remedy = "take fewer samples, factors, tests, steps or specimens, or make room"
     yield InputProblem(*place, found, f"what there is, {_read(there)} of {what}", remedy)
 

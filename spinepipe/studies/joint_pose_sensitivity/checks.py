@@ -13,7 +13,7 @@ from spinepipe.frames import FRAME_LANDMARKS
 from spinepipe.problems import InputProblem, one_of
 from spinepipe.studies.joint_pose_sensitivity.settings import JointPoseSensitivity
 from spinepipe.studies.parts import AUTO
-from spinepipe.studies.places import at, unknown_tests
+from spinepipe.studies.places import unknown_tests
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES
 
 
@@ -31,7 +31,7 @@ def check_joint_pose_sensitivity(
     yield from _tests(document, study, cohort)
     yield from _load_point(document, study, cohort)
     if study.best_models > study.poses:
-        place = at(document, "best_models")
+        place = document.place_of("best_models")
         allowed = f"at most the number of poses, {study.poses}"
         yield InputProblem(*place, str(study.best_models), allowed, "take fewer, or more poses")
 
@@ -42,7 +42,7 @@ def _landmarks(
     if cohort.landmarks is None:
         allowed = "a cohort with landmarks.csv: the study samples landmarks"
         found = f"cohort '{cohort.name}', which has none"
-        yield InputProblem(*at(document, "cohort"), found, allowed, "choose another cohort")
+        yield InputProblem(*document.place_of("cohort"), found, allowed, "choose another cohort")
         return
     tables = {"specimens": cohort.specimens, "landmarks": cohort.landmarks}
     absent = frozenset(TABLES) - set(tables)
@@ -57,7 +57,7 @@ def _landmarks(
         found = f"null, and {len(bare)} of {len(frame)} landmarks without sd_mm (first: {first})"
         allowed = "a number in mm, or an sd_mm for every landmark of a joint frame"
         remedy = "set landmark_sd_mm or fill the column"
-        yield InputProblem(*at(document, "landmark_sd_mm"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("landmark_sd_mm"), found, allowed, remedy)
 
 
 def _loading(
@@ -79,7 +79,7 @@ def _loading(
         if not missing:
             return
         lacking = f"no inertia in bodies.csv for {', '.join(missing[:5])}"
-    place = at(document, "loading")
+    place = document.place_of("loading")
     allowed = "equilibrium, or a cohort with masses and inertias of all moving vertebrae"
     yield InputProblem(
         *place, f"settle, but {lacking}", allowed, "choose equilibrium, or fill them in"
@@ -93,7 +93,7 @@ def _load_point(
     if not study.load_point.asked or cohort.loads is None or has_force(study, cohort):
         return
     found = "other load points, but no force in any chosen test"
-    place = at(document, "load_point")
+    place = document.place_of("load_point")
     allowed = "tests with a force: a pure moment has no point"
     yield InputProblem(*place, found, allowed, "choose tests with forces, or leave load_point out")
 
@@ -115,7 +115,7 @@ def _tests(
     if cohort.motion is None:
         found = f"cohort '{cohort.name}', which has no motion.csv"
         allowed = "a cohort with loads.csv and motion.csv: the study calibrates on motion"
-        yield InputProblem(*at(document, "cohort"), found, allowed, "choose another cohort")
+        yield InputProblem(*document.place_of("cohort"), found, allowed, "choose another cohort")
         return
     yield from unknown_tests(document, study.tests, cohort.tests)
     chosen = cohort.motion[cohort.motion["test"].isin(study.tests or cohort.tests)]
@@ -123,14 +123,14 @@ def _tests(
     if measured.empty:
         tests = one_of(dict.fromkeys(cohort.motion["test"]))
         found = "no motion in any chosen test"
-        yield InputProblem(*at(document, "tests"), found, tests, "choose a test with motion")
+        yield InputProblem(*document.place_of("tests"), found, tests, "choose a test with motion")
         return
     for specimen in cohort.specimen_names:
         if specimen not in set(measured["specimen"]):
             found = f"no motion of specimen '{specimen}' in any chosen test"
             allowed = "motion of every specimen in one chosen test at least"
             remedy = "choose more tests, or leave the specimen out of the cohort"
-            yield InputProblem(*at(document, "tests"), found, allowed, remedy)
+            yield InputProblem(*document.place_of("tests"), found, allowed, remedy)
     yield from _weights(document, study, measured)
 
 
@@ -141,11 +141,11 @@ def _weights(
     weights = study.calibration.weights.in_order()
     known = [c for c in COORDINATE_COLUMNS if measured[c].notna().any()]
     if not any(w > 0 for w, c in zip(weights, COORDINATE_COLUMNS, strict=True) if c in known):
-        place = at(document, "calibration.weights")
+        place = document.place_of("calibration.weights")
         found = "no weight on anything that was measured"
         yield InputProblem(*place, found, f"a weight on {one_of(known)}", "weigh what was measured")
     elif AUTO in study.calibration.free:
         found = "auto, and no coordinate was both loaded and measured"
         allowed = f"{one_of(COORDINATES)}, whose stiffness the data tell"
-        place = at(document, "calibration.free")
+        place = document.place_of("calibration.free")
         yield InputProblem(*place, found, allowed, "look at loads.csv and motion.csv, or name some")

@@ -17,7 +17,7 @@ from spinepipe.studies.parts import (
     PublishedStiffness,
     Tests,
 )
-from spinepipe.studies.places import at, unknown_levels, unknown_tests
+from spinepipe.studies.places import unknown_levels, unknown_tests
 from spinepipe.studies.study import Study
 
 VirtualTest = Literal[
@@ -150,11 +150,11 @@ def _poses(document: YamlDocument, study: RangeOfMotion, cohort: Cohort) -> Iter
     remedy = "set pose_sd, or set poses: 1"
     if cohort.motion is not None:
         found += f"cohort '{cohort.name}' has motion.csv: its measurement_sd is that of a reading"
-        yield InputProblem(*at(document, "pose_sd"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("pose_sd"), found, allowed, remedy)
     elif cohort.measurement_sd is None:
         found += f"cohort '{cohort.name}' has no measurement_sd"
         remedy = "set pose_sd, give the cohort a measurement_sd, or set poses: 1"
-        yield InputProblem(*at(document, "pose_sd"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("pose_sd"), found, allowed, remedy)
 
 
 def _tests(document: YamlDocument, study: RangeOfMotion, cohort: Cohort) -> Iterator[InputProblem]:
@@ -163,12 +163,12 @@ def _tests(document: YamlDocument, study: RangeOfMotion, cohort: Cohort) -> Iter
         if study.tests is not None:
             allowed = "null beside virtual_tests, which name their own tests"
             remedy = "name the tests in virtual_tests.tests, or set virtual_tests: null"
-            yield InputProblem(*at(document, "tests"), ", ".join(study.tests), allowed, remedy)
+            yield InputProblem(*document.place_of("tests"), ", ".join(study.tests), allowed, remedy)
         return
     if cohort.loads is None:
         found = f"null, and cohort '{cohort.name}' has no loads.csv"
         allowed = "virtual tests, or null with a cohort that has loads.csv"
         remedy = "set virtual_tests: {moment_nm: 7.5, tests: [flexion], steps: 10}"
-        yield InputProblem(*at(document, "virtual_tests"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("virtual_tests"), found, allowed, remedy)
         return
     yield from unknown_tests(document, study.tests, cohort.tests)

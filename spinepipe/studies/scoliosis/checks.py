@@ -9,7 +9,6 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem
-from spinepipe.studies.places import at
 from spinepipe.studies.scoliosis.curve_angles import curves, main_curve
 from spinepipe.studies.scoliosis.films import (
     CENTRE,
@@ -53,7 +52,7 @@ def check_scoliosis(
     if films is None:
         found, allowed = "a cohort without films.csv", "a cohort with films of its patients"
         remedy = "add films.csv, or name another cohort"
-        yield InputProblem(*at(document, "cohort"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("cohort"), found, allowed, remedy)
         return
     for patient in cohort.specimen_names:
         rows = films[films["specimen"] == patient]

@@ -19,7 +19,7 @@ from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
 from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.skeleton import BODIES, MarkerSet
 from spinepipe.problems import InputError, InputProblem, Spelling, one_of
-from spinepipe.studies.places import at, unknown_names
+from spinepipe.studies.places import unknown_names
 from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
 from spinepipe.studies.tracking.checks_of_markers import LoadedTrial
 from spinepipe.studies.tracking.checks_of_motion import motion_problems
@@ -103,7 +103,7 @@ def check_recordings(
 
 def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
     """Tables that every study of tracked motions needs, and the chain of joints from S1 to T1."""
-    place = at(document, "cohort")
+    place = document.place_of("cohort")
     for form in NEEDED:
         if form.stem not in cohort.further:
             found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
@@ -134,7 +134,7 @@ def _approaches(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iter
     trials = cohort.further.get(TRIALS.stem)
     kinds = set() if trials is None else set(trials["kind"])
     for index, approach in enumerate(study.approaches):
-        place = at(document, f"approaches.{index}")
+        place = document.place_of(f"approaches.{index}")
         name = approach.removeprefix(CONSTRAINED)
         if approach.startswith(CONSTRAINED) and name not in sets:
             found = f"'{approach}', and no ratios '{name}'"

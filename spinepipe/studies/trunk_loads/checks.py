@@ -17,7 +17,7 @@ from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import InputError, InputProblem, Spelling, did_you_mean, one_of
-from spinepipe.studies.places import at, unknown_names
+from spinepipe.studies.places import unknown_names
 from spinepipe.studies.plausibility import subject_doubts
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
@@ -45,7 +45,7 @@ def check_trunk(
         if form.stem not in further:
             found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
             remedy = f"add {form.file}, or name another cohort"
-            yield InputProblem(*at(document, "cohort"), found, allowed, remedy)
+            yield InputProblem(*document.place_of("cohort"), found, allowed, remedy)
     if "subjects" in further:
         yield from subject_problems(cohort, further["subjects"])
     if "tasks" in further:
@@ -68,7 +68,7 @@ def check_source(
     document: YamlDocument, study: TrunkLoads, cohort: Cohort, _root: Path
 ) -> Iterator[InputProblem]:
     """Refuse a study whose geometry and muscles cannot be read or make no trunk."""
-    place = at(document, "geometry")
+    place = document.place_of("geometry")
     try:
         source_of(study, cohort)
     except NoSource as error:
@@ -86,7 +86,9 @@ def _without_geometry(document: YamlDocument, cohort: Cohort) -> Iterator[InputP
     for name in [name for name, is_there in there.items() if not is_there]:
         found = f"cohort, and {cohort.name} has no {name}.csv"
         remedy = f"add {name}.csv, or write geometry: myo_sim"
-        yield InputProblem(*at(document, "geometry"), found, f"a cohort with {name}.csv", remedy)
+        yield InputProblem(
+            *document.place_of("geometry"), found, f"a cohort with {name}.csv", remedy
+        )
 
 
 def _several_trunks(cohort: Cohort) -> Iterator[InputProblem]:
@@ -113,7 +115,7 @@ def _regressions(
 ) -> Iterator[InputProblem]:
     """Faults of a table of the user's own, which lies in the cohort's folder."""
     name, folder = study.regressions, cohort.folder
-    led_out = outside(folder / name, folder, at(document, "regressions"), name)
+    led_out = outside(folder / name, folder, document.place_of("regressions"), name)
     if led_out is not None:
         yield led_out
         return
@@ -121,7 +123,7 @@ def _regressions(
         found = f"'{name}', which is no file of {cohort.name}"
         remedy = "correct the name, or add the file to the cohort's folder"
         allowed = f"{', '.join(PACKAGED)}, or a CSV file of the cohort"
-        yield InputProblem(*at(document, "regressions"), found, allowed, remedy)
+        yield InputProblem(*document.place_of("regressions"), found, allowed, remedy)
         return
     try:
         regressions_of(study, cohort.folder)
@@ -146,7 +148,7 @@ def _named(
     )
     if study.volunteer is not None and study.volunteer.specimen not in known:
         name = study.volunteer.specimen
-        place = at(document, "volunteer.specimen")
+        place = document.place_of("volunteer.specimen")
         remedy = did_you_mean(name, known, "name a person of specimens.csv")
         yield InputProblem(*place, f"unknown specimen '{name}'", one_of(known), remedy)
 
