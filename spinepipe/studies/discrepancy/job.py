@@ -197,7 +197,7 @@ def _start_model(ready: Prepared, of: str) -> ModelFile:
 def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> DiscrepancyResults:
     """The results of an investigation, and what the tests could tell apart."""
     joints, rules = ready.cohort.joint_names, ended.rules
-    needed = ended.found.stages[0].screen.threshold + rules.margin
+    needed = rules.needed + rules.margin
     told = distinguishability(
         ended.grounds, rules.trials, needed, ready.study.margin, ready.declared, rules.seed, run
     )
@@ -246,8 +246,8 @@ def _beyond(ended: Investigation, run: PieceRunner) -> ResidualModel:
     final, outcome = ended.found.final, ended.ended
     told = outcome.verdict in (VerdictKind.UNKNOWN, VerdictKind.PART)
     if not told or outcome.reason is Reason.DATA_ERRORS:
-        return ResidualModel(None, None, final)
-    stays = model_residual(final, ended.rules, run)
+        return ResidualModel(None, final)
+    stays = model_residual(ended.found, run)
     if stays.table is not None:
         on_record([stays.grounds.fit], final.readings, run)
     return stays

@@ -203,7 +203,6 @@ def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[
                 # the effect's evidence is that of all its forms: on the row of the best
                 "log_evidence": one.log_evidence if not place else tried.log_evidence,
                 "gap_share": _share(tried.explained, excess),
-                "threshold": stage.screen.threshold,
                 "message": NOT_FITTED,
             }
             rows.append(row)
@@ -287,7 +286,6 @@ def _refitted(stage: SearchStage, joints: Sequence[str], excess: float) -> list[
         scope = _scope(one.form, joints)
         row = _form_row(f"refit {stage.name}", stage.beside, one.form, scope)
         row |= _of_refit(one, excess)
-        row["threshold"] = stage.screen.threshold
         key = (row["effect"], row["variant"], row["spread"], row["scope"], row["shape"])
         if key not in seen:
             seen.add(key)

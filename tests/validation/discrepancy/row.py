@@ -101,8 +101,9 @@ def _said(found: SearchResult, said: Outcome) -> Row:
         "reason": said.reason,
         "lack": found.lack.log_evidence,
         "shape": {"coordinate": found.lack.coordinate, "words": found.lack.shape},
-        "lack_threshold": found.generic_threshold,
-        "threshold": found.stages[0].screen.threshold,
+        "probabilities": {name: p for name, p in found.probabilities.items() if p > 1e-3},
+        "fits": sum(len(stage.refits) for stage in found.stages),
+        "unfitted": found.unfitted,
         "noise_correlation": float(found.base.noise.correlation),
         "screen": [
             [one.effect, one.log_evidence] for one in found.stages[0].screen.effects[:RIVALS_KEPT]

@@ -81,9 +81,7 @@ def masked_effects(
     kinds = kinds_of(grounds)
     if not kinds:
         return ()
-    without = run(
-        look, with_narrower_priors(grounds, dict.fromkeys(kinds, 0.0)), trials, 0, 0.0, 0, threshold
-    )
+    without = run(look, with_narrower_priors(grounds, dict.fromkeys(kinds, 0.0)), trials)
     by_name = {one.effect: one for one in trials}
     most = without.effects[0].log_evidence
     return tuple(

@@ -227,6 +227,12 @@ class ActiveTerm:
     form: CandidateForm
     start: Array
 
+    def copies(self, specimen: str, tests: int) -> int:
+        """How many effects it is in the model of a specimen."""
+        if not self.form.acts_in(specimen):
+            return 0
+        return tests if self.form.spread is PlaceSpread.BY_TEST else 1
+
 
 @dataclass(frozen=True)
 class Unknown:

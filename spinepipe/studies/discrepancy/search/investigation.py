@@ -125,8 +125,6 @@ def investigate(
     rules = Rules(
         trials(study.effects, ready.coordinates, specimens, joints),
         ready.coordinates,
-        study.false_alarm,
-        study.bootstrap,
         study.margin,
         study.most_effects,
         study.seed,
@@ -147,7 +145,7 @@ def investigate(
         )
         for effect in found.standing
     }
-    ended = outcome(found, study.margin, proof, errors, not_excluded)
+    ended = outcome(found, proof, errors, not_excluded)
     told = Investigation(baseline, rules, found, errors, proof, ended)
     return _with_sure_effects(told, asked, run)
 

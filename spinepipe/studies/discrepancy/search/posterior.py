@@ -1,279 +1,225 @@
-"""PROTOTYPE. One posterior over which effects are missing, explored where its mass is."""
+"""How probable it is of each effect that it is missing: one posterior over sets of effects.
 
-from dataclasses import dataclass, field
-from itertools import product
+Hypotheses are sets of effects: none, one, two, three, each with and without *something else*
+(`something_else`; where it follows the neighbours or the steps of a test it is seen to first order
+only). A set's evidence is that of a joint fit of all its effects, summed over their forms. Fits go
+where most probability rests on a first-order look alone, and end where that is little.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import comb
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import logsumexp
 
-from spinepipe.statics import with_parameters
+from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.hypothesis import STRENGTH_SDS, ActiveTerm
-from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
-from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
-from spinepipe.studies.discrepancy.search.prediction import Simulated
-from spinepipe.studies.discrepancy.search.projected import taken_out
-from spinepipe.studies.discrepancy.search.refit import (
-    STARTS, _degenerate, curvature_of, standing, starting_term, weaker,
-)
-from spinepipe.studies.discrepancy.search.screen import SIZES
-from spinepipe.studies.discrepancy.search.search_state import Rules, look
+from spinepipe.studies.discrepancy.search.evidence import formula_error, joint_log_evidence
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials
+from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, lack_of_fit
+from spinepipe.studies.discrepancy.search.refit import Refit, refit, starting_term
+from spinepipe.studies.discrepancy.search.screen import Screen, ScreenedVariant
+from spinepipe.studies.discrepancy.search.search_state import ELSE, PRIOR, Rules, look
+from spinepipe.studies.discrepancy.search.something_else import TABLE, tables
 from spinepipe.studies.discrepancy.store import PieceRunner
-from spinepipe.units import subtract_baseline
 
-FORMULA_ERROR = 0.1
-PRIOR = (0.3, 0.4, 0.15, 0.05)
-ELSE = 0.15
 ENOUGH = 0.05
+"""Probability that may rest on first-order looks alone."""
+
+FAR = 4.0
+"""Log odds behind all others from which nothing is looked for beside a set."""
+
+BEYOND = 0.5
+"""A fit may come to so much more than the look says, as a share: looks are of first order."""
+
+WEAK = 2.0
+"""Log evidence up to which a first-order look is as good as a fit."""
+
+MOST_TABLES = 2
+
+Forms = frozenset[CandidateForm]
+
+
+def names_of(forms: Forms) -> frozenset[str]:
+    """Of the effects that have one."""
+    return frozenset(form.name for form in forms if form.name != TABLE)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedSet:
+    """A set of effects, fitted.
+
+    Attributes
+    ----------
+    baseline : where it stands; None where it has no fit. log_evidence : against the base alone.
+    parent : the set it was fitted beside. refit : how; None of the base.
+    screen, lack : looks beside it, where it was probable enough for any.
+    """
+
+    forms: Forms
+    baseline: BaselineFit | None
+    log_evidence: float
+    parent: "FittedSet | None" = None
+    refit: Refit | None = None
+    screen: Screen | None = None
+    lack: LackOfFit | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SeenSet:
+    """A set of effects that was only looked at, beside one that was fitted."""
+
+    forms: Forms
+    parent: FittedSet
+    added: ScreenedVariant
+    most: float
+
+    @property
+    def log_evidence(self) -> float:
+        """Against the base alone, to first order."""
+        return self.parent.log_evidence + self.added.log_evidence
+
+    @property
+    def weak(self) -> bool:
+        """Whether the look is as good as a fit."""
+        return self.added.log_evidence < WEAK
 
 
 @dataclass
-class Node:
-    terms: tuple[ActiveTerm, ...]
-    baseline: BaselineFit | None
-    log_evidence: float
-    lack: object = None
-    screen: object = None
-    log_else: float = -np.inf
+class Posterior:
+    """Sets of effects and how probable they are.
 
-    @property
-    def names(self):
-        return frozenset(t.form.name for t in self.terms)
+    Attributes
+    ----------
+    fitted : in the order in which they were. seen : those that were only looked at.
+    unfitted : probability that rests on looks alone.
+    """
 
-    @property
-    def key(self):
-        return frozenset((t.form) for t in self.terms)
+    base: BaselineFit
+    rules: Rules
+    fitted: dict[Forms, FittedSet] = field(default_factory=dict)
+    seen: dict[Forms, SeenSet] = field(default_factory=dict)
+    unfitted: float = 1.0
 
+    @cached_property
+    def trials(self) -> Mapping[str, Trials]:
+        """All that is tried, by name; something else too."""
+        every = (*self.rules.trials, tables(self.base, self.rules.coordinates))
+        return {one.effect: one for one in every}
 
-def joint_laplace(fit, numbers, gain, formula):
-    unknowns = fit.hypothesis.unknowns
-    own = np.array([u.supposed in numbers for u in unknowns])
-    curvature = curvature_of(fit, own)
-    chosen = [u for u in unknowns if u.supposed in numbers]
-    away = fit.x[own] - np.array([u.mean for u in chosen])
-    strength = np.array([u.is_strength for u in chosen])
-    of = np.array([u.supposed for u in chosen])
-    declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
-    sides = np.array([
-        fit.hypothesis.supposed[u.supposed].form.variant.create().parameters[u.column].side for u in chosen
-    ])
-    found = []
-    for sizes in product(SIZES, repeat=len(numbers)):
-        size = np.select([of == n for n in numbers], sizes)
-        sd = np.where(strength, size, 1.0) * declared
-        spread = np.eye(len(sd)) + curvature * sd**2
-        _, logdet = np.linalg.slogdet(spread)
-        fit_to_prior = away @ np.linalg.solve(spread, curvature @ away)
-        posterior = np.linalg.inv(curvature + np.diag(sd**-2.0))
-        mean = posterior @ (curvature @ away)
-        inside = sides * mean / np.sqrt(np.diagonal(posterior))
-        half = np.where(sides != 0.0, np.log(2.0) + log_ndtr(inside), 0.0)
-        found.append(-0.5 * (logdet + fit_to_prior) + float(half.sum()))
-    return 0.5 * gain + formula + float(logsumexp(found)) - float(len(numbers) * np.log(len(SIZES)))
-
-
-def formula_error(baseline, fit):
-    """Log evidence gained where the named effects' formulas are allowed to be off by a share."""
-    n = len(fit.hypothesis.supposed)
-    if not n or not FORMULA_ERROR:
-        return 0.0
-    taken = taken_out(fit)
-    total_gram, total_moment = None, None
-    rank = 0
-    columns = {}
-    for name, one in baseline.readings.items():
-        model = fit.models[name]
-        base_effects = len(baseline.start.models[name].effects)
-        blocks = []
-        extra = model.effects[base_effects:]
-        place = 0
-        for number, term in enumerate(fit.hypothesis.supposed):
-            if not term.form.acts_in(name):
-                blocks.append(None)
-                continue
-            many = len(set(range(1)))
-            count = len(baseline.tests) if term.form.spread.name == "BY_TEST" else 1
-            without = model.effects[: base_effects + place] + model.effects[base_effects + place + count :]
-            place += count
-            try:
-                other = Simulated(model.with_effects(without), one.cases, baseline.noise.zeroed, ()).at(np.zeros(0)).readings
-            except Exception:
-                other = None
-            blocks.append(other)
-        columns[name] = blocks
-    # basis: per effect, test, coordinate a smooth function of own motion and progress
-    knots = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-    grid = np.array([(a, b) for a in knots for b in (0.0, 0.5, 1.0)])
-    def kernel(p, q):
-        return np.exp(-0.5 * (((p[:, None, 0] - q[None, :, 0]) / 0.4) ** 2 + ((p[:, None, 1] - q[None, :, 1]) / 0.3) ** 2))
-    half = np.linalg.cholesky(kernel(grid, grid) + 1e-6 * np.eye(len(grid)))
-    tests = list(baseline.tests)
-    gram = moment = coupled = None
-    shared_gram = shared_moment = 0.0
-    q = len(grid)
-    for name, one in baseline.readings.items():
-        predicted = fit.predicted[name]
-        rows = []
-        for case_number, case in enumerate(one.cases):
-            now = predicted[case_number]
-            T, J, _ = now.shape
-            reach = np.maximum(np.abs(now).max(axis=0), 1e-9)
-            progress = np.linspace(0, 1, T)[:, None, None] * np.ones((1, J, 6))
-            points = np.stack([(now / reach).reshape(-1), progress.reshape(-1)], axis=1)
-            phi = np.linalg.solve(half, kernel(grid, points)).T.reshape(T, J, 6, q)
-            used = [c for c in range(6) if one.tests[case_number].count[..., c].any()]
-            columns_here = []
-            for other in columns[name]:
-                c = np.zeros_like(now) if other is None else now - other[case_number]
-                block = FORMULA_ERROR * c[..., None] * phi
-                for coordinate in range(6):
-                    if coordinate not in all_used(baseline):
-                        continue
-                    for test in tests:
-                        own = np.zeros((T, J, 6, q))
-                        if test == case.test:
-                            own[:, :, coordinate] = block[:, :, coordinate]
-                        columns_here.append(own)
-            rows.append(np.concatenate(columns_here, axis=-1))
-        white = baseline.setting.whitenings[name](rows)
-        t = taken[name]
-        left = t.out_of(white)
-        g, m, s = left.T @ left, left.T @ t.residual, left.T @ t.shared
-        gram = g if gram is None else gram + g
-        moment = m if moment is None else moment + m
-        coupled = s if coupled is None else coupled + s
-        shared_gram = shared_gram + t.shared.T @ t.shared
-        shared_moment = shared_moment + t.shared.T @ t.residual
-    if coupled.shape[1]:
-        inv = np.linalg.pinv(shared_gram, rcond=1e-10, hermitian=True)
-        moment = moment - coupled @ inv @ shared_moment
-        gram = gram - coupled @ inv @ coupled.T
-    a = np.eye(len(gram)) + gram
-    factor = cho_factor(a)
-    return float(0.5 * moment @ cho_solve(factor, moment) - np.log(np.diagonal(factor[0])).sum())
-
-
-def all_used(baseline):
-    used = set()
-    for one in baseline.readings.values():
-        for test in one.tests:
-            used |= {c for c in range(6) if test.count[..., c].any()}
-    return used
-
-
-def log_prior(names, trials):
-    n = len(trials)
-    k = len(names)
-    ways = {0: 1, 1: n, 2: n * (n - 1) / 2, 3: n * (n - 1) * (n - 2) / 6}[k]
-    return float(np.log(PRIOR[k] / ways))
-
-
-def explore(base: BaselineFit, rules: Rules, most_fits: int, run: PieceRunner, say=print):
-    trials = {t.effect: t for t in rules.trials}
-    fitted: dict = {}
-    predicted: dict = {}
-    screens = 0
-
-    def expand(node):
-        nonlocal screens
-        node.screen = run(look, node.baseline, rules.trials, 0, rules.false_alarm, rules.seed, 0.0)
-        node.lack = run(lack_of_fit, node.baseline, rules.coordinates, 0, rules.seed)
-        node.log_else = node.lack.log_evidence
-        screens += 1
-        if len(node.terms) >= min(rules.most_effects, 3):
-            return
-        excess = sum(float(r @ r) for r in node.baseline.fit.residuals.values())
-        for one in node.screen.effects:
-            if one.effect in node.names:
-                continue
-            seen = set()
-            for form in one.forms:
-                if form.form.variant in seen:
-                    continue
-                seen.add(form.form.variant)
-                key = node.key | {form.form}
-                if key in fitted:
-                    continue
-                value = node.log_evidence + min(form.log_evidence, 0.5 * excess)
-                if value > predicted.get(key, (-np.inf,))[0] or key not in predicted:
-                    predicted[key] = (value, node, starting_term(form))
-
-    root = Node((), base, 0.0)
-    fitted[frozenset()] = root
-    expand(root)
-    fits = 0
-    log = []
-    WEAK = 2.0
-
-    def weak(key):  # the linear prediction holds where an effect does next to nothing
-        value, parent, _ = predicted[key]
-        return value - parent.log_evidence < WEAK
-
-    while fits < most_fits:
-        total = logsumexp([lp(node, trials) for node in fitted.values()])
-        best = max(
-            ((value + log_prior({f.name for f in key}, trials), key) for key, (value, *_ ) in predicted.items() if key not in fitted and not weak(key)),
-            default=None, key=lambda p: p[0],
-        )
-        if best is None:
-            break
-        known = logsumexp([total, *(v + log_prior({f.name for f in k}, trials) for k, (v, *_) in predicted.items() if k not in fitted and weak(k))])
-        rest = logsumexp([v + log_prior({f.name for f in k}, trials) for k, (v, *_) in predicted.items() if k not in fitted and not weak(k)])
-        unfitted = np.exp(rest - np.logaddexp(rest, known))
-        if unfitted < ENOUGH:
-            break
-        _, key = best
-        value, parent, term = predicted.pop(key)
-        fits += 1
-        before = parent.baseline
-        for share in STARTS:
-            supposed = (*standing(before.fit), weaker(term, share))
-            fit = run(joint_fit, before.suppose(supposed), before.setting, before.fit.poses)
-            if fit.usable:
+    def explore(self, run: PieceRunner, progress: Progress) -> None:
+        """Fit sets while much probability rests on looks alone."""
+        self._take(FittedSet(frozenset(), self.base, 0.0), run)
+        for number in range(1, self.rules.most_fits + 1):
+            best = self._next()
+            if best is None:
                 break
-        if not fit.usable or any(_degenerate(fit, k) for k in range(len(supposed))):
-            fitted[key] = Node(supposed, None, -np.inf)
-            log.append((sorted(f.name for f in key), value, -np.inf))
-            continue
-        gain = base.fit.chi2 - fit.chi2
-        at = before.at(fit)
-        numbers = tuple(range(len(supposed)))
-        extra = formula_error(at, fit)
-        evidence = joint_laplace(fit, numbers, gain, extra) + sum(trials[t.form.name].log_share(t.form) for t in supposed)
-        node = Node(supposed, at, evidence)
-        fitted[key] = node
-        log.append((sorted(f.name for f in key), value, evidence, extra))
-        # look beside it only where it holds mass
-        total = logsumexp([lp(n, trials) for n in fitted.values()])
-        if lp(node, trials) > total - 3.0:
-            expand(node)
-    nodes = [n for n in fitted.values() if np.isfinite(n.log_evidence)]
-    logs, what = [], []
-    for n in nodes:
-        p = n.log_evidence + log_prior(n.names, trials)
-        logs.append(p + np.log(1 - ELSE)); what.append((n.names, False))
-        if np.isfinite(n.log_else):
-            logs.append(p + np.log(ELSE) + n.log_else); what.append((n.names, True))
-    for k, (v, parent, _) in predicted.items():
-        if k not in fitted and weak(k):
-            p = v + log_prior({f.name for f in k}, trials)
-            logs.append(p + np.log(1 - ELSE)); what.append((frozenset(f.name for f in k), False))
-            logs.append(p + np.log(ELSE) + parent.log_else); what.append((frozenset(f.name for f in k), True))
-    weights = np.exp(np.array(logs) - logsumexp(logs))
-    prob: dict = {}
-    for w, (names, other) in zip(weights, what):
-        for name in names:
-            prob[name] = prob.get(name, 0.0) + w
-        if other:
-            prob["something_else"] = prob.get("something_else", 0.0) + w
-        if not names and not other:
-            prob["null"] = prob.get("null", 0.0) + w
-    sets: dict = {}
-    for w, (names, other) in zip(weights, what):
-        sets[(tuple(sorted(names)), other)] = sets.get((tuple(sorted(names)), other), 0.0) + w
-    return prob, dict(sorted(sets.items(), key=lambda kv: -kv[1])[:6]), fits, screens, log, fitted
+            added = ", ".join(sorted(names_of(best.forms))) or "something else"
+            progress.round(
+                f"fit {number} of at most {self.rules.most_fits}: {added}; "
+                f"{100.0 * self.unfitted:.0f} % of the probability is open"
+            )
+            del self.seen[best.forms]
+            beside = best.parent.baseline
+            assert beside is not None
+            tried = run(refit, self.base.fit, beside, starting_term(best.added))
+            shares = sum(self.trials[form.name].log_share(form) for form in best.forms)
+            at = beside.at(tried.fit) if np.isfinite(tried.log_evidence) else None
+            evidence = tried.log_evidence + shares
+            self._take(FittedSet(best.forms, at, evidence, best.parent, tried), run)
 
+    def log_evidence_of(self, at: BaselineFit) -> float:
+        """Of all effects of a fit, against the base alone."""
+        shares = sum(self.trials[o.form.name].log_share(o.form) for o in at.fit.hypothesis.supposed)
+        return joint_log_evidence(self.base.fit, at.fit) + formula_error(at) + shares
 
-def lp(node, trials):
-    return node.log_evidence + log_prior(node.names, trials) if np.isfinite(node.log_evidence) else -np.inf
+    def _next(self) -> SeenSet | None:
+        """The set whose fit may matter most; None where no fit does."""
+        strong = [one for one in self.seen.values() if not one.weak]
+        if not strong:
+            self.unfitted = 0.0
+            return None
+        weak = (one for one in self.seen.values() if one.weak)
+        known = [*(self._log_odds(o) for o in self.fitted.values()), *map(self._log_odds, weak)]
+        open_ones = logsumexp([one.most + self.log_prior(one.forms) for one in strong])
+        self.unfitted = float(np.exp(open_ones - np.logaddexp(open_ones, logsumexp(known))))
+        if self.unfitted < ENOUGH:
+            return None
+        return max(
+            strong,
+            key=lambda one: (
+                one.most + self.log_prior(one.forms),
+                one.log_evidence,
+                sorted(map(repr, one.forms)),
+            ),
+        )
+
+    def log_prior(self, forms: Forms) -> float:
+        """Of a set of effects, before any reading."""
+        count = len(names_of(forms))
+        other = any(form.name == TABLE for form in forms)
+        ways = max(comb(len(self.rules.trials), count), 1)
+        return float(np.log(PRIOR[count] / ways * (ELSE if other else 1.0 - ELSE)))
+
+    def _log_odds(self, one: FittedSet | SeenSet) -> float:
+        """Logarithm of the posterior odds, less what all sets share."""
+        return one.log_evidence + self.log_prior(one.forms)
+
+    def _take(self, one: FittedSet, run: PieceRunner) -> None:
+        """Keep a set, and look what else there may be beside it, where it is probable enough."""
+        beside = [self._log_odds(other) for other in self.fitted.values()]
+        probable = not beside or self._log_odds(one) > logsumexp(beside) - FAR
+        if one.baseline is not None and probable:
+            rules = self.rules
+            screen = run(look, one.baseline, tuple(self.trials.values()))
+            lack = run(lack_of_fit, one.baseline, rules.coordinates, 0, rules.seed)
+            one = replace(one, screen=screen, lack=lack)
+            for seen in self._beside(one, one.baseline, screen):
+                known = self.seen.get(seen.forms)
+                if seen.forms not in self.fitted and (known is None or seen.most > known.most):
+                    self.seen[seen.forms] = seen
+        self.fitted[one.forms] = one
+
+    def _beside(self, one: FittedSet, baseline: BaselineFit, screen: Screen) -> Iterator[SeenSet]:
+        """Each variant of each further effect as it differs best, by a look."""
+        names = names_of(one.forms)
+        tabled = {form.variant for form in one.forms if form.name == TABLE}
+        full = len(names) >= min(self.rules.most_effects, len(PRIOR) - 1)
+        excess = sum(float(r @ r) for r in baseline.fit.residuals.values())
+        for effect in screen.effects:
+            if effect.effect == TABLE:
+                if len(tabled) >= MOST_TABLES:
+                    continue
+            elif full or effect.effect in names:
+                continue
+            known = set(tabled)
+            for tried in effect.forms:  # best first
+                if tried.form.variant not in known:
+                    known.add(tried.form.variant)
+                    more = tried.log_evidence + BEYOND * max(tried.log_evidence, 0.0)
+                    most = one.log_evidence + min(more, 0.5 * excess)
+                    yield SeenSet(one.forms | {tried.form}, one, tried, most)
+
+    @property
+    def log_odds(self) -> dict[tuple[frozenset[str], bool], float]:
+        """Of each set of names, with and without something else; less what all sets share.
+
+        Something else counts by its fits or by the first-order look, whichever has more.
+        """
+        groups: dict[tuple[frozenset[str], bool], list[float]] = {}
+        looks: dict[frozenset[str], list[float]] = {}
+        for one in (*self.fitted.values(), *self.seen.values()):
+            names = names_of(one.forms)
+            other = any(form.name == TABLE for form in one.forms)
+            if np.isfinite(one.log_evidence):
+                groups.setdefault((names, other), []).append(self._log_odds(one))
+            if isinstance(one, FittedSet) and one.lack is not None and not other:
+                with_it = self._log_odds(one) + one.lack.log_evidence + np.log(ELSE / (1.0 - ELSE))
+                looks.setdefault(names, []).append(float(with_it))
+        found = {key: float(logsumexp(of)) for key, of in groups.items()}
+        for names, of in looks.items():
+            seen = float(logsumexp(of))
+            found[names, True] = max(found.get((names, True), -np.inf), seen)
+        return found

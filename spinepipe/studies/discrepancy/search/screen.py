@@ -28,9 +28,6 @@ SIZES = np.array([0.1, 0.3, 1.0, 3.0])
 Places = tuple[tuple[str, NDArray[np.int64], NDArray[np.int64]], ...]
 """(specimen, columns (c,), strength (c,) that each column belongs to)."""
 
-LEAST_THRESHOLD = 5.0
-"""Less is not very strong (Kass and Raftery 1995, doi 10.2307/2291091), whatever the draws say."""
-
 
 def log_sum(logs: Array) -> Array:
     """(...) logarithm of the sum of exp(logs) over the first axis; none is infinite."""
@@ -256,35 +253,18 @@ class ScreenedVariant:
 
 @dataclass(frozen=True)
 class Screened:
-    """An effect on the screen: its evidence, of each draw of the null too, and its forms.
-
-    ``forms`` : best first.
-    """
+    """An effect on the screen: its evidence, and its forms, best first."""
 
     effect: str
     log_evidence: float
-    null: Array
     forms: tuple[ScreenedVariant, ...]
 
 
 @dataclass(frozen=True)
 class Screen:
-    """All effects, best first, and the evidence that the null exceeds as often as is allowed."""
+    """All effects, best first."""
 
     effects: tuple[Screened, ...]
-    threshold: float
-    draws: int
-
-
-def screen(
-    effects: Sequence[Screened], false_alarm: float, threshold: float | None = None
-) -> Screen:
-    """Effects ranked; the threshold is that of the largest evidence of each draw of the null."""
-    largest = np.max(np.stack([one.null for one in effects]), axis=0)
-    if threshold is None:
-        threshold = max(LEAST_THRESHOLD, exceeded(largest, false_alarm))
-    ranked = sorted(effects, key=lambda one: (-one.log_evidence, one.effect))
-    return Screen(tuple(ranked), threshold, len(largest))
 
 
 def screened(
@@ -320,7 +300,7 @@ def screened(
         tried.append(found[start + int(np.argmax(logs[start:end, 0]))])
     whole = log_sum(np.stack(totals))
     order = sorted(tried, key=lambda one: -one.log_evidence)
-    return Screened(trials.effect, float(whole[0]), whole[1:], tuple(order))
+    return Screened(trials.effect, float(whole[0]), tuple(order))
 
 
 def summed(

@@ -1,0 +1,187 @@
+"""Evidence for all effects of a fit together, against the base alone.
+
+Laplace's method (Kass and Raftery 1995, doi 10.2307/2291091): chi2 / 2 of the effects' parameters,
+everything else fitted anew, is taken for a parabola about the fit: curvature A, slope g (not zero
+where a parameter ended at its bound). With the prior N(off, S), off at a distance a,
+
+    log evidence = gain / 2 - log det(I + A S) / 2 - a' S^-1 a / 2 + h' (A + S^-1)^-1 h / 2,
+
+h = g + S^-1 a. Where bounds cut a strength's prior, the evidence is multiplied by the posterior's
+mass between them over the prior's (encompassing prior, Klugkist and Hoijtink 2007), by marginals.
+A strength's SD is its declared prior SD times one of a few sizes, over which evidence is averaged.
+
+No formula is that of nature: each effect may be off by a share of what it does, a smooth function
+of how far a joint has moved and of how far a test has gone, the same for all joints (a Gaussian
+process, to first order at the fit).
+"""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.special import log_ndtr, logsumexp
+
+from spinepipe.decomposition import pinvh
+from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit
+from spinepipe.studies.discrepancy.search.hypothesis import STRENGTH_SDS
+from spinepipe.studies.discrepancy.search.joint_fit import JointFit
+from spinepipe.studies.discrepancy.search.prediction import (
+    JointPrediction,
+    NoEquilibrium,
+    PredictedSpecimen,
+)
+from spinepipe.studies.discrepancy.search.projected import taken_out
+from spinepipe.studies.discrepancy.search.screen import SIZES
+from spinepipe.studies.discrepancy.search.something_else import TABLE
+
+FORMULA_SD = 0.1
+"""Share of what an effect does by which its formula may be off."""
+
+ALONG_MOTION, ALONG_TEST = 0.4, 0.3
+"""Lengths over which that changes, as shares of the largest motion and of a test."""
+
+KNOTS = np.array([(m, t) for m in (-1.0, -0.5, 0.0, 0.5, 1.0) for t in (0.0, 0.5, 1.0)])
+"""Where the process is free: shares of the largest motion, and of the test."""
+
+
+def joint_log_evidence(base: JointFit, fit: JointFit) -> float:
+    """For all supposed effects of a fit, against the base; formulas are taken for exact."""
+    unknowns = fit.hypothesis.unknowns
+    own = np.array([u.supposed is not None for u in unknowns])
+    if not own.any():
+        return 0.0
+    curvature, slope = curvature_of(fit, own), _slope(fit)[own]
+    chosen = [u for u in unknowns if u.supposed is not None]
+    of = np.array([u.supposed for u in chosen])
+    strength = np.array([u.is_strength for u in chosen])
+    away = fit.x[own] - np.array([u.mean for u in chosen])
+    # the fit itself has a wider prior on strengths, by STRENGTH_SDS
+    declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
+    ends = np.array([(u.low - u.mean, u.high - u.mean) for u in chosen])
+    supposed = range(len(fit.hypothesis.supposed))
+    found = []
+    for sizes in product(SIZES, repeat=len(supposed)):
+        size = np.select([of == number for number in supposed], sizes)
+        sd = np.where(strength, size, 1.0) * declared
+        pull = slope + away / sd**2
+        covariance = np.linalg.inv(curvature + np.diag(sd**-2.0))
+        _, logdet = np.linalg.slogdet(np.eye(len(sd)) + curvature * sd**2)
+        parabola = 0.5 * (pull @ covariance @ pull - np.sum((away / sd) ** 2) - logdet)
+        mean, spread = away - covariance @ pull, np.sqrt(np.diagonal(covariance))
+        inside = _log_mass(ends, mean, spread) - _log_mass(ends, 0.0 * mean, sd)
+        found.append(parabola + float(inside[strength].sum()))
+    averaged = float(logsumexp(found)) - len(supposed) * float(np.log(len(SIZES)))
+    return 0.5 * (base.chi2 - fit.chi2) + averaged
+
+
+def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
+    """(k, k) second derivative of chi2 / 2 by k of the unknowns, where all others follow by a fit.
+
+    The others have their weak priors, the k have none: their prior comes in with the evidence.
+
+    Parameters
+    ----------
+    own : (m,) which of all unknowns.
+    """
+    # the Schur complement of J'J + P in the others, with P = diag(1 / sd^2) of their priors: F'F of
+    # the k columns of J less their projection on the others' [J; P^(1/2)], by QR
+    jacobian = fit.whole_jacobian()
+    priors = np.diag([1.0 / u.sd for u in fit.hypothesis.unknowns])
+    others = np.vstack([jacobian[:, ~own], priors[np.ix_(~own, ~own)]])
+    mine = np.vstack([jacobian[:, own], np.zeros((int((~own).sum()), int(own.sum())))])
+    basis, _ = np.linalg.qr(others)
+    left = mine - basis @ (basis.T @ mine)
+    result: Array = left.T @ left
+    return result
+
+
+def _slope(fit: JointFit) -> Array:
+    """(m,) slope of chi2 / 2 where a parameter ended at a bound; elsewhere the fit has none."""
+    slope = np.zeros(len(fit.x))
+    for name, member in fit.hypothesis.members.items():
+        own = fit.jacobians[name].T @ fit.residuals[name]
+        np.add.at(slope, list(member.numbers), own)
+    return np.where(fit.at_bound, slope, 0.0)
+
+
+def _log_mass(ends: Array, mean: Array, sd: Array) -> Array:
+    """(k,) log of a normal's mass between two ends (k, 2), also far out."""
+    low, high = (ends[:, 0] - mean) / sd, (ends[:, 1] - mean) / sd
+    # the smaller tail side: both ends mirrored where they lie above the mean
+    mirrored = low > 0.0
+    a, b = np.where(mirrored, -high, low), np.where(mirrored, -low, high)
+    upper, lower = log_ndtr(b), log_ndtr(a)
+    return np.asarray(upper + np.log(-np.expm1(np.minimum(lower - upper, -1e-12))))
+
+
+def formula_error(baseline: BaselineFit) -> float:
+    """Log evidence gained where the fit's named effects may be off by a share of what they do."""
+    fit = baseline.fit
+    named = [n for n, one in enumerate(fit.hypothesis.supposed) if one.form.name != TABLE]
+    if not named:
+        return 0.0
+    half = np.linalg.cholesky(_kernel(KNOTS, KNOTS) + 1e-6 * np.eye(len(KNOTS)))
+    without = [_without(baseline, number) for number in named]
+    taken = taken_out(fit)
+    gram = moment = coupled = gram_shared = moment_shared = 0.0
+    for name, one in baseline.readings.items():
+        rows = []
+        for number, test in enumerate(one.tests):
+            predicted = fit.predicted[name][number]
+            steps, joints, _ = predicted.shape
+            furthest = np.maximum(np.abs(predicted).max(axis=0), np.finfo(float).tiny)
+            gone = np.broadcast_to(np.linspace(0.0, 1.0, steps)[:, None, None], predicted.shape)
+            points = np.stack([(predicted / furthest).ravel(), gone.ravel()], axis=1)
+            smooth = np.linalg.solve(half, _kernel(KNOTS, points)).T
+            smooth = smooth.reshape(steps, joints, 6, 1, len(KNOTS))
+            done = [predicted - other[name][number] for other in without]
+            effects = np.stack(done, axis=-1)[..., None]  # (T, J, 6, effects, 1)
+            moves = FORMULA_SD * (effects * smooth).reshape(steps, joints, 6, -1)
+            # a function of its own for each coordinate that was read
+            read = [c for c in range(6) if any(t.count[..., c].any() for t in one.tests)]
+            apart = np.zeros((steps, joints, 6, len(read), moves.shape[-1]))
+            for place, coordinate in enumerate(read):
+                apart[:, :, coordinate, place] = moves[:, :, coordinate]
+            rows.append(apart.reshape(steps, joints, 6, -1))
+        left = taken[name].out_of(baseline.setting.whitenings[name](rows))
+        gram = gram + left.T @ left
+        moment = moment + left.T @ taken[name].residual
+        coupled = coupled + left.T @ taken[name].shared
+        gram_shared = gram_shared + taken[name].shared.T @ taken[name].shared
+        moment_shared = moment_shared + taken[name].shared.T @ taken[name].residual
+    assert isinstance(gram, np.ndarray)
+    if coupled.shape[1]:
+        gain = coupled @ pinvh(gram_shared, rcond=1e-10)
+        gram, moment = gram - gain @ coupled.T, moment - gain @ moment_shared
+    factor = cho_factor(np.eye(len(gram)) + gram)
+    return float(0.5 * moment @ cho_solve(factor, moment) - np.log(np.diagonal(factor[0])).sum())
+
+
+def _kernel(first: Array, second: Array) -> Array:
+    lengths = np.array([ALONG_MOTION, ALONG_TEST])
+    apart = (first[:, None] - second[None]) / lengths
+    return np.asarray(np.exp(-0.5 * np.sum(apart**2, axis=-1)))
+
+
+def _without(baseline: BaselineFit, number: int) -> dict[str, tuple[Array, ...]]:
+    """Predicted readings of all specimens without one of the fit's effects, the rest as it is."""
+    fit, subjects = baseline.fit, {}
+    for name, model in fit.models.items():
+        place = len(baseline.start.models[name].effects)
+        keep = list(model.effects[:place])
+        for other, one in enumerate(fit.hypothesis.supposed):
+            copies = one.copies(name, len(baseline.tests))
+            if other != number:
+                keep += model.effects[place : place + copies]
+            place += copies
+        cases = baseline.readings[name].cases
+        subjects[name] = PredictedSpecimen(model.with_effects(tuple(keep)), cases, ())
+    try:
+        found = JointPrediction(subjects, baseline.noise.zeroed, fit.poses).at(
+            {name: np.zeros(0) for name in subjects}
+        )
+    except NoEquilibrium:  # without it the spine does not stand: nothing tells what it does
+        return {name: fit.predicted[name] for name in subjects}
+    return {name: one.readings for name, one in found.items()}
