@@ -1,8 +1,9 @@
 """Evidence for all effects of a fit together, against the base alone.
 
 Laplace's method (Kass and Raftery 1995, doi 10.2307/2291091): chi2 / 2 of the effects' parameters,
-everything else fitted anew, is taken for a parabola about the fit: curvature A, slope g (not zero
-where a parameter ended at its bound). With the prior N(off, S), off at a distance a,
+everything else fitted anew, is taken for a parabola about the fit: curvature A, slope g (at a bound
+that of the readings; elsewhere what the fit's own prior holds in balance). With the prior N(off, S),
+off at a distance a,
 
     log evidence = gain / 2 - log det(I + A S) / 2 - a' S^-1 a / 2 + h' (A + S^-1)^-1 h / 2,
 
@@ -98,12 +99,15 @@ def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
 
 
 def _slope(fit: JointFit) -> Array:
-    """(m,) slope of chi2 / 2 where a parameter ended at a bound; elsewhere the fit has none."""
+    """(m,) slope of chi2 / 2 where the fit ended."""
     slope = np.zeros(len(fit.x))
     for name, member in fit.hypothesis.members.items():
         own = fit.jacobians[name].T @ fit.residuals[name]
         np.add.at(slope, list(member.numbers), own)
-    return np.where(fit.at_bound, slope, 0.0)
+    # between its bounds a fit ends where chi2 / 2 and its prior's (x - mean)^2 / 2 sd^2 balance
+    unknowns = fit.hypothesis.unknowns
+    balance = [(u.mean - x) / u.sd**2 for x, u in zip(fit.x, unknowns, strict=True)]
+    return np.where(fit.at_bound, slope, balance)
 
 
 def _log_mass(ends: Array, mean: Array, sd: Array) -> Array:
