@@ -112,10 +112,9 @@ class Posterior:
     def explore(self, run: PieceRunner, progress: Progress) -> None:
         """Fit sets while much probability rests on looks alone."""
         self._take(FittedSet(frozenset(), self.base, 0.0), run)
-        for number in range(1, self.rules.most_fits + 1):
-            best = self._next()
-            if best is None:
-                break
+        number = 0
+        while (best := self._next()) is not None and number < self.rules.most_fits:
+            number += 1
             added = ", ".join(sorted(names_of(best.forms))) or "something else"
             progress.round(
                 f"fit {number} of at most {self.rules.most_fits}: {added}; "

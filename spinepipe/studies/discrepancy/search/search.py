@@ -114,9 +114,13 @@ def _standing(
     odds, evidence = posterior.log_odds, posterior.log_evidence_of(final)
     for one in supposed:
         name = one.form.name
-        without = [s for s in posterior.fitted.values() if names_of(s.forms) < names]
-        without = [s for s in without if name not in names_of(s.forms) and s.baseline is not None]
-        # the others alone, or as many of them as were fitted
+        # the others alone, or as many of them as were fitted; with no table in the name's place
+        without = [
+            s
+            for s in posterior.fitted.values()
+            if (of := names_of(s.forms)) < names and name not in of and len(of) == len(s.forms)
+        ]
+        without = [s for s in without if s.baseline is not None]
         best = max(without, key=lambda s: (len(s.forms), s.log_evidence))
         assert best.baseline is not None
         yield SelectedTerm(
@@ -124,18 +128,21 @@ def _standing(
             probabilities[name],
             evidence - best.log_evidence,
             best.baseline.fit.chi2 - final.fit.chi2,
-            _rivals(one, odds, posterior),
+            _rivals(one, names, odds, posterior),
         )
 
 
 def _rivals(
-    one: ActiveTerm, odds: dict[tuple[frozenset[str], bool], float], posterior: Posterior
+    one: ActiveTerm,
+    standing: frozenset[str],
+    odds: dict[tuple[frozenset[str], bool], float],
+    posterior: Posterior,
 ) -> tuple[Rival, ...]:
-    """Other effects in the place of one, by the odds of all sets that have the one or the other."""
+    """Others than stand in the place of one, by the odds of all sets that have the one or other."""
     name = one.form.name
     mine = logsumexp([value for (names, _), value in odds.items() if name in names])
     found = []
-    for other in sorted({n for names, _ in odds for n in names} - {name}):
+    for other in sorted({n for names, _ in odds for n in names} - standing):
         instead = [v for (names, _), v in odds.items() if other in names and name not in names]
         if instead:
             best = max(

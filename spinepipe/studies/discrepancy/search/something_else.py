@@ -7,7 +7,7 @@ process, its slope drawn anew for each stretch. It is looked at and fitted like 
 import numpy as np
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.effects.tabulated_law import ITSELF
+from spinepipe.effects.tabulated_law import FURTHEST, ITSELF, TabulatedLaw
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant
 from spinepipe.units import COORDINATES
@@ -37,6 +37,8 @@ def _variant(base: BaselineFit, on: str, over: str) -> Variant:
         moved = [np.abs(test.mean[..., at][test.count[..., at] > 0]) for test in one.tests]
         moved += [np.abs(predicted[..., at]) for predicted in base.fit.predicted[name]]
         furthest.append(max(float(of_test.max(initial=0.0)) for of_test in moved))
-    reach = float(f"{min(furthest):.{DIGITS}g}")
+    # a reading in a wrong unit may be further than any joint moves
+    most = TabulatedLaw(over).furthest * FURTHEST
+    reach = min(float(f"{min(furthest):.{DIGITS}g}"), most)
     over = ITSELF if over == on else over
     return Variant(TABLE, (("coordinate", on), ("over", over), ("reach", reach)))
