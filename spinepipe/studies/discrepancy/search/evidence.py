@@ -2,8 +2,8 @@
 
 Laplace's method (Kass and Raftery 1995, doi 10.2307/2291091): chi2 / 2 of the effects' parameters,
 everything else fitted anew, is taken for a parabola about the fit: curvature A, slope g (at a bound
-that of the readings; elsewhere what the fit's own prior holds in balance). With the prior N(off, S),
-off at a distance a,
+that of the readings, elsewhere what the fit's own prior holds in balance). With the prior
+N(off, S), off at a distance a,
 
     log evidence = gain / 2 - log det(I + A S) / 2 - a' S^-1 a / 2 + h' (A + S^-1)^-1 h / 2,
 
@@ -129,11 +129,12 @@ def formula_error(baseline: BaselineFit) -> float:
     half = np.linalg.cholesky(_kernel(KNOTS, KNOTS) + 1e-6 * np.eye(len(KNOTS)))
     without = [_without(baseline, number) for number in named]
     taken = taken_out(fit)
-    gram = moment = coupled = gram_shared = moment_shared = 0.0
-    for name, one in baseline.readings.items():
+    every = [test for one in baseline.readings.values() for test in one.tests]
+    read = [c for c in range(6) if any(test.count[..., c].any() for test in every)]
+    moved = []
+    for name in baseline.readings:
         rows = []
-        for number, test in enumerate(one.tests):
-            predicted = fit.predicted[name][number]
+        for number, predicted in enumerate(fit.predicted[name]):
             steps, joints, _ = predicted.shape
             furthest = np.maximum(np.abs(predicted).max(axis=0), np.finfo(float).tiny)
             gone = np.broadcast_to(np.linspace(0.0, 1.0, steps)[:, None, None], predicted.shape)
@@ -143,22 +144,18 @@ def formula_error(baseline: BaselineFit) -> float:
             done = [predicted - other[name][number] for other in without]
             effects = np.stack(done, axis=-1)[..., None]  # (T, J, 6, effects, 1)
             moves = FORMULA_SD * (effects * smooth).reshape(steps, joints, 6, -1)
-            # a function of its own for each coordinate that was read
-            read = [c for c in range(6) if any(t.count[..., c].any() for t in one.tests)]
+            # a function of its own for each coordinate that was read, of any specimen
             apart = np.zeros((steps, joints, 6, len(read), moves.shape[-1]))
             for place, coordinate in enumerate(read):
                 apart[:, :, coordinate, place] = moves[:, :, coordinate]
             rows.append(apart.reshape(steps, joints, 6, -1))
-        left = taken[name].out_of(baseline.setting.whitenings[name](rows))
-        gram = gram + left.T @ left
-        moment = moment + left.T @ taken[name].residual
-        coupled = coupled + left.T @ taken[name].shared
-        gram_shared = gram_shared + taken[name].shared.T @ taken[name].shared
-        moment_shared = moment_shared + taken[name].shared.T @ taken[name].residual
-    assert isinstance(gram, np.ndarray)
-    if coupled.shape[1]:
-        gain = coupled @ pinvh(gram_shared, rcond=1e-10)
-        gram, moment = gram - gain @ coupled.T, moment - gain @ moment_shared
+        moved.append(taken[name].out_of(baseline.setting.whitenings[name](rows)))
+    left = np.concatenate(moved)
+    shared = np.concatenate([taken[name].shared for name in baseline.readings])
+    residual = np.concatenate([taken[name].residual for name in baseline.readings])
+    if shared.shape[1]:
+        left = left - shared @ (pinvh(shared.T @ shared, rcond=1e-10) @ (shared.T @ left))
+    gram, moment = left.T @ left, left.T @ residual
     factor = cho_factor(np.eye(len(gram)) + gram)
     return float(0.5 * moment @ cho_solve(factor, moment) - np.log(np.diagonal(factor[0])).sum())
 

@@ -170,12 +170,13 @@ class Posterior:
         """Keep a set, and look what else there may be beside it, where it is probable enough."""
         beside = [self._log_odds(other) for other in self.fitted.values()]
         probable = not beside or self._log_odds(one) > logsumexp(beside) - FAR
-        if one.baseline is not None and probable:
+        baseline = one.baseline
+        if baseline is not None and probable:
             rules = self.rules
-            screen = run(look, one.baseline, tuple(self.trials.values()))
-            lack = run(lack_of_fit, one.baseline, rules.coordinates, 0, rules.seed)
+            screen = run(look, baseline, tuple(self.trials.values()))
+            lack = run(lack_of_fit, baseline, rules.coordinates, 0, rules.seed)
             one = replace(one, screen=screen, lack=lack)
-            for seen in self._beside(one, one.baseline, screen):
+            for seen in self._beside(one, baseline, screen):
                 known = self.seen.get(seen.forms)
                 if seen.forms not in self.fitted and (known is None or seen.most > known.most):
                     self.seen[seen.forms] = seen
@@ -209,7 +210,8 @@ class Posterior:
         """
         groups: dict[tuple[frozenset[str], bool], list[float]] = {}
         looks: dict[frozenset[str], list[float]] = {}
-        for one in (*self.fitted.values(), *self.seen.values()):
+        every: list[FittedSet | SeenSet] = [*self.fitted.values(), *self.seen.values()]
+        for one in every:
             names = names_of(one.forms)
             other = any(form.name == TABLE for form in one.forms)
             if np.isfinite(one.log_evidence):
