@@ -19,8 +19,6 @@ from spinepipe.model import SpineModel
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit, fit_baseline
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.hypothesis import (
-    STRENGTH_SDS,
-    ActiveTerm,
     CandidateForm,
     Hypothesis,
     HypothesisMember,
@@ -43,13 +41,11 @@ from spinepipe.studies.discrepancy.search.projected import (
     products,
     taken_out,
 )
-from spinepipe.studies.discrepancy.search.refit import laplace
 from spinepipe.studies.discrepancy.search.screen import (
     SIZES,
     EffectColumns,
     Group,
     Screen,
-    exceeded,
     screened,
     summed,
 )
@@ -247,57 +243,6 @@ def test_what_the_base_explains_is_no_signature() -> None:
     assert found.gram[1, 1] > 1.0
 
 
-# Laplace evidence ----------------------------------------------------------------------------
-
-
-def linear_problem(variant: Variant, size: float) -> tuple[JointFit, float, Array, Array, Array]:
-    """One effect's strength beside two base unknowns; the exact optimum of chi2, and its gain."""
-    rng = np.random.default_rng(7)
-    base, f = 20.0 * rng.normal(size=(60, 2)), 4.0 * rng.normal(size=60)
-    scale = variant.create().parameters[variant.strengths[0]].prior_scale
-    y = base @ [0.1, -0.2] + f * size + rng.normal(size=60)
-    whole = np.column_stack([base, f / scale])
-    x = np.linalg.lstsq(whole, y)[0]
-    off = y - base @ np.linalg.lstsq(base, y)[0]
-    on = y - whole @ x
-    form = CandidateForm(variant, PlaceSpread.SHARED)
-    unknowns = (unknown(None, 3.0), unknown(None, 3.0), unknown(0, STRENGTH_SDS * scale, True))
-    member = HypothesisMember(cast(SpineModel, None), (), (0, 1, 2))
-    supposed = (ActiveTerm(form, np.zeros(1)),)
-    hypothesis = Hypothesis({"a": member}, unknowns, supposed)
-    bound = np.zeros(3, dtype=bool)
-    fit = JointFit(hypothesis, x, {}, float(on @ on), {"a": -on}, {"a": -whole}, {}, {}, bound, "")
-    return fit, float(off @ off - on @ on), base, f, y
-
-
-@sweep("size", [0.0, 0.2, 1.0])
-def test_laplace_is_the_exact_evidence_of_a_linear_problem(size: float) -> None:
-    fit, gain, base, f, y = linear_problem(COUPLING, size)
-    without = np.eye(60) + 9.0 * base @ base.T
-    logs = [log_normal(y, without + t**2 * np.outer(f, f)) for t in SIZES]
-    expected = logsumexp(logs) - np.log(len(SIZES)) - log_normal(y, without)
-    assert laplace(fit, 0, gain) == pytest.approx(expected, abs=0.01)
-
-
-@sweep("size, within", [(0.0, 0.02), (0.15, 0.01), (0.2, 0.01), (1.0, 0.01)])
-def test_laplace_of_a_one_sided_strength_is_the_exact_integral(size: float, within: float) -> None:
-    fit, gain, base, f, y = linear_problem(LAXITY, size)
-    without = np.eye(60) + 9.0 * base @ base.T
-    inverse = np.linalg.inv(without)
-    slope, bend = f @ inverse @ y, f @ inverse @ f
-    ratios = [
-        quad(
-            lambda b, t=t: 2.0 * norm.pdf(b, 0.0, t) * np.exp(b * slope - 0.5 * b**2 * bend - 20.0),
-            0.0,
-            10.0 * t,
-            points=[min(max(slope / bend, 1e-3), 9.0 * t)],
-        )[0]
-        for t in SIZES
-    ]
-    expected = np.log(np.mean(ratios)) + 20.0
-    assert laplace(fit, 0, gain) == pytest.approx(expected, abs=within)
-
-
 # Fits, screens and gaps of chains in closed form -----------------------------------------------
 
 
@@ -354,14 +299,9 @@ def test_the_screen_favours_no_effect_and_no_specimen_by_its_place() -> None:
     given = readings(6, stiffer_one_way)
     names = [one.specimen for one in given]
     tried = trials(EFFECTS, ROTATIONS, names, 6)
-    one_way = look(grounds_of(given, NO_NUISANCE), tried, 50, 0.01, 0)
-    other_way = look(
-        grounds_of(given[::-1], NO_NUISANCE),
-        trials(EFFECTS, ROTATIONS, names[::-1], 6)[::-1],
-        50,
-        0.01,
-        0,
-    )
+    one_way = look(grounds_of(given, NO_NUISANCE), tried)
+    backwards = trials(EFFECTS, ROTATIONS, names[::-1], 6)[::-1]
+    other_way = look(grounds_of(given[::-1], NO_NUISANCE), backwards)
     assert shown(one_way)["flexion_extension_asymmetry"] > 3.0
     assert [e.effect for e in one_way.effects] == [e.effect for e in other_way.effects]
     for name, found in shown(one_way).items():
@@ -378,27 +318,12 @@ def test_the_screen_favours_no_joint_by_its_place() -> None:
 
         given = readings(7, lax, specimens=("a", "b"), sd=0.0)
         tried = trials(["local_laxity"], ROTATIONS, ["a", "b"], 6)
-        (best,) = look(grounds_of(given, NO_NUISANCE), tried, 10, 0.01, 0).effects
+        (best,) = look(grounds_of(given, NO_NUISANCE), tried).effects
         of_place = [t.log_evidence for t in best.forms if t.form.joint == place]
         assert best.forms[0].form.joint == place
         found.append([best.log_evidence, *of_place])
     np.testing.assert_allclose(found[1], found[0], rtol=1e-6)
     np.testing.assert_allclose(found[2], found[0], rtol=1e-6)
-
-
-def test_the_threshold_is_exceeded_by_fresh_draws_as_seldom_as_asked() -> None:
-    """Largest evidence of several effects: 300 draws set the threshold, 4000 others judge it."""
-    given = readings(8)
-    grounds = grounds_of(given, NuisancePriors())
-    tried = trials(EFFECTS, ROTATIONS, [one.specimen for one in given], 6)
-    fresh = look(grounds, tried, 4000, 0.01, 99)
-    largest = np.max(np.stack([one.null for one in fresh.effects]), axis=0)
-    for draws, asked in ((300, 0.01), (300, 0.05), (1000, 0.01)):
-        few = look(grounds, tried, draws, asked, 3)
-        assert np.mean(largest > few.threshold) <= 2.0 * asked
-        own = np.max(np.stack([one.null for one in few.effects]), axis=0)
-        share = float(np.mean(largest > exceeded(own, asked)))
-        assert 0.3 * asked <= share <= 2.5 * asked  # a Gumbel fit to 300 draws is no better
 
 
 @sweep("gap", [0.0, 0.2, 1.0])
