@@ -223,7 +223,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
         verdict=summarise(ready, ended, told, stays, numbers, taken["with_effects"], hidden, run),
         rows={
             "gap": gap,
-            "candidates": [*design_rows(told), *candidate_rows(found, joints)],
+            "candidates": [*design_rows(told), *candidate_rows(found, rules.needed, joints)],
             "where": where_rows(found, joints),
             "confusions": confusion_rows(told),
             "held_out": held_out_rows(ended.proof),

@@ -67,7 +67,7 @@ _SHOWN: Mapping[str, tuple[str, str, str]] = {
     "candidates": (
         "Effects tried",
         "Each alone beside the base, in its best form: fitted (refit), or linear (screen).",
-        "stage effect spread log_evidence threshold gap_share status",
+        "stage effect spread log_evidence gap_share decision",
     ),
     "imperfections": (
         "Set-up errors",

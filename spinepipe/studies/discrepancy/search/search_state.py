@@ -24,18 +24,13 @@ from spinepipe.studies.discrepancy.search.projected import (
 )
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import EffectColumns, Screen, screened
+from spinepipe.studies.discrepancy.verdict import SURE
 
 PRIOR = (0.35, 0.45, 0.15, 0.05)
 """Probabilities before any reading that no, one, two or three effects are missing."""
 
 ELSE = 0.15
 """Probability before any reading that something else is missing, whatever else is."""
-
-SURE = 0.95
-"""Probability from which a name is said for certain."""
-
-SOMETHING_ELSE, NOTHING = "something_else", "nothing"
-"""Among the probabilities of effects by their names."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +42,7 @@ class Rules:
     margin: float
     most_effects: int
     seed: int
-    most_fits: int = 24
+    most_fits: int = 10
 
     @property
     def needed(self) -> float:
@@ -97,11 +92,14 @@ class SearchStage:
     Attributes
     ----------
     name : its number. beside : names of the effects of the set, one for each form.
+    refits : each with the log evidence that it adds to the set's.
+    behind : of each, log odds by which it is behind the most probable set.
     """
 
     name: str
     screen: Screen
     refits: tuple[Refit, ...]
+    behind: tuple[float, ...] = ()
     beside: tuple[str, ...] = ()
 
 
