@@ -116,7 +116,7 @@ def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
 
 @_told
 def table_told(ended: Investigation) -> Told:
-    """Of UNKNOWN and PART: what a tabulated law and a formula close of held-out readings."""
+    """Of UNKNOWN and PART: what a tabulated law closes of held-out readings."""
     final, said = ended.for_verdict().found.final, ended.ended
     if (
         said.verdict not in (VerdictKind.UNKNOWN, VerdictKind.PART)

@@ -174,7 +174,7 @@ class Posterior:
         if one.baseline is not None and probable:
             rules = self.rules
             screen = run(look, one.baseline, tuple(self.trials.values()))
-            lack = run(lack_of_fit, one.baseline, rules.coordinates, 0, rules.seed)
+            lack = run(lack_of_fit, one.baseline, rules.coordinates)
             one = replace(one, screen=screen, lack=lack)
             for seen in self._beside(one, one.baseline, screen):
                 known = self.seen.get(seen.forms)
