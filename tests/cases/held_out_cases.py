@@ -119,7 +119,7 @@ def found(base: BaselineFit, zone: bool, spread: PlaceSpread = PlaceSpread.SHARE
     if zone:
         guess = ActiveTerm(replace(ZONE, spread=spread), np.array([0.4, 0.04, 12.0]))
         final = base.at(joint_fit(base.suppose((guess,)), base.setting))
-    lack = LackOfFit(0.0, np.zeros(1), "own", "extension", PlaceSpread.SHARED, 0.0, {}, at={})
+    lack = LackOfFit(0.0, "own", "extension", PlaceSpread.SHARED, 0.0, {}, at={})
     gaps = whole_gap(base, base.fit), whole_gap(final, final.fit)
     at = gaps_at(base, base.fit), gaps_at(final, final.fit)
-    return SearchResult(base, final, (), (), lack, 0.0, *gaps, *at, {}, lack)
+    return SearchResult(base, final, (), (), {}, (), None, lack, 0.0, *gaps, *at)

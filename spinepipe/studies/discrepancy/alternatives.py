@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.words import count, listed, plain
+from spinepipe.report.words import listed, plain
 from spinepipe.studies.discrepancy.misfits import (
     NOISE,
     WITH_EFFECTS,
@@ -100,18 +100,16 @@ def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterato
         )
         names = {"shape": shape_in_words(shape or "")}
         yield Conclusion("shape", "seen" if shape else "unseen", names=names)
-    formula, table = None if told is None else told.formula, verdict.tabulated
-    if table is not None:
+    if (table := verdict.tabulated) is not None:
         values = {"after": Value(table.gap, NOISE, source="verdict: tabulated")}
         laws = readable(table.place).split("; ")
         curve = in_words([laws], _MOST_WORDS_OF_CURVE) or f"{len(laws)} motions"
-        yield _described("curve", values, table.held_out_closed, {"curve": curve})
-    if formula is not None:
-        values = {
-            "fit": Value(change_of_misfit(formula.explained), "%", source="verdict: formula"),
-        }
-        terms = {"terms": count(len(formula.terms), "term")}
-        yield _described("formula", values, formula.held_out_closed, terms)
+        if (closed := table.held_out_closed) is not None:
+            how = "verdict: tabulated, held_out_closed"
+            values["closed"] = Value(change_of_misfit(closed), "%", source=how)
+        yield Conclusion(
+            "curve", "left_out" if "closed" in values else "fit", values, {"curve": curve}
+        )
     for one in {one.name: one for one in reversed(verdict.withheld)}.values():
         unit, factor = ("%", 100.0) if one.unit == "1" else UNITS.get(one.unit, (one.unit, 1.0))
         values = {"allowed": Value(factor * one.allowed, unit, source="verdict: withheld")}
@@ -119,15 +117,6 @@ def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterato
             values["known"] = Value(factor * one.known_to, unit, source="verdict: withheld")
         names = {"effect": general(one.name), "imperfection": _set_up(one.imperfection)}
         yield Conclusion("hidden", "known" if "known" in values else "unknown", values, names)
-
-
-def _described(
-    rule: str, values: dict[str, Value], closed: float | None, names: dict[str, str]
-) -> Conclusion:
-    if closed is None:
-        return Conclusion(rule, "fit", values, names)
-    change = Value(change_of_misfit(closed), "%", source=f"verdict: {rule}, held_out_closed")
-    return Conclusion(rule, "left_out", {**values, "closed": change}, names)
 
 
 def _set_up(kind: str) -> str:

@@ -88,9 +88,7 @@ def outcome(
     sure = [one for one in found.standing if done and p[one.name] >= SURE]
     other = p[SOMETHING_ELSE] >= EVEN
     shape = f"something else, with probability {p[SOMETHING_ELSE]:.2f} ({found.lack.shape})"
-    whole = found.with_tables or found.final
-    rms = whole_gap(whole, whole.fit).rms if other else found.final_gap.rms
-    if rms > MUCH:
+    if (rms := left_of(found)) > MUCH:
         why = f"the model's shape is wrong here: {rms:.1f} noise SD stay whatever is added"
         return Outcome(VerdictKind.UNKNOWN, why, reason=Reason.MOST_STAYS)
     names = {one.name for one in sure}
@@ -125,6 +123,13 @@ def outcome(
     if unproven:
         return Outcome(VerdictKind.UNKNOWN, unproven, reason=Reason.NOT_PROVEN)
     return Outcome(VerdictKind.NAMED, _probably(sure, p), tuple(sure))
+
+
+def left_of(found: SearchResult) -> float:
+    """Noise SDs (rms) that stay beside all that is probable, something else included."""
+    if found.probabilities[SOMETHING_ELSE] < EVEN or found.with_tables is None:
+        return found.final_gap.rms
+    return whole_gap(found.with_tables, found.with_tables.fit).rms
 
 
 def _probably(sure: Sequence[SelectedTerm], p: Mapping[str, float]) -> str:

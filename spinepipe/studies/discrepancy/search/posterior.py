@@ -186,7 +186,7 @@ class Posterior:
         if one.baseline is None or not probable:
             return
         screen = run(look, one.baseline, tuple(self.trials.values()))
-        lack = run(lack_of_fit, one.baseline, self.rules.coordinates, 0, self.rules.seed)
+        lack = run(lack_of_fit, one.baseline, self.rules.coordinates)
         one = self.fitted[one.forms] = replace(one, screen=screen, lack=lack)
         for seen in (*self._further(one), *self._in_place(one)):
             known = self.seen.get(seen.forms)

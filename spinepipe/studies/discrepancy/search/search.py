@@ -52,7 +52,7 @@ def search(
         by_names[names] = by_names.get(names, 0.0) + p
     names = max(by_names, key=lambda one: (by_names[one], sorted(one)))
     final = _model_of(names, posterior, run)
-    lack = run(lack_of_fit, final, rules.coordinates, 0, rules.seed)
+    lack = run(lack_of_fit, final, rules.coordinates)
     return SearchResult(
         base=base,
         final=final,

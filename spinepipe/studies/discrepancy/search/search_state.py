@@ -16,7 +16,6 @@ from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
     columns_of,
-    drawn,
     linearised,
     products,
     signatures_of_each,
@@ -135,7 +134,7 @@ class SearchResult:
 
 def look(baseline: BaselineFit, trials: Sequence[Trials]) -> Screen:
     """Evidence of every effect beside those of the fit, with base and nuisances taken out."""
-    problems = linearised_for(baseline, trials, 0, 0)
+    problems = linearised_for(baseline, trials)
     found = [
         screened(one, index, problem, tuple(baseline.readings), baseline.tests)
         for one, (index, problem) in zip(trials, problems, strict=True)
@@ -144,21 +143,20 @@ def look(baseline: BaselineFit, trials: Sequence[Trials]) -> Screen:
 
 
 def linearised_for(
-    baseline: BaselineFit, trials: Sequence[Trials], draws: int, seed: int
+    baseline: BaselineFit, trials: Sequence[Trials]
 ) -> list[tuple[EffectColumns, Linearised]]:
-    """The products of each effect's signatures; draws of the null are the same for all effects."""
+    """The products of each effect's signatures."""
     joints = next(iter(baseline.fit.models.values())).n_joints
     indices = [_index(one, joints, tuple(baseline.tests)) for one in trials]
     columns = [one.columns for one in indices]
     taken = taken_out(baseline.fit)
     parts: list[dict[str, Products]] = [{} for _ in trials]
-    for number, (name, one) in enumerate(baseline.readings.items()):
+    for name, one in baseline.readings.items():
         solved = SolvedSpecimen(baseline.fit.models[name], one.cases, baseline.noise.zeroed)
-        errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
         for place, moved in zip(parts, signatures_of_each(solved, columns), strict=True):
             plain = baseline.plain[name].noise_only(moved)
             white = baseline.setting.whitenings[name].shortened(plain)
-            place[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
+            place[name] = products(taken[name], white, np.sum(plain**2, axis=0))
     return [(index, linearised(place)) for index, place in zip(indices, parts, strict=True)]
 
 
