@@ -65,7 +65,6 @@ from spinepipe.studies.discrepancy.tables import (
 )
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
-    Threshold,
     Verdict,
     VerdictKind,
     write_verdict,
@@ -174,7 +173,6 @@ def _without_base(ready: Prepared, trouble: NoBase) -> DiscrepancyResults:
         noise=noise_summary(noise),
         unknown=UnnamedMisfit(str(trouble), NO_SHAPE, Reason.NO_BASE),
         suspected_data_errors=errors,
-        threshold=Threshold(false_alarm=ready.study.false_alarm),
     )
     return DiscrepancyResults(
         verdict=verdict,
@@ -223,7 +221,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
         verdict=summarise(ready, ended, told, stays, numbers, taken["with_effects"], hidden, run),
         rows={
             "gap": gap,
-            "candidates": [*design_rows(told), *candidate_rows(found, joints)],
+            "candidates": [*design_rows(told), *candidate_rows(found, rules.needed, joints)],
             "where": where_rows(found, joints),
             "confusions": confusion_rows(told),
             "held_out": held_out_rows(ended.proof),

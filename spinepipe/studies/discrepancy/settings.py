@@ -109,10 +109,10 @@ class Discrepancy(Study):
         default=0.01,
         gt=0,
         lt=1,
-        description="how often an effect may be named where none is missing; sets the threshold",
+        description="read by versions before; does nothing now",
     )
     bootstrap: int = Field(
-        default=500, ge=20, le=100_000, description="draws without a missing effect, for that"
+        default=500, ge=20, le=100_000, description="read by versions before; does nothing now"
     )
     most_effects: int = Field(default=3, ge=1, le=10, description="most effects that are named")
     margin: float = Field(

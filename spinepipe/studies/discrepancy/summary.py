@@ -23,14 +23,12 @@ from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import EVEN, Outcome
 from spinepipe.studies.discrepancy.search.regions import values_with_regions
 from spinepipe.studies.discrepancy.search.residual_model import ResidualModel
-from spinepipe.studies.discrepancy.search.search_state import (
-    SOMETHING_ELSE,
-    SearchResult,
-    SelectedTerm,
-)
+from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
+    LEAST_PROBABLE,
+    SOMETHING_ELSE,
     Candidate,
     CommonImperfection,
     Estimate,
@@ -138,6 +136,7 @@ def summarise(
         tabulated=stays.table,
         withheld=tuple(withheld),
         left_out=tuple(_left_out(proof)),
+        probabilities={n: p for n, p in found.probabilities.items() if p >= LEAST_PROBABLE},
     )
 
 
@@ -222,12 +221,16 @@ def _missing(
 def noise_summary(noise: FittedNoise) -> ReportedNoise:
     """SDs of one reading in the units of tables, and how they are known."""
     sd = noise.sd * DISPLAY_PER_SI
+    shared = np.where(np.isfinite(sd), noise.accuracy * DISPLAY_PER_SI, np.nan)
     return ReportedNoise(
         source=noise.source,
         rotation_sd_deg=_rms(sd[3:]),
         translation_sd_mm=_rms(sd[:3]),
         serial_correlation=noise.correlation,
         outliers_left_out=noise.outliers,
+        accuracy_rotation_deg=_rms(shared[3:]),
+        accuracy_translation_mm=_rms(shared[:3]),
+        accuracy_assumed=noise.assumed,
     )
 
 

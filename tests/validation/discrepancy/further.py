@@ -116,8 +116,8 @@ def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
 
 @_told
 def table_told(ended: Investigation) -> Told:
-    """Of UNKNOWN and PART: what a tabulated law and a formula close of held-out readings."""
-    final, said = ended.for_verdict().found.final, ended.ended
+    """Of UNKNOWN and PART: what a tabulated law closes of held-out readings."""
+    said = ended.ended
     if (
         said.verdict not in (VerdictKind.UNKNOWN, VerdictKind.PART)
         or said.reason is Reason.DATA_ERRORS

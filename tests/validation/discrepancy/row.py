@@ -27,7 +27,6 @@ STUDY = Discrepancy(
     kind="discrepancy",
     cohort="hidden",
     base=DiscrepancyBase(stiffness="per_specimen"),
-    bootstrap=300,
 )
 RIVALS_KEPT = 5
 MOST_SAID = 500

@@ -208,7 +208,7 @@ def _checked(
 
 def _of_unnamed(grounds: BaselineFit, rules: Rules, place: Bench) -> list[Advice]:
     """Runs that show more of what the generic basis sees."""
-    lack = lack_of_fit(grounds, rules.coordinates, 0, rules.seed)
+    lack = lack_of_fit(grounds, rules.coordinates)
     pattern = generic(grounds, rules.coordinates, lack)
     return _rows(f"{UNNAMED}: {lack.shape}", offers([pattern], place), 0.0)
 

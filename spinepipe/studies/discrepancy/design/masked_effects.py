@@ -175,11 +175,10 @@ class MaskedEvidence:
                 taken[name],
                 grounds.setting.whitenings[name].shortened(moved),
                 np.sum(moved**2, axis=0),
-                taken[name].residual[:, None],
             )
             for name, moved in self._moved.items()
         }
         specimens = tuple(grounds.readings)
         problem = linearised(parts)
         one = summed(self._index, problem, self._form, self._sds, specimens, grounds.tests)
-        return float(one.group.log_evidence(one.moments)[0]) + self._share
+        return float(one.group.log_evidence(one.moments)) + self._share

@@ -12,15 +12,16 @@ mass between them over the prior's (encompassing prior, Klugkist and Hoijtink 20
 A strength's SD is its declared prior SD times one of a few sizes, over which evidence is averaged.
 
 No formula is that of nature: each effect may be off by a share of what it does, a smooth function
-of how far a joint has moved and of how far a test has gone, the same for all joints (a Gaussian
+of how far a joint has moved and of how far a test has gone, another in each specimen (a Gaussian
 process, to first order at the fit).
 """
 
-from itertools import product
+from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import block_diag, cho_factor, cho_solve
 from scipy.special import log_ndtr, logsumexp
 
 from spinepipe.decomposition import pinvh
@@ -37,11 +38,14 @@ from spinepipe.studies.discrepancy.search.projected import taken_out
 from spinepipe.studies.discrepancy.search.screen import SIZES
 from spinepipe.studies.discrepancy.search.something_else import TABLE
 
-FORMULA_SD = 0.1
+FORMULA_SD = 0.2
 """Share of what an effect does by which its formula may be off."""
 
 ALONG_MOTION, ALONG_TEST = 0.4, 0.3
 """Lengths over which that changes, as shares of the largest motion and of a test."""
+
+SWEEPS = 2
+"""Times that the best size of each effect is looked for."""
 
 KNOTS = np.array([(m, t) for m in (-1.0, -0.5, 0.0, 0.5, 1.0) for t in (0.0, 0.5, 1.0)])
 """Where the process is free: shares of the largest motion, and of the test."""
@@ -53,7 +57,7 @@ def joint_log_evidence(base: JointFit, fit: JointFit) -> float:
     own = np.array([u.supposed is not None for u in unknowns])
     if not own.any():
         return 0.0
-    curvature, slope = curvature_of(fit, own), _slope(fit)[own]
+    curvature = curvature_of(fit, own)
     chosen = [u for u in unknowns if u.supposed is not None]
     of = np.array([u.supposed for u in chosen])
     strength = np.array([u.is_strength for u in chosen])
@@ -61,20 +65,48 @@ def joint_log_evidence(base: JointFit, fit: JointFit) -> float:
     # the fit itself has a wider prior on strengths, by STRENGTH_SDS
     declared = np.array([u.sd / STRENGTH_SDS if u.is_strength else u.sd for u in chosen])
     ends = np.array([(u.low - u.mean, u.high - u.mean) for u in chosen])
-    supposed = range(len(fit.hypothesis.supposed))
-    found = []
-    for sizes in product(SIZES, repeat=len(supposed)):
-        size = np.select([of == number for number in supposed], sizes)
+    # at a bound chi2 / 2 rises inwards, with that slope; the others are free where these stand
+    held = fit.at_bound[own]
+    free = ~held
+    inwards = np.where(away - ends[:, 0] < ends[:, 1] - away, 1.0, -1.0)
+    slope = _slope(fit)[own]
+    rise = np.maximum(inwards * slope, 0.0)
+
+    @cache
+    def at(sizes: tuple[float, ...]) -> float:
+        size = np.array(sizes)[of]
         sd = np.where(strength, size, 1.0) * declared
-        pull = slope + away / sd**2
-        covariance = np.linalg.inv(curvature + np.diag(sd**-2.0))
-        _, logdet = np.linalg.slogdet(np.eye(len(sd)) + curvature * sd**2)
-        parabola = 0.5 * (pull @ covariance @ pull - np.sum((away / sd) ** 2) - logdet)
-        mean, spread = away - covariance @ pull, np.sqrt(np.diagonal(covariance))
-        inside = _log_mass(ends, mean, spread) - _log_mass(ends, 0.0 * mean, sd)
-        found.append(parabola + float(inside[strength].sum()))
-    averaged = float(logsumexp(found)) - len(supposed) * float(np.log(len(SIZES)))
+        narrow, a = sd[free], away[free]
+        covariance = np.linalg.inv(curvature[np.ix_(free, free)] + np.diag(narrow**-2.0))
+        pull = slope[free] + a / narrow**2
+        _, logdet = np.linalg.slogdet(np.eye(len(a)) + curvature[np.ix_(free, free)] * narrow**2)
+        parabola = 0.5 * (pull @ covariance @ pull - np.sum((a / narrow) ** 2) - logdet)
+        mean, spread = a - covariance @ pull, np.sqrt(np.diagonal(covariance))
+        inside = _log_mass(ends[free], mean, spread)
+        prior_mass = _log_mass(ends, 0.0 * away, sd)
+        counted = float(inside[strength[free]].sum() - prior_mass[strength | held].sum())
+        # half a parabola at the bound: its prior density there, times what is left inwards
+        c = np.diagonal(curvature)[held] + sd[held] ** -2.0
+        h = rise[held] + inwards[held] * away[held] / sd[held] ** 2
+        density = -0.5 * (away[held] / sd[held]) ** 2 - np.log(sd[held])
+        inner = 0.5 * h**2 / c - 0.5 * np.log(c) + log_ndtr(-h / np.sqrt(c))
+        return float(parabola + counted + (density + inner).sum())
+
+    # sizes of several effects hardly hang on each other: each is averaged where the others are best
+    best = [1.0] * len(fit.hypothesis.supposed)
+    for number in [*range(len(best))] * SWEEPS:
+        best[number] = max(SIZES.tolist(), key=lambda one, n=number: at(_with(best, n, one)))
+    most = at(tuple(best))
+    spread_of_sizes = sum(
+        float(logsumexp([at(_with(best, n, one)) - most for one in SIZES.tolist()]))
+        for n in range(len(best))
+    )
+    averaged = most + spread_of_sizes - len(best) * float(np.log(len(SIZES)))
     return 0.5 * (base.chi2 - fit.chi2) + averaged
+
+
+def _with(sizes: Sequence[float], number: int, one: float) -> tuple[float, ...]:
+    return (*sizes[:number], one, *sizes[number + 1 :])
 
 
 def curvature_of(fit: JointFit, own: NDArray[np.bool_]) -> Array:
@@ -129,12 +161,12 @@ def formula_error(baseline: BaselineFit) -> float:
     half = np.linalg.cholesky(_kernel(KNOTS, KNOTS) + 1e-6 * np.eye(len(KNOTS)))
     without = [_without(baseline, number) for number in named]
     taken = taken_out(fit)
-    every = [test for one in baseline.readings.values() for test in one.tests]
-    read = [c for c in range(6) if any(test.count[..., c].any() for test in every)]
-    moved = []
-    for name in baseline.readings:
+    grams, moments, coupled = [], [], []
+    gram_shared = moment_shared = 0.0
+    for name, one in baseline.readings.items():
         rows = []
-        for number, predicted in enumerate(fit.predicted[name]):
+        for number in range(len(one.tests)):
+            predicted = fit.predicted[name][number]
             steps, joints, _ = predicted.shape
             furthest = np.maximum(np.abs(predicted).max(axis=0), np.finfo(float).tiny)
             gone = np.broadcast_to(np.linspace(0.0, 1.0, steps)[:, None, None], predicted.shape)
@@ -144,18 +176,23 @@ def formula_error(baseline: BaselineFit) -> float:
             done = [predicted - other[name][number] for other in without]
             effects = np.stack(done, axis=-1)[..., None]  # (T, J, 6, effects, 1)
             moves = FORMULA_SD * (effects * smooth).reshape(steps, joints, 6, -1)
-            # a function of its own for each coordinate that was read, of any specimen
+            # a function of its own for each coordinate that was read
+            read = [c for c in range(6) if any(t.count[..., c].any() for t in one.tests)]
             apart = np.zeros((steps, joints, 6, len(read), moves.shape[-1]))
             for place, coordinate in enumerate(read):
                 apart[:, :, coordinate, place] = moves[:, :, coordinate]
             rows.append(apart.reshape(steps, joints, 6, -1))
-        moved.append(taken[name].out_of(baseline.setting.whitenings[name](rows)))
-    left = np.concatenate(moved)
-    shared = np.concatenate([taken[name].shared for name in baseline.readings])
-    residual = np.concatenate([taken[name].residual for name in baseline.readings])
+        left = taken[name].out_of(baseline.setting.whitenings[name](rows))
+        grams.append(left.T @ left)
+        moments.append(left.T @ taken[name].residual)
+        coupled.append(left.T @ taken[name].shared)
+        gram_shared = gram_shared + taken[name].shared.T @ taken[name].shared
+        moment_shared = moment_shared + taken[name].shared.T @ taken[name].residual
+    # a function of its own for each specimen; what these share couples them
+    gram, moment, shared = block_diag(*grams), np.concatenate(moments), np.concatenate(coupled)
     if shared.shape[1]:
-        left = left - shared @ (pinvh(shared.T @ shared, rcond=1e-10) @ (shared.T @ left))
-    gram, moment = left.T @ left, left.T @ residual
+        gain = shared @ pinvh(np.asarray(gram_shared), rcond=1e-10)
+        gram, moment = gram - gain @ shared.T, moment - gain @ moment_shared
     factor = cho_factor(np.eye(len(gram)) + gram)
     return float(0.5 * moment @ cho_solve(factor, moment) - np.log(np.diagonal(factor[0])).sum())
 

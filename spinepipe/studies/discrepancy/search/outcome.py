@@ -9,15 +9,20 @@ import numpy as np
 
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
+from spinepipe.studies.discrepancy.search.gaps import whole_gap
+from spinepipe.studies.discrepancy.search.posterior import ENOUGH
 from spinepipe.studies.discrepancy.search.search_state import (
-    NOTHING,
-    SOMETHING_ELSE,
-    SURE,
     SearchResult,
     SelectedTerm,
 )
 from spinepipe.studies.discrepancy.search.something_else import TABLE
-from spinepipe.studies.discrepancy.verdict import SuspectedError, VerdictKind
+from spinepipe.studies.discrepancy.verdict import (
+    NOTHING,
+    SOMETHING_ELSE,
+    SURE,
+    SuspectedError,
+    VerdictKind,
+)
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
 EVEN = 0.5
@@ -77,11 +82,12 @@ def outcome(
     if p[NOTHING] > 1.0 - SURE:
         why = f"nothing is sure to be missing: with probability {p[NOTHING]:.2f} nothing is"
         return Outcome(VerdictKind.NULL, why)
-    sure = [one for one in found.standing if p[one.name] >= SURE]
+    # what rests on looks alone may yet hold a rival
+    done = found.unfitted <= ENOUGH
+    sure = [one for one in found.standing if done and p[one.name] >= SURE]
     other = p[SOMETHING_ELSE] >= EVEN
     shape = f"something else, with probability {p[SOMETHING_ELSE]:.2f} ({found.lack.shape})"
-    rms = found.final_gap.rms
-    if rms > MUCH:
+    if (rms := left_of(found)) > MUCH:
         why = f"the model's shape is wrong here: {rms:.1f} noise SD stay whatever is added"
         return Outcome(VerdictKind.UNKNOWN, why, reason=Reason.MOST_STAYS)
     names = {one.name for one in sure}
@@ -92,7 +98,7 @@ def outcome(
         apart = [
             one
             for one in sure
-            if (on := one.supposed.form.variant.acts_on) and not loaded & set(on)
+            if (on := one.supposed.form.variant.acts_on) and not set(on) <= loaded
         ]
         if not apart:
             reason = Reason.A_PART_STAYS if sure else Reason.NO_KNOWN_EFFECT
@@ -116,6 +122,13 @@ def outcome(
     if unproven:
         return Outcome(VerdictKind.UNKNOWN, unproven, reason=Reason.NOT_PROVEN)
     return Outcome(VerdictKind.NAMED, _probably(sure, p), tuple(sure))
+
+
+def left_of(found: SearchResult) -> float:
+    """Noise SDs (rms) that stay beside all that is probable, something else included."""
+    if found.probabilities[SOMETHING_ELSE] < EVEN or found.with_tables is None:
+        return found.final_gap.rms
+    return whole_gap(found.with_tables, found.with_tables.fit).rms
 
 
 def _probably(sure: Sequence[SelectedTerm], p: Mapping[str, float]) -> str:

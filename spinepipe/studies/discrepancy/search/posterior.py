@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.evidence import formula_error, joint_log_evidence
-from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, lack_of_fit
 from spinepipe.studies.discrepancy.search.refit import Refit, refit, starting_term
 from spinepipe.studies.discrepancy.search.screen import Screen, ScreenedVariant
@@ -31,13 +31,14 @@ ENOUGH = 0.05
 FAR = 4.0
 """Log odds behind all others from which nothing is looked for beside a set."""
 
-BEYOND = 0.5
-"""A fit may come to so much more than the look says, as a share: looks are of first order."""
+SLACK = 0.05
+"""Share of its log evidence by which a look may be off against another's beside the same set."""
 
 WEAK = 2.0
 """Log evidence up to which a first-order look is as good as a fit."""
 
-MOST_TABLES = 2
+MOST_FORMS, MOST_TABLES = 6, 3
+"""In one set; an effect may act in another way on each coordinate."""
 
 Forms = frozenset[CandidateForm]
 
@@ -54,14 +55,15 @@ class FittedSet:
     Attributes
     ----------
     baseline : where it stands; None where it has no fit. log_evidence : against the base alone.
-    parent : the set it was fitted beside. refit : how; None of the base.
-    screen, lack : looks beside it, where it was probable enough for any.
+    entered : of each of its forms, the set beside which it was looked at, and what was seen.
+    refit : how it was fitted; None of the base. screen, lack : looks beside it, where it was
+        probable enough for any.
     """
 
     forms: Forms
     baseline: BaselineFit | None
     log_evidence: float
-    parent: "FittedSet | None" = None
+    entered: Mapping[CandidateForm, "tuple[FittedSet, ScreenedVariant]"]
     refit: Refit | None = None
     screen: Screen | None = None
     lack: LackOfFit | None = None
@@ -69,17 +71,24 @@ class FittedSet:
 
 @dataclass(frozen=True, eq=False)
 class SeenSet:
-    """A set of effects that was only looked at, beside one that was fitted."""
+    """A set of effects that was only looked at.
 
-    forms: Forms
-    parent: FittedSet
+    Attributes
+    ----------
+    start : fitted, of which it has ``added`` besides, in the place of ``instead`` if that is not
+        None. beside : where it was looked at. log_evidence : predicted.
+    """
+
+    start: FittedSet
+    beside: FittedSet
     added: ScreenedVariant
-    most: float
+    instead: CandidateForm | None
+    log_evidence: float
 
     @property
-    def log_evidence(self) -> float:
-        """Against the base alone, to first order."""
-        return self.parent.log_evidence + self.added.log_evidence
+    def forms(self) -> Forms:
+        """All its forms."""
+        return (self.start.forms - {self.instead}) | {self.added.form}
 
     @property
     def weak(self) -> bool:
@@ -111,23 +120,26 @@ class Posterior:
 
     def explore(self, run: PieceRunner, progress: Progress) -> None:
         """Fit sets while much probability rests on looks alone."""
-        self._take(FittedSet(frozenset(), self.base, 0.0), run)
+        self._take(FittedSet(frozenset(), self.base, 0.0, {}), run)
         number = 0
         while (best := self._next()) is not None and number < self.rules.most_fits:
             number += 1
-            added = ", ".join(sorted(names_of(best.forms))) or "something else"
+            names = ", ".join(sorted(names_of(best.forms))) or "something else"
             progress.round(
-                f"fit {number} of at most {self.rules.most_fits}: {added}; "
+                f"fit {number} of at most {self.rules.most_fits}: {names}; "
                 f"{100.0 * self.unfitted:.0f} % of the probability is open"
             )
             del self.seen[best.forms]
-            beside = best.parent.baseline
-            assert beside is not None
-            tried = run(refit, self.base.fit, beside, starting_term(best.added))
+            assert best.start.baseline is not None
+            term = starting_term(best.added)
+            tried = run(refit, self.base.fit, best.start.baseline, term, best.instead)
             shares = sum(self.trials[form.name].log_share(form) for form in best.forms)
-            at = beside.at(tried.fit) if np.isfinite(tried.log_evidence) else None
+            usable = np.isfinite(tried.log_evidence)
+            at = best.start.baseline.at(tried.fit) if usable else None
+            entered = {**best.start.entered, best.added.form: (best.beside, best.added)}
+            entered = {form: entered[form] for form in best.forms}
             evidence = tried.log_evidence + shares
-            self._take(FittedSet(best.forms, at, evidence, best.parent, tried), run)
+            self._take(FittedSet(best.forms, at, evidence, entered, tried), run)
 
     def log_evidence_of(self, at: BaselineFit) -> float:
         """Of all effects of a fit, against the base alone."""
@@ -141,16 +153,15 @@ class Posterior:
             self.unfitted = 0.0
             return None
         weak = (one for one in self.seen.values() if one.weak)
-        known = [*(self._log_odds(o) for o in self.fitted.values()), *map(self._log_odds, weak)]
-        open_ones = logsumexp([one.most + self.log_prior(one.forms) for one in strong])
+        known = [*(self.log_odds_of(o) for o in self.fitted.values()), *map(self.log_odds_of, weak)]
+        open_ones = logsumexp([self.log_odds_of(one) for one in strong])
         self.unfitted = float(np.exp(open_ones - np.logaddexp(open_ones, logsumexp(known))))
         if self.unfitted < ENOUGH:
             return None
         return max(
             strong,
             key=lambda one: (
-                one.most + self.log_prior(one.forms),
-                one.log_evidence,
+                self.log_odds_of(one),
                 sorted(map(repr, one.forms)),
             ),
         )
@@ -162,45 +173,48 @@ class Posterior:
         ways = max(comb(len(self.rules.trials), count), 1)
         return float(np.log(PRIOR[count] / ways * (ELSE if other else 1.0 - ELSE)))
 
-    def _log_odds(self, one: FittedSet | SeenSet) -> float:
+    def log_odds_of(self, one: FittedSet | SeenSet) -> float:
         """Logarithm of the posterior odds, less what all sets share."""
         return one.log_evidence + self.log_prior(one.forms)
 
     def _take(self, one: FittedSet, run: PieceRunner) -> None:
-        """Keep a set, and look what else there may be beside it, where it is probable enough."""
-        beside = [self._log_odds(other) for other in self.fitted.values()]
-        probable = not beside or self._log_odds(one) > logsumexp(beside) - FAR
-        baseline = one.baseline
-        if baseline is not None and probable:
-            rules = self.rules
-            screen = run(look, baseline, tuple(self.trials.values()))
-            lack = run(lack_of_fit, baseline, rules.coordinates, 0, rules.seed)
-            one = replace(one, screen=screen, lack=lack)
-            for seen in self._beside(one, baseline, screen):
-                known = self.seen.get(seen.forms)
-                if seen.forms not in self.fitted and (known is None or seen.most > known.most):
-                    self.seen[seen.forms] = seen
+        """Keep a set, and look what else there may be, where it is probable enough."""
+        beside = [self.log_odds_of(other) for other in self.fitted.values()]
+        probable = not beside or self.log_odds_of(one) > logsumexp(beside) - FAR
         self.fitted[one.forms] = one
+        if one.baseline is None or not probable:
+            return
+        screen = run(look, one.baseline, tuple(self.trials.values()))
+        lack = run(lack_of_fit, one.baseline, self.rules.coordinates)
+        one = self.fitted[one.forms] = replace(one, screen=screen, lack=lack)
+        for seen in (*self._further(one), *self._in_place(one)):
+            known = self.seen.get(seen.forms)
+            new = known is None or seen.log_evidence > known.log_evidence
+            if new and seen.forms not in self.fitted and self._allowed(seen.forms):
+                self.seen[seen.forms] = seen
 
-    def _beside(self, one: FittedSet, baseline: BaselineFit, screen: Screen) -> Iterator[SeenSet]:
-        """Each variant of each further effect as it differs best, by a look."""
-        names = names_of(one.forms)
-        tabled = {form.variant for form in one.forms if form.name == TABLE}
-        full = len(names) >= min(self.rules.most_effects, len(PRIOR) - 1)
-        excess = sum(float(r @ r) for r in baseline.fit.residuals.values())
-        for effect in screen.effects:
-            if effect.effect == TABLE:
-                if len(tabled) >= MOST_TABLES:
-                    continue
-            elif full or effect.effect in names:
-                continue
-            known = set(tabled)
-            for tried in effect.forms:  # best first
-                if tried.form.variant not in known:
-                    known.add(tried.form.variant)
-                    more = tried.log_evidence + BEYOND * max(tried.log_evidence, 0.0)
-                    most = one.log_evidence + min(more, 0.5 * excess)
-                    yield SeenSet(one.forms | {tried.form}, one, tried, most)
+    def _allowed(self, forms: Forms) -> bool:
+        tables_of = sum(form.name == TABLE for form in forms)
+        most = min(self.rules.most_effects, len(PRIOR) - 1)
+        few = len(names_of(forms)) <= most and len(forms) <= MOST_FORMS
+        return few and tables_of <= MOST_TABLES
+
+    def _further(self, one: FittedSet) -> Iterator[SeenSet]:
+        """Beside a set."""
+        there = {form.variant for form in one.forms}
+        for tried in _best_forms(one, there):
+            yield SeenSet(one, one, tried, None, one.log_evidence + tried.log_evidence)
+
+    def _in_place(self, one: FittedSet) -> Iterator[SeenSet]:
+        """In the place of each effect of a set, what was looked at when that entered.
+
+        Looks are of first order: how much they miss is taken to be alike for both.
+        """
+        there = {form.variant for form in one.forms}
+        for form, (beside, entered) in one.entered.items():
+            for tried in _best_forms(beside, there):
+                lead = (1.0 - SLACK) * entered.log_evidence - tried.log_evidence
+                yield SeenSet(one, beside, tried, form, one.log_evidence - max(lead, 0.0))
 
     @property
     def log_odds(self) -> dict[tuple[frozenset[str], bool], float]:
@@ -210,17 +224,27 @@ class Posterior:
         """
         groups: dict[tuple[frozenset[str], bool], list[float]] = {}
         looks: dict[frozenset[str], list[float]] = {}
-        every: list[FittedSet | SeenSet] = [*self.fitted.values(), *self.seen.values()]
-        for one in every:
+        for one in (*self.fitted.values(), *self.seen.values()):
             names = names_of(one.forms)
             other = any(form.name == TABLE for form in one.forms)
             if np.isfinite(one.log_evidence):
-                groups.setdefault((names, other), []).append(self._log_odds(one))
+                groups.setdefault((names, other), []).append(self.log_odds_of(one))
             if isinstance(one, FittedSet) and one.lack is not None and not other:
-                with_it = self._log_odds(one) + one.lack.log_evidence + np.log(ELSE / (1.0 - ELSE))
-                looks.setdefault(names, []).append(float(with_it))
+                more = one.lack.log_evidence + float(np.log(ELSE / (1.0 - ELSE)))
+                looks.setdefault(names, []).append(self.log_odds_of(one) + more)
         found = {key: float(logsumexp(of)) for key, of in groups.items()}
         for names, of in looks.items():
             seen = float(logsumexp(of))
             found[names, True] = max(found.get((names, True), -np.inf), seen)
         return found
+
+
+def _best_forms(one: FittedSet, there: set[Variant]) -> Iterator[ScreenedVariant]:
+    """Each variant as it differs best, by a look beside a set; not those that are there."""
+    assert one.screen is not None
+    known = set(there)
+    for effect in one.screen.effects:
+        for tried in effect.forms:  # best first
+            if tried.form.variant not in known:
+                known.add(tried.form.variant)
+                yield tried

@@ -52,15 +52,18 @@ class Refit:
         return self.form.name
 
 
-def refit(base: JointFit, beside: BaselineFit, one: ActiveTerm) -> Refit:
-    """One more form beside those of a fit.
+def refit(
+    base: JointFit, beside: BaselineFit, one: ActiveTerm, instead: CandidateForm | None = None
+) -> Refit:
+    """One more form beside those of a fit, in the place of one of them where that is told.
 
     Where the spine has no stable equilibrium at the start (a load, or a joint that is too soft), or
     the fit ends off the load path, it is started again closer to off, see `STARTS`.
     """
     before = beside.fit
     for share in STARTS:
-        supposed = (*standing(before), weaker(one, share))
+        rest = (other for other in standing(before) if other.form != instead)
+        supposed = (*rest, weaker(one, share))
         fit = joint_fit(beside.suppose(supposed), beside.setting, before.poses)
         if fit.usable:
             break

@@ -1,6 +1,7 @@
 """The search: the posterior of a study, and the model that stands for what is most probable."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -14,8 +15,6 @@ from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
 from spinepipe.studies.discrepancy.search.posterior import FittedSet, Posterior, names_of
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.search_state import (
-    NOTHING,
-    SOMETHING_ELSE,
     Rival,
     Rules,
     SearchResult,
@@ -24,6 +23,7 @@ from spinepipe.studies.discrepancy.search.search_state import (
 )
 from spinepipe.studies.discrepancy.search.something_else import TABLE
 from spinepipe.studies.discrepancy.store import PieceRunner
+from spinepipe.studies.discrepancy.verdict import NOTHING, SOMETHING_ELSE
 
 LEAST_TOLD = 1e-4
 """Probability below which a set of names is not told."""
@@ -52,7 +52,7 @@ def search(
         by_names[names] = by_names.get(names, 0.0) + p
     names = max(by_names, key=lambda one: (by_names[one], sorted(one)))
     final = _model_of(names, posterior, run)
-    lack = run(lack_of_fit, final, rules.coordinates, 0, rules.seed)
+    lack = run(lack_of_fit, final, rules.coordinates)
     return SearchResult(
         base=base,
         final=final,
@@ -118,9 +118,9 @@ def _standing(
         without = [
             s
             for s in posterior.fitted.values()
-            if (of := names_of(s.forms)) < names and name not in of and len(of) == len(s.forms)
+            if (of := names_of(s.forms)) < names and name not in of and s.baseline is not None
         ]
-        without = [s for s in without if s.baseline is not None]
+        without = [s for s in without if all(form.name != TABLE for form in s.forms)]
         best = max(without, key=lambda s: (len(s.forms), s.log_evidence))
         assert best.baseline is not None
         yield SelectedTerm(
@@ -158,14 +158,20 @@ def _rivals(
 
 def _stages(posterior: Posterior) -> Iterable[SearchStage]:
     """Looks in their order, each with the fits that followed it."""
-    looked = [one for one in posterior.fitted.values() if one.screen is not None]
+    every = posterior.fitted.values()
+    best = max(posterior.log_odds_of(one) for one in every)
+    looked = [one for one in every if one.screen is not None]
     for number, parent in enumerate(looked, 1):
         assert parent.screen is not None
-        of_it = [one for one in posterior.fitted.values() if one.parent is not None]
-        tried = [one.refit for one in of_it if one.parent and one.parent.forms == parent.forms]
+        tried = [
+            (replace(one.refit, log_evidence=one.log_evidence - parent.log_evidence), one)
+            for one in every
+            if one.refit is not None and one.entered[one.refit.form][0].forms == parent.forms
+        ]
         yield SearchStage(
             str(number),
             parent.screen,
-            tuple(one for one in tried if one is not None),
+            tuple(refit for refit, _ in tried),
+            tuple(best - posterior.log_odds_of(one) for _, one in tried),
             tuple(sorted(form.name for form in parent.forms)),
         )

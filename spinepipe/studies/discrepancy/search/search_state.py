@@ -16,7 +16,6 @@ from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
     columns_of,
-    drawn,
     linearised,
     products,
     signatures_of_each,
@@ -24,18 +23,13 @@ from spinepipe.studies.discrepancy.search.projected import (
 )
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import EffectColumns, Screen, screened
+from spinepipe.studies.discrepancy.verdict import SURE
 
 PRIOR = (0.35, 0.45, 0.15, 0.05)
 """Probabilities before any reading that no, one, two or three effects are missing."""
 
 ELSE = 0.15
 """Probability before any reading that something else is missing, whatever else is."""
-
-SURE = 0.95
-"""Probability from which a name is said for certain."""
-
-SOMETHING_ELSE, NOTHING = "something_else", "nothing"
-"""Among the probabilities of effects by their names."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +41,7 @@ class Rules:
     margin: float
     most_effects: int
     seed: int
-    most_fits: int = 24
+    most_fits: int = 10
 
     @property
     def needed(self) -> float:
@@ -97,11 +91,14 @@ class SearchStage:
     Attributes
     ----------
     name : its number. beside : names of the effects of the set, one for each form.
+    refits : each with the log evidence that it adds to the set's.
+    behind : of each, log odds by which it is behind the most probable set.
     """
 
     name: str
     screen: Screen
     refits: tuple[Refit, ...]
+    behind: tuple[float, ...] = ()
     beside: tuple[str, ...] = ()
 
 
@@ -137,7 +134,7 @@ class SearchResult:
 
 def look(baseline: BaselineFit, trials: Sequence[Trials]) -> Screen:
     """Evidence of every effect beside those of the fit, with base and nuisances taken out."""
-    problems = linearised_for(baseline, trials, 0, 0)
+    problems = linearised_for(baseline, trials)
     found = [
         screened(one, index, problem, tuple(baseline.readings), baseline.tests)
         for one, (index, problem) in zip(trials, problems, strict=True)
@@ -146,21 +143,20 @@ def look(baseline: BaselineFit, trials: Sequence[Trials]) -> Screen:
 
 
 def linearised_for(
-    baseline: BaselineFit, trials: Sequence[Trials], draws: int, seed: int
+    baseline: BaselineFit, trials: Sequence[Trials]
 ) -> list[tuple[EffectColumns, Linearised]]:
-    """The products of each effect's signatures; draws of the null are the same for all effects."""
+    """The products of each effect's signatures."""
     joints = next(iter(baseline.fit.models.values())).n_joints
     indices = [_index(one, joints, tuple(baseline.tests)) for one in trials]
     columns = [one.columns for one in indices]
     taken = taken_out(baseline.fit)
     parts: list[dict[str, Products]] = [{} for _ in trials]
-    for number, (name, one) in enumerate(baseline.readings.items()):
+    for name, one in baseline.readings.items():
         solved = SolvedSpecimen(baseline.fit.models[name], one.cases, baseline.noise.zeroed)
-        errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
         for place, moved in zip(parts, signatures_of_each(solved, columns), strict=True):
             plain = baseline.plain[name].noise_only(moved)
             white = baseline.setting.whitenings[name].shortened(plain)
-            place[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
+            place[name] = products(taken[name], white, np.sum(plain**2, axis=0))
     return [(index, linearised(place)) for index, place in zip(indices, parts, strict=True)]
 
 

@@ -20,10 +20,8 @@ def tables(base: BaselineFit, coordinates: tuple[str, ...]) -> Trials:
     """Loads over any motion that was read, on any coordinate that was."""
     joints = next(iter(base.fit.models.values())).n_joints
     spreads = [PlaceSpread.SHARED]
-    if joints > 1:
-        spreads.append(PlaceSpread.BY_JOINT)
-    if len(base.readings) > 1:
-        spreads.append(PlaceSpread.EACH if joints > 1 else PlaceSpread.BY_SPECIMEN)
+    spreads += [PlaceSpread.BY_JOINT] if joints > 1 else []
+    spreads += [PlaceSpread.BY_SPECIMEN] if len(base.readings) > 1 else []
     variants = tuple(_variant(base, on, over) for on in coordinates for over in coordinates)
     forms = tuple(CandidateForm(variant, spread) for variant in variants for spread in spreads)
     return Trials(TABLE, variants, forms)
