@@ -77,8 +77,11 @@ def readings(
 
 
 def grounds_of(given: Sequence[SpecimenReadings]) -> BaselineFit:
-    """The base fitted, noise from the repeats, nuisances as large as by default."""
-    noise = estimated_noise(given, None, zeroed=False, outliers=0)
+    """The base fitted, noise from the repeats, nuisances as large as by default.
+
+    Errors of the readings are white: cycles of a test share none.
+    """
+    noise = estimated_noise(given, None, zeroed=False, outliers=0, accuracy=np.zeros(6))
     assert noise is not None
     return fit_baseline(given, noise, NuisancePriors(), chains.start(given), at_once)
 
