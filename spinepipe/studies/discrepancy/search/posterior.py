@@ -31,8 +31,8 @@ ENOUGH = 0.05
 FAR = 4.0
 """Log odds behind all others from which nothing is looked for beside a set."""
 
-SLACK = 0.05
-"""Share of its log evidence by which a look may be off against another's beside the same set."""
+SLACK, SLACK_OF_FORMS = 0.2, 0.05
+"""Share of log evidence by which looks at two effects, or at two forms of one, may be off."""
 
 WEAK = 2.0
 """Log evidence up to which a first-order look is as good as a fit."""
@@ -213,8 +213,12 @@ class Posterior:
         """
         there = {form.variant for form in one.forms}
         for form, (beside, entered) in one.entered.items():
+            known = {form.name}
             for tried in _best_forms(beside, there):
-                lead = (1.0 - SLACK) * entered.log_evidence - tried.log_evidence
+                name = tried.form.name
+                slack = SLACK_OF_FORMS if name in known else SLACK
+                known.add(name)
+                lead = (1.0 - slack) * entered.log_evidence - tried.log_evidence
                 yield SeenSet(one, beside, tried, form, one.log_evidence - max(lead, 0.0))
 
     @property

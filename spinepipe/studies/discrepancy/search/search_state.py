@@ -28,7 +28,7 @@ from spinepipe.studies.discrepancy.verdict import SURE
 PRIOR = (0.35, 0.45, 0.15, 0.05)
 """Probabilities before any reading that no, one, two or three effects are missing."""
 
-ELSE = 0.15
+ELSE = 0.05
 """Probability before any reading that something else is missing, whatever else is."""
 
 
