@@ -1,6 +1,5 @@
 """The verdict of a search, read off its probabilities: named, a part, a set, nothing, unknown."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -95,11 +94,11 @@ def outcome(
     further = _further(found, names)
     if other or not (sure or further):
         # beside something else on the same coordinates a name may only mend what that gets wrong
-        places = _places_of_else(found)
+        elsewhere = _places_of_else(found)
         apart = [
             one
             for one in sure
-            if (on := one.supposed.form.variant.acts_on) and not set(on) <= places
+            if (acts_on := set(one.supposed.form.variant.acts_on)) and not acts_on <= elsewhere
         ]
         if not apart:
             reason = Reason.A_PART_STAYS if sure else Reason.NO_KNOWN_EFFECT
@@ -148,9 +147,10 @@ def _places_of_else(found: SearchResult) -> set[str]:
 
 def _further(found: SearchResult, sure: set[str]) -> list[str]:
     """Names that hold what probability is left, likeliest first, until they hold most of it."""
-    further: Counter[frozenset[str]] = Counter()
+    further: dict[frozenset[str], float] = {}
     for names, _, probability in found.sets:
-        further[frozenset(names - sure)] += probability
+        rest = names - sure
+        further[rest] = further.get(rest, 0.0) + probability
     none = further.pop(frozenset(), 0.0)
     whole = sum(further.values())
     if none >= EVEN or not whole:

@@ -6,6 +6,7 @@ only). A set's evidence is that of a joint fit of all its effects, summed over t
 where most probability rests on a first-order look alone, and end where that is little.
 """
 
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -39,6 +40,8 @@ WEAK = 2.0
 
 MOST_FORMS, MOST_TABLES = 6, 3
 """In one set; an effect may act in another way on each coordinate."""
+
+SECONDS = 60.0
 
 Forms = frozenset[CandidateForm]
 
@@ -120,10 +123,11 @@ class Posterior:
 
     def explore(self, run: PieceRunner, progress: Progress) -> None:
         """Fit sets while much probability rests on looks alone."""
+        begun, minutes = time.monotonic(), self.rules.minutes
         self._take(FittedSet(frozenset(), self.base, 0.0, {}), run)
         for number in range(1, self.rules.most_fits + 1):
             best = self._next()
-            if best is None:
+            if best is None or (minutes and time.monotonic() - begun > SECONDS * minutes):
                 break
             names = ", ".join(sorted(names_of(best.forms))) or "something else"
             progress.round(
@@ -229,7 +233,8 @@ class Posterior:
         """
         groups: dict[tuple[frozenset[str], bool], list[float]] = {}
         looks: dict[frozenset[str], list[float]] = {}
-        for one in (*self.fitted.values(), *self.seen.values()):
+        every: tuple[FittedSet | SeenSet, ...] = (*self.fitted.values(), *self.seen.values())
+        for one in every:
             names = names_of(one.forms)
             other = any(form.name == TABLE for form in one.forms)
             if np.isfinite(one.log_evidence):
