@@ -120,6 +120,7 @@ def _result(found: DiscrepancyResults, model: str) -> MissingEffects:
         ("residual (RMS) of left-out readings, without", rms.held_out_base, rms.unit),
         ("residual (RMS) of left-out readings, with", rms.held_out_with_effects, rms.unit),
     ]
+    ranked = sorted(verdict.probabilities.items(), key=lambda one: -one[1])
     ended = answer(verdict, model, tables[WHERE.name], tables[GAP.name])
     (said,) = told([ended], sentences_of(PACKAGE))
     return MissingEffects(
@@ -128,10 +129,7 @@ def _result(found: DiscrepancyResults, model: str) -> MissingEffects:
         quality=pd.DataFrame(quality, columns=["quantity", "value", "unit"]),
         verdict=verdict.verdict.value,
         why=verdict.why,
-        probabilities=pd.DataFrame(
-            sorted(verdict.probabilities.items(), key=lambda one: -one[1]),
-            columns=["name", "probability"],
-        ),
+        probabilities=pd.DataFrame(ranked, columns=["name", "probability"]),
         alternatives=pd.DataFrame([asdict(one) for one in verdict.in_set]),
         not_testable=pd.DataFrame([asdict(one) for one in verdict.not_testable]),
         next_tests=tables[NEXT_TESTS.name],

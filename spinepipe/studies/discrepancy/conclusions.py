@@ -110,7 +110,9 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
             n = len(sizes_found)
             names["shown"] = f"any of {n} effects" if n > 1 else "the one testable effect"
         case found.VerdictKind.UNKNOWN:
-            told = f"unknown_{_WITHOUT_A_NAME.get(verdict.reason, 'shape')}"
+            told = (
+                f"unknown_{_WITHOUT_A_NAME.get(verdict.reason or Reason.NO_KNOWN_EFFECT, 'shape')}"
+            )
             names["errors"] = count(len(verdict.suspected_data_errors), "respect")
     return Conclusion("verdict", told, values, names)
 

@@ -47,7 +47,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import model_file
-from spinepipe.studies.discrepancy.search.prediction import BUSHING
+from spinepipe.studies.discrepancy.search.prediction import BUSHING, NoEquilibrium
 from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, model_residual
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner, Store
@@ -247,7 +247,10 @@ def _beyond(ended: Investigation, run: PieceRunner) -> ResidualModel:
         return ResidualModel(None, final)
     stays = model_residual(ended.found, run)
     if stays.table is not None:
-        on_record([stays.grounds.fit], final.readings, run)
+        try:
+            on_record([stays.grounds.fit], final.readings, run)
+        except NoEquilibrium:  # a table that the engine of record cannot follow predicts nothing
+            return ResidualModel(None, final)
     return stays
 
 

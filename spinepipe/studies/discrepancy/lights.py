@@ -41,6 +41,8 @@ def lights(
     after : misfit of the model with effects.
     """
     yield _errors(verdict)
+    if verdict.noise.accuracy_assumed:
+        yield _accuracy(verdict)
     yield _noise(verdict)
     if after is not None:
         light = "stop" if after.number > LARGE else "check"
@@ -70,6 +72,15 @@ def _errors(verdict: Verdict) -> Conclusion:
         return Conclusion("errors", "ok")
     first = {"where": readable(errors[0].where), "what": readable(errors[0].what)}
     return Conclusion("errors", "stop", names={**first, "errors": count(len(errors), "such error")})
+
+
+def _accuracy(verdict: Verdict) -> Conclusion:
+    """Of an accuracy that nobody told."""
+    noise, how = verdict.noise, "verdict: noise, accuracy"
+    sizes = ((noise.accuracy_rotation_deg, "°"), (noise.accuracy_translation_mm, "mm"))
+    known = [Value(size, unit, source=how) for size, unit in sizes if size is not None]
+    names = {"accuracy": listed(f"{one:unit}" for one in known)}
+    return Conclusion("accuracy", "check", {"value": known[0]}, names)
 
 
 def _noise(verdict: Verdict) -> Conclusion:

@@ -26,16 +26,13 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
 from spinepipe.studies.discrepancy.search.posterior import Posterior
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
-from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
+from spinepipe.studies.discrepancy.search.search_state import ELSE, PRIOR, Rules, SearchResult
 from spinepipe.studies.discrepancy.search.something_else import tables
 from spinepipe.units import COORDINATES
 
 Forms = frozenset[CandidateForm]
 
 EXTENSION, BENDING = "extension", "right_bending"
-CHANCES = (0.35, 0.45, 0.15, 0.05)
-"""Of none, one, two, three effects, before any reading; as the documentation says."""
-ELSE = 0.15
 
 
 def form(name: str, on: str = EXTENSION, spread: PlaceSpread = PlaceSpread.SHARED) -> CandidateForm:
@@ -226,7 +223,7 @@ def test_one_strong_effect_of_three_by_bayes_rule(monkeypatch: pytest.MonkeyPatc
         sets = list(combinations(evidence, count))
         for names in sets:
             total = sum(evidence[name] for name in names)
-            weights[frozenset(names)] = CHANCES[count] / len(sets) * np.exp(total)
+            weights[frozenset(names)] = PRIOR[count] / len(sets) * np.exp(total)
     # with a table, evidence -5
     beside = ELSE * np.exp(-5.0) / (1.0 - ELSE)
     whole = sum(weights.values()) * (1.0 + beside)
@@ -280,7 +277,7 @@ def test_forms_of_one_effect_add_up(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {frozenset({ZONE}), frozenset({ZONE_BENDING})} <= set(world.fitted())
     odds = found.log_odds
     names: frozenset[str] = frozenset({"neutral_zone"})
-    expected = np.log(CHANCES[1] / 2.0) + 7.0 - np.log(CHANCES[0])  # of two effects
+    expected = np.log(PRIOR[1] / 2.0) + 7.0 - np.log(PRIOR[0])  # of two effects
     assert odds[names, False] - odds[frozenset(), False] == pytest.approx(expected, abs=0.01)
 
 
@@ -323,10 +320,10 @@ def test_something_else_counts_by_its_table_or_by_the_look(
 
 
 def test_fits_go_where_most_may_be_and_the_rest_is_told_as_open() -> None:
-    """One is fitted, then no more may be. What is open is the second in the place of the first: a
-    twentieth of 20, by which a look may be off, makes its 18 come to 19.
+    """One is fitted, then no more may be. What is open is the second in the place of the first,
+    behind by 1 and by as much as a look may be off.
     """
-    names = {"neutral_zone": 20.0, "facet_contact": 18.0}
+    names = {"neutral_zone": 20.0, "facet_contact": 19.0 - 20.0 * posteriors.SLACK}
     world = World(
         [[ZONE], [STOP], [LOOP]],
         lambda forms: max(only(**names)(frozenset({one})) for one in forms),
@@ -425,7 +422,7 @@ def test_a_table_takes_no_evidence_from_the_name_that_stands(
     def fits(forms: Forms) -> float:
         return 50.0 if ZONE in forms else 49.0
 
-    looks = {TABLE: 48.0, ZONE: 45.0}
+    looks = {TABLE: 55.0, ZONE: 45.0}
     world = World([[ZONE]], fits, looks=lambda there, one: -5.0 if there else looks[one])
     found = searched(world, monkeypatch)
     assert frozenset({TABLE}) in world.fitted()

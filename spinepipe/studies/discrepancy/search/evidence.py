@@ -95,7 +95,8 @@ def joint_log_evidence(base: JointFit, fit: JointFit) -> float:
     # sizes of several effects hardly hang on each other: each is averaged where the others are best
     best = [1.0] * len(fit.hypothesis.supposed)
     for number in [*range(len(best))] * SWEEPS:
-        best[number] = max(SIZES.tolist(), key=lambda one, n=number: at(_with(best, n, one)))
+        tried = {at(_with(best, number, one)): one for one in SIZES.tolist()}
+        best[number] = tried[max(tried)]
     most = at(tuple(best))
     spread_of_sizes = sum(
         float(logsumexp([at(_with(best, n, one)) - most for one in SIZES.tolist()]))
@@ -162,7 +163,7 @@ def formula_error(baseline: BaselineFit) -> float:
     without = [_without(baseline, number) for number in named]
     taken = taken_out(fit)
     grams, moments, coupled = [], [], []
-    gram_shared = moment_shared = 0.0
+    of_shared = []
     for name, one in baseline.readings.items():
         rows = []
         for number in range(len(one.tests)):
@@ -186,13 +187,13 @@ def formula_error(baseline: BaselineFit) -> float:
         grams.append(left.T @ left)
         moments.append(left.T @ taken[name].residual)
         coupled.append(left.T @ taken[name].shared)
-        gram_shared = gram_shared + taken[name].shared.T @ taken[name].shared
-        moment_shared = moment_shared + taken[name].shared.T @ taken[name].residual
+        own = taken[name].shared.T
+        of_shared.append((own @ taken[name].shared, own @ taken[name].residual))
     # a function of its own for each specimen; what these share couples them
     gram, moment, shared = block_diag(*grams), np.concatenate(moments), np.concatenate(coupled)
     if shared.shape[1]:
-        gain = shared @ pinvh(np.asarray(gram_shared), rcond=1e-10)
-        gram, moment = gram - gain @ shared.T, moment - gain @ moment_shared
+        gain = shared @ pinvh(sum(gram for gram, _ in of_shared), rcond=1e-10)
+        gram, moment = gram - gain @ shared.T, moment - gain @ sum(m for _, m in of_shared)
     factor = cho_factor(np.eye(len(gram)) + gram)
     return float(0.5 * moment @ cho_solve(factor, moment) - np.log(np.diagonal(factor[0])).sum())
 

@@ -40,7 +40,7 @@ from spinepipe.studies.discrepancy.search.prediction import solve_on_record
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
-from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.settings import MOST_FITS, Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError, VerdictKind
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
@@ -134,6 +134,8 @@ def investigate(
         study.margin,
         study.most_effects,
         study.seed,
+        MOST_FITS[study.effort],
+        study.minutes,
     )
     baseline = fit_base(ready, run)
     found = search(baseline, rules, run, progress)

@@ -94,11 +94,11 @@ def outcome(
     further = _further(found, names)
     if other or not (sure or further):
         # beside something else on the same coordinates a name may only mend what that gets wrong
-        loaded = _places_of_else(found)
+        elsewhere = _places_of_else(found)
         apart = [
             one
             for one in sure
-            if (on := one.supposed.form.variant.acts_on) and not set(on) <= loaded
+            if (acts_on := set(one.supposed.form.variant.acts_on)) and not acts_on <= elsewhere
         ]
         if not apart:
             reason = Reason.A_PART_STAYS if sure else Reason.NO_KNOWN_EFFECT
@@ -149,7 +149,8 @@ def _further(found: SearchResult, sure: set[str]) -> list[str]:
     """Names that hold what probability is left, likeliest first, until they hold most of it."""
     further: dict[frozenset[str], float] = {}
     for names, _, probability in found.sets:
-        further[names - sure] = further.get(names - sure, 0.0) + probability
+        rest = names - sure
+        further[rest] = further.get(rest, 0.0) + probability
     none = further.pop(frozenset(), 0.0)
     whole = sum(further.values())
     if none >= EVEN or not whole:

@@ -6,6 +6,7 @@ only). A set's evidence is that of a joint fit of all its effects, summed over t
 where most probability rests on a first-order look alone, and end where that is little.
 """
 
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -31,14 +32,16 @@ ENOUGH = 0.05
 FAR = 4.0
 """Log odds behind all others from which nothing is looked for beside a set."""
 
-SLACK = 0.05
-"""Share of its log evidence by which a look may be off against another's beside the same set."""
+SLACK, SLACK_OF_FORMS = 0.2, 0.05
+"""Share of log evidence by which looks at two effects, or at two forms of one, may be off."""
 
 WEAK = 2.0
 """Log evidence up to which a first-order look is as good as a fit."""
 
 MOST_FORMS, MOST_TABLES = 6, 3
 """In one set; an effect may act in another way on each coordinate."""
+
+SECONDS = 60.0
 
 Forms = frozenset[CandidateForm]
 
@@ -120,9 +123,12 @@ class Posterior:
 
     def explore(self, run: PieceRunner, progress: Progress) -> None:
         """Fit sets while much probability rests on looks alone."""
+        begun, minutes = time.monotonic(), self.rules.minutes
         self._take(FittedSet(frozenset(), self.base, 0.0, {}), run)
         number = 0
         while (best := self._next()) is not None and number < self.rules.most_fits:
+            if minutes and time.monotonic() - begun > SECONDS * minutes:
+                break
             number += 1
             names = ", ".join(sorted(names_of(best.forms))) or "something else"
             progress.round(
@@ -212,8 +218,12 @@ class Posterior:
         """
         there = {form.variant for form in one.forms}
         for form, (beside, entered) in one.entered.items():
+            known = {form.name}
             for tried in _best_forms(beside, there):
-                lead = (1.0 - SLACK) * entered.log_evidence - tried.log_evidence
+                name = tried.form.name
+                slack = SLACK_OF_FORMS if name in known else SLACK
+                known.add(name)
+                lead = (1.0 - slack) * entered.log_evidence - tried.log_evidence
                 yield SeenSet(one, beside, tried, form, one.log_evidence - max(lead, 0.0))
 
     @property
@@ -224,7 +234,8 @@ class Posterior:
         """
         groups: dict[tuple[frozenset[str], bool], list[float]] = {}
         looks: dict[frozenset[str], list[float]] = {}
-        for one in (*self.fitted.values(), *self.seen.values()):
+        every: tuple[FittedSet | SeenSet, ...] = (*self.fitted.values(), *self.seen.values())
+        for one in every:
             names = names_of(one.forms)
             other = any(form.name == TABLE for form in one.forms)
             if np.isfinite(one.log_evidence):

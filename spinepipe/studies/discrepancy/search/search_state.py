@@ -28,13 +28,16 @@ from spinepipe.studies.discrepancy.verdict import SURE
 PRIOR = (0.35, 0.45, 0.15, 0.05)
 """Probabilities before any reading that no, one, two or three effects are missing."""
 
-ELSE = 0.15
+ELSE = 0.05
 """Probability before any reading that something else is missing, whatever else is."""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """What a search may do. ``margin`` of log evidence within which a rival is told."""
+    """What a search may do. ``margin`` of log evidence within which a rival is told.
+
+    ``most_fits``, ``minutes`` : after which it ends with what it has; None for no clock.
+    """
 
     trials: tuple[Trials, ...]
     coordinates: tuple[str, ...]
@@ -42,6 +45,7 @@ class Rules:
     most_effects: int
     seed: int
     most_fits: int = 10
+    minutes: float | None = None
 
     @property
     def needed(self) -> float:
