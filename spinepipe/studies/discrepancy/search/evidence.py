@@ -21,10 +21,10 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, cho_factor, cho_solve
+from scipy.linalg import block_diag
 from scipy.special import log_ndtr, logsumexp
 
-from spinepipe.decomposition import pinvh
+from spinepipe.decomposition import eigh, pinvh
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import STRENGTH_SDS
@@ -38,8 +38,8 @@ from spinepipe.studies.discrepancy.search.projected import taken_out
 from spinepipe.studies.discrepancy.search.screen import SIZES
 from spinepipe.studies.discrepancy.search.something_else import TABLE
 
-FORMULA_SD = 0.2
-"""Share of what an effect does by which its formula may be off."""
+FORMULA_SDS = np.array([0.0, 0.05, 0.1, 0.2])
+"""Shares of what an effect does by which its formula may be off, held equally likely."""
 
 ALONG_MOTION, ALONG_TEST = 0.4, 0.3
 """Lengths over which that changes, as shares of the largest motion and of a test."""
@@ -176,7 +176,7 @@ def formula_error(baseline: BaselineFit) -> float:
             smooth = smooth.reshape(steps, joints, 6, 1, len(KNOTS))
             done = [predicted - other[name][number] for other in without]
             effects = np.stack(done, axis=-1)[..., None]  # (T, J, 6, effects, 1)
-            moves = FORMULA_SD * (effects * smooth).reshape(steps, joints, 6, -1)
+            moves = (effects * smooth).reshape(steps, joints, 6, -1)
             # a function of its own for each coordinate that was read
             read = [c for c in range(6) if any(t.count[..., c].any() for t in one.tests)]
             apart = np.zeros((steps, joints, 6, len(read), moves.shape[-1]))
@@ -194,8 +194,12 @@ def formula_error(baseline: BaselineFit) -> float:
     if shared.shape[1]:
         gain = shared @ pinvh(sum(gram for gram, _ in of_shared), rcond=1e-10)
         gram, moment = gram - gain @ shared.T, moment - gain @ sum(m for _, m in of_shared)
-    factor = cho_factor(np.eye(len(gram)) + gram)
-    return float(0.5 * moment @ cho_solve(factor, moment) - np.log(np.diagonal(factor[0])).sum())
+    # marginal likelihood of a linear problem for each share, in the eigenbasis of its Gram matrix
+    values, vectors = eigh(gram)
+    variance, values = FORMULA_SDS[:, None] ** 2, np.maximum(values, 0.0)
+    gain = variance * (vectors.T @ moment) ** 2 / (1.0 + variance * values)
+    logs = 0.5 * np.sum(gain - np.log1p(variance * values), axis=-1)
+    return float(logsumexp(logs) - np.log(len(logs)))
 
 
 def _kernel(first: Array, second: Array) -> Array:
