@@ -349,8 +349,8 @@ def test_a_coordinate_that_is_not_read_of_all_has_its_own_process() -> None:
 
 
 def test_a_formula_off_by_a_tenth_is_forgiven() -> None:
-    """Of the evidence that a misfit costs, half its chi2, more than a third comes back; a formula that
-    is exact pays little for that it might have been off.
+    """Of the evidence that a misfit costs, half its chi2, more than a third comes back; a formula
+    that is exact pays little for that it might have been off.
     """
     exact, off = zone(4, 0.0), zone(4, 0.1)
     assert -np.log(4.0) <= formula_error(exact) < 0.0
