@@ -44,6 +44,8 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
             away = np.rad2deg(turned(moment, k) - moment / k)
             made.motion.loc[row.Index, "extension_deg"] += away
     made.write(root)
+    header = root / "config/cohorts/chains/cohort.yaml"
+    header.write_text(header.read_text() + "accuracy: {rotation_deg: 0.001}\n")  # noise is white
     return root
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from sweeps import sweep
 
-from spinepipe.effects import PlaceSpread, create
+from spinepipe.effects import PlaceSpread
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search import posterior as posteriors
 from spinepipe.studies.discrepancy.search import search as searches
@@ -27,7 +27,6 @@ from spinepipe.studies.discrepancy.search.posterior import Posterior
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import ELSE, PRIOR, Rules, SearchResult
-from spinepipe.studies.discrepancy.search.something_else import tables
 from spinepipe.units import COORDINATES
 
 Forms = frozenset[CandidateForm]
@@ -499,62 +498,3 @@ def test_the_order_of_trials_changes_nothing(monkeypatch: pytest.MonkeyPatch) ->
         assert first.probabilities[name] == pytest.approx(other.probabilities[name], rel=1e-9)
     assert [one.beside for one in first.stages] == [one.beside for one in other.stages]
     assert first.unfitted == pytest.approx(other.unfitted, abs=1e-12)
-
-
-# Tables -------------------------------------------------------------------------------------------
-
-
-def base_that_moves(**furthest: Sequence[float]) -> Any:
-    """Specimens of two joints that were read, and by the model, to these of `COORDINATES`."""
-    readings, predicted = {}, {}
-    for name, (read, modelled) in furthest.items():
-        mean = np.zeros((2, 2, 6))
-        mean[1, 0, :] = -np.asarray(read)
-        readings[name] = SimpleNamespace(
-            tests=[SimpleNamespace(mean=mean, count=np.ones_like(mean))]
-        )
-        predicted[name] = (np.full((2, 2, 6), modelled),)
-    fit = SimpleNamespace(models={"a": SimpleNamespace(n_joints=2)}, predicted=predicted)
-    return SimpleNamespace(readings=readings, fit=fit)
-
-
-def reaches(base: Any, *read: str) -> dict[tuple[str, str], float]:
-    found = {}
-    for variant in tables(base, read).variants:
-        options = dict(variant.options)
-        law: Any = variant.create()
-        assert law == create("tabulated_law", options)
-        found[options["coordinate"], options["over"]] = options["reach"]
-    return found
-
-
-def test_a_table_goes_as_far_as_all_specimens_move() -> None:
-    """Read or modelled, whichever is further; to three digits."""
-    base = base_that_moves(a=(0.2, 0.12345), b=(0.05, 0.08))
-    assert reaches(base, EXTENSION, BENDING) == {
-        (on, "itself" if on == over else over): 0.08
-        for on in (EXTENSION, BENDING)
-        for over in (EXTENSION, BENDING)
-    }
-    assert reaches(base_that_moves(a=(0.1, 0.12345)), BENDING) == {(BENDING, "itself"): 0.123}
-
-
-def test_a_table_goes_no_further_than_its_law_may() -> None:
-    """Readings in a wrong unit are a matter for later, and no error here: 1 rad and 10 mm."""
-    base = base_that_moves(a=(2.0, 1.5), b=(3.0, 0.1))
-    found = reaches(base, "anterior", EXTENSION)
-    assert found[EXTENSION, "itself"] == found["anterior", EXTENSION] == 1.0
-    assert found["anterior", "itself"] == found[EXTENSION, "anterior"] == 0.01
-
-
-def test_one_joint_or_specimen_differs_from_no_other() -> None:
-    def spreads(base: Any) -> list[PlaceSpread]:
-        return list(dict.fromkeys(one.spread for one in tables(base, (EXTENSION,)).forms))
-
-    one, two = base_that_moves(a=(0.1, 0.1)), base_that_moves(a=(0.1, 0.1), b=(0.1, 0.1))
-    assert spreads(two) == [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN]
-    assert spreads(one) == [PlaceSpread.SHARED, PlaceSpread.BY_JOINT]
-    for base in (one, two):
-        base.fit.models["a"].n_joints = 1
-    assert spreads(two) == [PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN]
-    assert spreads(one) == [PlaceSpread.SHARED]

@@ -42,7 +42,7 @@ def grounds(
         (1, "a", [PlaceSpread.SHARED]),
         (1, "ab", [PlaceSpread.SHARED, PlaceSpread.BY_SPECIMEN]),
         (2, "a", [PlaceSpread.SHARED, PlaceSpread.BY_JOINT]),
-        (2, "ab", [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.EACH]),
+        (2, "ab", [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN]),
     ],
 )
 def test_a_table_differs_where_there_is_something_that_can(
@@ -73,6 +73,7 @@ def test_a_table_goes_as_far_as_all_specimens_move() -> None:
     moved = np.zeros((2, 1, 6))
     moved[1, 0, 3] = -0.4
     assert reach(grounds({"a": readings(0.1)}, predicted={"a": (moved,)})) == 0.4
+    assert reach(grounds({"a": readings(57.3)})) == 1.0  # in a wrong unit: as far as a table goes
 
 
 def form(
