@@ -8,7 +8,7 @@ where most probability rests on a first-order look alone, and end where that is 
 
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
 
@@ -101,7 +101,6 @@ class SeenSet:
         return self.added.log_evidence < WEAK
 
 
-@dataclass
 class Posterior:
     """Sets of effects and how probable they are.
 
@@ -111,11 +110,11 @@ class Posterior:
     unfitted : probability that rests on looks alone.
     """
 
-    base: BaselineFit
-    rules: Rules
-    fitted: dict[Forms, FittedSet] = field(default_factory=dict)
-    seen: dict[Forms, SeenSet] = field(default_factory=dict)
-    unfitted: float = 1.0
+    def __init__(self, base: BaselineFit, rules: Rules) -> None:
+        self.base, self.rules = base, rules
+        self.fitted: dict[Forms, FittedSet] = {}
+        self.seen: dict[Forms, SeenSet] = {}
+        self.unfitted = 1.0
 
     @cached_property
     def trials(self) -> Mapping[str, Trials]:
