@@ -28,6 +28,9 @@ from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 EVEN = 0.5
 """Probability from which something else is said to be there, or a further name."""
 
+MOST = 0.8
+"""Share of what is explained that names must explain by themselves."""
+
 HARDLY = 0.02
 """Probability below which a name is in no set."""
 
@@ -93,12 +96,14 @@ def outcome(
     names = {one.name for one in sure}
     further = _further(found, names)
     if other or not (sure or further):
-        # beside something else on the same coordinates a name may only mend what that gets wrong
-        elsewhere = _places_of_else(found)
+        # beside something else on the same coordinates a name may only mend what that gets wrong,
+        # unless it explains most by itself: then it is its formula that is not nature's
+        elsewhere, most = _places_of_else(found), _explain_most(found)
         apart = [
             one
             for one in sure
-            if (acts_on := set(one.supposed.form.variant.acts_on)) and not acts_on <= elsewhere
+            if (acts_on := set(one.supposed.form.variant.acts_on))
+            and (most or not acts_on <= elsewhere)
         ]
         if not apart:
             reason = Reason.A_PART_STAYS if sure else Reason.NO_KNOWN_EFFECT
@@ -122,6 +127,14 @@ def outcome(
     if unproven:
         return Outcome(VerdictKind.UNKNOWN, unproven, reason=Reason.NOT_PROVEN)
     return Outcome(VerdictKind.NAMED, _probably(sure, p), tuple(sure))
+
+
+def _explain_most(found: SearchResult) -> bool:
+    """Whether names explain most of what they do together with something else."""
+    if found.with_tables is None:
+        return False
+    base = found.base.fit.chi2
+    return base - found.final.fit.chi2 > MOST * (base - found.with_tables.fit.chi2)
 
 
 def left_of(found: SearchResult) -> float:

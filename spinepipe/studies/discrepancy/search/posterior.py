@@ -8,7 +8,7 @@ where most probability rests on a first-order look alone, and end where that is 
 
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
 
@@ -32,8 +32,10 @@ ENOUGH = 0.05
 FAR = 4.0
 """Log odds behind all others from which nothing is looked for beside a set."""
 
-SLACK, SLACK_OF_FORMS = 0.2, 0.05
-"""Share of log evidence by which looks at two effects, or at two forms of one, may be off."""
+SLACK, SLACK_OF_FORMS, SLACK_OF_TABLE = 0.2, 0.05, 0.4
+"""Share of log evidence by which looks may be off: at two effects, at two forms of one, and at a
+table and an effect in its place, whose formula bends where the look is straight.
+"""
 
 WEAK = 2.0
 """Log evidence up to which a first-order look is as good as a fit."""
@@ -99,7 +101,6 @@ class SeenSet:
         return self.added.log_evidence < WEAK
 
 
-@dataclass
 class Posterior:
     """Sets of effects and how probable they are.
 
@@ -109,11 +110,11 @@ class Posterior:
     unfitted : probability that rests on looks alone.
     """
 
-    base: BaselineFit
-    rules: Rules
-    fitted: dict[Forms, FittedSet] = field(default_factory=dict)
-    seen: dict[Forms, SeenSet] = field(default_factory=dict)
-    unfitted: float = 1.0
+    def __init__(self, base: BaselineFit, rules: Rules) -> None:
+        self.base, self.rules = base, rules
+        self.fitted: dict[Forms, FittedSet] = {}
+        self.seen: dict[Forms, SeenSet] = {}
+        self.unfitted = 1.0
 
     @cached_property
     def trials(self) -> Mapping[str, Trials]:
@@ -222,6 +223,7 @@ class Posterior:
             for tried in _best_forms(beside, there):
                 name = tried.form.name
                 slack = SLACK_OF_FORMS if name in known else SLACK
+                slack = SLACK_OF_TABLE if form.name == TABLE and name != TABLE else slack
                 known.add(name)
                 lead = (1.0 - slack) * entered.log_evidence - tried.log_evidence
                 yield SeenSet(one, beside, tried, form, one.log_evidence - max(lead, 0.0))
