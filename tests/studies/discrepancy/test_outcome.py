@@ -53,12 +53,14 @@ def ended(
     tables: Sequence[str] = (),
     rms: float = 1.0,
     rms_of_tables: float = 1.0,
+    alone: float = 0.5,
     unfitted: float = 0.0,
 ) -> SearchResult:
     """A search that gives these sets of names these probabilities, without and with else.
 
     What stands are the names of the likeliest set. Something else is looked at in the coordinate
-    ``lack``, and fitted as ``tables`` on theirs; ``rms`` noise SD stay without and with these.
+    ``lack``, and fitted as ``tables`` on theirs; ``rms`` noise SD stay without and with these, and
+    names explain a share ``alone`` of what they do together.
     """
     every = [(frozenset(names), False, p) for names, p in sets.items()]
     every += [(frozenset(names), True, p) for names, p in (beside_else or {}).items()]
@@ -73,13 +75,13 @@ def ended(
     )
     tabled = [SimpleNamespace(form=form("tabulated_law", place)) for place in tables]
     tabled += [one.supposed for one in standing]
-    fit = SimpleNamespace(hypothesis=SimpleNamespace(supposed=tabled))
+    fit = SimpleNamespace(hypothesis=SimpleNamespace(supposed=tabled), chi2=0.0)
     with_tables = SimpleNamespace(fit=fit, rms=rms_of_tables)
-    base = cast(BaselineFit, None)
+    base, final = (SimpleNamespace(fit=SimpleNamespace(chi2=c)) for c in (1e3, 1e3 * (1.0 - alone)))
     gap = Gap(400.0 * rms**2, 400.0, 400)
     return SearchResult(
-        base=base,
-        final=base,
+        base=cast(BaselineFit, base),
+        final=cast(BaselineFit, final),
         standing=standing,
         stages=(),
         probabilities=of,
@@ -212,6 +214,17 @@ def test_where_something_else_was_fitted_its_tables_say_where() -> None:
     assert names(outcome(both)) == ["creep"]
     too = ended({("creep",): 0.3}, {("creep",): 0.7}, tables=["right_bending", "extension"])
     assert_unknown(outcome(too), Reason.A_PART_STAYS)
+
+
+@sweep("alone, told", [(0.81, True), (0.79, False)])
+def test_what_explains_most_by_itself_is_told_beside_something_else(
+    alone: float, told: bool
+) -> None:
+    """Then its formula is not that of nature; a look alone does not say how much it explains."""
+    sets, beside = {("creep",): 0.3}, {("creep",): 0.7}
+    result = outcome(ended(sets, beside, tables=["extension"], alone=alone))
+    assert result.verdict is (VerdictKind.PART if told else VerdictKind.UNKNOWN)
+    assert_unknown(outcome(ended(sets, beside, alone=alone)), Reason.A_PART_STAYS)
 
 
 def test_what_acts_on_no_coordinate_of_its_own_is_nowhere_apart() -> None:
