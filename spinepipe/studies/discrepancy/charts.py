@@ -291,8 +291,8 @@ def evidence(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
     if not panels:
         return saying(title, "No effect was tried.")
     caption = (
-        "Several may be missing together, so that probabilities need not sum to one. Something "
-        f"else: a law without a name. Dashed: {SURE:g}, from which on a name is said."
+        "Several may be missing together, so probabilities need not sum to one; something else is "
+        f"a law without a name. Dashed: {SURE:g}, from which on a name is said."
     )
     return Chart(title, panels, caption)
 
