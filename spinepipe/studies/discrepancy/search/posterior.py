@@ -40,6 +40,9 @@ table and an effect in its place, whose formula bends where the look is straight
 WEAK = 2.0
 """Log evidence up to which a first-order look is as good as a fit."""
 
+FURTHER_FORM = 0.5
+"""Probability before any reading that an effect acts in one more form."""
+
 MOST_FORMS, MOST_TABLES = 6, 3
 """In one set; an effect may act in another way on each coordinate."""
 
@@ -175,10 +178,12 @@ class Posterior:
 
     def log_prior(self, forms: Forms) -> float:
         """Of a set of effects, before any reading."""
-        count = len(names_of(forms))
+        names = names_of(forms)
         other = any(form.name == TABLE for form in forms)
-        ways = max(comb(len(self.rules.trials), count), 1)
-        return float(np.log(PRIOR[count] / ways * (ELSE if other else 1.0 - ELSE)))
+        ways = max(comb(len(self.rules.trials), len(names)), 1)
+        more = len(forms) - len(names) - other
+        prior = PRIOR[len(names)] / ways * (ELSE if other else 1.0 - ELSE) * FURTHER_FORM**more
+        return float(np.log(prior))
 
     def log_odds_of(self, one: FittedSet | SeenSet) -> float:
         """Logarithm of the posterior odds, less what all sets share."""
