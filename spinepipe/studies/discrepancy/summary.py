@@ -20,12 +20,13 @@ from spinepipe.studies.discrepancy.search.imperfections import (
 from spinepipe.studies.discrepancy.search.investigation import Investigation, Prepared
 from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
-from spinepipe.studies.discrepancy.search.outcome import EVEN, Outcome
+from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.regions import values_with_regions
 from spinepipe.studies.discrepancy.search.residual_model import ResidualModel
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import (
+    EVEN,
     EVERY,
     LEAST_PROBABLE,
     SOMETHING_ELSE,

@@ -41,6 +41,9 @@ SOMETHING_ELSE, NOTHING = "something_else", "nothing"
 SURE = 0.95
 """Probability from which a name is said for certain."""
 
+EVEN = 0.5
+"""Probability from which something else is said to be there, or a further name."""
+
 LEAST_PROBABLE = 0.005
 
 UNIT = "noise sd"

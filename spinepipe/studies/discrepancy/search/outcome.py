@@ -10,13 +10,13 @@ import numpy as np
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
-from spinepipe.studies.discrepancy.search.posterior import ENOUGH
 from spinepipe.studies.discrepancy.search.search_state import (
     SearchResult,
     SelectedTerm,
 )
 from spinepipe.studies.discrepancy.search.something_else import TABLE
 from spinepipe.studies.discrepancy.verdict import (
+    EVEN,
     NOTHING,
     SOMETHING_ELSE,
     SURE,
@@ -24,9 +24,6 @@ from spinepipe.studies.discrepancy.verdict import (
     VerdictKind,
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
-
-EVEN = 0.5
-"""Probability from which something else is said to be there, or a further name."""
 
 MOST = 0.8
 """Share of what is explained that names must explain by themselves."""
@@ -86,7 +83,7 @@ def outcome(
         why = f"nothing is sure to be missing: with probability {p[NOTHING]:.2f} nothing is"
         return Outcome(VerdictKind.NULL, why)
     # what rests on looks alone may yet hold a rival
-    done = found.unfitted <= ENOUGH
+    done = found.unfitted < EVEN
     sure = [one for one in found.standing if done and p[one.name] >= SURE]
     other = p[SOMETHING_ELSE] >= EVEN
     shape = f"something else, with probability {p[SOMETHING_ELSE]:.2f} ({found.lack.shape})"
@@ -99,12 +96,13 @@ def outcome(
         # beside something else on the same coordinates a name may only mend what that gets wrong,
         # unless it explains most by itself: then it is its formula that is not nature's
         elsewhere, most = _places_of_else(found), _explain_most(found)
-        apart = [
-            one
+        names_apart = {
+            one.name
             for one in sure
             if (acts_on := set(one.supposed.form.variant.acts_on))
             and (most or not acts_on <= elsewhere)
-        ]
+        }
+        apart = [one for one in sure if one.name in names_apart]
         if not apart:
             reason = Reason.A_PART_STAYS if sure else Reason.NO_KNOWN_EFFECT
             beside = (

@@ -65,7 +65,7 @@ class FittedSet:
     baseline : where it stands; None where it has no fit. log_evidence : against the base alone.
     entered : of each of its forms, the set beside which it was looked at, and what was seen.
     refit : how it was fitted; None of the base. screen, lack : looks beside it, where it was
-        probable enough for any.
+        probable enough for any. reformed : whether it is another form of the same names.
     """
 
     forms: Forms
@@ -75,6 +75,7 @@ class FittedSet:
     refit: Refit | None = None
     screen: Screen | None = None
     lack: LackOfFit | None = None
+    reformed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,8 @@ class SeenSet:
     Attributes
     ----------
     start : fitted, of which it has ``added`` besides, in the place of ``instead`` if that is not
-        None. beside : where it was looked at. log_evidence : predicted.
+        None. beside : where it was looked at. log_evidence : predicted. most : what it may be, as
+        looks are of first order.
     """
 
     start: FittedSet
@@ -92,6 +94,7 @@ class SeenSet:
     added: ScreenedVariant
     instead: CandidateForm | None
     log_evidence: float
+    most: float
 
     @property
     def forms(self) -> Forms:
@@ -110,14 +113,14 @@ class Posterior:
     Attributes
     ----------
     fitted : in the order in which they were. seen : those that were only looked at.
-    unfitted : probability that rests on looks alone.
+    open : probability that may lie in sets that were only looked at, at most.
     """
 
     def __init__(self, base: BaselineFit, rules: Rules) -> None:
         self.base, self.rules = base, rules
         self.fitted: dict[Forms, FittedSet] = {}
         self.seen: dict[Forms, SeenSet] = {}
-        self.unfitted = 1.0
+        self.open = 1.0
 
     @cached_property
     def trials(self) -> Mapping[str, Trials]:
@@ -137,7 +140,7 @@ class Posterior:
             names = ", ".join(sorted(names_of(best.forms))) or "something else"
             progress.round(
                 f"fit {number} of at most {self.rules.most_fits}: {names}; "
-                f"{100.0 * self.unfitted:.0f} % of the probability is open"
+                f"{100.0 * self.open:.0f} % of the probability may lie elsewhere"
             )
             del self.seen[best.forms]
             assert best.start.baseline is not None
@@ -149,7 +152,9 @@ class Posterior:
             entered = {**best.start.entered, best.added.form: (best.beside, best.added)}
             entered = {form: entered[form] for form in best.forms}
             evidence = tried.log_evidence + shares
-            self._take(FittedSet(best.forms, at, evidence, entered, tried), run)
+            reformed = best.instead is not None and best.instead.name == best.added.form.name
+            one = FittedSet(best.forms, at, evidence, entered, tried, reformed=reformed)
+            self._take(one, run)
 
     def log_evidence_of(self, at: BaselineFit) -> float:
         """Of all effects of a fit, against the base alone."""
@@ -160,21 +165,28 @@ class Posterior:
         """The set whose fit may matter most; None where no fit does."""
         strong = [one for one in self.seen.values() if not one.weak]
         if not strong:
-            self.unfitted = 0.0
             return None
-        weak = (one for one in self.seen.values() if one.weak)
-        known = [*(self.log_odds_of(o) for o in self.fitted.values()), *map(self.log_odds_of, weak)]
-        open_ones = logsumexp([self.log_odds_of(one) for one in strong])
-        self.unfitted = float(np.exp(open_ones - np.logaddexp(open_ones, logsumexp(known))))
-        if self.unfitted < ENOUGH:
+        weak = [self.log_odds_of(one) for one in self.seen.values() if one.weak]
+        of_known = logsumexp([*weak, *(self.log_odds_of(one) for one in self.fitted.values())])
+        may_be = float(logsumexp([one.most + self.log_prior(one.forms) for one in strong]))
+        self.open = float(np.exp(may_be - np.logaddexp(may_be, of_known)))
+        if self.open < ENOUGH:
             return None
         return max(
             strong,
             key=lambda one: (
-                self.log_odds_of(one),
+                one.most + self.log_prior(one.forms),
+                one.log_evidence,
                 sorted(map(repr, one.forms)),
             ),
         )
+
+    @property
+    def unfitted(self) -> float:
+        """Probability of what was only looked at, as the looks have it."""
+        looks = [self.log_odds_of(one) for one in self.seen.values() if not one.weak]
+        whole = logsumexp([*looks, *(self.log_odds_of(one) for one in self.fitted.values())])
+        return float(np.exp(logsumexp(looks) - whole)) if looks else 0.0
 
     def log_prior(self, forms: Forms) -> float:
         """Of a set of effects, before any reading."""
@@ -201,7 +213,7 @@ class Posterior:
         one = self.fitted[one.forms] = replace(one, screen=screen, lack=lack)
         for seen in (*self._further(one), *self._in_place(one)):
             known = self.seen.get(seen.forms)
-            new = known is None or seen.log_evidence > known.log_evidence
+            new = known is None or seen.most > known.most
             if new and seen.forms not in self.fitted and self._allowed(seen.forms):
                 self.seen[seen.forms] = seen
 
@@ -215,23 +227,32 @@ class Posterior:
         """Beside a set."""
         there = {form.variant for form in one.forms}
         for tried in _best_forms(one, there):
-            yield SeenSet(one, one, tried, None, one.log_evidence + tried.log_evidence)
+            variant = tried.form.variant
+            own = (other for other in there if other.effect == variant.effect)
+            if variant.effect != TABLE and any(_alike(variant, other) for other in own):
+                continue  # two laws of one name on one coordinate are one law
+            evidence = one.log_evidence + tried.log_evidence
+            yield SeenSet(one, one, tried, None, evidence, evidence)
 
     def _in_place(self, one: FittedSet) -> Iterator[SeenSet]:
         """In the place of each effect of a set, what was looked at when that entered.
 
-        Looks are of first order: how much they miss is taken to be alike for both.
+        Looks are of first order: how much they miss is taken to be alike for both. Of a set that is
+        itself another form of the same names no more forms are tried: it would be all combinations.
         """
         there = {form.variant for form in one.forms}
         for form, (beside, entered) in one.entered.items():
             known = {form.name}
             for tried in _best_forms(beside, there):
                 name = tried.form.name
+                if name == form.name and one.reformed:
+                    continue
                 slack = SLACK_OF_FORMS if name in known else SLACK
                 slack = SLACK_OF_TABLE if form.name == TABLE and name != TABLE else slack
                 known.add(name)
-                lead = (1.0 - slack) * entered.log_evidence - tried.log_evidence
-                yield SeenSet(one, beside, tried, form, one.log_evidence - max(lead, 0.0))
+                lead = entered.log_evidence - tried.log_evidence
+                most = one.log_evidence - max(lead - slack * entered.log_evidence, 0.0)
+                yield SeenSet(one, beside, tried, form, one.log_evidence - lead, most)
 
     @property
     def log_odds(self) -> dict[tuple[frozenset[str], bool], float]:
@@ -266,3 +287,8 @@ def _best_forms(one: FittedSet, there: set[Variant]) -> Iterator[ScreenedVariant
             if tried.form.variant not in known:
                 known.add(tried.form.variant)
                 yield tried
+
+
+def _alike(first: Variant, second: Variant) -> bool:
+    """Whether two variants act on the same coordinates, wholly or in part."""
+    return bool(set(first.acts_on) & set(second.acts_on)) or first.acts_on == second.acts_on

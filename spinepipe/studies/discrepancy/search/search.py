@@ -23,7 +23,7 @@ from spinepipe.studies.discrepancy.search.search_state import (
 )
 from spinepipe.studies.discrepancy.search.something_else import TABLE
 from spinepipe.studies.discrepancy.store import PieceRunner
-from spinepipe.studies.discrepancy.verdict import NOTHING, SOMETHING_ELSE
+from spinepipe.studies.discrepancy.verdict import EVEN, NOTHING, SOMETHING_ELSE
 
 LEAST_TOLD = 1e-4
 """Probability below which a set of names is not told."""
@@ -46,12 +46,14 @@ def search(
         for name in names:
             probabilities[name] += p
 
-    # names by the sum over with and without something else: something else is no name
-    by_names: dict[frozenset[str], float] = {}
-    for names, _, p in sets:
-        by_names[names] = by_names.get(names, 0.0) + p
-    names = max(by_names, key=lambda one: (by_names[one], sorted(one)))
-    final = _model_of(names, posterior, run)
+    # names by the sum over with and without something else, which is no name; of those that have
+    # a fit
+    there = {names_of(o.forms) for o in posterior.fitted.values() if o.baseline is not None}
+    by_names = {one: sum(p for names, _, p in sets if names == one) for one in there}
+    names = max(there, key=lambda one: (by_names[one], sorted(one)))
+    tabled = _likeliest(names, posterior, tables=True)
+    likely = tabled if probabilities[SOMETHING_ELSE] >= EVEN else None
+    final = _model_of(names, likely, posterior, run)
     lack = run(lack_of_fit, final, rules.coordinates)
     return SearchResult(
         base=base,
@@ -60,7 +62,7 @@ def search(
         stages=tuple(_stages(posterior)),
         probabilities=probabilities,
         sets=tuple(one for one in sets if one[2] > LEAST_TOLD),
-        with_tables=_with_tables(names, posterior),
+        with_tables=tabled.baseline if tabled else None,
         lack=lack,
         unfitted=posterior.unfitted,
         base_gap=whole_gap(base, base.fit),
@@ -70,39 +72,33 @@ def search(
     )
 
 
-def _model_of(names: frozenset[str], posterior: Posterior, run: PieceRunner) -> BaselineFit:
-    """The likeliest model with these effects and no table; the base where it has no fit."""
-    having = [one for one in posterior.fitted.values() if names_of(one.forms) == names]
-    best = _likeliest(having)
-    if best is None or best.baseline is None:
-        return posterior.base
-    named = [one for one in standing(best.baseline.fit) if one.form.name != TABLE]
-    if len(named) == len(best.forms):
-        return best.baseline
-    # tables entered first: their place is taken by nothing
-    fit = run(joint_fit, best.baseline.suppose(named), best.baseline.setting, None)
-    return best.baseline.at(fit) if fit.usable else posterior.base
+def _model_of(
+    names: frozenset[str], beside: FittedSet | None, posterior: Posterior, run: PieceRunner
+) -> BaselineFit:
+    """The likeliest model with these effects and no table; the base where it has no fit.
+
+    ``beside`` : the same with tables, whose effects stand where something else is likely.
+    """
+    if beside is not None and beside.baseline is not None:
+        at = beside.baseline
+        named = [one for one in standing(at.fit) if one.form.name != TABLE]
+        fit = run(joint_fit, at.suppose(named), at.setting, None)
+        if fit.usable:
+            return at.at(fit)
+    best = _likeliest(names, posterior, tables=False)
+    return posterior.base if best is None or best.baseline is None else best.baseline
 
 
-def _with_tables(names: frozenset[str], posterior: Posterior) -> BaselineFit | None:
-    """The likeliest model with these effects and something else."""
-    best = _likeliest(
+def _likeliest(names: frozenset[str], posterior: Posterior, *, tables: bool) -> FittedSet | None:
+    """Of the sets of these names, with tables or without."""
+    having = [
         one
         for one in posterior.fitted.values()
-        if names_of(one.forms) == names and any(form.name == TABLE for form in one.forms)
-    )
-    return best.baseline if best is not None else None
-
-
-def _likeliest(sets: Iterable[FittedSet]) -> FittedSet | None:
-    """Without tables, if there is one; else with."""
-    usable = [one for one in sets if one.baseline is not None]
-
-    def order(one: FittedSet) -> tuple[bool, float, list[str]]:
-        plain = all(form.name != TABLE for form in one.forms)
-        return plain, one.log_evidence, sorted(map(repr, one.forms))
-
-    return max(usable, key=order, default=None)
+        if one.baseline is not None
+        and names_of(one.forms) == names
+        and any(form.name == TABLE for form in one.forms) == tables
+    ]
+    return max(having, key=lambda o: (o.log_evidence, sorted(map(repr, o.forms))), default=None)
 
 
 def _standing(
