@@ -92,7 +92,7 @@ class Nuisance(BaseModel):
     )
 
 
-MOST_FITS = {"quick": 16, "standard": 40, "full": 100}
+MOST_FITS = {"quick": 10, "standard": 40, "full": 100}
 """Of a search, by its effort."""
 
 
@@ -128,7 +128,7 @@ class Discrepancy(Study):
     )
     effort: Literal["quick", "standard", "full"] = Field(
         default="quick",
-        description="most fits of the search: quick 16, standard 40, full 100; it ends earlier "
+        description="most fits of the search: quick 10, standard 40, full 100; it ends earlier "
         "where few hold all probability, and names nothing for certain where it does not",
     )
     minutes: float | None = Field(

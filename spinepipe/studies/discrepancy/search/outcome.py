@@ -136,10 +136,11 @@ def _explain_most(found: SearchResult) -> bool:
 
 
 def left_of(found: SearchResult) -> float:
-    """Noise SDs (rms) that stay beside all that is probable, something else included."""
-    if found.probabilities[SOMETHING_ELSE] < EVEN or found.with_tables is None:
-        return found.final_gap.rms
-    return whole_gap(found.with_tables, found.with_tables.fit).rms
+    """Noise SDs (rms of all readings) that stay beside all that is probable, tables included."""
+    likely = found.probabilities[SOMETHING_ELSE] >= EVEN
+    at = found.with_tables if likely else None
+    gap = found.final_gap if at is None else whole_gap(at, at.fit)
+    return float(np.sqrt(gap.chi2 / max(gap.readings, 1)))
 
 
 def _probably(sure: Sequence[SelectedTerm], p: Mapping[str, float]) -> str:

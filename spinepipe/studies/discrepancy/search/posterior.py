@@ -165,6 +165,7 @@ class Posterior:
         """The set whose fit may matter most; None where no fit does."""
         strong = [one for one in self.seen.values() if not one.weak]
         if not strong:
+            self.open = 0.0
             return None
         weak = [self.log_odds_of(one) for one in self.seen.values() if one.weak]
         of_known = logsumexp([*weak, *(self.log_odds_of(one) for one in self.fitted.values())])

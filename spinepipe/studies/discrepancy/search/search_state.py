@@ -44,7 +44,7 @@ class Rules:
     margin: float
     most_effects: int
     seed: int
-    most_fits: int = 16
+    most_fits: int = 10
     minutes: float | None = None
 
     @property
