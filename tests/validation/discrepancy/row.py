@@ -70,7 +70,7 @@ def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -
     started = time.process_time()
     ended = investigate(prepare(STUDY, cohort, None), at_once)
     found = ended.found
-    row = _said(found, ended.ended)
+    row = _said(found, ended.ended) | {"threshold": ended.rules.needed}
     seconds["search"] = time.process_time() - started
     started = time.process_time()
     row["held_out"] = held_out_told(ended.proof) if found.standing else None
