@@ -193,7 +193,9 @@ def candidate_rows(found: SearchResult, needed: float, joints: Sequence[str]) ->
     """
     # chi2 of the base beyond noise, kept positive to be divided by
     excess = max(found.base_gap.excess, np.finfo(float).tiny)
-    not_fitted = f"not fitted: only {found.unfitted:.2f} of the probability rests on looks"
+    not_fitted = (
+        f"not fitted: all that was only looked at holds {found.unfitted:.2f} of the probability"
+    )
     rows = []
     for stage in found.stages:
         rows += _screened(stage, joints, excess, not_fitted)
