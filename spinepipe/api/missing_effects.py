@@ -33,6 +33,7 @@ class MissingEffects(Result):
     headline : the answer as the page of a study has it.
     quality : what the verdict depends on: noise, threshold, and residuals with and without.
     verdict : ``NAMED``, ``PART``, ``SET``, ``NULL`` or ``UNKNOWN``; ``why`` in a sentence.
+    probabilities : that each effect is missing, something else is, nothing is; likeliest first.
     alternatives : effects that the data cannot exclude. not_testable : effects that these tests
         cannot show, and the test that would. next_tests : tests that would tell more.
     misfit : measured and predicted motion, with and without the effects.
@@ -43,6 +44,7 @@ class MissingEffects(Result):
 
     verdict: str
     why: str
+    probabilities: pd.DataFrame
     alternatives: pd.DataFrame
     not_testable: pd.DataFrame
     next_tests: pd.DataFrame
@@ -118,6 +120,7 @@ def _result(found: DiscrepancyResults, model: str) -> MissingEffects:
         ("residual (RMS) of left-out readings, without", rms.held_out_base, rms.unit),
         ("residual (RMS) of left-out readings, with", rms.held_out_with_effects, rms.unit),
     ]
+    ranked = sorted(verdict.probabilities.items(), key=lambda one: -one[1])
     ended = answer(verdict, model, tables[WHERE.name], tables[GAP.name])
     (said,) = told([ended], sentences_of(PACKAGE))
     return MissingEffects(
@@ -126,6 +129,7 @@ def _result(found: DiscrepancyResults, model: str) -> MissingEffects:
         quality=pd.DataFrame(quality, columns=["quantity", "value", "unit"]),
         verdict=verdict.verdict.value,
         why=verdict.why,
+        probabilities=pd.DataFrame(ranked, columns=["name", "probability"]),
         alternatives=pd.DataFrame([asdict(one) for one in verdict.in_set]),
         not_testable=pd.DataFrame([asdict(one) for one in verdict.not_testable]),
         next_tests=tables[NEXT_TESTS.name],

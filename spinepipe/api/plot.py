@@ -81,10 +81,9 @@ def indices(asked: Sensitivity, *, index: str = "ST", ax: Axes | None = None) ->
 
 
 def effects(found: MissingEffects, *, ax: Axes | None = None) -> Axes:
-    """Log evidence of each effect that was tried, against the model without it."""
+    """How probable it is of each effect that it is missing."""
     ax = ax or plt.subplots()[1]
-    rows = found.candidates.dropna(subset=["log_evidence"])
-    best = rows.groupby("effect")["log_evidence"].max().sort_values()
-    ax.barh(list(best.index), best.to_list())
-    ax.set(xlabel="log evidence")
+    rows = found.probabilities.iloc[::-1]
+    ax.barh(rows["name"].to_list(), rows["probability"].to_list())
+    ax.set(xlabel="probability", xlim=(0.0, 1.0))
     return ax

@@ -125,6 +125,8 @@ class Kind:
     told_by_check : ``file:function`` of what `spinepipe check` says of a sound study besides;
         called with study, cohort and the folder of the Snakefile, it returns words, and what it
         warns of.
+    explains : ``file:function`` of what `spinepipe why` says; called with the folder of a study's
+        results and a name, it yields lines.
     question : what its studies ask, in a few words: the heading above them on the page of all.
     doubts : ``file:function`` of what most likely is wrong with files that it alone reads; called
         with a cohort that has any of them, it yields doubts.
@@ -146,6 +148,7 @@ class Kind:
     settled: Callable[[Any, Cohort], Any] | None = None
     told_by_check: str | None = None
     doubts: str | None = None
+    explains: str | None = None
     question: str = "Other questions"
 
     def job(self, name: str) -> Job:

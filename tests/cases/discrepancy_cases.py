@@ -136,14 +136,20 @@ VERDICTS: dict[str, dict[str, Any]] = {
     | {
         "verdict": "NAMED",
         "effects": [_NAMED],
-        "why": "the neutral zone beats every rival by more than the margin",
+        "why": "neutral_zone (0.97)",
+        "probabilities": {
+            "neutral_zone": 0.97,
+            "nonlinear_stiffening": 0.02,
+            "something_else": 0.01,
+        },
     },
-    "NULL": _COMMON | {"verdict": "NULL"},
+    "NULL": _COMMON | {"verdict": "NULL", "probabilities": {"nothing": 0.82, "neutral_zone": 0.04}},
     "SET": _COMMON
     | _OPEN
     | {
         "verdict": "SET",
         "candidates_in_set": ["neutral_zone", "nonlinear_stiffening"],
+        "probabilities": {"neutral_zone": 0.6, "nonlinear_stiffening": 0.38},
         "suspected_data_errors": [
             {
                 "where": "specimen b, flexion, cycle 2, L3L4",
@@ -163,6 +169,7 @@ VERDICTS: dict[str, dict[str, Any]] = {
     | _OPEN
     | {
         "verdict": "UNKNOWN",
+        "probabilities": {"something_else": 0.99, "facet_contact": 0.11, "neutral_zone": 0.02},
         "unknown": {
             "where": "L4L5, extension, test flexion (gap 9.3)",
             "shape": "one side only, grows with the cube of the angle",
@@ -340,6 +347,7 @@ def _candidates(wide: bool) -> Rows:
             "detectable_gap": 0.15 + 0.3 * absorbed,
             "status": "converged",
             "message": "",
+            "decision": "",
         }
         rows.append({**told, "stage": "design", "scope": "*"})
         for joint, share in (("L4L5", 1.0), ("L3L4", 0.2)):
@@ -360,6 +368,7 @@ def _candidates(wide: bool) -> Rows:
             {
                 "stage": "design",
                 "beside": "",
+                "decision": "",
                 "effect": name,
                 "kind": kind,
                 "variant": "{}",

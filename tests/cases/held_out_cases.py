@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -119,7 +120,18 @@ def found(base: BaselineFit, zone: bool, spread: PlaceSpread = PlaceSpread.SHARE
     if zone:
         guess = ActiveTerm(replace(ZONE, spread=spread), np.array([0.4, 0.04, 12.0]))
         final = base.at(joint_fit(base.suppose((guess,)), base.setting))
-    lack = LackOfFit(0.0, np.zeros(1), "own", "extension", PlaceSpread.SHARED, 0.0, {}, at={})
-    gaps = whole_gap(base, base.fit), whole_gap(final, final.fit)
-    at = gaps_at(base, base.fit), gaps_at(final, final.fit)
-    return SearchResult(base, final, (), (), lack, 0.0, *gaps, *at, {}, lack)
+    return SearchResult(
+        base=base,
+        final=final,
+        standing=(),
+        stages=(),
+        probabilities={},
+        sets=(),
+        with_tables=None,
+        lack=cast(LackOfFit, None),  # nothing that is held out asks for it
+        unfitted=0.0,
+        base_gap=whole_gap(base, base.fit),
+        final_gap=whole_gap(final, final.fit),
+        base_at=gaps_at(base, base.fit),
+        final_at=gaps_at(final, final.fit),
+    )

@@ -54,6 +54,6 @@ def alike(centre_m: Array) -> dict[str, Array]:
 
 def grounds_of(given: list[SpecimenReadings], priors: NuisancePriors | None = None) -> BaselineFit:
     """The base fitted, noise from the repeats."""
-    noise = estimated_noise(given, None, zeroed=False, outliers=0)
+    noise = estimated_noise(given, None, zeroed=False, outliers=0, accuracy=np.zeros(6))
     assert noise is not None
     return fit_baseline(given, noise, priors or NuisancePriors(), chains.start(given), at_once)

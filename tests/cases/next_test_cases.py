@@ -91,7 +91,7 @@ def shared_form(trials: Trials, **options: str) -> CandidateForm:
     )
 
 
-def fitted(grounds: BaselineFit, trials: Trials, form: CandidateForm) -> Refit:
+def fitted(grounds: BaselineFit, form: CandidateForm) -> Refit:
     """The form beside the base, from a third of its typical strength."""
     start = []
     for p in form.variant.create().parameters:
@@ -101,7 +101,7 @@ def fitted(grounds: BaselineFit, trials: Trials, form: CandidateForm) -> Refit:
             start.append(p.off * (p.default / p.off) ** 0.3)
         else:
             start.append(p.off + 0.3 * (p.default - p.off))
-    return refit(grounds, ActiveTerm(form, np.array(start)), trials)
+    return refit(grounds.fit, grounds, ActiveTerm(form, np.array(start)))
 
 
 def scaled_case(test: str, factor: float) -> LoadCase:

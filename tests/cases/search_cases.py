@@ -77,8 +77,11 @@ def readings(
 
 
 def grounds_of(given: Sequence[SpecimenReadings]) -> BaselineFit:
-    """The base fitted, noise from the repeats, nuisances as large as by default."""
-    noise = estimated_noise(given, None, zeroed=False, outliers=0)
+    """The base fitted, noise from the repeats, nuisances as large as by default.
+
+    Errors of the readings are white: cycles of a test share none.
+    """
+    noise = estimated_noise(given, None, zeroed=False, outliers=0, accuracy=np.zeros(6))
     assert noise is not None
     return fit_baseline(given, noise, NuisancePriors(), chains.start(given), at_once)
 
@@ -91,6 +94,6 @@ def searched(
     """The search of a study; ``backwards``: effects are tried in the other order."""
     names = sorted(one.specimen for one in given)
     tried = trials(effects, ROTATIONS, names, JOINTS)
-    rules = Rules(tried[::-1] if backwards else tried, ROTATIONS, 0.01, 100, MARGIN, 3, 0)
+    rules = Rules(tried[::-1] if backwards else tried, ROTATIONS, MARGIN, 3, 0)
     found = search(grounds_of(given), rules, at_once)
-    return Searched(found, outcome(found, MARGIN))
+    return Searched(found, outcome(found))

@@ -14,7 +14,6 @@ kind: discrepancy
 cohort: chains
 base: {stiffness: per_specimen}
 effects: [nonlinear_stiffening, hysteresis]
-bootstrap: 100
 """
 STIFFNESS = {"a": 50.0, "b": 40.0}
 SIGN = {"flexion": -1.0, "extension": 1.0}

@@ -67,6 +67,7 @@ BY_NAME = {
     "jobs/draw.py": "a figure that a kind declares",
     "cli/check.py": "what a kind says of a sound study besides",
     "cli/export.py": "what a kind declares",
+    "cli/why.py": "what a kind says of an effect",
     "cli/program.py": "commands, each a file of its folder",
     "imports/registry.py": "what reads a settings file, by its kind, which is one written there",
     "studies/discrepancy/codec.py": "classes of data of spinepipe, see its tests",

@@ -28,7 +28,6 @@ from tests.validation import (
     wrong_inputs,
 )
 from tests.validation.discrepancy import command as discrepancy
-from tests.validation.discrepancy import sparse
 from tests.validation.written import write as _write
 
 
@@ -49,7 +48,6 @@ def main() -> None:
         "plausibility": _plausibility,
         "pooled_coverage": _pooled_coverage,
         "posterior_coverage": _posterior_coverage,
-        "sparse": _sparse,
         "tracking": _tracking,
         "tracking_profiles": _tracking_profiles,
         "tracking_starts": lambda: _write(
@@ -134,18 +132,6 @@ def _posterior_coverage() -> None:
         "Laplace."
     )
     _write("posterior_coverage", head, found)
-
-
-def _sparse() -> None:
-    found = sparse.table()
-    head = (
-        "How often a sparse regression takes any term: on cohorts where nothing is missing (null, "
-        "the usual dirt in half of them; goal for ours: 1 %), and where extension squared drives "
-        f"lateral bending (square); {sparse.COHORTS} each, every regression on the same problem: "
-        "whitened, base and nuisances taken out. Ends in percent: Wilson's interval. Ours stops at "
-        "what noise alone shows and asks for proof on readings left out; the others do not."
-    )
-    _write("sparse", head, found)
 
 
 def _trunk_pressures() -> None:

@@ -82,7 +82,7 @@ def test_missing_effects_are_those_of_a_run(eight: Project) -> None:
     same(found.misfit, run["gap"])
     same(found.candidates, run["candidates"])
     assert stiffening_chains.STIFFNESS.keys() == set(found.misfit["specimen"])
-    assert len(sp.plot.effects(found).patches) == 2
+    assert len(sp.plot.effects(found).patches) == len(found.probabilities)
     # the model goes on into a fit
     fit = sp.calibrate(cohort_of(eight, "chains"), base=found.model, leave_out=None)
     plain = sp.calibrate(cohort_of(eight, "chains"), leave_out=None)

@@ -6,17 +6,16 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.report.conclusions import Conclusion, Value
-from spinepipe.report.words import count, listed, plain
+from spinepipe.report.words import listed, plain
 from spinepipe.studies.discrepancy.misfits import (
     NOISE,
     WITH_EFFECTS,
     bare,
     change_of_misfit,
-    largest,
     place_of_most,
 )
 from spinepipe.studies.discrepancy.quantities import UNITS
-from spinepipe.studies.discrepancy.verdict import Verdict
+from spinepipe.studies.discrepancy.verdict import NOTHING, SOMETHING_ELSE, SURE, Verdict
 from spinepipe.studies.discrepancy.verdict import VerdictKind as Ended
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import (
@@ -34,23 +33,29 @@ UNNAMED = "what no effect explains"
 WITHHELD = "withheld"
 """How a message begins that tells what an error of the set-up would have to be known to."""
 
+NO_NAMES = (SOMETHING_ELSE, NOTHING)
+
 _MOST_WORDS_OF_CURVE = 7
 
 USEFUL = ("advised", "offered")
 """Status of runs that would tell something."""
 
 
-def alternatives(verdict: Verdict, margin: float, candidates: pd.DataFrame) -> Iterator[Conclusion]:
+def alternatives(verdict: Verdict) -> Iterator[Conclusion]:
     """The next best explanation: of the named effect whose lead is least, or of a set."""
-    needed = Value(margin, source="settings: margin")
+    if not verdict.probabilities:
+        return
+
+    def probable(name: str) -> Value:
+        return Value(verdict.probabilities.get(name, 0.0), source="verdict: probabilities")
+
     with_rivals = [one for one in verdict.effects if one.rivals]
     if with_rivals:
         leads = [min(one.rivals, key=lambda r: r.log_evidence_margin) for one in with_rivals]
         rival, effect = min(
             zip(leads, with_rivals, strict=True), key=lambda both: both[0].log_evidence_margin
         )
-        how = "verdict: effects, rivals"
-        values = {"margin": Value(rival.log_evidence_margin, source=how), "needed": needed}
+        values = {"own": probable(effect.name), "other": probable(rival.name)}
         names = {
             "effect": name_at(effect.name, effect.scope.coordinates),
             "rival": name_at(rival.name, rival.coordinates),
@@ -59,7 +64,7 @@ def alternatives(verdict: Verdict, margin: float, candidates: pd.DataFrame) -> I
     elif verdict.effects:
         first = verdict.effects[0]
         names = {"effect": name_at(first.name, first.scope.coordinates)}
-        yield Conclusion("alternatives", "alone", names=names)
+        yield Conclusion("alternatives", "alone", {"own": probable(first.name)}, names)
     if verdict.verdict is Ended.SET:
         best, *others = sorted(verdict.in_set, key=lambda one: (one.behind is None, one.behind))
         other = next((one for one in others if one.name != best.name), best)
@@ -70,24 +75,15 @@ def alternatives(verdict: Verdict, margin: float, candidates: pd.DataFrame) -> I
         if other.behind is None or best.behind is None:
             yield Conclusion("alternatives", "set_silent", names=names)
         else:
-            lead = Value(other.behind - best.behind, source="verdict: candidates, behind")
-            yield Conclusion("alternatives", "set", {"margin": lead, "needed": needed}, names)
+            needed = Value(SURE, source="a name is said from here on")
+            values = {"own": probable(best.name), "other": probable(other.name), "needed": needed}
+            yield Conclusion("alternatives", "set", values, names)
     if verdict.reason is Reason.NO_KNOWN_EFFECT:
-        yield from _nearest(verdict, candidates)
-
-
-def _nearest(verdict: Verdict, candidates: pd.DataFrame) -> Iterator[Conclusion]:
-    """Of what no known effect explains: the one that comes nearest."""
-    threshold = verdict.threshold.log_evidence
-    tried = candidates[candidates["stage"] == "refit 1"] if len(candidates) else candidates
-    if threshold is None or tried.empty or not tried["log_evidence"].max() > threshold:
-        return
-    best = largest(tried, tried["log_evidence"])
-    values = {
-        "evidence": Value(float(best["log_evidence"]), source="candidates: refit 1"),
-        "threshold": Value(threshold, source="verdict: threshold"),
-    }
-    yield Conclusion("alternatives", "nearest", values, {"effect": general(best["effect"])})
+        known = {n: p for n, p in verdict.probabilities.items() if n not in NO_NAMES}
+        if known:
+            nearest = max(known, key=lambda name: (known[name], name))
+            values = {"own": probable(nearest), "other": probable(SOMETHING_ELSE)}
+            yield Conclusion("alternatives", "nearest", values, {"effect": general(nearest)})
 
 
 def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterator[Conclusion]:
@@ -104,18 +100,16 @@ def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterato
         )
         names = {"shape": shape_in_words(shape or "")}
         yield Conclusion("shape", "seen" if shape else "unseen", names=names)
-    formula, table = None if told is None else told.formula, verdict.tabulated
-    if table is not None:
+    if (table := verdict.tabulated) is not None:
         values = {"after": Value(table.gap, NOISE, source="verdict: tabulated")}
         laws = readable(table.place).split("; ")
         curve = in_words([laws], _MOST_WORDS_OF_CURVE) or f"{len(laws)} motions"
-        yield _described("curve", values, table.held_out_closed, {"curve": curve})
-    if formula is not None:
-        values = {
-            "fit": Value(change_of_misfit(formula.explained), "%", source="verdict: formula"),
-        }
-        terms = {"terms": count(len(formula.terms), "term")}
-        yield _described("formula", values, formula.held_out_closed, terms)
+        if (closed := table.held_out_closed) is not None:
+            how = "verdict: tabulated, held_out_closed"
+            values["closed"] = Value(change_of_misfit(closed), "%", source=how)
+        yield Conclusion(
+            "curve", "left_out" if "closed" in values else "fit", values, {"curve": curve}
+        )
     for one in {one.name: one for one in reversed(verdict.withheld)}.values():
         unit, factor = ("%", 100.0) if one.unit == "1" else UNITS.get(one.unit, (one.unit, 1.0))
         values = {"allowed": Value(factor * one.allowed, unit, source="verdict: withheld")}
@@ -123,15 +117,6 @@ def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterato
             values["known"] = Value(factor * one.known_to, unit, source="verdict: withheld")
         names = {"effect": general(one.name), "imperfection": _set_up(one.imperfection)}
         yield Conclusion("hidden", "known" if "known" in values else "unknown", values, names)
-
-
-def _described(
-    rule: str, values: dict[str, Value], closed: float | None, names: dict[str, str]
-) -> Conclusion:
-    if closed is None:
-        return Conclusion(rule, "fit", values, names)
-    change = Value(change_of_misfit(closed), "%", source=f"verdict: {rule}, held_out_closed")
-    return Conclusion(rule, "left_out", {**values, "closed": change}, names)
 
 
 def _set_up(kind: str) -> str:

@@ -37,8 +37,8 @@ from spinepipe.studies.discrepancy.misfits import model_name, stands_for
 from spinepipe.studies.discrepancy.quantities import UNITS
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import MODELS
-from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, Verdict, VerdictKind, read_verdict
-from spinepipe.studies.discrepancy.words import general, load_axis, motion_of, name_at
+from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, SURE, VerdictKind, read_verdict
+from spinepipe.studies.discrepancy.words import general, load_axis, motion_of
 from spinepipe.tables import StudyTables
 from spinepipe.units import LOAD_UNITS
 
@@ -273,52 +273,32 @@ def stiffness(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
 
 
 def evidence(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
-    """Evidence of named effects and what could stand in their place; else of each effect alone.
+    """How probable it is of each effect that it is missing.
 
     Where nothing is missing also from which misfit on each effect would have been found.
     """
-    title = "Evidence for each effect"
+    title = "How probable each effect is"
     verdict = read_verdict(tables.files["verdict"])
-    threshold, panels = verdict.threshold.log_evidence, []
+    panels = []
     if verdict.verdict is VerdictKind.NULL and verdict.smallest_detectable:
         title = "What these tests could have shown"
         found = sorted((one.gap, general(one.name), "") for one in verdict.smallest_detectable)
         panels.append(_bars("To be found", "smallest misfit (× noise SD)", found))
-    for heading, told in _evidence(verdict, tables["candidates"]):
-        marks = {} if threshold is None else {threshold: ""}
-        panels.append(_bars(heading, "log evidence", told[:MOST_ROWS], marks))
+    ranked = sorted(verdict.probabilities.items(), key=lambda one: -one[1])[:MOST_ROWS]
+    if ranked:
+        bars = [(p, general(name), f"{p:.2f}") for name, p in ranked]
+        panels.append(_bars("", "probability of being missing", bars, {SURE: ""}))
     if not panels:
         return saying(title, "No effect was tried.")
-    share = 100.0 * (verdict.threshold.false_alarm or 0.0)
     caption = (
-        "Log evidence (log units) is the natural log of the Bayes factor. Dashed: threshold, "
-        f"passed in at most {share:g} % of data sets without a missing effect."
+        "Several may be missing together, so probabilities need not sum to one; something else is "
+        f"a law without a name. Dashed: {SURE:g}, from which on a name is said."
     )
     return Chart(title, panels, caption)
 
 
 Bars = list[tuple[float, str, str]]
 """Size, name and note of each."""
-
-
-def _evidence(verdict: Verdict, candidates: pd.DataFrame) -> Iterator[tuple[str, Bars]]:
-    """Bars of one panel and their heading."""
-    for one in verdict.effects[:2]:
-        own = name_at(one.name, one.scope.coordinates)
-        bars = [(one.log_evidence, own, "")]
-        for rival in one.rivals:
-            behind = rival.log_evidence_margin
-            name = name_at(rival.name, rival.coordinates)
-            bars.append((one.log_evidence - behind, name, f"{number(behind, 2)} behind"))
-        yield short(capital(own), 26) if len(verdict.effects) > 1 else "", bars
-    tried = candidates[candidates["log_evidence"].notna()] if len(candidates) else candidates
-    for stage, heading in (("refit 1", "Each alone"), ("screen 1", "Each alone (linear)")):
-        rows = tried[tried["stage"] == stage] if len(tried) else tried
-        if len(rows) and not verdict.effects:
-            best = rows.groupby("effect")["log_evidence"].max().sort_values(ascending=False)
-            bars = [(size, general(str(name)), number(size, 2)) for name, size in best.items()]
-            yield heading, bars
-            return
 
 
 def _bars(heading: str, label: str, bars: Bars, marks: Mapping[float, str] | None = None) -> Rows:

@@ -47,13 +47,10 @@ _WITHOUT_A_NAME = {
     Reason.DATA_ERRORS: "data",
     Reason.NO_KNOWN_EFFECT: "shape",
     Reason.A_PART_STAYS: "shape",
-    Reason.MOST_STAYS: "shape",
-    Reason.STIFFNESS_OF_EACH_JOINT: "stiffness",
+    Reason.MOST_STAYS: "much",
     Reason.NOT_PROVEN: "left_out",
-    Reason.IMITATED_TOGETHER: "together",
-    Reason.NONE_KEEPS_ITS_PLACE: "together",
-    Reason.RIVALS_UNKNOWN: "together",
 }
+"""The answer to each reason; to those that only versions before gave, that of a shape."""
 
 
 def conclusions(study: Discrepancy, cohort: Cohort, results: ResultTables) -> Iterator[Conclusion]:
@@ -69,7 +66,7 @@ def conclusions(study: Discrepancy, cohort: Cohort, results: ResultTables) -> It
     yield from _by_test(verdict, model, where)
     yield from _stiffness(numbers, model)
     yield from _carries_over(verdict, where, held_out)
-    yield from alternatives(verdict, study.margin, results.table("candidates"))
+    yield from alternatives(verdict)
     yield from unnamed(verdict, where, gap)
     yield from next_test(verdict, results.table("next_tests"))
     yield from lights(study, cohort, verdict, results, misfit(where, WITH_EFFECTS))
@@ -113,7 +110,9 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
             n = len(sizes_found)
             names["shown"] = f"any of {n} effects" if n > 1 else "the one testable effect"
         case found.VerdictKind.UNKNOWN:
-            told = f"unknown_{_WITHOUT_A_NAME[verdict.reason or Reason.NO_KNOWN_EFFECT]}"
+            told = (
+                f"unknown_{_WITHOUT_A_NAME.get(verdict.reason or Reason.NO_KNOWN_EFFECT, 'shape')}"
+            )
             names["errors"] = count(len(verdict.suspected_data_errors), "respect")
     return Conclusion("verdict", told, values, names)
 

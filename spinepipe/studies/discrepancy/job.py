@@ -47,7 +47,7 @@ from spinepipe.studies.discrepancy.search.investigation import (
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import model_file
-from spinepipe.studies.discrepancy.search.prediction import BUSHING
+from spinepipe.studies.discrepancy.search.prediction import BUSHING, NoEquilibrium
 from spinepipe.studies.discrepancy.search.residual_model import ResidualModel, model_residual
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner, Store
@@ -65,7 +65,6 @@ from spinepipe.studies.discrepancy.tables import (
 )
 from spinepipe.studies.discrepancy.verdict import (
     EVERY,
-    Threshold,
     Verdict,
     VerdictKind,
     write_verdict,
@@ -174,7 +173,6 @@ def _without_base(ready: Prepared, trouble: NoBase) -> DiscrepancyResults:
         noise=noise_summary(noise),
         unknown=UnnamedMisfit(str(trouble), NO_SHAPE, Reason.NO_BASE),
         suspected_data_errors=errors,
-        threshold=Threshold(false_alarm=ready.study.false_alarm),
     )
     return DiscrepancyResults(
         verdict=verdict,
@@ -197,7 +195,7 @@ def _start_model(ready: Prepared, of: str) -> ModelFile:
 def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> DiscrepancyResults:
     """The results of an investigation, and what the tests could tell apart."""
     joints, rules = ready.cohort.joint_names, ended.rules
-    needed = ended.found.stages[0].screen.threshold + rules.margin
+    needed = rules.needed + rules.margin
     told = distinguishability(
         ended.grounds, rules.trials, needed, ready.study.margin, ready.declared, rules.seed, run
     )
@@ -223,7 +221,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
         verdict=summarise(ready, ended, told, stays, numbers, taken["with_effects"], hidden, run),
         rows={
             "gap": gap,
-            "candidates": [*design_rows(told), *candidate_rows(found, joints)],
+            "candidates": [*design_rows(told), *candidate_rows(found, rules.needed, joints)],
             "where": where_rows(found, joints),
             "confusions": confusion_rows(told),
             "held_out": held_out_rows(ended.proof),
@@ -246,10 +244,13 @@ def _beyond(ended: Investigation, run: PieceRunner) -> ResidualModel:
     final, outcome = ended.found.final, ended.ended
     told = outcome.verdict in (VerdictKind.UNKNOWN, VerdictKind.PART)
     if not told or outcome.reason is Reason.DATA_ERRORS:
-        return ResidualModel(None, None, final)
-    stays = model_residual(final, ended.rules, run)
+        return ResidualModel(None, final)
+    stays = model_residual(ended.found, run)
     if stays.table is not None:
-        on_record([stays.grounds.fit], final.readings, run)
+        try:
+            on_record([stays.grounds.fit], final.readings, run)
+        except NoEquilibrium:  # a table that the engine of record cannot follow predicts nothing
+            return ResidualModel(None, final)
     return stays
 
 

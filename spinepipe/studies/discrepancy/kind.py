@@ -77,4 +77,5 @@ KIND = Kind(
     makes_models="search",
     holds=True,
     exports="export:exported",
+    explains="why:why",
 )

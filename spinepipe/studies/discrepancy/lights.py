@@ -12,7 +12,7 @@ from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.discrepancy.misfits import LARGE, SMALL, WITH_EFFECTS, bare, largest
 from spinepipe.studies.discrepancy.quantities import quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, Verdict
+from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, SURE, Verdict
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import SET_UP, general, readable
 
@@ -41,6 +41,8 @@ def lights(
     after : misfit of the model with effects.
     """
     yield _errors(verdict)
+    if verdict.noise.accuracy_assumed:
+        yield _accuracy(verdict)
     yield _noise(verdict)
     if after is not None:
         light = "stop" if after.number > LARGE else "check"
@@ -70,6 +72,15 @@ def _errors(verdict: Verdict) -> Conclusion:
         return Conclusion("errors", "ok")
     first = {"where": readable(errors[0].where), "what": readable(errors[0].what)}
     return Conclusion("errors", "stop", names={**first, "errors": count(len(errors), "such error")})
+
+
+def _accuracy(verdict: Verdict) -> Conclusion:
+    """Of an accuracy that nobody told."""
+    noise, how = verdict.noise, "verdict: noise, accuracy"
+    sizes = ((noise.accuracy_rotation_deg, "°"), (noise.accuracy_translation_mm, "mm"))
+    known = [Value(size, unit, source=how) for size, unit in sizes if size is not None]
+    names = {"accuracy": listed(f"{one:unit}" for one in known)}
+    return Conclusion("accuracy", "check", {"value": known[0]}, names)
 
 
 def _noise(verdict: Verdict) -> Conclusion:
@@ -169,7 +180,7 @@ def _sample(
     study: Discrepancy, cohort: Cohort, verdict: Verdict, results: ResultTables
 ) -> Iterator[Conclusion]:
     """How much there is, how a name was decided upon, and the methods."""
-    gap, threshold = results.table("gap"), verdict.threshold
+    gap = results.table("gap")
     specimens = len(cohort.specimen_names)
     values = {"readings": Value(len(gap), source="gap: rows")}
     names = {"specimens": count(specimens, "specimen"), "base": _BASES[study.base.stiffness]}
@@ -178,20 +189,16 @@ def _sample(
     if verdict.noise.outliers_left_out:
         n = Value(verdict.noise.outliers_left_out, source="verdict: noise")
         yield Conclusion("outliers", "check", {"n": n})
-    if threshold.log_evidence is None or not threshold.draws or threshold.false_alarm is None:
+    if verdict.threshold.log_evidence is None:
         return
-    how = "verdict: threshold"
     values = {
         "tests": Value(len(study.tests or cohort.tests), source="settings and cohort: tests"),
         "tried": Value(
             len(verdict.smallest_detectable) + len(verdict.not_testable),
             source="verdict: smallest_detectable, not_testable",
         ),
-        "threshold": Value(threshold.log_evidence, source=how),
-        "share": Value(100.0 * threshold.false_alarm, "%", source=how),
-        "draws": Value(threshold.draws, source=how),
+        "needed": Value(SURE, source="a name is said from here on"),
     }
-    yield Conclusion("false_alarms", "ok", values)
     yield Conclusion("methods", "searched", values, names)
     asked = (study.held_out.tests, study.held_out.specimens and specimens > 1)
     left_out = {(True, True): "both", (True, False): "tests", (False, True): "specimens"}

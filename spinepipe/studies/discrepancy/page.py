@@ -10,10 +10,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import sentences_of
 from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, sortable
-from spinepipe.report.words import level, listed, plain
+from spinepipe.report.words import listed, plain
 from spinepipe.schema import Column, Table
 from spinepipe.studies.discrepancy.conclusions import conclusions
-from spinepipe.studies.discrepancy.quantities import per_degree, quantities
+from spinepipe.studies.discrepancy.quantities import quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import (
     CANDIDATES,
@@ -27,7 +27,6 @@ from spinepipe.studies.discrepancy.tables import (
     WHERE,
 )
 from spinepipe.studies.discrepancy.verdict import EVERY, Verdict, read_verdict, share_of_gap
-from spinepipe.studies.discrepancy.verdict_unnamed import FormulaTerm
 from spinepipe.studies.discrepancy.words import SET_UP, general, motion_of, readable, what_of
 
 FOLDER = "discrepancy/"
@@ -67,7 +66,7 @@ _SHOWN: Mapping[str, tuple[str, str, str]] = {
     "candidates": (
         "Effects tried",
         "Each alone beside the base, in its best form: fitted (refit), or linear (screen).",
-        "stage effect spread log_evidence threshold gap_share status",
+        "stage effect spread log_evidence gap_share decision",
     ),
     "imperfections": (
         "Set-up errors",
@@ -113,8 +112,6 @@ def page(study: Discrepancy, cohort: Cohort, results: ResultTables) -> Page:
 
 def _of_verdict(verdict: Verdict) -> Iterator[Sortable]:
     """What the verdict alone holds; tables without rows are left out."""
-    told = verdict.part or verdict.unknown
-    terms = told.formula.terms if told is not None and told.formula is not None else ()
     rivals = [
         (general(one.name), _motions(one.coordinates), one.log_evidence_margin)
         for effect in verdict.effects
@@ -157,19 +154,6 @@ def _of_verdict(verdict: Verdict) -> Iterator[Sortable]:
         "effect found_from* by_name_from*",
         [(general(one.name), one.gap, one.by_name) for one in verdict.smallest_detectable],
     )
-    yield from _table(
-        "Formula of what is unexplained",
-        "What each term adds to load or reading: coefficient times term. It has no mechanism.",
-        "place motion adds_to term coefficient* sd* unit",
-        [
-            (
-                *(_place(one), motion_of(one.coordinate), one.acts, readable(one.term)),
-                *(per_degree(size, one.unit)[0] for size in (one.coefficient, one.sd)),
-                per_degree(0.0, one.unit)[1],
-            )
-            for one in terms
-        ],
-    )
 
 
 def _table(title: str, about: str, names: str, rows: Sequence[object]) -> Iterator[Sortable]:
@@ -182,11 +166,6 @@ def _table(title: str, about: str, names: str, rows: Sequence[object]) -> Iterat
         frame = pd.DataFrame(rows, columns=[column.name for column in columns])
         name = title.lower().replace(" ", "-")
         yield sortable(name, title, about, frame, columns, f"{FOLDER}verdict.json")
-
-
-def _place(term: FormulaTerm) -> str:
-    joint = "every joint" if term.joint == EVERY[0] else level(term.joint)
-    return joint if term.specimen == EVERY[0] else f"{joint} of {term.specimen}"
 
 
 def _motions(coordinates: Sequence[str]) -> str:

@@ -4,7 +4,6 @@ Results keep the parameters of the laws. What 17.7 1/rad² means nobody sees; th
 doubled at 10.7° everybody does.
 """
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, log, pi, sqrt
@@ -93,19 +92,6 @@ def quantities(effect: Missing) -> list[Quantity]:
         where = ", ".join(map(plain, place))
         found.append(Quantity(way.name, where, way.told(one), one.at_bound))
     return found
-
-
-_RAD = re.compile(r"rad(?:\^(\d))?")
-
-
-def per_degree(value: float, unit: str) -> tuple[float, str]:
-    """A coefficient by radians as one by degrees, and its unit as it is printed."""
-    below = unit.partition("/")[2]
-    powers = sum(int(found[1] or 1) for found in _RAD.finditer(below))
-    told = _RAD.sub(lambda at: "°" + (f"^{at[1]}" if at[1] else ""), unit)
-    for typed, shown in (("^2", "²"), ("^3", "³")):
-        told = told.replace(typed, shown)
-    return value / DEG_PER_RAD**powers, told
 
 
 def _way(effect: str, variant: Mapping[str, Any], name: str, unit: str) -> _Way:

@@ -43,6 +43,9 @@ HELD_OUT_MODELS = ("held_out_base", "held_out_with_effects")
 NOT_FITTED = "the linear problem, no fit"
 """Message of what was screened: its numbers are of readings linearised at the fit before."""
 
+FITTED = "fitted"
+MOST_PROBABLE, NO_FIT = "in the most probable set", "no fit: probability 0"
+
 DEGENERATE = "a shape ran to its bound: no more what its name says"
 """Message of a refit without evidence."""
 
@@ -181,20 +184,31 @@ def where_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
     return rows
 
 
-def candidate_rows(found: SearchResult, joints: Sequence[str]) -> list[Row]:
-    """What was tried, stage by stage: forms on the screen, then those that were refitted."""
+def candidate_rows(found: SearchResult, needed: float, joints: Sequence[str]) -> list[Row]:
+    """What was tried, stage by stage: forms on the screen, then those that were refitted.
+
+    Parameters
+    ----------
+    needed : log evidence from which a single effect is sure.
+    """
     # chi2 of the base beyond noise, kept positive to be divided by
     excess = max(found.base_gap.excess, np.finfo(float).tiny)
+    not_fitted = (
+        f"not fitted: all that was only looked at holds {found.unfitted:.2f} of the probability"
+    )
     rows = []
     for stage in found.stages:
-        rows += _screened(stage, joints, excess)
+        rows += _screened(stage, joints, excess, not_fitted)
         rows += _refitted(stage, joints, excess)
-    return rows
+    return [row | {"threshold": needed} for row in rows]
 
 
-def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[Row]:
+def _screened(
+    stage: SearchStage, joints: Sequence[str], excess: float, not_fitted: str
+) -> list[Row]:
     """Rows of the best forms of each effect on a screen."""
     rows = []
+    fitted = {one.form for one in stage.refits}
     for one in stage.screen.effects:
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
             scope = _scope(tried.form, joints)
@@ -203,8 +217,8 @@ def _screened(stage: SearchStage, joints: Sequence[str], excess: float) -> list[
                 # the effect's evidence is that of all its forms: on the row of the best
                 "log_evidence": one.log_evidence if not place else tried.log_evidence,
                 "gap_share": _share(tried.explained, excess),
-                "threshold": stage.screen.threshold,
                 "message": NOT_FITTED,
+                "decision": FITTED if tried.form in fitted else not_fitted,
             }
             rows.append(row)
     return rows
@@ -239,7 +253,17 @@ def _form_row(stage: str, beside: Sequence[str], form: CandidateForm, scope: str
         "threshold": None,
         "status": Status.CONVERGED,
         "message": "",
+        "decision": "",
     }
+
+
+def _decision(one: Refit, behind: float) -> str:
+    """What became of a set of effects that was fitted."""
+    if not np.isfinite(one.log_evidence):
+        return NO_FIT if one.fit.status or not one.fit.usable else DEGENERATE
+    if behind <= 0.0:
+        return MOST_PROBABLE
+    return f"with it all are {behind:.1f} log odds behind the most probable set"
 
 
 def _of_screen(tried: ScreenedVariant) -> Row:
@@ -283,11 +307,10 @@ def _share(drop: float, excess: float) -> float | None:
 def _refitted(stage: SearchStage, joints: Sequence[str], excess: float) -> list[Row]:
     """Rows of the refits of a stage; of those that ended at the same form and shape, the first."""
     rows, seen = [], set()
-    for one in stage.refits:
+    for one, behind in zip(stage.refits, stage.behind, strict=True):
         scope = _scope(one.form, joints)
         row = _form_row(f"refit {stage.name}", stage.beside, one.form, scope)
-        row |= _of_refit(one, excess)
-        row["threshold"] = stage.screen.threshold
+        row |= _of_refit(one, excess) | {"decision": _decision(one, behind)}
         key = (row["effect"], row["variant"], row["spread"], row["scope"], row["shape"])
         if key not in seen:
             seen.add(key)

@@ -92,6 +92,10 @@ class Nuisance(BaseModel):
     )
 
 
+MOST_FITS = {"quick": 10, "standard": 40, "full": 100}
+"""Of a search, by its effort."""
+
+
 class Discrepancy(Study):
     """Find which effect the base model lacks, and prove it on motion that was held out."""
 
@@ -109,10 +113,10 @@ class Discrepancy(Study):
         default=0.01,
         gt=0,
         lt=1,
-        description="how often an effect may be named where none is missing; sets the threshold",
+        description="read by versions before; does nothing now",
     )
     bootstrap: int = Field(
-        default=500, ge=20, le=100_000, description="draws without a missing effect, for that"
+        default=500, ge=20, le=100_000, description="read by versions before; does nothing now"
     )
     most_effects: int = Field(default=3, ge=1, le=10, description="most effects that are named")
     margin: float = Field(
@@ -121,6 +125,17 @@ class Discrepancy(Study):
         le=1e3,
         description="log evidence by which a name must beat its runner-up; with less both form a "
         "set",
+    )
+    effort: Literal["quick", "standard", "full"] = Field(
+        default="quick",
+        description="most fits of the search: quick 10, standard 40, full 100; it ends earlier "
+        "where few hold all probability, and names nothing for certain where it does not",
+    )
+    minutes: float | None = Field(
+        default=None,
+        gt=0,
+        le=10_000,
+        description="ends the search by the clock: its answer then hangs on the computer",
     )
     held_out: HeldOutSettings = Field(
         default_factory=HeldOutSettings, description="what is held out"

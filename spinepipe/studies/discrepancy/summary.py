@@ -23,11 +23,13 @@ from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.regions import values_with_regions
 from spinepipe.studies.discrepancy.search.residual_model import ResidualModel
-from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import (
+    EVEN,
     EVERY,
+    LEAST_PROBABLE,
+    SOMETHING_ELSE,
     Candidate,
     CommonImperfection,
     Estimate,
@@ -81,7 +83,6 @@ def summarise(
     """
     cohort = ready.cohort
     found, proof, ended = investigation.found, investigation.proof, investigation.ended
-    screen = found.stages[0].screen
     gaps = {
         "base": found.base_gap,
         "with_effects": found.final_gap,
@@ -95,8 +96,8 @@ def summarise(
         for p in worst(final, MOST_PLACES)
     )
     left_where = largest or "no single place stands out"
-    # What the generic basis sees there; None without evidence.
-    evident = found.lack.log_evidence > max(LEAST_THRESHOLD, found.generic_threshold)
+    # what the generic basis sees there
+    evident = found.probabilities[SOMETHING_ELSE] >= EVEN
     shape = found.lack.shape if evident else None
     coordinate = found.lack.coordinate if shape else None
 
@@ -125,19 +126,18 @@ def summarise(
         smallest_detectable=told.smallest_detectable,
         unknown=None
         if ended.reason is None
-        else UnnamedMisfit(left_where, shape, ended.reason, coordinate, stays.formula),
-        part=UnnamedRest(
-            found.final_gap.gap, left_where, shape, ended.left, coordinate, stays.formula
-        )
+        else UnnamedMisfit(left_where, shape, ended.reason, coordinate),
+        part=UnnamedRest(found.final_gap.gap, left_where, shape, ended.left, coordinate)
         if ended.left
         else None,
         suspected_data_errors=investigation.errors,
-        threshold=Threshold(screen.threshold, ready.study.false_alarm, screen.draws),
+        threshold=Threshold(investigation.rules.needed),
         families=told.families,
         imperfections=imperfection_summary(taken),
         tabulated=stays.table,
         withheld=tuple(withheld),
         left_out=tuple(_left_out(proof)),
+        probabilities={n: p for n, p in found.probabilities.items() if p >= LEAST_PROBABLE},
     )
 
 
@@ -222,12 +222,16 @@ def _missing(
 def noise_summary(noise: FittedNoise) -> ReportedNoise:
     """SDs of one reading in the units of tables, and how they are known."""
     sd = noise.sd * DISPLAY_PER_SI
+    shared = np.where(np.isfinite(sd), noise.accuracy * DISPLAY_PER_SI, np.nan)
     return ReportedNoise(
         source=noise.source,
         rotation_sd_deg=_rms(sd[3:]),
         translation_sd_mm=_rms(sd[:3]),
         serial_correlation=noise.correlation,
         outliers_left_out=noise.outliers,
+        accuracy_rotation_deg=_rms(shared[3:]),
+        accuracy_translation_mm=_rms(shared[:3]),
+        accuracy_assumed=noise.assumed,
     )
 
 

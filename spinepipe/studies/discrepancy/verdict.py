@@ -35,6 +35,17 @@ EVERY = ("*",)
 REPEATS, DECLARED = "repeats", "declared"
 """Where the noise is known from: repeated cycles of a test, or the cohort's ``measurement_sd``."""
 
+SOMETHING_ELSE, NOTHING = "something_else", "nothing"
+"""Among the probabilities: that a law without a name is missing, and that nothing is."""
+
+SURE = 0.95
+"""Probability from which a name is said for certain."""
+
+EVEN = 0.5
+"""Probability from which something else is said to be there, or a further name."""
+
+LEAST_PROBABLE = 0.005
+
 UNIT = "noise sd"
 """Of `MisfitSizes`, as the file has it: SDs of the noise of one reading."""
 
@@ -193,6 +204,8 @@ class ReportedNoise:
         where none was.
     serial_correlation : between neighbouring load steps of a cycle.
     outliers_left_out : how many readings.
+    accuracy_rotation_deg, accuracy_translation_mm : SD of the error that all cycles of a test
+        share, in the same way. accuracy_assumed : whether nobody told it; None in older files.
     """
 
     source: str = ""
@@ -200,6 +213,9 @@ class ReportedNoise:
     translation_sd_mm: float | None = None
     serial_correlation: float = 0.0
     outliers_left_out: int = 0
+    accuracy_rotation_deg: float | None = None
+    accuracy_translation_mm: float | None = None
+    accuracy_assumed: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -408,6 +424,8 @@ class Verdict:
     tabulated : of UNKNOWN and PART, tables in the model file for what has no name; None for none.
     withheld : effects that imperfections hide, one entry for each kind of imperfection that does.
     left_out : held-out gaps by what was left out, tests and specimens apart.
+    probabilities : that each effect is missing, `SOMETHING_ELSE` is, and `NOTHING`; those below
+        `LEAST_PROBABLE` are not told. Empty in files written before the key existed.
     """
 
     cohort: str
@@ -430,6 +448,7 @@ class Verdict:
     tabulated: Tabulated | None = None
     withheld: tuple[WithheldEffect, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
+    probabilities: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def named(self) -> tuple[str, ...]:

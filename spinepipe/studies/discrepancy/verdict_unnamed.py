@@ -46,6 +46,8 @@ class FormulaTerm:
 class Formula:
     """What would describe a discrepancy that has no name; it is no effect.
 
+    Written by versions before; nobody writes it now.
+
     Attributes
     ----------
     terms : as they entered. text : a line for each place. explained : share of the excess misfit
@@ -84,7 +86,7 @@ class UnnamedMisfit:
     ----------
     where : the largest gaps, in words. shape : as generic shapes see it, None without evidence.
     reason : why there is no name. coordinate : of the shape; None without one.
-    formula : what would describe it; it is no name either.
+    formula : of files written by versions before.
     """
 
     where: str
@@ -103,7 +105,7 @@ class UnnamedRest:
     left_gap : noise SD, with the effects; None where it was not told.
     left_where : the largest gaps that stay, in words. left_shape : None without evidence.
     reasons : why it is not said that nothing else is missing.
-    coordinate : of the shape; None without one. formula : what would describe what stays.
+    coordinate : of the shape; None without one. formula : of files written by versions before.
     """
 
     left_gap: float | None

@@ -38,6 +38,7 @@ made_up: true
 vertebrae: [{vertebrae}]
 gravity: {gravity}
 zeroed_at_step_0: {zeroed}
+accuracy: {{rotation_deg: 0.001, translation_mm: 0.001}}
 """
 MEASUREMENT_SD = """\
 measurement_sd:

@@ -303,6 +303,6 @@ def test_an_exchange_is_told_beside_a_real_effect(tmp_path: Path) -> None:
     make(Recipe(seed=20501, errors=mistakes, hidden=(hidden,)), tmp_path)
     there = grounds_of_folder(tmp_path)
     tried = trials(("nonlinear_stiffening", "marker_bias"), ROTATIONS, list(there.readings), 6)
-    assert look(there, tried, 0, 0.5, 0, 5.0).effects[0].log_evidence > 100.0
+    assert look(there, tried).effects[0].log_evidence > 100.0
     found = suspected_errors(there, list(there.readings.values()), at_once, tried)
     assert [(e.where, e.what) for e in found] == [("s01 and s02", "motion exchanged")]

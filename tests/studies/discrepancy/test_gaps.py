@@ -1,16 +1,10 @@
-"""Gaps pooled by place, and the terms of a law, which are what their words say."""
-
-import re
-from collections.abc import Sequence
+"""Gaps pooled by place."""
 
 import numpy as np
 import pandas as pd
-from sweeps import sweep
 
-from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.search import law_terms
 from spinepipe.studies.discrepancy.search.gaps import KEYS, Gap, GapPlace, _spread, places, worst
-from spinepipe.units import COORDINATES, ROTATIONS, TRANSLATIONS
+from spinepipe.units import ROTATIONS
 
 
 def frame() -> pd.DataFrame:
@@ -62,77 +56,3 @@ def test_values_are_spread_over_what_was_read_test_by_test() -> None:
     assert first[1, 0, 3] == 7.0
     assert (second[0, 0, 3], second[0, 0, 5]) == (8.0, 9.0)
     assert np.isnan(first).sum() + np.isnan(second).sum() == 2 * 12 - 3
-
-
-# Terms of a law
-
-
-def state(joints: int, timed: bool) -> law_terms._TestState:
-    rng = np.random.default_rng(20005)
-    q, rate, load = rng.normal(size=(3, 4, joints, 6))
-    return law_terms._TestState(
-        q, rate if timed else None, rng.integers(-1, 2, q.shape) * 1.0, load
-    )
-
-
-def said(words: str, name: str, at: law_terms._TestState) -> Array:
-    """(T, J) what words say: products and powers of motions by their names, and single words."""
-    own = COORDINATES.index(name)
-    word = name.replace("_", " ")
-    if words.startswith("way of"):
-        return at.way[..., own]
-    if words.startswith("rate of"):
-        assert at.rate is not None
-        return at.rate[..., own]
-    beside = np.zeros_like(at.q[..., own])
-    if words == f"{word} of the joint above":
-        beside[:, :-1] = at.q[:, 1:, own]
-        return beside
-    if words == f"{word} of the joint below":
-        beside[:, 1:] = at.q[:, :-1, own]
-        return beside
-    names = {one: at.q[..., COORDINATES.index(one)] for one in COORDINATES}
-    names["compression"] = -at.load[..., COORDINATES.index("superior")]
-    product = np.ones_like(beside)
-    for part in words.replace(f"{word} |{word}|", "SIGNED").split(" x "):
-        if part == "SIGNED":
-            product = product * names[name] * np.abs(names[name])
-            continue
-        base, _, power = part.partition("^")
-        product = product * names[base.replace(" ", "_")] ** int(power or 1)
-    return product
-
-
-@sweep("read", [("extension",), ROTATIONS, COORDINATES])
-@sweep("joints", [1, 3])
-def test_terms_have_the_values_and_units_of_their_words(read: Sequence[str], joints: int) -> None:
-    at = state(joints, timed=True)
-    for name in read:
-        found = list(law_terms._of(at, name, read))
-        assert len({term.words for term, _ in found}) == len(found)
-        for term, values in found:
-            np.testing.assert_allclose(values, said(term.words, name, at), err_msg=term.words)
-            assert (term.coordinate, term.acts) == (name, law_terms.LOAD)
-            assert term.powers == powers(term.words)
-
-
-def powers(words: str) -> tuple[int, int, int, int]:
-    """Of m, rad, s and N in what the words say."""
-    if words.startswith("way of"):
-        return (0, 0, 0, 0)
-    single = re.sub(r" of the joint (above|below)|^rate of ", "", words)
-    motions = {one.replace("_", " "): one in TRANSLATIONS for one in COORDINATES}
-    longest_first = "|".join(sorted(motions, key=len, reverse=True))
-    moved, turned = 0, 0
-    for word, power in re.findall(rf"({longest_first})(?:\^(\d))?", single):
-        moved += int(power or 1) * motions[word]
-        turned += int(power or 1) * (not motions[word])
-    return (moved, turned, -words.startswith("rate"), int("compression" in words))
-
-
-def test_a_joint_alone_has_no_neighbours_and_superior_no_compression() -> None:
-    words = [term.words for term, _ in law_terms._of(state(1, False), "superior", ("superior",))]
-    assert words == [
-        *("superior", "superior^2", "superior^3", "superior |superior|"),
-        "way of superior (+1, 0, -1)",
-    ]

@@ -31,7 +31,7 @@ RATE = 8.0
 
 FLEXES = "extension_deg"
 PER_SPECIMEN = "base: {stiffness: per_specimen}\n"
-FEW = "bootstrap: 50\neffects: [load_offset, neutral_zone, nonlinear_stiffening]\n"
+FEW = "effects: [load_offset, neutral_zone, nonlinear_stiffening]\n"
 SMALL: dict[str, Any] = {
     "tests": ("flexion", "left_lateral_bending"),
     "cycles": 3,

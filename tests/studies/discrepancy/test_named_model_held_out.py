@@ -30,7 +30,6 @@ kind: discrepancy
 cohort: seen
 base: {stiffness: per_specimen}
 effects: [nonlinear_stiffening, neutral_zone]
-bootstrap: 100
 """
 STUDY = """\
 kind: cohort_stiffness

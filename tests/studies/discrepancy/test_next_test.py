@@ -56,8 +56,8 @@ def pair(seed: int, rival: str):
     """Fits of the true effect and of a rival to the same readings, by the grounds they stand on."""
     grounds, known = grounds_of(readings(seed)), tried([TRUE, rival])
     options = {"coordinate": "extension"}
-    true = fitted(grounds, known[TRUE], shared_form(known[TRUE], **options, shape="exponential"))
-    return grounds, true, fitted(grounds, known[rival], shared_form(known[rival], **options))
+    true = fitted(grounds, shared_form(known[TRUE], **options, shape="exponential"))
+    return grounds, true, fitted(grounds, shared_form(known[rival], **options))
 
 
 def margin_after(seed: int, rival: str, case, noise_seed: int) -> float:
@@ -66,10 +66,7 @@ def margin_after(seed: int, rival: str, case, noise_seed: int) -> float:
     options = {"coordinate": "extension"}
     true = shared_form(known[TRUE], **options, shape="exponential")
     other = shared_form(known[rival], **options)
-    return (
-        fitted(grounds, known[TRUE], true).log_evidence
-        - fitted(grounds, known[rival], other).log_evidence
-    )
+    return fitted(grounds, true).log_evidence - fitted(grounds, other).log_evidence
 
 
 @sweep(
@@ -171,11 +168,9 @@ def test_a_test_done_at_both_rates_needs_no_slower_one():
 def test_a_set_gets_a_test_that_tells_its_names_apart():
     grounds = grounds_of(readings(0))
     effects = ["facet_contact", TRUE]
-    rules = Rules(
-        trials(effects, ROTATIONS, tuple(STIFFNESS), JOINTS), ROTATIONS, 0.01, 50, MARGIN, 3, 0
-    )
+    rules = Rules(trials(effects, ROTATIONS, tuple(STIFFNESS), JOINTS), ROTATIONS, MARGIN, 3, 0)
     found = search(grounds, rules, at_once)
-    ended = outcome(found, MARGIN)
+    ended = outcome(found)
     assert ended.verdict is VerdictKind.SET
     hidden = hidden_effects(found, ended, rules, at_once)
     told = advice(found, ended, rules, bench(grounds, None), at_once, hidden)

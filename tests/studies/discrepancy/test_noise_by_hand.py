@@ -1,6 +1,7 @@
 """Which readings are outliers, and when repeats tell their noise, on both sides of each limit."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -112,18 +113,20 @@ def test_thirty_differences_between_cycles_tell_the_noise(count: int, source: st
         assert estimated_noise([read(cycles)], None, False, 0) is None
 
 
-@sweep("accuracy, share", [(0.5, 1.0), (2.0, None)])
-def test_what_repeats_do_not_show_counts_where_it_is_larger(
-    accuracy: float, share: float | None
-) -> None:
+@sweep("told, assumed", [(2.0, False), (np.nan, True)])
+def test_what_all_cycles_share_is_no_smaller_in_their_mean(told: float, assumed: bool) -> None:
     cycles = np.random.default_rng(20031).normal(size=(2, 40, 1))
     alone = estimated_noise([read(cycles)], None, False, 0)
-    found = estimated_noise([read(cycles)], None, False, 0, np.full(6, accuracy))
+    found = estimated_noise([read(cycles)], None, False, 0, np.full(6, told))
     assert alone is not None
     assert found is not None
-    assert found.sd[3] == (2.0 if share is None else share * alone.sd[3])
-    assert np.isnan(np.delete(found.sd, 3)).all()
-    assert found.correlation == alone.correlation
+    assert (found.sd[3], found.correlation) == (alone.sd[3], alone.correlation)
+    assert found.assumed is assumed
+    assert found.accuracy[3] == pytest.approx(np.deg2rad(0.1) if assumed else told)
+    # a drift changes over the length 0.3 of a test: the Gaussian of a lag of 1 in 10 steps
+    assert found.drift(11)[0, 1] == pytest.approx(np.exp(-0.5 * (0.1 / 0.3) ** 2))
+    zeroed = replace(found, zeroed=True).drift(11)
+    assert np.abs(zeroed[0]).max() == 0.0
 
 
 def test_three_cycles_have_two_differences_a_step() -> None:

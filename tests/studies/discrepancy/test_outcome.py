@@ -1,442 +1,338 @@
-"""The verdict from how a search ended: each reason for it, by itself and beside the others."""
+"""The verdict read off the probabilities of a search: each verdict, each reason, each limit."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
+import pytest
 from sweeps import sweep
 
 from spinepipe.effects import PlaceSpread, Wrench
 from spinepipe.effects.registry import registered
 from spinepipe.model import LoadCase, LoadStep
-from spinepipe.studies.discrepancy.proof.held_out import SCORED, FoldRow, HeldOut
+from spinepipe.studies.discrepancy.proof.held_out import HeldOut
+from spinepipe.studies.discrepancy.search import outcome as outcomes
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
-from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, LackOfFitTest
+from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
 from spinepipe.studies.discrepancy.search.outcome import Outcome, cannot_be_excluded, outcome
-from spinepipe.studies.discrepancy.search.search_state import (
-    Rival,
-    SearchResult,
-    SearchStage,
-    SelectedTerm,
-)
+from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
 from spinepipe.studies.discrepancy.summary import nearest_candidates
 from spinepipe.studies.discrepancy.verdict import Candidate, SuspectedError, VerdictKind
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
-MARGIN = 3.0
 SHAPE = "load over the joint's own extension, shared"
+PLACES = {
+    "creep": "extension",
+    "hysteresis": "extension",
+    "neutral_zone": "right_bending",
+    "load_offset": None,
+    "bending_rotation_coupling": ("right_bending", "left_rotation"),
+}
+"""What each effect of these tests loads; None where it names no coordinate."""
+
+Sets = Mapping[tuple[str, ...], float]
 
 
-def stands(
-    name: str = "creep",
-    rivals: Sequence[tuple[str, float]] = (("hysteresis", 20.0),),
-    log_evidence: float = 40.0,
-    alone: float = 40.0,
-    over_stiffness: float | None = None,
-    coordinate: str = "extension",
-    rivals_known: bool = True,
-) -> SelectedTerm:
-    variant = Variant(name, (("coordinate", coordinate),))
-    supposed = ActiveTerm(CandidateForm(variant, PlaceSpread.SHARED), np.zeros(1))
-    behind = tuple(Rival(*one) for one in rivals)
-    return SelectedTerm(
-        supposed, log_evidence, alone, 100.0, behind, over_stiffness, rivals_known=rivals_known
-    )
+def form(name: str, on: str | tuple[str, ...] | None) -> CandidateForm:
+    options = (("coordinate" if isinstance(on, str) else "pair", on),) if on else ()
+    return CandidateForm(Variant(name, options), PlaceSpread.SHARED)
+
+
+@pytest.fixture(autouse=True)
+def gap_of_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outcomes, "whole_gap", lambda at, fit: Gap(400.0 * at.rms**2, 400.0, 400))
 
 
 def ended(
-    *standing: SelectedTerm,
-    gain: float = 100.0,
-    lack: float = -2.0,
-    generic_threshold: float = 2.0,
-    left: Gap | None = None,
-    elsewhere: float = -2.0,
-    neighbours: float = -2.0,
+    sets: Sets,
+    beside_else: Sets | None = None,
+    lack: str = "extension",
+    tables: Sequence[str] = (),
+    rms: float = 1.0,
+    rms_of_tables: float = 1.0,
+    alone: float = 0.5,
+    unfitted: float = 0.0,
 ) -> SearchResult:
-    """A search whose effects lower chi2 by ``gain``, with the generic basis' evidence behind.
+    """A search that gives these sets of names these probabilities, without and with else.
 
-    All of it in extension; ``elsewhere`` is the basis' evidence in right bending; ``neighbours``
-    that of the neighbouring joints' motion for what the base lacks in extension.
+    What stands are the names of the likeliest set. Something else is looked at in the coordinate
+    ``lack``, and fitted as ``tables`` on theirs; ``rms`` noise SD stay without and with these, and
+    names explain a share ``alone`` of what they do together.
     """
-
-    def grounds(chi2: float) -> BaselineFit:
-        return cast(BaselineFit, SimpleNamespace(fit=SimpleNamespace(chi2=chi2)))
-
-    def of(evidence: float, coordinate: str) -> LackOfFitTest:
-        beside = neighbours if coordinate == "extension" else -2.0
-        shapes = {"own": evidence, "neighbour": beside, "drift": -2.0}
-        return LackOfFitTest(
-            evidence, np.zeros(1), "own", coordinate, PlaceSpread.SHARED, 0.0, shapes
-        )
-
-    at = {"extension": of(lack, "extension"), "right_bending": of(elsewhere, "right_bending")}
-    whole = max(at.values(), key=lambda one: one.log_evidence)
-    basis = LackOfFit(**vars(whole), at=at)
-    gap, none = left or Gap(400.0, 400.0, 420), Gap(10.0, 10.0, 10)
-    of_base = Gap(gap.chi2 + gain, gap.dof, gap.readings)
-    thresholds = dict.fromkeys(at, generic_threshold)
+    every = [(frozenset(names), False, p) for names, p in sets.items()]
+    every += [(frozenset(names), True, p) for names, p in (beside_else or {}).items()]
+    assert sum(p for *_, p in every) == pytest.approx(1.0)
+    every.sort(key=lambda one: -one[2])
+    of = {name: sum(p for names, _, p in every if name in names) for name in PLACES}
+    of["something_else"] = sum(p for _, other, p in every if other)
+    of["nothing"] = sum(p for names, other, p in every if not names and not other)
+    standing = tuple(
+        SelectedTerm(ActiveTerm(form(name, PLACES[name]), np.zeros(1)), of[name], 40.0, 90.0, ())
+        for name in sorted(every[0][0])
+    )
+    tabled = [SimpleNamespace(form=form("tabulated_law", place)) for place in tables]
+    tabled += [one.supposed for one in standing]
+    fit = SimpleNamespace(hypothesis=SimpleNamespace(supposed=tabled), chi2=0.0)
+    with_tables = SimpleNamespace(fit=fit, rms=rms_of_tables)
+    base, final = (SimpleNamespace(fit=SimpleNamespace(chi2=c)) for c in (1e3, 1e3 * (1.0 - alone)))
+    gap = Gap(400.0 * rms**2, 400.0, 400)
     return SearchResult(
-        base=grounds(500.0),
-        final=grounds(500.0 - gain),
+        base=cast(BaselineFit, base),
+        final=cast(BaselineFit, final),
         standing=standing,
-        stages=(first_look(standing),),
-        lack=basis,
-        generic_threshold=generic_threshold,
-        base_gap=of_base,
+        stages=(),
+        probabilities=of,
+        sets=tuple(every),
+        with_tables=cast(BaselineFit, with_tables) if tables else None,
+        lack=cast(LackOfFit, SimpleNamespace(shape=SHAPE, coordinate=lack)),
+        unfitted=unfitted,
+        base_gap=gap,
         final_gap=gap,
-        base_at={"extension": of_base, "right_bending": none},
-        final_at={"extension": gap, "right_bending": none},
-        generic_threshold_at=thresholds,
-        base_lack=basis,
+        base_at={},
+        final_at={},
     )
 
 
-def first_look(standing: Sequence[SelectedTerm]) -> SearchStage:
-    """Each effect on the screen with what it has alone."""
-    effects = [
-        SimpleNamespace(
-            forms=[SimpleNamespace(form=one.supposed.form, log_evidence=one.alone)],
-            log_evidence=one.alone,
-        )
-        for one in standing
-    ]
-    return cast(SearchStage, SimpleNamespace(screen=SimpleNamespace(effects=effects)))
+SURE = ended({("creep",): 0.97, ("hysteresis",): 0.03})
+NULL: Sets = {(): 0.9, ("creep",): 0.1}
+ERROR = SuspectedError("specimen b, L3L4", "sign flipped", "slope -1")
 
 
 def proof(over_base: float | None) -> HeldOut:
     return HeldOut((), {}, None, None, 0.0, over_base)
 
 
-def says(found: SearchResult, **more: Any) -> tuple[str, str]:
-    result = outcome(found, MARGIN, **more)
-    return result.verdict.value, result.why
+def names(result: Outcome) -> list[str]:
+    return [one.name for one in result.named]
 
 
-def assert_unknown(result: Outcome, *words: str) -> None:
-    assert (result.verdict, result.named, result.tied) == (VerdictKind.UNKNOWN, (), ())
+def assert_unknown(result: Outcome, reason: Reason, *words: str) -> None:
+    assert (result.verdict, result.reason) == (VerdictKind.UNKNOWN, reason)
+    assert (result.named, result.tied, result.left) == ((), (), ())
     for word in words:
         assert word in result.why
 
 
-ERROR = SuspectedError("specimen b, L3L4", "sign flipped", "slope -1")
+# Data errors, nothing, and a model of another shape
 
 
-@sweep("found", [ended(stands()), ended(), ended(lack=50.0)])
+@sweep("found", [SURE, ended(NULL), ended({(): 0.04}, {(): 0.96}, rms=9.0)])
 def test_data_that_look_wrong_come_before_everything(found: SearchResult) -> None:
-    result = outcome(found, MARGIN, proof(50.0), [ERROR])
-    assert_unknown(result, "sign flipped (specimen b, L3L4)", "the data look wrong")
+    result = outcome(found, proof(-50.0), [ERROR])
+    assert_unknown(result, Reason.DATA_ERRORS, "sign flipped (specimen b, L3L4)", "look wrong")
 
 
 def test_of_many_errors_three_are_told() -> None:
     errors = [SuspectedError(f"specimen {name}", "units", "") for name in "abcd"]
-    why = outcome(ended(), MARGIN, None, errors).why
+    why = outcome(ended(NULL), None, errors).why
     assert [f"specimen {name}" in why for name in "abcd"] == [True, True, True, False]
 
 
-@sweep(
-    "lack, threshold, verdict",
-    [
-        (-2.0, 2.0, "NULL"),
-        (4.9, 2.0, "NULL"),
-        (5.1, 2.0, "UNKNOWN"),
-        (7.9, 8.0, "NULL"),
-        (8.1, 8.0, "UNKNOWN"),
-    ],
-)
-def test_with_nothing_named_the_generic_basis_tells_nothing_from_something_unknown(
-    lack: float, threshold: float, verdict: str
-) -> None:
-    """Its evidence must exceed the null's, and 5 (very strong) whatever the null shows."""
-    found, why = says(ended(lack=lack, generic_threshold=threshold))
-    assert found == verdict
-    assert (SHAPE in why) == (verdict == "UNKNOWN")
+@sweep("nothing, verdict", [(0.06, "NULL"), (0.04, "NAMED")])
+def test_nothing_is_missing_unless_that_is_hardly_probable(nothing: float, verdict: str) -> None:
+    """As sure as a name must be; what stands then is no matter, nor what it leaves."""
+    result = outcome(ended({(): nothing, ("creep",): 1.0 - nothing}))
+    assert (result.verdict.value, result.reason) == (verdict, None)
+    if verdict == "NULL":
+        assert (result.named, result.tied) == ((), ())
+        assert f"{nothing:.2f}" in result.why
 
 
-def test_what_is_left_to_the_generic_basis_is_unknown() -> None:
-    """Evidence 10 is a drop of chi2 of 20 or so: 20 beside a gain of 100 is a sixth."""
-    assert_unknown(outcome(ended(stands(), lack=10.0), MARGIN), "creep", "17 %")
+@sweep("rms, unknown", [(2.9, False), (3.1, True)])
+def test_where_much_stays_nothing_is_certain(rms: float, unknown: bool) -> None:
+    result = outcome(ended({("creep",): 1.0}, rms=rms))
+    if unknown:
+        assert_unknown(result, Reason.MOST_STAYS, "3.1 noise SD stay")
+    else:
+        assert names(result) == ["creep"]
 
 
-@sweep("lack, threshold", [(5.4, 2.0), (10.0, 11.0)])
-def test_little_left_or_no_more_than_the_null_shows_is_no_matter(
-    lack: float, threshold: float
-) -> None:
-    """10.8 of 110.8 is less than a tenth."""
-    found = ended(stands(), lack=lack, generic_threshold=threshold)
-    assert says(found)[0] == "NAMED"
+@sweep("other, stays", [(0.4, True), (0.6, False)])
+def test_what_something_else_explains_does_not_stay(other: float, stays: bool) -> None:
+    """If it is likelier there than not: else the model stands without it."""
+    sets: Sets = {("neutral_zone",): 1.0 - other}
+    tables = ["extension"]
+    found = ended(sets, {("neutral_zone",): other}, tables=tables, rms=9.0, rms_of_tables=1.1)
+    result = outcome(found)
+    if stays:
+        assert_unknown(result, Reason.MOST_STAYS, "9.0 noise SD")
+    else:
+        assert result.verdict is VerdictKind.PART
+    worse = ended({(): 0.02}, {(): 0.98}, tables=tables, rms=9.0, rms_of_tables=3.1)
+    assert_unknown(outcome(worse), Reason.MOST_STAYS, "3.1 noise SD")
 
 
-def test_effects_that_only_mend_one_another_imitate_something_else() -> None:
-    prop = stands("load_offset", log_evidence=40.0, alone=9.0)
-    result = outcome(ended(stands(), prop), MARGIN)
-    assert_unknown(result, "creep and load_offset imitate", "nothing speaks for load_offset")
-    enough = stands("load_offset", log_evidence=40.0, alone=11.0)
-    assert says(ended(stands(), enough))[0] == "NAMED"
+@sweep("unfitted, verdict", [(0.45, "NAMED"), (0.55, "SET")])
+def test_while_much_rests_on_looks_alone_nothing_is_sure(unfitted: float, verdict: str) -> None:
+    """There may yet be a rival among what was not fitted."""
+    result = outcome(ended({("creep",): 0.97, ("hysteresis",): 0.03}, unfitted=unfitted))
+    assert result.verdict.value == verdict
+    assert names(result) == (["creep"] if verdict == "NAMED" else [])
 
 
-def test_a_small_prop_takes_no_name_from_what_explains_nearly_all() -> None:
-    """A tenth of what both explain is the limit: gains of 1000 and 100."""
-    prop = stands("load_offset", log_evidence=40.0, alone=1.0)
-    sure = replace(stands(), gain=1000.0)
-    result = outcome(ended(sure, prop, gain=1100.0), MARGIN)
-    assert (result.verdict, result.named) == (VerdictKind.PART, (sure,))
-    assert_unknown(outcome(ended(replace(sure, gain=890.0), prop, gain=990.0), MARGIN), "imitate")
+# Something else
 
 
-def test_one_effect_has_nothing_to_mend() -> None:
-    assert says(ended(stands(alone=1.0)))[0] == "NAMED"
+@sweep("found", [ended({(): 0.04, ("creep",): 0.2}, {(): 0.76}), ended({(): 0.03}, {(): 0.97})])
+def test_something_else_has_no_name(found: SearchResult) -> None:
+    assert_unknown(outcome(found), Reason.NO_KNOWN_EFFECT, SHAPE, "something else, with prob")
 
 
-@sweep(
-    "excess, dof, verdict",
-    [
-        (120.0, 400.0, "UNKNOWN"),
-        (90.0, 400.0, "NAMED"),
-        (120.0, 4000.0, "NAMED"),
-        (900.0, 10000.0, "NAMED"),
-    ],
-)
-def test_most_of_a_gap_must_close_if_more_than_a_small_one_stays(
-    excess: float, dof: float, verdict: str
-) -> None:
-    """chi2 has an SD of sqrt(2 dof): 28, and 89 of 4000 readings, where 120 may be noise; 900 of
-    10000 are none, but a gap of 0.3 of the noise at most."""
-    found, why = says(ended(stands(), left=Gap(dof + excess, dof, int(dof))))
-    assert found == verdict
-    assert ("most of the discrepancy stays" in why) == (verdict == "UNKNOWN")
-
-
-@sweep(
-    "given, verdict",
-    [
-        (None, "NAMED"),
-        (proof(None), "NAMED"),
-        (proof(12.0), "NAMED"),
-        (proof(-0.1), "UNKNOWN"),
-        (proof(0.0), "NAMED"),
-    ],
-)
-def test_names_must_predict_what_was_held_out(given: HeldOut | None, verdict: str) -> None:
-    """Where nothing that was scored hangs on the effects, it speaks neither for nor against."""
-    found, why = says(ended(stands(), stands("load_offset")), proof=given)
-    assert found == verdict
+@sweep("other, verdict", [(0.49, "NAMED"), (0.51, "UNKNOWN")])
+def test_something_else_on_the_same_coordinate_silences_a_name(other: float, verdict: str) -> None:
+    """It may only mend what something else gets wrong."""
+    found = ended({("creep",): 1.0 - other}, {("creep",): other})
+    result = outcome(found)
+    assert result.verdict.value == verdict
     if verdict == "UNKNOWN":
-        assert "creep and load_offset would explain" in why
-        assert "held-out" in why
+        assert_unknown(result, Reason.A_PART_STAYS, "creep would explain a part", f"{other:.2f}")
 
 
-@sweep(
-    "base, with_effects, verdict",
-    [
-        (100.0, 129.0, "PART"),
-        (100.0, 131.0, "UNKNOWN"),
-        (2050.0, 2149.0, "PART"),
-        (2050.0, 2151.0, "UNKNOWN"),
-    ],
-)
-def test_unseen_tests_must_not_be_predicted_worse(
-    base: float, with_effects: float, verdict: str
+def test_something_else_on_another_coordinate_leaves_a_part() -> None:
+    result = outcome(ended({("neutral_zone",): 0.3}, {("neutral_zone",): 0.7}))
+    assert (result.verdict, names(result)) == (VerdictKind.PART, ["neutral_zone"])
+    assert (result.reason, result.tied) == (None, ())
+    (left,) = result.left
+    assert SHAPE in left
+    assert "neutral_zone (1.00); but more stays" in result.why
+
+
+def test_of_two_names_the_one_apart_from_something_else_is_told() -> None:
+    both = ("creep", "neutral_zone")
+    result = outcome(ended({both: 0.3}, {both: 0.7}))
+    assert (result.verdict, names(result)) == (VerdictKind.PART, ["neutral_zone"])
+
+
+def test_where_something_else_was_fitted_its_tables_say_where() -> None:
+    """The look sees it in extension, the fit in bending."""
+    found = ended({("neutral_zone",): 0.3}, {("neutral_zone",): 0.7}, tables=["right_bending"])
+    assert_unknown(outcome(found), Reason.A_PART_STAYS)
+    both = ended({("creep",): 0.3}, {("creep",): 0.7}, tables=["right_bending", "anterior"])
+    assert names(outcome(both)) == ["creep"]
+    too = ended({("creep",): 0.3}, {("creep",): 0.7}, tables=["right_bending", "extension"])
+    assert_unknown(outcome(too), Reason.A_PART_STAYS)
+
+
+@sweep("alone, told", [(0.81, True), (0.79, False)])
+def test_what_explains_most_by_itself_is_told_beside_something_else(
+    alone: float, told: bool
 ) -> None:
-    """Whatever specimens say: worse by 30, and by a twentieth of what the base misses (2000).
-
-    Worse at all, beyond noise, is no full name either: predictions are 5 noise SD apart here.
-    """
-
-    def fold(kind: str, *sizes: float) -> FoldRow:
-        before, after = (Gap(chi2, 50.0, 50) for chi2 in sizes)
-        return FoldRow(kind, kind, 50, 50, before, after, None, 50.0, SCORED, "", 25.0)
-
-    folds = (fold("test", base, with_effects), fold("specimen", 5000.0, 60.0))
-    whole = replace(proof(4900.0), folds=folds)
-    assert says(ended(stands()), proof=whole)[0] == verdict
+    """Then its formula is not that of nature; a look alone does not say how much it explains."""
+    sets, beside = {("creep",): 0.3}, {("creep",): 0.7}
+    result = outcome(ended(sets, beside, tables=["extension"], alone=alone))
+    assert result.verdict is (VerdictKind.PART if told else VerdictKind.UNKNOWN)
+    assert_unknown(outcome(ended(sets, beside, alone=alone)), Reason.A_PART_STAYS)
 
 
-def test_nothing_named_needs_no_proof() -> None:
-    assert says(ended(), proof=proof(0.0))[0] == "NULL"
+def test_what_acts_on_no_coordinate_of_its_own_is_nowhere_apart() -> None:
+    found = ended({("load_offset",): 0.3}, {("load_offset",): 0.7})
+    assert_unknown(outcome(found), Reason.A_PART_STAYS)
 
 
-@sweep(
-    "over, verdict",
-    [(2.9, "PART"), (-4.0, "PART"), (3.0, "NAMED"), (None, "NAMED")],
-)
-def test_many_strengths_must_do_more_than_a_stiffness_of_each_joint(
-    over: float | None, verdict: str
+def test_an_effect_on_two_coordinates_is_apart_where_else_is_on_one() -> None:
+    pair = ("bending_rotation_coupling",)
+    assert names(outcome(ended({pair: 0.3}, {pair: 0.7}, lack="right_bending"))) == list(pair)
+    both = ["left_rotation", "right_bending"]
+    assert_unknown(outcome(ended({pair: 0.3}, {pair: 0.7}, tables=both)), Reason.A_PART_STAYS)
+
+
+def test_without_any_name_that_is_likely_there_is_no_known_effect() -> None:
+    """Nothing is hardly probable, else not even; names share the rest, none of it most."""
+    found = ended({(): 0.04, ("creep",): 0.25, ("hysteresis",): 0.22}, {(): 0.49})
+    assert_unknown(outcome(found), Reason.NO_KNOWN_EFFECT)
+
+
+# Names and sets
+
+
+def test_a_sure_name_is_told_with_its_probability() -> None:
+    result = outcome(SURE)
+    assert (result.verdict, names(result)) == (VerdictKind.NAMED, ["creep"])
+    assert (result.reason, result.tied, result.left) == (None, (), ())
+    assert result.why == "creep (0.97)"
+    two = outcome(ended({("creep", "neutral_zone"): 0.98, ("creep",): 0.02}))
+    assert two.why == "creep (1.00) and neutral_zone (0.98)"
+
+
+@sweep("p, verdict", [(0.949, "SET"), (0.951, "NAMED")])
+def test_a_name_is_sure_from_nineteen_in_twenty(p: float, verdict: str) -> None:
+    result = outcome(ended({("creep",): p, ("hysteresis",): 1.0 - p}))
+    assert result.verdict.value == verdict
+    if verdict == "SET":
+        assert (names(result), result.tied) == ([], ("creep", "hysteresis"))
+        assert result.why.endswith("cannot tell which: creep or hysteresis")
+
+
+@sweep("least, told", [(0.021, True), (0.019, False)])
+def test_a_set_lists_no_name_that_is_hardly_probable(least: float, told: bool) -> None:
+    sets = {(): 0.04, ("hysteresis",): 0.86, ("creep",): 0.03, ("load_offset",): least}
+    rare = {("neutral_zone",): 0.018, ("load_offset", "neutral_zone"): 0.017}
+    result = outcome(ended(sets | rare | {("creep", "neutral_zone"): 0.035 - least}))
+    expected = ("hysteresis", "creep", *(["load_offset"] if told else []))
+    assert (result.verdict, result.tied) == (VerdictKind.SET, expected)
+
+
+def test_a_set_ends_where_its_names_hold_nearly_all() -> None:
+    """Of 0.97 that some name is missing the first two have 0.93: more than 19 in 20."""
+    sets = {("creep",): 0.60, ("hysteresis",): 0.33, ("load_offset",): 0.04, (): 0.03}
+    assert outcome(ended(sets)).tied == ("creep", "hysteresis")
+
+
+def test_beside_a_tie_what_is_sure_is_named() -> None:
+    """In every set, the zone is; with which of two, nobody can tell."""
+    sets = {("creep", "neutral_zone"): 0.5, ("hysteresis", "neutral_zone"): 0.4}
+    result = outcome(ended(sets | {("neutral_zone",): 0.1}))
+    assert (result.verdict, names(result)) == (VerdictKind.SET, ["neutral_zone"])
+    assert result.tied == ("creep", "hysteresis")
+
+
+@sweep("alone, verdict", [(0.51, "NAMED"), (0.49, "SET")])
+def test_further_names_are_told_where_it_is_likelier_that_there_is_one(
+    alone: float, verdict: str
 ) -> None:
-    """Alone it has no name; beside a sure effect it is what stays."""
-    other = stands("load_offset", coordinate="right_bending")
-    found, why = says(ended(other, stands(over_stiffness=over)))
-    assert found == verdict
-    assert ("creep explains no more than a stiffness" in why) == (verdict == "PART")
-    alone = "UNKNOWN" if verdict == "PART" else "NAMED"
-    assert says(ended(stands(over_stiffness=over)))[0] == alone
+    """Spread over several, each less than sure."""
+    more = {("creep", "neutral_zone"): 0.3, ("creep", "load_offset"): 0.7 - alone}
+    found = ended({("creep",): alone} | more)
+    result = outcome(found)
+    assert (result.verdict.value, names(result)) == (verdict, ["creep"])
 
 
-def test_what_stays_elsewhere_does_not_silence_an_effect() -> None:
-    """Right bending is unexplained: the effect in extension is there, and not all."""
-    found = ended(stands(), elsewhere=60.0)
-    result = outcome(found, MARGIN)
-    assert (result.verdict, result.named) == (VerdictKind.PART, found.standing)
-    assert "right bending" in result.left[0]
-    assert_unknown(outcome(ended(stands(), lack=60.0), MARGIN), "stays in extension")
-
-
-def test_a_trifle_elsewhere_is_no_part() -> None:
-    """Evidence 6 is a drop of chi2 of 12: a fiftieth of what the effect explains is 20."""
-    assert says(ended(stands(), elsewhere=6.0, gain=1000.0))[0] == "NAMED"
-    assert says(ended(stands(), elsewhere=6.0, gain=500.0))[0] == "PART"
-
-
-def test_effects_on_other_coordinates_are_no_props() -> None:
-    prop = stands("load_offset", log_evidence=40.0, alone=9.0, coordinate="right_bending")
-    assert says(ended(stands(), prop))[0] == "NAMED"
-
-
-def test_without_rivals_there_is_no_name() -> None:
-    unknown = stands("load_offset", rivals=(), rivals_known=False, coordinate="right_bending")
-    assert_unknown(outcome(ended(unknown), MARGIN), "its rivals are not known")
-    sure = stands()
-    result = outcome(ended(sure, unknown), MARGIN)
-    assert (result.verdict, result.named) == (VerdictKind.PART, (sure,))
-
-
-def test_what_closes_less_than_half_of_the_held_out_gap_is_a_part() -> None:
-    base = Gap(500.0, 100.0, 100)
-    for after, verdict in ((250.0, "NAMED"), (350.0, "PART")):
-        both = replace(proof(500.0 - after), base=base, with_effects=Gap(after, 100.0, 100))
-        assert says(ended(stands()), proof=replace(both, expected=100.0))[0] == verdict
-
-
-def test_ties_come_after_what_is_unexplained_or_unproven() -> None:
-    tie = stands(rivals=[("hysteresis", 1.0)])
-    assert says(ended(tie))[0] == "SET"
-    assert says(ended(tie, lack=10.0))[0] == "UNKNOWN"
-    assert says(ended(tie), proof=proof(-5.0))[0] == "UNKNOWN"
-
-
-def test_rivals_within_the_margin_make_a_set() -> None:
-    rivals = [("hysteresis", -0.5), ("load_offset", 2.9), ("marker_bias", 3.0)]
-    result = outcome(ended(stands(rivals=rivals)), MARGIN)
-    assert (result.verdict, result.named) == (VerdictKind.SET, ())
-    assert result.tied == ("creep", "hysteresis", "load_offset")
-    assert "creep, hysteresis or load_offset" in result.why
+def test_two_that_are_missing_together_are_both_in_the_set() -> None:
+    sets = {("creep", "neutral_zone"): 0.6, ("hysteresis",): 0.4}
+    result = outcome(ended(sets))
+    assert (names(result), result.tied) == ([], ("creep", "neutral_zone", "hysteresis"))
 
 
 def test_what_was_not_recorded_excludes_no_rival() -> None:
     """Without times creep is never fitted: evidence for friction is none against creep."""
-    friction = stands("hysteresis", rivals=[("creep", 40.0)])
-    result = outcome(ended(friction), MARGIN, not_excluded={"hysteresis": ("creep",)})
-    assert (result.verdict, result.tied) == (VerdictKind.SET, ("hysteresis", "creep"))
-    assert says(ended(friction))[0] == "NAMED"
+    friction = ended({("hysteresis", "neutral_zone"): 1.0})
+    result = outcome(friction, not_excluded={"hysteresis": ("creep",), "neutral_zone": ()})
+    assert (result.verdict, names(result)) == (VerdictKind.SET, ["neutral_zone"])
+    assert result.tied == ("hysteresis", "creep")
+    beside = ended({("creep", "hysteresis"): 1.0})
+    named = outcome(beside, not_excluded={"hysteresis": ("creep",)})
+    assert names(named) == ["creep", "hysteresis"]  # it is there as well
 
 
-def test_beside_a_tie_what_is_sure_is_named() -> None:
-    sure = stands("local_laxity")
-    result = outcome(ended(stands(rivals=[("hysteresis", 1.0)]), sure), MARGIN)
-    assert (result.verdict, result.named) == (VerdictKind.SET, (sure,))
-    assert result.tied == ("creep", "hysteresis")
+@sweep("over_base, verdict", [(None, "NAMED"), (12.0, "NAMED"), (0.0, "NAMED"), (-0.1, "UNKNOWN")])
+def test_names_must_predict_what_was_held_out(over_base: float | None, verdict: str) -> None:
+    """Where nothing that was scored hangs on the effects, it speaks neither for nor against."""
+    result = outcome(SURE, proof(over_base))
+    assert result.verdict.value == verdict
+    if verdict == "UNKNOWN":
+        assert_unknown(result, Reason.NOT_PROVEN, "creep would explain", "held-out")
 
 
-def test_effects_that_stand_beside_one_another_are_no_ties() -> None:
-    one = stands("creep", rivals=[("hysteresis", 1.0), ("load_offset", 9.0)])
-    other = stands("hysteresis", rivals=[("creep", 0.5)])
-    result = outcome(ended(one, other), MARGIN)
-    assert (result.verdict, result.named, result.tied) == (VerdictKind.NAMED, (one, other), ())
-    assert result.why.startswith("creep and hysteresis: ")
+def test_a_set_and_nothing_need_no_proof() -> None:
+    assert outcome(ended(NULL), proof(-9.0)).verdict is VerdictKind.NULL
+    tie = ended({("creep",): 0.6, ("hysteresis",): 0.4})
+    assert outcome(tie, proof(-9.0)).verdict is VerdictKind.SET
 
 
-def test_an_effect_on_another_coordinate_is_still_a_rival_here() -> None:
-    """Stiffening is sure in extension; in bending it is as likely as what stands there."""
-    sure = stands("nonlinear_stiffening", rivals=[("facet_contact", 90.0)])
-    here = stands(
-        "facet_contact", rivals=[("nonlinear_stiffening", 0.5)], coordinate="right_bending"
-    )
-    result = outcome(ended(sure, here), MARGIN)
-    assert (result.verdict, result.named) == (VerdictKind.SET, (sure,))
-    assert result.tied == ("facet_contact", "nonlinear_stiffening")
-
-
-def test_an_effect_in_two_coordinates_has_one_name() -> None:
-    result = outcome(ended(stands(), stands(), stands("load_offset")), MARGIN)
-    assert result.why.startswith("creep and load_offset: ")
-    assert len(result.named) == 3
-
-
-@sweep(
-    "found, more, reason",
-    [
-        (ended(), {"errors": [ERROR]}, Reason.DATA_ERRORS),
-        (ended(lack=50.0), {}, Reason.NO_KNOWN_EFFECT),
-        (ended(stands(), lack=10.0), {}, Reason.A_PART_STAYS),
-        (ended(stands(), left=Gap(1900.0, 1000.0, 1000)), {}, Reason.MOST_STAYS),
-        (ended(stands(), stands("load_offset", alone=1.0)), {}, Reason.IMITATED_TOGETHER),
-        (ended(stands(over_stiffness=0.0)), {}, Reason.STIFFNESS_OF_EACH_JOINT),
-        (ended(stands()), {"proof": proof(-5.0)}, Reason.NOT_PROVEN),
-        (ended(stands()), {}, None),
-        (ended(), {}, None),
-    ],
-)
-def test_why_there_is_no_name_is_told_to_programs_too(
-    found: SearchResult, more: dict[str, Any], reason: Reason | None
-) -> None:
-    result = outcome(found, MARGIN, **more)
-    assert result.reason is reason
-    assert (result.verdict is VerdictKind.UNKNOWN) == (reason is not None)
-
-
-@sweep(
-    "neighbours, verdict",
-    [(-2.0, "NAMED"), (42.0, "NAMED"), (44.0, "UNKNOWN"), (400.0, "UNKNOWN")],
-)
-def test_a_shape_that_no_known_effect_has_and_that_fits_better_leaves_no_name(
-    neighbours: float, verdict: str
-) -> None:
-    """The effect has 40 alone; a name needs the generic shape to be no more than 3 ahead."""
-    assert says(ended(stands(), neighbours=neighbours))[0] == verdict
-
-
-def test_a_shape_that_all_effects_together_leave_behind_takes_no_name() -> None:
-    two = (stands("level_dependence"), stands("creep"))
-    assert says(ended(*two, neighbours=60.0))[0] == "NAMED"
-    assert says(ended(*two, neighbours=80.0))[0] == "UNKNOWN"
-
-
-def test_a_shape_on_another_coordinate_takes_no_name() -> None:
-    assert says(ended(stands(coordinate="right_bending"), neighbours=400.0))[0] != "UNKNOWN"
-
-
-@sweep(
-    "margins, tied",
-    [
-        ((3.6,), ()),
-        ((3.5, 3.8), ("creep", "a", "b")),
-        ((3.6, 5.0), ()),
-        ((3.1, 3.9, 9.0), ("creep", "a", "b")),
-        ((2.9, 4.5), ("creep", "a")),
-    ],
-)
-def test_odds_are_against_all_rivals_together(
-    margins: Sequence[float], tied: tuple[str, ...]
-) -> None:
-    """exp(-3.5) + exp(-3.8) is more than exp(-3), exp(-3.6) + exp(-5) is not."""
-    rivals = list(zip("abc", margins, strict=False))
-    assert outcome(ended(stands(rivals=rivals)), MARGIN).tied == tied
-
-
-def test_a_shape_that_a_load_over_the_own_motion_has_as_well_takes_no_name() -> None:
-    """Coordinates that move together are shapes of each other."""
-    found = ended(stands(), neighbours=400.0)
-    of_own = replace(
-        found.base_lack,
-        at={
-            name: replace(one, by_family=one.by_family | {"own": 398.0})
-            for name, one in found.base_lack.at.items()
-        },
-    )
-    assert says(replace(found, base_lack=of_own))[0] == "NAMED"
+# Candidates that are told
 
 
 def test_a_set_is_told_where_its_names_are_near() -> None:

@@ -153,12 +153,3 @@ def test_a_load_that_holds_moves_the_other_way() -> None:
     assert second[3, 0, 4, 0] == pytest.approx(-1.0 / 40.0, rel=1e-6)
     assert np.abs(second[3, ..., 1:]).max() < 1e-12  # of the other joints
     assert np.abs(np.delete(second, 3, axis=0)).max() < 1e-12
-
-
-def test_joints_hold_what_is_put_on_them() -> None:
-    extension, bending = SolvedSpecimen(
-        chain("a", 40.0), cases(("extension", "bending")), False
-    ).held
-    for joint in range(JOINTS):
-        assert extension[:, joint, EXTENSION] == pytest.approx(MOMENTS_NM, abs=1e-6)
-        assert bending[:, joint, 4] == pytest.approx(MOMENTS_NM, abs=1e-6)

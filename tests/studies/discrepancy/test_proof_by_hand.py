@@ -1,4 +1,4 @@
-"""What a held-out proof says of chi2 that is given, and of terms whose columns are."""
+"""What a held-out proof says of chi2 that is given."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -23,11 +23,9 @@ from spinepipe.studies.discrepancy.proof.folds import (
     step_fold,
 )
 from spinepipe.studies.discrepancy.proof.held_out import (
-    ChosenTerm,
     HeldOutMotion,
     fill,
     pool_folds,
-    with_terms,
 )
 from spinepipe.studies.discrepancy.search.gaps import Gap
 
@@ -182,31 +180,6 @@ def test_some_readings_of_a_test_are_kept_by_step_or_by_place() -> None:
     places = np.zeros(test.count.shape, dtype=bool)
     places[2, 1, 4] = True
     assert np.argwhere(np.isfinite(only(test, places).cycles[0])).tolist() == [[2, 1, 4]]
-
-
-# Terms besides
-
-
-def test_terms_move_readings_by_their_prior_sd_where_they_are() -> None:
-    plain, _ = linear_model(("a", "b"))
-    moved = {
-        name: tuple(np.ones(c.shape[:3]) for c in one.by_x) for name, one in plain.members.items()
-    }
-    terms = [ChosenTerm({"b": moved["b"]}, 3.0), ChosenTerm(moved, 5.0)]
-    found = with_terms(plain, terms)
-    known = len(plain.mean)
-    for name, numbers, sizes in (("a", [known + 1], [5.0]), ("b", [known, known + 1], [3.0, 5.0])):
-        one, before = found.members[name], plain.members[name]
-        count = len(before.numbers)
-        assert one.numbers.tolist() == [*before.numbers.tolist(), *numbers]
-        for columns, old in zip(one.by_x, before.by_x, strict=True):
-            assert (columns[..., :count] == old).all()
-            assert (columns[..., count:] == sizes).all()
-    assert found.mean[known:].tolist() == [0.0, 0.0]
-    assert found.sd[known:].tolist() == [1.0, 1.0]
-    assert found.low[known:].tolist() == [-np.inf, -np.inf]
-    assert found.high[known:].tolist() == [np.inf, np.inf]
-    assert (found.mean[:known] == plain.mean).all()
 
 
 @sweep("units", [1.0, 1e6])

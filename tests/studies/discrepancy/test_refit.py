@@ -1,4 +1,4 @@
-"""Which forms of the screen are refitted, and where their fits start."""
+"""Where fits of a form start, and what a fit that is none comes to."""
 
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -13,18 +13,15 @@ from spinepipe.studies.discrepancy.search import refit as refits_of
 from spinepipe.studies.discrepancy.search.hypothesis import (
     ActiveTerm,
     CandidateForm,
-    Trials,
     Variant,
 )
 from spinepipe.studies.discrepancy.search.refit import (
-    Refit,
-    leading,
     refit,
     standing,
     starting_term,
     weaker,
 )
-from spinepipe.studies.discrepancy.search.screen import Screen, Screened, ScreenedVariant
+from spinepipe.studies.discrepancy.search.screen import ScreenedVariant
 
 
 def variant(name: str, coordinate: str = "extension") -> Variant:
@@ -43,55 +40,6 @@ def tried(
     sds: tuple[float, ...] = (),
 ) -> ScreenedVariant:
     return ScreenedVariant(form, sds, tuple(strengths), log_evidence, np.array(estimate), 0.0)
-
-
-def of(name: str, *evidence: float) -> Screened:
-    """An effect whose variants, one for each evidence, act on different coordinates."""
-    forms = [
-        tried(CandidateForm(variant(name, f"c{number}"), PlaceSpread.SHARED), one)
-        for number, one in enumerate(evidence)
-    ]
-    return Screened(name, max(evidence), np.zeros(1), tuple(forms))
-
-
-def leaders(*effects: Screened) -> list[ScreenedVariant]:
-    return list(leading(Screen(effects, 5.0, 1)))
-
-
-def refitted(*effects: Screened) -> list[tuple[str, float]]:
-    return [(one.form.name, one.log_evidence) for one in leaders(*effects)]
-
-
-# Which
-
-
-def test_the_first_two_effects_have_three_variants_refitted_the_next_two_one() -> None:
-    effects = [of(name, 100.0, 99.0, 98.0, 97.0) for name in "abcde"]
-    assert refitted(*effects) == [
-        *[(name, 100.0 - n) for name in "ab" for n in range(3)],
-        *[(name, 100.0) for name in "cd"],
-    ]
-
-
-@sweep("best, least", [(100.0, 19.0), (40.0, 4.0), (24.0, 0.0), (8.0, 0.0)])
-def test_an_effect_may_trail_by_three_quarters_and_six(best: float, least: float) -> None:
-    """The screen is linear, a refit is not; without evidence none is worth it."""
-    assert refitted(of("a", best), of("b", least + 0.1)) == [("a", best), ("b", least + 0.1)]
-    assert refitted(of("a", best), of("b", least - 0.1)) == [("a", best)]
-    assert refitted(of("a", best, least + 0.1)) == [("a", best), ("a", least + 0.1)]
-    assert refitted(of("a", best, least - 0.1)) == [("a", best)]
-
-
-def test_the_form_of_equal_values_is_refitted_beside_the_best_of_its_variant() -> None:
-    each, shared, joint = (
-        CandidateForm(ZONE, s) for s in (PlaceSpread.EACH, PlaceSpread.SHARED, PlaceSpread.BY_JOINT)
-    )
-    other = CandidateForm(variant("neutral_zone", "right_bending"), PlaceSpread.SHARED)
-    first = tried(each, 50.0), tried(joint, 45.0), tried(other, 42.0)
-    for evidence, expected in ((40.0, [each, other, shared]), (6.0, [each, other])):
-        forms = (*first, tried(shared, evidence))
-        found = leaders(Screened("neutral_zone", 50.0, np.zeros(1), forms))
-        assert [one.form for one in found] == expected  # three quarters and six behind 50 is 6.5
 
 
 # Where from
@@ -191,59 +139,31 @@ class Fits:
         return SimpleNamespace(usable=self.usable.pop(0), chi2=60.0)
 
 
-def test_a_form_adds_the_unknowns_of_its_own() -> None:
-    form = CandidateForm(ZONE, PlaceSpread.SHARED)
-    fit = fit_of([(0, 0, 0.0), (1, 0, 0.0), (1, 1, 0.0), (2, 0, 0.0)], *[None] * 2)  # type: ignore[list-item]
-    assert Refit(form, fit, 0.0, 0.0).unknowns == 2  # of the last, the second
-
-
 def refit_with(fits: Fits, monkeypatch: pytest.MonkeyPatch, degenerate: bool = False) -> Any:
     monkeypatch.setattr(refits_of, "_degenerate", lambda fit, number: degenerate)
-    monkeypatch.setattr(refits_of, "laplace", lambda fit, number, gain: 0.5 * gain)
-    form = CandidateForm(LEVELS, PlaceSpread.SHARED)
+    monkeypatch.setattr(refits_of, "joint_log_evidence", lambda base, fit: base - fit.chi2)
+    monkeypatch.setattr(refits_of, "formula_error", lambda baseline: 3.0)
+    monkeypatch.setattr(refits_of, "joint_fit", fits)
     before = fit_of([])
     before.chi2, before.poses = 100.0, None
-    grounds: Any = SimpleNamespace(fit=before, setting=None, suppose=lambda supposed: supposed)
-    trials = Trials("", (LEVELS, ZONE), (form,))
-    monkeypatch.setattr(refits_of, "joint_fit", fits)
-    return refit(grounds, ActiveTerm(form, np.array([32.0])), trials)
+    beside: Any = SimpleNamespace(fit=before, setting=None, suppose=tuple, at=lambda fit: fit)
+    form = CandidateForm(LEVELS, PlaceSpread.SHARED)
+    base: Any = 95.0
+    return refit(base, beside, ActiveTerm(form, np.array([32.0])))
 
 
 @pytest.mark.parametrize("failures", [0, 1, 2])
 def test_what_tips_over_is_tried_again_closer_to_off(
     failures: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Its evidence is that of all effects over the base; chi2 has fallen from the fit before."""
     fits = Fits(*[False] * failures, True)
     found = refit_with(fits, monkeypatch)
     assert fits.starts == pytest.approx([32.0, 32.0**0.5, 32.0**0.2][: failures + 1])
-    assert (found.gain, found.log_evidence) == pytest.approx((40.0, 20.0 - np.log(2.0)))
+    assert (found.gain, found.log_evidence) == pytest.approx((40.0, 35.0 + 3.0))
 
 
 def test_without_a_fit_there_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
     for fits, degenerate in ((Fits(False, False, False), False), (Fits(True), True)):
         found = refit_with(fits, monkeypatch, degenerate)
         assert (found.gain, found.log_evidence) == (-np.inf, -np.inf)
-
-
-def test_the_two_that_lead_are_refitted_with_equal_values_too() -> None:
-    """Where the screen has that form and it was not tried yet."""
-    spreads = PlaceSpread.EACH, PlaceSpread.BY_JOINT, PlaceSpread.SHARED
-    effects = [
-        Screened(v.effect, 9.0, np.zeros(1), tuple(tried(CandidateForm(v, s)) for s in spreads))
-        for v in (ZONE, LEVELS, LAXITY)
-    ]
-    screen = Screen(tuple(effects), 5.0, 1)
-
-    def found(v: Variant, log_evidence: float, spread: PlaceSpread = PlaceSpread.EACH) -> Any:
-        start = ActiveTerm(CandidateForm(v, spread), v.off((0.0,) * len(v.shapes)))
-        fit = fit_of([(0, 0, -0.25)], start)
-        return SimpleNamespace(name=v.effect, form=start.form, log_evidence=log_evidence, fit=fit)
-
-    ranked = [found(LAXITY, 5.0), found(LEVELS, 7.0), found(ZONE, 8.0)]
-    simple = list(refits_of._simpler(ranked, screen, ()))
-    assert [one.form for one in simple] == [
-        CandidateForm(v, PlaceSpread.SHARED) for v in (ZONE, LEVELS)
-    ]
-    assert simple[0].start[0] == pytest.approx(0.75)  # from where the other form ended
-    known = [found(ZONE, 8.0), found(ZONE, 3.0, PlaceSpread.SHARED), found(LEVELS, -np.inf)]
-    assert list(refits_of._simpler(known, screen, ())) == []

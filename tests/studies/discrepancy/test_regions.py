@@ -22,7 +22,7 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     hypothesis,
 )
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit, Setting, joint_fit
-from spinepipe.studies.discrepancy.search.model_files import standard_errors
+from spinepipe.studies.discrepancy.search.model_files import covariance
 from spinepipe.studies.discrepancy.search.noise import Noise
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 from spinepipe.studies.discrepancy.search.regions import (
@@ -152,7 +152,7 @@ def local(fit: JointFit, name: str) -> float:
         for k, u in enumerate(fit.hypothesis.unknowns)
         if u.supposed == 0 and parameters[u.column].name == name
     )
-    return float(standard_errors(fit)[at])
+    return float(np.sqrt(covariance(fit)[at, at]))
 
 
 def test_loads_that_stay_inside_a_zone_do_not_tell_where_it_ends() -> None:

@@ -42,6 +42,7 @@ source: made up
 vertebrae: [C7, C6]
 gravity: false
 measurement_sd: {rotation_deg: 0.1, translation_mm: 0.02, force_n: 1.0}
+accuracy: {rotation_deg: 0.001, translation_mm: 0.0002, force_n: 0.01}
 """
 SUPPORTS = """\
 specimen,test,joint,coordinate,state,reaction
@@ -100,7 +101,9 @@ def test_a_study_says_before_its_cohort_how_large_the_noise_is(tmp_path: Path) -
     for study, mm, deg in ((STUDY, 0.02, 0.1), (own, 0.5, 0.2)):
         expected = [1e-3 * mm] * 3 + [np.deg2rad(deg)] * 3
         assert prepare(study, cohort, None).declared == pytest.approx(expected)
-    assert prepare(STUDY, replace(cohort, measurement_sd=None), None).declared is None
+    assert (
+        prepare(STUDY, replace(cohort, measurement_sd=None, accuracy=None), None).declared is None
+    )
 
 
 def test_what_is_read_and_what_is_not(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def test_known_as_well_as_told_the_effect_is_evident(hidden, share, evident):
     """The base is fitted again with other priors, and the whole screen looked at."""
     priors = NuisancePriors(joint_centre=share * hidden.needed * hidden.prior)
     grounds = grounds_of(off_centre(alike(SHIFT_M)), priors)
-    screen = look(grounds, all_trials(), 0, 0.01, 0, NEEDED)
+    screen = look(grounds, all_trials())
     best = next(one for one in screen.effects if one.effect == "joint_centre_offset")
     assert (best.forms[0].log_evidence > NEEDED) is evident
 
@@ -60,9 +60,9 @@ def test_nothing_is_withheld_where_nothing_is_missing():
 
 def test_a_null_says_what_would_have_to_be_known_better():
     grounds = grounds_of(off_centre(alike(SHIFT_M)))
-    rules = Rules(all_trials(), COORDINATES, 0.01, 50, 3.0, 3, 0)
+    rules = Rules(all_trials(), COORDINATES, 3.0, 3, 0)
     found = search(grounds, rules, at_once)
-    ended = outcome(found, 3.0)
+    ended = outcome(found)
     assert ended.verdict is VerdictKind.NULL
     hidden = hidden_effects(found, ended, rules, at_once)
     told = advice(found, ended, rules, bench(grounds, None), at_once, hidden)

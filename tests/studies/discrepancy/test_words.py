@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from sweeps import sweep
 
 from spinepipe.effects import create
-from spinepipe.studies.discrepancy.quantities import Quantity, per_degree, quantities
+from spinepipe.studies.discrepancy.quantities import Quantity, quantities
 from spinepipe.studies.discrepancy.verdict import Estimate, Missing, VerdictScope
 from spinepipe.studies.discrepancy.words import (
     effects_in_words,
@@ -225,10 +225,3 @@ def test_an_asymmetry_is_the_ratio_of_its_two_sides() -> None:
     assert shear.name == "stiffness in anterior translation over that in posterior translation"
     assert shear.value is not None
     assert shear.value.number == pytest.approx(1.0 / 1.5)
-
-
-def test_a_coefficient_is_told_by_degrees() -> None:
-    assert per_degree(-138.0, "N m/rad^2") == (pytest.approx(-138.0 / DEG_PER_RAD**2), "N m/°²")
-    assert per_degree(3.0, "N/(mm rad)") == (pytest.approx(3.0 / DEG_PER_RAD), "N/(mm °)")
-    assert per_degree(3.0, "N m s/rad")[1] == "N m s/°"
-    assert per_degree(2.0, "deg per test") == (2.0, "deg per test")

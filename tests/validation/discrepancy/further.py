@@ -85,7 +85,7 @@ def testable_told(found: SearchResult, rules: Rules, names: Sequence[str]) -> To
     grounds = found.base
     of = {name: specimen_signatures(grounds, name, mine) for name in grounds.readings}
     joints = next(iter(grounds.fit.models.values())).n_joints
-    needed = found.stages[0].screen.threshold + rules.margin
+    needed = rules.needed + rules.margin
     judged = judgements(mine, of, joints, grounds.tests, needed, rules.seed)
     repeats = repeats_of(grounds)
     return {
@@ -116,19 +116,16 @@ def places_told(ended: Investigation, joints: Sequence[str]) -> Told:
 
 @_told
 def table_told(ended: Investigation) -> Told:
-    """Of UNKNOWN and PART: what a tabulated law and a formula close of held-out readings."""
-    final, said = ended.for_verdict().found.final, ended.ended
+    """Of UNKNOWN and PART: what a tabulated law closes of held-out readings."""
+    said = ended.ended
     if (
         said.verdict not in (VerdictKind.UNKNOWN, VerdictKind.PART)
         or said.reason is Reason.DATA_ERRORS
     ):
         return {}
-    stays = model_residual(final, ended.rules, at_once)
-    table, formula = stays.table, stays.formula
+    table = model_residual(ended.found, at_once).table
     return {
         "place": table.place if table else None,
         "gap": table.gap if table else None,
         "held_out_closed": table.held_out_closed if table else None,
-        "formula": formula.text if formula else None,
-        "formula_closed": formula.held_out_closed if formula else None,
     }

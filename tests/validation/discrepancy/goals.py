@@ -123,7 +123,6 @@ def _aliens(aliens: Sequence[Judged]) -> Rows:
         share(f"{told}: UNKNOWN or PART", _said(aliens, ("UNKNOWN", "PART"))),
         share(f"{told}: place right", (r.place_right for r in left), Goal(low=0.85)),
         share(f"{told}: gap shrunk by a tabulated law", map(_shrunk, left), Goal(low=0.7)),
-        share(f"{told}: gap shrunk by a table or a formula", map(_described, left)),
     ]
 
 
@@ -131,12 +130,6 @@ def _shrunk(row: Judged) -> bool:
     """On readings that the table has not seen."""
     closed = (row.row.get("table") or {}).get("held_out_closed")
     return closed is not None and closed > 0.0
-
-
-def _described(row: Judged) -> bool:
-    """The same by a formula, which may be over other motions and readings."""
-    closed = (row.row.get("table") or {}).get("formula_closed")
-    return _shrunk(row) or (closed is not None and closed > 0.0)
 
 
 def _parts(parts: Sequence[Judged]) -> Rows:

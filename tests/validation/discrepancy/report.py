@@ -16,8 +16,8 @@ RESULTS = Path(__file__).resolve().parents[1] / "results"
 
 HEAD = """\
 Cohorts whose truth is hidden, made by another simulator (tests/generators/hidden: rigid spine in
-closed form held against OpenSim, laws of its own), searched with the rules a study has by default
-but for 300 draws of the null. Formula: "same" where the library has the formula that was hidden, as
+closed form held against OpenSim, laws of its own), searched with the rules a study has by default.
+Formula: "same" where the library has the formula that was hidden, as
 it is written, "other" where it only has others of the same physics. PART counts as named: its names
 are right or wrong like those of NAMED. Top-1: exactly what is true and has a name is named. Wrong
 name: any sure name that is not true, also beside a set. Above its limit: the design shows the

@@ -27,7 +27,6 @@ STUDY = Discrepancy(
     kind="discrepancy",
     cohort="hidden",
     base=DiscrepancyBase(stiffness="per_specimen"),
-    bootstrap=300,
 )
 RIVALS_KEPT = 5
 MOST_SAID = 500
@@ -71,7 +70,7 @@ def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -
     started = time.process_time()
     ended = investigate(prepare(STUDY, cohort, None), at_once)
     found = ended.found
-    row = _said(found, ended.ended)
+    row = _said(found, ended.ended) | {"threshold": ended.rules.needed}
     seconds["search"] = time.process_time() - started
     started = time.process_time()
     row["held_out"] = held_out_told(ended.proof) if found.standing else None
@@ -101,8 +100,9 @@ def _said(found: SearchResult, said: Outcome) -> Row:
         "reason": said.reason,
         "lack": found.lack.log_evidence,
         "shape": {"coordinate": found.lack.coordinate, "words": found.lack.shape},
-        "lack_threshold": found.generic_threshold,
-        "threshold": found.stages[0].screen.threshold,
+        "probabilities": {name: p for name, p in found.probabilities.items() if p > 1e-3},
+        "fits": sum(len(stage.refits) for stage in found.stages),
+        "unfitted": found.unfitted,
         "noise_correlation": float(found.base.noise.correlation),
         "screen": [
             [one.effect, one.log_evidence] for one in found.stages[0].screen.effects[:RIVALS_KEPT]

@@ -25,6 +25,7 @@ from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
+from spinepipe.studies.discrepancy.search.something_else import TABLE
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.tables import ADVICE
 from spinepipe.studies.discrepancy.verdict import VerdictKind
@@ -89,7 +90,7 @@ def advice(
     rows = [row for pair in _pairs(found, ended, rules) for row in _of_pair(*pair, place, run)]
     if ended.verdict in (VerdictKind.PART, VerdictKind.UNKNOWN):
         rows += run(_of_unnamed, grounds, rules, place)
-    threshold = found.stages[0].screen.threshold
+    threshold = rules.needed
     for one in hidden:
         rows += _of_withheld(grounds, one, threshold)
     first = {one.effect: one for one in reversed(hidden)}
@@ -106,7 +107,7 @@ def hidden_effects(
     if ended.reason is Reason.DATA_ERRORS:
         return ()
     named = {one.name for one in ended.named} | set(ended.tied)
-    threshold = found.stages[0].screen.threshold
+    threshold = rules.needed
     grounds = found.final if named else found.base
     return masked_effects(grounds, rules.trials, threshold, sorted(named), run)
 
@@ -139,7 +140,7 @@ def _leading(found: SearchResult, rules: Rules) -> Iterator[Pair]:
     first = found.stages[0]
     best: dict[str, Refit] = {}
     for one in first.refits:
-        if one.fit.usable and one.log_evidence > first.screen.threshold:
+        if one.fit.usable and one.name != TABLE and one.log_evidence > rules.needed:
             best.setdefault(one.name, one)
     if len(best) > 1:
         a, b = list(best.values())[:2]
@@ -207,7 +208,7 @@ def _checked(
 
 def _of_unnamed(grounds: BaselineFit, rules: Rules, place: Bench) -> list[Advice]:
     """Runs that show more of what the generic basis sees."""
-    lack = lack_of_fit(grounds, rules.coordinates, 0, rules.seed)
+    lack = lack_of_fit(grounds, rules.coordinates)
     pattern = generic(grounds, rules.coordinates, lack)
     return _rows(f"{UNNAMED}: {lack.shape}", offers([pattern], place), 0.0)
 

@@ -81,9 +81,7 @@ def masked_effects(
     kinds = kinds_of(grounds)
     if not kinds:
         return ()
-    without = run(
-        look, with_narrower_priors(grounds, dict.fromkeys(kinds, 0.0)), trials, 0, 0.0, 0, threshold
-    )
+    without = run(look, with_narrower_priors(grounds, dict.fromkeys(kinds, 0.0)), trials)
     by_name = {one.effect: one for one in trials}
     most = without.effects[0].log_evidence
     return tuple(
@@ -177,11 +175,10 @@ class MaskedEvidence:
                 taken[name],
                 grounds.setting.whitenings[name].shortened(moved),
                 np.sum(moved**2, axis=0),
-                taken[name].residual[:, None],
             )
             for name, moved in self._moved.items()
         }
         specimens = tuple(grounds.readings)
         problem = linearised(parts)
         one = summed(self._index, problem, self._form, self._sds, specimens, grounds.tests)
-        return float(one.group.log_evidence(one.moments)[0]) + self._share
+        return float(one.group.log_evidence(one.moments)) + self._share

@@ -119,10 +119,10 @@ def strengths(
 ) -> TangentPattern:
     """A form at one shape, as strong as the readings suggest."""
     alone = Trials(trials.effect, (form.variant,), (form,))
-    ((index, problem),) = linearised_for(grounds, [alone], 0, 0)
+    ((index, problem),) = linearised_for(grounds, [alone])
     specimens = tuple(grounds.readings)
     one = summed(index, problem, form, sds, specimens, grounds.tests)
-    estimate = _beyond_noise(one.group, one.gram, one.moments[:, 0])
+    estimate = _beyond_noise(one.group, one.gram, one.moments)
     weights = {name: np.zeros(len(index.columns)) for name in specimens}
     for name, columns, owners in index.places(form, sds, specimens, grounds.tests)[0]:
         np.add.at(weights[name], columns, estimate[owners])
@@ -172,21 +172,20 @@ def generic(
         found = generic_columns(model, one.cases, grounds.noise.zeroed, coordinates)
         plain, terms = grounds.plain[name].noise_only(found.moved), found.terms
         white = grounds.setting.whitenings[name].shortened(plain)
-        residual = taken[name].residual[:, None]
-        parts[name] = products(taken[name], white, np.sum(plain**2, axis=0), residual)
+        parts[name] = products(taken[name], white, np.sum(plain**2, axis=0))
     onto = _onto(terms, lack, tuple(parts))
     if not len(next(iter(onto.values()))):  # shifts of these tests say nothing of others
         return TangentPattern(grounds, terms_of, {name: np.zeros(len(terms)) for name in onto})
     # normal equations of the strengths, what is common to all specimens eliminated
     problem, count = linearised(parts), len(next(iter(onto.values())))
-    gram, moments = np.zeros((count, count)), np.zeros((count, 1))
+    gram, moments = np.zeros((count, count)), np.zeros(count)
     coupled = np.zeros((count, len(problem.gram_shared)))
     for name, part in parts.items():
         gram += onto[name] @ part.gram @ onto[name].T
         moments += onto[name] @ part.moments
         coupled += onto[name] @ part.shared
     gram, moments = problem.without_shared(gram, moments, coupled)
-    estimate = _beyond_noise(Group.of(gram, np.zeros(count)), gram, moments[:, 0])
+    estimate = _beyond_noise(Group.of(gram, np.zeros(count)), gram, moments)
     return TangentPattern(grounds, terms_of, {name: estimate @ one for name, one in onto.items()})
 
 

@@ -241,7 +241,7 @@ def _least(one: Typical, needed: float, seed: int) -> float | None:
     noise = group.vectors @ noise
 
     def short(log_times: float) -> float:
-        evidence: Array = group.log_evidence(np.exp(log_times) * moved + noise)
+        evidence = group.log_evidence((np.exp(log_times) * moved + noise).T)
         return float(np.quantile(evidence, 1.0 - OFTEN)) - needed
 
     # the same draws at every size (common random numbers): evidence rises with it, one root

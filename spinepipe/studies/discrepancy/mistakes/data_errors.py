@@ -37,6 +37,7 @@ from spinepipe.studies.discrepancy.mistakes.bad_markers import (
 from spinepipe.studies.discrepancy.mistakes.swapped_specimens import swapped_pairs
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import Trials
+from spinepipe.studies.discrepancy.search.outcome import MUCH, left_of
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.search_state import SearchResult
 from spinepipe.studies.discrepancy.store import PieceRunner
@@ -70,7 +71,8 @@ def suspected_errors(
     if not _is_repeated(measured):
         scatter = beside_the_curve(measured, baseline.fit.predicted)
         found += bad_markers(scatter, list(baseline.readings), joints, in_every=True)
-    if not found:
+    # a model of the wrong shape says nothing of specimens that changed places
+    if not found and (search is None or left_of(search) <= MUCH):
         found += swapped_pairs(baseline, run, trials, search)
     return tuple(found)
 

@@ -32,7 +32,6 @@ from spinepipe.studies.discrepancy.search.nuisance import nuisance_signatures
 from spinepipe.studies.discrepancy.search.prediction import NoEquilibrium, Simulated, SolvedSpecimen
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.refit import standing
-from spinepipe.studies.discrepancy.search.screen import LEAST_THRESHOLD, Screen
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, look
 from spinepipe.studies.discrepancy.search.whitening import with_nuisances
 from spinepipe.studies.discrepancy.store import PieceRunner
@@ -76,7 +75,7 @@ def swapped_pairs(
     pairs, every = _promising(baseline), tuple(trials)
     as_read = 0.0
     if pairs and every:  # log evidence of the effects that explain what the base leaves as it is
-        first = found.stages[0].screen if found else run(_look, baseline, every)
+        first = found.stages[0].screen if found else run(look, baseline, every)
         of_standing = sum(one.log_evidence for one in found.standing) if found else 0.0
         as_read = max(0.0, first.effects[0].log_evidence, of_standing)
     ways = tuple(_ways(baseline, run, found)) if pairs else ()
@@ -137,17 +136,13 @@ def _exchange(
     there = _fitted(baseline, setting, pair, ())
     if there is None:
         return None
-    effects = max(0.0, _look(there, trials).effects[0].log_evidence) if trials else 0.0
+    effects = max(0.0, look(there, trials).effects[0].log_evidence) if trials else 0.0
     best = [_compared(baseline, there, pair, effects - as_read, effects)]
     for others, left_out in ways:
         beside = _fitted(others, setting, pair, standing(others.fit))
         if beside is not None:
             best.append(_compared(others, beside, pair, -left_out, 0.0))
     return max(best, key=lambda one: one.evidence)
-
-
-def _look(baseline: BaselineFit, trials: Sequence[Trials]) -> Screen:
-    return look(baseline, trials, 0, 0.5, 0, LEAST_THRESHOLD)
 
 
 def _ways(

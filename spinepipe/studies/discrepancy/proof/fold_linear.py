@@ -7,7 +7,7 @@ eliminated by the Schur complement). The surrogate without physics is the base a
 generic basis.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,33 +49,6 @@ class LinearModel:
     sd: Array
     low: Array
     high: Array
-
-    def with_coefficients(
-        self,
-        columns: Mapping[str, Sequence[Array]],
-        numbers: Mapping[str, Indices],
-        count: int,
-    ) -> "LinearModel":
-        """The model with unbounded coefficients more, in prior SDs about zero.
-
-        Parameters
-        ----------
-        columns : by specimen that has some, per test (T, J, 6, k), by one prior SD.
-        numbers : (k,) which of the ``count`` new coefficients these are.
-        """
-        known, members = len(self.mean), dict(self.members)
-        for name, own in columns.items():
-            pairs = zip(members[name].by_x, own, strict=True)
-            by_x = tuple(np.concatenate(pair, axis=-1) for pair in pairs)
-            joined = np.concatenate([members[name].numbers, known + numbers[name]])
-            members[name] = replace(members[name], by_x=by_x, numbers=joined)
-        return LinearModel(
-            members,
-            np.concatenate([self.mean, np.zeros(count)]),
-            np.concatenate([self.sd, np.ones(count)]),
-            np.concatenate([self.low, np.full(count, -np.inf)]),
-            np.concatenate([self.high, np.full(count, np.inf)]),
-        )
 
 
 def tangent(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
@@ -294,8 +267,8 @@ def surrogate(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
     base = tangent(grounds, nuisance_size)
     read = np.any([used.any(axis=(0, 1)) for w in grounds.plain.values() for used in w.used], 0)
     coordinates = [name for name, there in zip(COORDINATES, read, strict=True) if there]
-    columns, numbers, added = {}, {}, 0
-    for name in base.members:
+    known, added, members = len(base.mean), 0, {}
+    for name, one in base.members.items():
         model, cases = grounds.fit.models[name], grounds.readings[name].cases
         found = generic_columns(model, cases, grounds.noise.zeroed, coordinates)
         keys = [(t.family, t.coordinate, t.number) for t in found.terms]
@@ -304,6 +277,14 @@ def surrogate(grounds: BaselineFit, nuisance_size: float) -> LinearModel:
         together[np.arange(len(keys)), [order[key] for key in keys]] = 1.0
         onto = np.hstack([np.eye(len(keys)), together])
         added = onto.shape[1]
-        columns[name] = tuple(moved @ onto for moved in found.moved)
-        numbers[name] = np.arange(added)
-    return base.with_coefficients(columns, numbers, added)
+        pairs = zip(one.by_x, found.moved, strict=True)
+        by_x = tuple(np.concatenate([old, moved @ onto], axis=-1) for old, moved in pairs)
+        numbers = np.concatenate([one.numbers, known + np.arange(added)])
+        members[name] = replace(one, by_x=by_x, numbers=numbers)
+    return LinearModel(
+        members,
+        np.concatenate([base.mean, np.zeros(added)]),
+        np.concatenate([base.sd, np.ones(added)]),
+        np.concatenate([base.low, np.full(added, -np.inf)]),
+        np.concatenate([base.high, np.full(added, np.inf)]),
+    )

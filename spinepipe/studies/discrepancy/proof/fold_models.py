@@ -74,7 +74,12 @@ class FoldModels:
     """
 
     def __init__(
-        self, base: BaselineFit, final: BaselineFit, refit: bool, run: PieceRunner
+        self,
+        base: BaselineFit,
+        final: BaselineFit,
+        refit: bool,
+        run: PieceRunner,
+        with_surrogate: bool = True,
     ) -> None:
         self.grounds = (base, final)
         self.refit, self.run = refit, run
@@ -85,6 +90,8 @@ class FoldModels:
         self.final = LinearFolds(tangent(final, size), self.chosen) if self.named else self.base
         self.surrogate: LinearFolds | None = None
         self.why_none = ""
+        if not with_surrogate:
+            return
         try:
             self.surrogate = LinearFolds(surrogate(base, size), self.chosen)
         except NoEquilibrium as trouble:

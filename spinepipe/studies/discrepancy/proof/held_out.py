@@ -15,16 +15,12 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.proof.fold_linear import (
     FoldPrediction,
-    LinearFolds,
-    LinearModel,
-    tangent,
 )
 from spinepipe.studies.discrepancy.proof.fold_models import (
     Both,
     FoldModels,
     NoFold,
     Predictions,
-    nuisance_size,
 )
 from spinepipe.studies.discrepancy.proof.folds import (
     STEPS,
@@ -178,57 +174,9 @@ def to_first_order(base: BaselineFit, final: BaselineFit, asked: Asked) -> HeldO
     return _proof(FoldModels(base, final, False, at_once), asked)
 
 
-@dataclass(frozen=True)
-class ChosenTerm:
-    """A term of a formula.
-
-    Attributes
-    ----------
-    moved : per test (T, J, 6) by one unit of its coefficient, of the specimens that have it.
-    sd : prior of the coefficient: as large as makes the term a joint's whole load.
-    """
-
-    moved: Mapping[str, tuple[Array, ...]]
-    sd: float
-
-
-def proof_of_terms(
-    before: BaselineFit, after: BaselineFit, terms: Sequence[ChosenTerm] = ()
-) -> HeldOut:
-    """Two fits, the second one with terms besides, on each test and specimen left out.
-
-    Which terms was found with all readings; their coefficients are fitted without those left out.
-    """
-    return _proof(FormulaFolds(before, after, terms), Asked())
-
-
-class FormulaFolds(FoldModels):
-    """One fit as the base, another and terms besides as the model with effects."""
-
-    def __init__(
-        self, before: BaselineFit, after: BaselineFit, terms: Sequence[ChosenTerm]
-    ) -> None:
-        self.grounds = (before, after)
-        self.refit, self.run, self.named = False, at_once, True
-        self.chosen = ChosenSteps(before.readings, before.noise)
-        size = nuisance_size(after)
-        self.base = LinearFolds(tangent(before, size), self.chosen)
-        self.final = LinearFolds(with_terms(tangent(after, size), terms), self.chosen)
-        self.surrogate, self.why_none = None, ""
-
-
-def with_terms(plain: LinearModel, terms: Sequence[ChosenTerm]) -> LinearModel:
-    """A linear model with a coefficient more for each term, in prior SDs."""
-    columns, numbers = {}, {}
-    for name, one in plain.members.items():
-        own = [number for number, term in enumerate(terms) if name in term.moved]
-        if own:
-            columns[name] = [
-                np.stack([terms[n].sd * terms[n].moved[name][test] for n in own], axis=-1)
-                for test in range(len(one.by_x))
-            ]
-            numbers[name] = np.array(own, dtype=np.int64)
-    return plain.with_coefficients(columns, numbers, len(terms))
+def proof_of_terms(before: BaselineFit, after: BaselineFit) -> HeldOut:
+    """Two fits on each test and specimen left out; the second one has more terms."""
+    return _proof(FoldModels(before, after, False, at_once, with_surrogate=False), Asked())
 
 
 def _proof(models: FoldModels, asked: Asked) -> HeldOut:

@@ -74,14 +74,6 @@ class CandidateForm:
     joint: int | None = None
     specimen: str | None = None
 
-    @classmethod
-    def at(cls, variant: Variant, joint: int | None, specimen: str | None) -> "CandidateForm":
-        """Of one joint or of all (None), in one specimen or in all."""
-        if joint is None:
-            return cls(variant, PlaceSpread.SHARED, None, specimen)
-        spread = PlaceSpread.ONE_JOINT if specimen is None else PlaceSpread.ONE
-        return cls(variant, spread, joint, specimen)
-
     @property
     def name(self) -> str:
         """Name of the effect."""
@@ -226,6 +218,12 @@ class ActiveTerm:
 
     form: CandidateForm
     start: Array
+
+    def copies(self, specimen: str, tests: int) -> int:
+        """How many effects it is in the model of a specimen."""
+        if not self.form.acts_in(specimen):
+            return 0
+        return tests if self.form.spread is PlaceSpread.BY_TEST else 1
 
 
 @dataclass(frozen=True)

@@ -30,14 +30,20 @@ from spinepipe.studies.discrepancy.search.noise import (
     without_outliers,
 )
 from spinepipe.studies.discrepancy.search.nuisance import as_si
-from spinepipe.studies.discrepancy.search.outcome import Outcome, cannot_be_excluded, outcome
+from spinepipe.studies.discrepancy.search.outcome import (
+    MUCH,
+    Outcome,
+    cannot_be_excluded,
+    outcome,
+)
 from spinepipe.studies.discrepancy.search.prediction import solve_on_record
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
-from spinepipe.studies.discrepancy.settings import Discrepancy
+from spinepipe.studies.discrepancy.settings import MOST_FITS, Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner
-from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError
+from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError, VerdictKind
+from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, to_si
 
 GUESSED_SD = np.array([1e-3] * 3 + [np.deg2rad(1.0)] * 3)
@@ -125,11 +131,11 @@ def investigate(
     rules = Rules(
         trials(study.effects, ready.coordinates, specimens, joints),
         ready.coordinates,
-        study.false_alarm,
-        study.bootstrap,
         study.margin,
         study.most_effects,
         study.seed,
+        MOST_FITS[study.effort],
+        study.minutes,
     )
     baseline = fit_base(ready, run)
     found = search(baseline, rules, run, progress)
@@ -147,7 +153,7 @@ def investigate(
         )
         for effect in found.standing
     }
-    ended = outcome(found, study.margin, proof, errors, not_excluded)
+    ended = outcome(found, proof, errors, not_excluded)
     told = Investigation(baseline, rules, found, errors, proof, ended)
     return _with_sure_effects(told, asked, run)
 
@@ -165,6 +171,11 @@ def _with_sure_effects(one: Investigation, asked: Asked, run: PieceRunner) -> In
         return one
     final = final.at(fit)
     gap, at = whole_gap(final, fit), gaps_at(final, fit)
+    if gap.rms > MUCH:  # beside so much nothing is certain
+        names = " and ".join(dict.fromkeys(e.name for e in kept))
+        why = f"{names} would explain a part, but {gap.rms:.1f} noise SD stay"
+        ended = Outcome(VerdictKind.UNKNOWN, why, reason=Reason.A_PART_STAYS)
+        return replace(one, ended=ended)
     standing = tuple(kept)
     found = replace(one.found, final=final, standing=standing, final_gap=gap, final_at=at)
     on_record([fit], one.grounds.readings, run)

@@ -23,7 +23,6 @@ from spinepipe.studies.discrepancy.search.prediction import SolvedSpecimen, bush
 from spinepipe.studies.discrepancy.search.projected import (
     Linearised,
     Products,
-    drawn,
     linearised,
     products,
     taken_out,
@@ -161,13 +160,11 @@ class LackOfFitTest:
 
     Attributes
     ----------
-    log_evidence : of the data. null : (D,) of each draw without a missing effect.
     family, coordinate, spread : where most is explained. explained : drop of chi2 there.
     by_family : of each family alone, with its share of the whole taken off.
     """
 
     log_evidence: float
-    null: Array
     family: str
     coordinate: str
     spread: PlaceSpread
@@ -190,20 +187,18 @@ class LackOfFit(LackOfFitTest):
 
 @dataclass(frozen=True)
 class _FamilyEvidence:
-    """Of one family at one coordinate: log evidence (1 + D,), drop of chi2 of the data."""
+    """Of one family at one coordinate: log evidence, drop of chi2."""
 
     family: str
     coordinate: str
     spread: PlaceSpread
-    logs: Array
+    log_evidence: float
     explained: float
 
 
-def lack_of_fit(
-    baseline: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
-) -> LackOfFit:
+def lack_of_fit(baseline: BaselineFit, coordinates: Sequence[str]) -> LackOfFit:
     """Evidence of the generic basis beside the baseline's fit."""
-    terms, problem = _problem(baseline, coordinates, draws, seed)
+    terms, problem = _problem(baseline, coordinates)
     spreads = [s for s in SPREADS if not (s is PlaceSpread.EACH and len(baseline.readings) == 1)]
     families = list(dict.fromkeys(term.family for term in terms))
     parts = {
@@ -220,32 +215,32 @@ def lack_of_fit(
 
 
 def _lack(parts: Sequence[_FamilyEvidence]) -> LackOfFitTest:
-    logs = logsumexp(np.stack([part.logs for part in parts]), axis=0) - np.log(len(parts))
-    best = max(parts, key=lambda part: part.logs[0])
-    share = np.log(len(parts))
+    def averaged(some: Sequence[_FamilyEvidence]) -> float:
+        return float(logsumexp([part.log_evidence for part in some]) - np.log(len(parts)))
+
+    best = max(parts, key=lambda part: part.log_evidence)
     by_family = {
-        family: float(logsumexp([p.logs[0] for p in parts if p.family == family]) - share)
+        family: averaged([part for part in parts if part.family == family])
         for family in dict.fromkeys(part.family for part in parts)
     }
     where = (best.family, best.coordinate, best.spread)
-    return LackOfFitTest(float(logs[0]), logs[1:], *where, best.explained, by_family)
+    return LackOfFitTest(averaged(parts), *where, best.explained, by_family)
 
 
 def _problem(
-    baseline: BaselineFit, coordinates: Sequence[str], draws: int, seed: int
+    baseline: BaselineFit, coordinates: Sequence[str]
 ) -> tuple[tuple[Term, ...], Linearised]:
     parts: dict[str, Products] = {}
     terms: tuple[Term, ...] = ()
     taken = taken_out(baseline.fit)
-    for number, (name, one) in enumerate(baseline.readings.items()):
+    for name, one in baseline.readings.items():
         model = baseline.fit.models[name]
         zeroed = baseline.noise.zeroed
         shifted = () if zeroed else baseline.tests  # counted from step 0 there is none
         found = generic_columns(model, one.cases, zeroed, coordinates, shifted=shifted)
         plain = baseline.plain[name].noise_only(found.moved)
         white = baseline.setting.whitenings[name].shortened(plain)
-        errors = drawn(taken[name], draws, np.random.default_rng([seed, number]))
-        parts[name] = products(taken[name], white, np.sum(plain**2, axis=0), errors)
+        parts[name] = products(taken[name], white, np.sum(plain**2, axis=0))
         terms = found.terms
     return terms, linearised(parts)
 
@@ -277,6 +272,7 @@ def _part(
         gram, moment, shared = (np.sum(parts, axis=0) for parts in (grams, moments, coupled))
     gram, moment = problem.without_shared(gram, moment, shared)
     group = Group.of(gram, np.zeros(len(gram)))
-    estimate = group.estimate(moment[:, 0])
-    explained = float(2.0 * estimate @ moment[:, 0] - estimate @ gram @ estimate)
-    return _FamilyEvidence(family, coordinate, spread, group.log_evidence(moment), explained)
+    estimate = group.estimate(moment)
+    explained = float(2.0 * estimate @ moment - estimate @ gram @ estimate)
+    log_evidence = float(group.log_evidence(moment))
+    return _FamilyEvidence(family, coordinate, spread, log_evidence, explained)

@@ -166,11 +166,6 @@ def display_value(unit: str, value: float) -> tuple[float, str]:
     return value * factor, name
 
 
-def standard_errors(fit: JointFit) -> Array:
-    """(m,) of all unknowns, priors counted in."""
-    return np.sqrt(np.diagonal(covariance(fit)))
-
-
 def covariance(fit: JointFit) -> Array:
     """(m, m) of all unknowns, priors counted in."""
     # Gauss-Newton: inverse of the curvature of half chi2 and of the priors

@@ -2,6 +2,8 @@
 
 A reading's error has one SD for all readings of a coordinate and the correlation rho^|t - u|
 between load steps t and u of a cycle. Zeroing subtracts the error of step 0 from the whole cycle.
+Repeats do not tell what all cycles of a test share: the instrument's accuracy is an error of its
+own, which drifts smoothly over a test and is no smaller in the mean of the cycles.
 Where the loads of cycles were meant to be equal and are not quite, the base's prediction takes the
 difference out; what it misses is common to the cycles of a test, so that differences of their
 residuals are noise.
@@ -41,6 +43,12 @@ FEWEST = 30
 DECLARED_DOUBT = 1.2
 """Without repeats readings count as this much noisier than declared: a doubt kept on purpose."""
 
+USUAL_ACCURACY = np.array([5e-5] * 3 + [np.deg2rad(0.1)] * 3)
+"""m and rad, SD; where nothing tells the accuracy: that of usual optical tracking of a joint."""
+
+DRIFT_LENGTH = 0.3
+"""Share of a test over which the error that its cycles share changes."""
+
 Predicted = Mapping[str, Sequence[Array]]
 
 
@@ -54,7 +62,8 @@ class Noise:
     correlation : of neighbouring steps. source : ``repeats`` or ``declared``.
     differences : independent differences between cycles behind it, per coordinate (6,).
     outliers : readings left out.
-    accuracy : (6,) m and rad, which no SD is below; NaN where it is not told.
+    accuracy : (6,) m and rad, SD of what all cycles of a test share. assumed : whether any of it
+        is `USUAL_ACCURACY`.
     """
 
     sd: Array
@@ -63,16 +72,26 @@ class Noise:
     differences: NDArray[np.int64]
     outliers: int
     zeroed: bool
-    accuracy: Array = field(default_factory=lambda: np.full(6, np.nan))
+    accuracy: Array = field(default_factory=lambda: np.zeros(6))
+    assumed: bool = False
 
     def correlations(self, steps: int) -> Array:
         """(T, T) covariance of the readings of one cycle in units of SD squared, zeroed or not."""
         lag = np.abs(np.subtract.outer(np.arange(steps), np.arange(steps)))
         serial: Array = self.correlation**lag
-        if not self.zeroed:
-            return serial
-        left = subtract_baseline(np.eye(steps), self.zeroed)
-        return left @ serial @ left.T
+        return self._counted(serial)
+
+    def drift(self, steps: int) -> Array:
+        """(T, T) covariance of what the cycles of a test share, in units of accuracy squared."""
+        length = DRIFT_LENGTH * max(steps - 1, 1)
+        lag = np.subtract.outer(np.arange(steps), np.arange(steps)) / length
+        return self._counted(np.exp(-0.5 * lag**2))
+
+    def _counted(self, covariance: Array) -> Array:
+        """Counted from step 0, where readings are."""
+        left = subtract_baseline(np.eye(len(covariance)), self.zeroed)
+        result: Array = left @ covariance @ left.T
+        return result
 
 
 def estimated_noise(
@@ -84,21 +103,23 @@ def estimated_noise(
 ) -> Noise | None:
     """Noise from the repeats; where these are too few, as ``declared`` (6,) and doubted.
 
-    None when neither is there. ``accuracy`` (6,) counts where it is larger than repeats tell.
+    None when neither is there. ``accuracy`` (6,) NaN where it is not told: then it is the usual.
     """
-    floor = np.full(6, np.nan) if accuracy is None else accuracy
+    told = np.full(6, np.nan) if accuracy is None else accuracy
     contrasts = _contrasts(specimens)
     counts = np.array([sum(len(c) * c.shape[1] for c in contrasts[k]) for k in range(6)])
     tests = [test for one in specimens for test in one.tests]
     read = np.array([any(test.count[..., k].any() for test in tests) for k in range(6)])
+    assumed = bool(np.isnan(told[read]).any())
+    shared = np.where(np.isnan(told), USUAL_ACCURACY, told)
     if np.all(counts[read] >= FEWEST):
         sd, correlation = _most_likely(contrasts, zeroed)
-        sd = np.where(read, np.fmax(sd, floor), np.nan)
-        return Noise(sd, correlation, REPEATS, counts, outliers, zeroed, floor)
+        sd = np.where(read, sd, np.nan)
+        return Noise(sd, correlation, REPEATS, counts, outliers, zeroed, shared, assumed)
     if declared is None:
         return None
     sd = np.where(read, DECLARED_DOUBT * declared, np.nan)
-    return Noise(sd, 0.0, DECLARED, counts, outliers, zeroed, floor)
+    return Noise(sd, 0.0, DECLARED, counts, outliers, zeroed, shared, assumed)
 
 
 def _contrasts(specimens: Sequence[SpecimenReadings]) -> list[list[Array]]:
@@ -164,7 +185,8 @@ def noise_of_residuals(
     """
     residuals = [_residuals(one, predicted[name]) for name, one in readings.items()]
     kept, outliers = without_outliers(residuals)
-    found = estimated_noise(kept, None, noise.zeroed, noise.outliers + outliers, noise.accuracy)
+    told = np.full(6, np.nan) if noise.assumed else noise.accuracy
+    found = estimated_noise(kept, None, noise.zeroed, noise.outliers + outliers, told)
     if found is None or found.source != REPEATS:
         return dict(readings), noise
     names = readings.items()

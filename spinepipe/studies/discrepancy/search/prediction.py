@@ -21,7 +21,6 @@ from spinepipe.statics.batched import (
     readings,
     readings_by,
 )
-from spinepipe.statics.batched.spines import carried
 from spinepipe.units import COORDINATES, subtract_baseline
 
 BUSHING = "linear_bushing"
@@ -203,11 +202,6 @@ class SolvedSpecimen:
     def poses(self) -> tuple[Array, ...]:
         """(T, J, 6) of each test."""
         return self._by_test(self._q)
-
-    @property
-    def held(self) -> tuple[Array, ...]:
-        """(T, J, 6) N and N m of each test that the joints' laws hold."""
-        return self._by_test(carried(self._stack, self._q))
 
     def by(self, full: SpineModel, free: Sequence[FreeParameter]) -> tuple[Array, ...]:
         """(T, J, 6, m) derivatives of each test's readings by unknowns of idle effects.

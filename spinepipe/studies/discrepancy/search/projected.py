@@ -57,14 +57,14 @@ class ProjectedOut:
 
 @dataclass(frozen=True)
 class Products:
-    """Products of a specimen's signatures; M columns, the data and D draws of the null.
+    """Products of a specimen's M signatures.
 
     Attributes
     ----------
-    gram : (M, M) F'F. moments : (M, 1 + D) F'r of the data and of the draws.
+    gram : (M, M) F'F. moments : (M,) F'r.
     raw : (M,) squared norms in noise SDs before anything was taken out.
     shared : (M, a) F'A of the shared unknowns. gram_shared : (a, a) A'A.
-    moments_shared : (a, 1 + D) A'r.
+    moments_shared : (a,) A'r.
     """
 
     gram: Array
@@ -88,7 +88,7 @@ class Linearised:
         return pinvh(self.gram_shared, rcond=1e-10)
 
     def without_shared(self, gram: Array, moments: Array, coupled: Array) -> tuple[Array, Array]:
-        """Products (..., k, k), (..., k, 1 + D) of strengths less what shared unknowns take.
+        """Products (..., k, k), (..., k) of strengths less what shared unknowns take.
 
         ``coupled`` (..., k, a): products of the strengths with the shared unknowns.
         """
@@ -158,20 +158,15 @@ def _basis(columns: Array) -> Array:
     return seen
 
 
-def drawn(taken: ProjectedOut, draws: int, rng: np.random.Generator) -> Array:
-    """(N, 1 + D) the data's residual, and residuals as the null would have them."""
-    return np.column_stack([taken.residual, rng.standard_normal((len(taken.residual), draws))])
-
-
-def products(taken: ProjectedOut, white: Array, raw: Array, errors: Array) -> Products:
-    """Products of whitened signatures (N, M) with themselves, the errors and what is shared."""
+def products(taken: ProjectedOut, white: Array, raw: Array) -> Products:
+    """Products of whitened signatures (N, M) with themselves, the residual and what is shared."""
     left = taken.out_of(white)
-    gram, moments = left.T @ left, left.T @ errors
+    gram, moments = left.T @ left, left.T @ taken.residual
     gone = np.diagonal(gram) < UNSEEN * raw  # rounding error, and no direction of its own
     gram[gone], gram[:, gone], moments[gone] = 0.0, 0.0, 0.0
     shared = np.where(gone[:, None], 0.0, left.T @ taken.shared)
     own = taken.shared.T
-    return Products(gram, moments, raw, shared, own @ taken.shared, own @ errors)
+    return Products(gram, moments, raw, shared, own @ taken.shared, own @ taken.residual)
 
 
 def columns_of(trials: Trials, joints: int, tests: Sequence[str]) -> list[VariantColumn]:

@@ -1,4 +1,4 @@
-"""The screen: evidence of every effect in the linearised problem, and what the null would show.
+"""The screen: evidence of every effect in the linearised problem.
 
 Readings are whitened, base and nuisances projected out: residual r, signatures F in prior SDs of
 the strengths. A form says which columns each of its strengths sums. With strengths ~ N(0, t^2) the
@@ -28,9 +28,6 @@ SIZES = np.array([0.1, 0.3, 1.0, 3.0])
 Places = tuple[tuple[str, NDArray[np.int64], NDArray[np.int64]], ...]
 """(specimen, columns (c,), strength (c,) that each column belongs to)."""
 
-LEAST_THRESHOLD = 5.0
-"""Less is not very strong (Kass and Raftery 1995, doi 10.2307/2291091), whatever the draws say."""
-
 
 def log_sum(logs: Array) -> Array:
     """(...) logarithm of the sum of exp(logs) over the first axis; none is infinite."""
@@ -57,19 +54,19 @@ class Group:
         return cls(np.maximum(values, 0.0), vectors, signs)
 
     def log_evidence(self, moments: Array) -> Array:
-        """(..., D) evidence for F'r of each draw, (..., k, D)."""
+        """(...) evidence for F'r, (..., k)."""
         # Bayesian linear regression in the eigenbasis of F'F, where strengths are independent:
         # (..., S, k) posterior variance of each direction at each prior size t
-        components = np.swapaxes(self.vectors, -1, -2) @ moments
+        components = (moments[..., None, :] @ self.vectors)[..., 0, :]
         of_sizes = self.eigenvalues[..., None, :]
         variance = 1.0 / (SIZES[:, None] ** -2.0 + of_sizes)
-        gain = 0.5 * variance @ components**2
+        gain = 0.5 * np.sum(variance * components[..., None, :] ** 2, axis=-1)
         cost = 0.5 * np.sum(np.log1p(SIZES[:, None] ** 2 * of_sizes), axis=-1)
-        found = gain - cost[..., None] + self._one_sided(variance, components)
-        return log_sum(np.moveaxis(found, -2, 0)) - float(np.log(len(SIZES)))
+        found = gain - cost + self._one_sided(variance, components)
+        return log_sum(np.moveaxis(found, -1, 0)) - float(np.log(len(SIZES)))
 
     def _one_sided(self, variance: Array, components: Array) -> Array:
-        """(..., S, D) log evidence of half-normal priors over that of whole ones.
+        """(..., S) log evidence of half-normal priors over that of whole ones.
 
         Half a normal is the whole one, twice as high on the side that is allowed, so the evidence
         is multiplied by the share of the posterior on that side over the share of the prior, 1/2
@@ -78,26 +75,24 @@ class Group:
 
         Parameters
         ----------
-        variance : (..., S, k) at each size. components : (..., k, D).
+        variance : (..., S, k) at each size. components : (..., k).
         """
         there = self.signs != 0.0
         if not there.any():
-            return np.zeros((*variance.shape[:-1], components.shape[-1]))
-        vectors = self.vectors[..., there, :]
+            return np.zeros(variance.shape[:-1])
+        back = np.swapaxes(self.vectors[..., there, :], -1, -2)
         # posterior mean and SD of each signed strength, back from the eigenbasis
-        by_size = variance[..., None] * components[..., None, :, :]
-        mean = vectors[..., None, :, :] @ by_size
-        sd = np.sqrt(variance @ np.swapaxes(vectors**2, -1, -2))
-        sides = self.signs[there, None] * mean / sd[..., None]
-        return np.asarray(np.sum(np.log(2.0) + log_ndtr(sides), axis=-2))
+        mean = (variance * components[..., None, :]) @ back
+        sides = self.signs[there] * mean / np.sqrt(variance @ back**2)
+        return np.asarray(np.sum(np.log(2.0) + log_ndtr(sides), axis=-1))
 
     def estimate(self, moments: Array) -> Array:
         """(..., k) strengths, in prior SDs, that explain most; shrunk a little where nothing tells.
 
-        ``moments`` (..., k) F'r of the data.
+        ``moments`` (..., k) F'r.
         """
         inverse = 1.0 / (SIZES[-1] ** -2.0 + self.eigenvalues)  # ridge: the widest prior
-        components = (np.swapaxes(self.vectors, -1, -2) @ moments[..., None])[..., 0]
+        components = (moments[..., None, :] @ self.vectors)[..., 0, :]
         found: Array = (self.vectors @ (inverse * components)[..., None])[..., 0]
         return np.where(self.signs * found < 0.0, 0.0, found)
 
@@ -123,22 +118,21 @@ class IndistinctVariants:
     places: tuple[tuple[str, NDArray[np.int64], Array], ...]
 
     def summed(self, problem: Linearised) -> tuple[Array, Array]:
-        """Gram matrices (B, k, k) and moments (B, k, 1 + D) of the points' strengths."""
+        """Gram matrices (B, k, k) and moments (B, k) of the points' strengths."""
         points, k = len(self.numbers), len(self.strengths)
-        shared, draws = problem.moments_shared.shape
-        gram, moments = np.zeros((points, k, k)), np.zeros((points, k, draws))
-        coupled = np.zeros((points, k, shared))
+        gram, moments = np.zeros((points, k, k)), np.zeros((points, k))
+        coupled = np.zeros((points, k, len(problem.moments_shared)))
         for specimen, columns, onto in self.places:
             part = problem.of[specimen]
             gram += onto @ part.gram[columns[:, :, None], columns[:, None, :]] @ onto.T
-            moments += onto @ part.moments[columns]
+            moments += part.moments[columns] @ onto.T
             coupled += onto @ part.shared[columns]
         return problem.without_shared(gram, moments, coupled)
 
 
 @dataclass(frozen=True)
 class Summed:
-    """A form at one shape: its strengths' Gram matrix (k, k), moments (k, D + 1) and signs (k,).
+    """A form at one shape: its strengths' Gram matrix (k, k), moments (k,) and signs (k,).
 
     Attributes
     ----------
@@ -256,35 +250,18 @@ class ScreenedVariant:
 
 @dataclass(frozen=True)
 class Screened:
-    """An effect on the screen: its evidence, of each draw of the null too, and its forms.
-
-    ``forms`` : best first.
-    """
+    """An effect on the screen: its evidence, and its forms, best first."""
 
     effect: str
     log_evidence: float
-    null: Array
     forms: tuple[ScreenedVariant, ...]
 
 
 @dataclass(frozen=True)
 class Screen:
-    """All effects, best first, and the evidence that the null exceeds as often as is allowed."""
+    """All effects, best first."""
 
     effects: tuple[Screened, ...]
-    threshold: float
-    draws: int
-
-
-def screen(
-    effects: Sequence[Screened], false_alarm: float, threshold: float | None = None
-) -> Screen:
-    """Effects ranked; the threshold is that of the largest evidence of each draw of the null."""
-    largest = np.max(np.stack([one.null for one in effects]), axis=0)
-    if threshold is None:
-        threshold = max(LEAST_THRESHOLD, exceeded(largest, false_alarm))
-    ranked = sorted(effects, key=lambda one: (-one.log_evidence, one.effect))
-    return Screen(tuple(ranked), threshold, len(largest))
 
 
 def screened(
@@ -296,20 +273,20 @@ def screened(
 ) -> Screened:
     """Evidence of one effect."""
     points = [(form, sds) for form in trials.forms for sds in shape_grid(form.variant)]
-    logs = np.zeros((len(points), problem.moments_shared.shape[1]))
+    logs = np.zeros(len(points))
     found: dict[int, ScreenedVariant] = {}
     share = {form: trials.log_share(form) for form in trials.forms}
     for some in index.batches(points, specimens, tests):
         gram, moments = some.summed(problem)
         group = Group.of(gram, some.signs)
         logs[some.numbers] = group.log_evidence(moments)
-        estimates = group.estimate(moments[..., 0])
+        estimates = group.estimate(moments)
         # (B,) drop of chi2 with these strengths: 2 s'F'r - s'F'F s
-        left = 2.0 * moments[..., 0] - (gram @ estimates[..., None])[..., 0]
+        left = 2.0 * moments - (gram @ estimates[..., None])[..., 0]
         explained = np.sum(estimates * left, axis=-1)
         for row, number in enumerate(some.numbers.tolist()):
             (form, sds), gain = points[number], float(explained[row])
-            log_evidence = float(logs[number, 0]) + share[form]
+            log_evidence = float(logs[number]) + share[form]
             told = (form, sds, some.strengths, log_evidence)
             found[number] = ScreenedVariant(*told, estimates[row], gain)
     # the effect's evidence is the mean over its forms by their shares, and over shapes of each
@@ -317,10 +294,9 @@ def screened(
     for form in trials.forms:
         start, end = end, end + len(shape_grid(form.variant))
         totals.append(log_sum(logs[start:end]) - np.log(end - start) + share[form])
-        tried.append(found[start + int(np.argmax(logs[start:end, 0]))])
-    whole = log_sum(np.stack(totals))
+        tried.append(found[start + int(np.argmax(logs[start:end]))])
     order = sorted(tried, key=lambda one: -one.log_evidence)
-    return Screened(trials.effect, float(whole[0]), whole[1:], tuple(order))
+    return Screened(trials.effect, float(log_sum(np.stack(totals))), tuple(order))
 
 
 def summed(
@@ -341,13 +317,3 @@ def sides(form: CandidateForm, strengths: Sequence[int]) -> Array:
     """(k,) side of off that the bounds of each strength allow, a column of the effect's values."""
     parameters = form.variant.create().parameters
     return np.array([parameters[column].side for column in strengths])
-
-
-def exceeded(values: Array, share: float) -> float:
-    """The value exceeded by that share: of the draws, or of a Gumbel fit where these are few."""
-    if len(values) * share >= 5.0:  # five draws beyond: the quantile is known to a half or so
-        return float(np.quantile(values, 1.0 - share))
-    # by moments: mean = place + gamma scale, SD = pi scale / sqrt(6)
-    scale = float(np.std(values)) * np.sqrt(6.0) / np.pi
-    place = float(np.mean(values)) - np.euler_gamma * scale
-    return place - scale * float(np.log(-np.log1p(-share)))

@@ -137,26 +137,30 @@ def _with_moves(plain: Whitening, directions: Array, sizes: Array, mixing: Array
 
 def _roots(test: Repeats, noise: Noise) -> Array:
     steps, joints = test.count.shape[:2]
-    serial = noise.correlations(steps)
+    serial, drift = noise.correlations(steps), noise.drift(steps)
     roots = np.zeros((joints, 6, steps, steps))
-    known: dict[bytes, Array] = {}
+    known: dict[tuple[int, bytes], Array] = {}
     for joint in range(joints):
         for coordinate in range(6):
             count = test.count[:, joint, coordinate]
-            key = count.tobytes()
-            if key not in known:
-                known[key] = _inverse_root(serial, count)
+            key = (coordinate, count.tobytes())
+            if key not in known and count.any():
+                sd, shared = noise.sd[coordinate], noise.accuracy[coordinate]
+                known[key] = _inverse_root(sd**2 * serial, shared**2 * drift, count)
             if count.any():
-                roots[joint, coordinate] = known[key] / noise.sd[coordinate]
+                roots[joint, coordinate] = known[key]
     return roots
 
 
-def _inverse_root(serial: Array, count: NDArray[np.int64]) -> Array:
-    """(T, T) inverse root of the covariance of means over ``count`` (T,) cycles; 0 where none."""
+def _inverse_root(own: Array, shared: Array, count: NDArray[np.int64]) -> Array:
+    """(T, T) inverse root of the covariance of means over ``count`` (T,) cycles; 0 where none.
+
+    ``own``, ``shared`` (T, T): covariance of what each cycle has by itself, and of what all have.
+    """
     used = np.flatnonzero(count)
-    root = np.zeros_like(serial)
-    if len(used):
-        shrunk = 1.0 / np.sqrt(count[used])
-        factor = np.linalg.cholesky(serial[np.ix_(used, used)] * np.outer(shrunk, shrunk))
-        root[np.ix_(used, used)] = np.linalg.inv(factor)
+    root = np.zeros_like(own)
+    shrunk = 1.0 / np.sqrt(count[used])
+    here = np.ix_(used, used)
+    factor = np.linalg.cholesky(own[here] * np.outer(shrunk, shrunk) + shared[here])
+    root[here] = np.linalg.inv(factor)
     return root
