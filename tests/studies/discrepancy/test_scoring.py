@@ -18,7 +18,6 @@ from tests.validation.discrepancy import report, run, seeds, store, tables, tune
 from tests.validation.discrepancy.designs import DESIGNS, design_of
 from tests.validation.discrepancy.goals import goals
 from tests.validation.discrepancy.judged import formula_of, judged
-from tests.validation.discrepancy.own_name import gap_of_own_name
 from tests.validation.discrepancy.rates import Goal, median, percentile, share
 from tests.validation.discrepancy.row import scored
 from tests.validation.discrepancy.targets import COUNTS, DRAWN, NUMBER, Target, of_seeds, targets
@@ -61,6 +60,7 @@ def row(
         "named": named.split(),
         "tied": tied.split(),
         "standing": [],
+        "oracle": {"ahead": 3.0, "nameable": 0.5},
         "testable": {name: told for name in names if name in KNOWN},
     }
 
@@ -111,18 +111,18 @@ LARGE = "one effect, gap >= 0.5, above its limit"
         ("null and dirty null: NAMED, PART or SET", 1, 3),
         ("null and dirty null: not NULL", 2, 3),
         ("null: NAMED, PART or SET", 1, 2),
-        (f"{LARGE}; same formula: top-1, NAMED or PART", 1, 3),
-        (f"{LARGE}; same formula: truth in set", 3, 3),
-        (f"{LARGE}; same formula: wrong name", 1, 3),
-        (f"{LARGE}; other formula: top-1, NAMED or PART", 2, 3),
-        (f"{LARGE}; other formula: top-1, NAMED alone", 1, 3),
-        (f"{LARGE}; other formula: wrong name", 1, 3),
-        (f"{LARGE}; all: wrong name, of PART alone", 0, 1),
-        ("one effect, gap 0.2-0.5, above its limit: top-1, NAMED or PART", 1, 2),
-        ("below the limit: wrong name", 1, 1),
+        (f"{LARGE}: named right", 3, 6),
+        (f"{LARGE}: named right, as a share of what the oracle expects", 3, 6),
+        (f"{LARGE}: NAMED alone", 2, 6),
+        ("one effect, above its limit; same formula: named right", 2, 5),
+        ("one effect, above its limit; other formula: named right", 2, 3),
+        ("one effect, gap 0.2-0.5, above its limit: named right", 1, 2),
+        ("one effect, above its limit: right or in the set", 6, 8),
+        ("one effect, above its limit: wrong name", 2, 8),
+        ("one effect, below its limit: wrong name", 1, 1),
         ("two effects, both above the limit: both named and no other", 1, 2),
         ("two effects, both above the limit: wrong name", 0, 2),
-        ("out of library, gap >= 0.5: no wrong name", 2, 3),
+        ("out of library, gap >= 0.5: a known name", 1, 3),
         ("out of library, gap >= 0.5: place right", 1, 2),
         ("out of library, gap >= 0.5: gap shrunk by a tabulated law", 1, 2),
         ("a known effect beside one out of the library: it is named, as a part", 1, 2),
@@ -143,8 +143,27 @@ def test_what_a_design_cannot_show_counts_nowhere() -> None:
         row(3, "level_dependence", "", "", "NULL", joints=1),
     ]
     found = {one["what"]: one for one in goals([judged(one) for one in rows])}
-    assert found[f"{LARGE}; all: top-1, NAMED or PART"]["n"] == 0
-    assert found[f"{LARGE}; all: top-1, NAMED or PART"]["value"] is None
+    assert found[f"{LARGE}: named right"]["n"] == 0
+    assert found[f"{LARGE}: named right"]["value"] is None
+
+
+def test_names_are_counted_beside_what_anybody_could_name() -> None:
+    """Three of six named, where half is nameable: all of what can be asked."""
+    found = goals_of_rows()[f"{LARGE}: named right, as a share of what the oracle expects"]
+    assert found["value"] == pytest.approx(3 / 3.0)
+    assert found["low"] < 1.0 < found["high"]
+
+
+def test_said_probabilities_are_held_against_the_truth() -> None:
+    rows = [
+        row(1, "creep", "creep") | {"probabilities": {"creep": 0.97, "hysteresis": 0.6}},
+        row(2, "creep", "") | {"probabilities": {"creep": 0.55, "something_else": 0.99}},
+        row(3, "angle_bump", "", kind="alien") | {"probabilities": {"creep": 1.0}},
+    ]
+    found = {one["what"]: one for one in goals([judged(one) for one in rows])}
+    for said, count, n in (("0.95 to 1", 1, 1), ("0.8 to 0.95", None, 0), ("0.5 to 0.8", 1, 2)):
+        one = found[f"said with {said}: true"]
+        assert (one["count"], one["n"]) == (count, n)
 
 
 def test_intervals_are_those_of_clopper_and_pearson() -> None:
@@ -332,6 +351,5 @@ def test_one_cohort_from_recipe_to_row(tmp_path: Path) -> None:
     assert path == store.path_of(target, tmp_path)
     assert row["status"] == "scored"
     assert judged(row).top1
-    told = gap_of_own_name(row)
-    assert 0.0 < told["gap"] < row["truth"]["gap"]
+    assert row["oracle"]["nameable"] > 0.9
     run.run([target], tmp_path, 1)  # would start a worker if it were not kept

@@ -4,7 +4,6 @@ import argparse
 import os
 from collections.abc import Sequence
 
-from tests.validation.discrepancy.own_name import tell_own_names
 from tests.validation.discrepancy.report import write
 from tests.validation.discrepancy.run import run
 from tests.validation.discrepancy.seeds import claim, first_seed
@@ -21,7 +20,6 @@ def main(arguments: Sequence[str] = ()) -> None:
         claim(place.name, first, first + NUMBER - 1)
         run(_chosen(asked, first), place, asked.jobs)
     found = kept(targets(first), place)
-    tell_own_names(found, asked.jobs)
     rows = [row for _, row in found]
     write(rows, "python -m tests.validation discrepancy", place.name)
 

@@ -80,12 +80,6 @@ class Judged:
         return self.shown and self.testable is True and self.below_limit is False
 
     @property
-    def has_own_name(self) -> bool:
-        """Above the gap from which no other effect is as good, to first order (`own_name.py`)."""
-        least = (self.row.get("own_name") or {}).get("gap")
-        return self.above and least is not None and self.gap >= least
-
-    @property
     def band(self) -> str:
         """Of the gap: large, small, tiny, or none."""
         if self.gap >= LARGE * (1.0 - REACHED):

@@ -41,6 +41,20 @@ def share(name: str, counts: Iterable[bool], goal: Goal | None = None) -> dict[s
     return _row(name, len(flags), sum(flags), found, float(ends.low), float(ends.high), goal)
 
 
+def ratio(
+    name: str, counts: Sequence[bool], expected: Sequence[float], goal: Goal | None = None
+) -> dict[str, Any]:
+    """How often something holds over how often it is expected to; bootstrap over the cohorts."""
+    of, by = np.array(counts, dtype=float), np.array(expected)
+    if not by.sum() > 0.0:
+        return _row(name, len(of), None, None, None, None, goal)
+    drawn = np.random.default_rng(0).integers(len(of), size=(2000, len(of)))
+    found = of[drawn].sum(axis=1) / np.maximum(by[drawn].sum(axis=1), np.finfo(float).tiny)
+    low, high = np.quantile(found, [0.025, 0.975])
+    value = float(of.sum() / by.sum())
+    return _row(name, len(of), int(of.sum()), value, float(low), float(high), goal)
+
+
 def median(name: str, values: Sequence[float], goal: Goal | None = None) -> dict[str, Any]:
     """A median with the interval of its order statistics; ends are None where too few."""
     return percentile(name, values, 0.5, goal)

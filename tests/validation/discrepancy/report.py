@@ -23,11 +23,12 @@ are right or wrong like those of NAMED. Top-1: exactly what is true and has a na
 name: any sure name that is not true, also beside a set. Above its limit: the design shows the
 effect by algebra (centres need translations or preloads, stiffness that grows with compression two
 preloads, differing levels several joints), spinepipe judges it testable, and the true gap is above
-the one that spinepipe says it finds in nine cohorts of ten. Told from all others by the tests: and
-above the gap at which no other effect is as good, to first order. Gaps are those truly there, in SD
-of one reading. Place: the coordinate of the shape, and the joint if it is one. Intervals:
-Clopper-Pearson, of percentiles by order statistics, 95 %. Met: by the value. Reached: by the whole
-interval. Each range of seeds is scored once (scored_seeds.csv); tuning uses others."""
+the one that spinepipe says it finds in nine cohorts of ten. What the oracle expects: the sum over
+cohorts of the probability that noise leaves 3 of the log evidence by which the truth beats its best
+rival on data without noise (oracle.py). Gaps are those truly there, in SD of one reading. Place:
+the coordinate of the shape, and the joint if it is one. Intervals: Clopper-Pearson, of percentiles
+by order statistics, of shares of what is expected by bootstrap, 95 %. Met: by the value. Reached:
+by the whole interval. Each range of seeds is scored once (scored_seeds.csv); tuning uses others."""
 
 
 def write(rows: Sequence[Row], command: str, code: str, folder: Path = RESULTS) -> None:

@@ -21,6 +21,7 @@ from tests.validation.discrepancy.further import (
     table_told,
     testable_told,
 )
+from tests.validation.discrepancy.oracle import oracle
 
 STUDY = Discrepancy(
     study="hidden",
@@ -68,7 +69,8 @@ def _truth(truth: Truth) -> Row:
 def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -> Row:
     """What the search says, then what is asked besides."""
     started = time.process_time()
-    ended = investigate(prepare(STUDY, cohort, None), at_once)
+    ready = prepare(STUDY, cohort, None)
+    ended = investigate(ready, at_once)
     found = ended.found
     row = _said(found, ended.ended) | {"threshold": ended.rules.needed}
     seconds["search"] = time.process_time() - started
@@ -79,6 +81,7 @@ def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -
     row["suspected"] = {"errors": [[e.where, e.what, e.evidence] for e in ended.errors]}
     row["places"] = places_told(ended, cohort.joint_names)
     row["table"] = table_told(ended)
+    row["oracle"] = oracle(ready, ended.rules, truth)
     seconds["besides"] = time.process_time() - started
     return row
 
