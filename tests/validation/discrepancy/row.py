@@ -8,6 +8,7 @@ from typing import Any
 from spinepipe import cohort as cohorts
 from spinepipe.problems import InputError
 from spinepipe.studies.discrepancy.search.baseline import NoBase
+from spinepipe.studies.discrepancy.search import investigation
 from spinepipe.studies.discrepancy.search.investigation import investigate, prepare
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.regions import values_with_regions
@@ -15,6 +16,7 @@ from spinepipe.studies.discrepancy.search.search_state import SearchResult, Sele
 from spinepipe.studies.discrepancy.settings import Discrepancy, DiscrepancyBase
 from spinepipe.studies.discrepancy.store import at_once
 from tests.generators.hidden import NoEquilibriumError, Recipe, Truth, make
+from tests.validation.discrepancy.ablation import replays
 from tests.validation.discrepancy.further import (
     held_out_told,
     places_told,
@@ -69,10 +71,22 @@ def _truth(truth: Truth) -> Row:
 def _searched(cohort: cohorts.Cohort, truth: Truth, seconds: dict[str, float]) -> Row:
     """What the search says, then what is asked besides."""
     started = time.process_time()
-    ended = investigate(prepare(STUDY, cohort, None), at_once)
+    asked: list[Any] = []
+    plain = investigation.outcome
+
+    def heard(*arguments: Any) -> Outcome:
+        asked[:] = arguments
+        return plain(*arguments)
+
+    investigation.outcome = heard
+    try:
+        ended = investigate(prepare(STUDY, cohort, None), at_once)
+    finally:
+        investigation.outcome = plain
     found = ended.found
     row = _said(found, ended.ended)
     seconds["search"] = time.process_time() - started
+    row["ablation"] = {name: list(said) for name, said in replays(asked).items()}
     started = time.process_time()
     row["held_out"] = held_out_told(ended.proof) if found.standing else None
     names = [hidden.name for hidden in truth.recipe.hidden]
