@@ -13,7 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from spinepipe.cli.find import study_names, unknown
+from spinepipe.cli.find import known_study
 from spinepipe.files import appearing, is_hidden
 from spinepipe.jobs.expected import Expected
 from spinepipe.jobs.project import RUNNING, AtWork, lock
@@ -79,9 +79,7 @@ def run(options: argparse.Namespace) -> int:
     if output.suffix != ".zip":
         at = "command line", None, "-o"
         raise InputError([InputProblem(*at, output.name, "FILE.zip", "rename it")])
-    if name not in study_names(root):
-        raise InputError([unknown("study", name, study_names(root))])
-    expected = Expected(str(root), *studies.check(root, name, starting=False))
+    expected = Expected(str(root), *studies.check(root, known_study(name, root), starting=False))
     study, files = expected.study, expected.files
     full = [path for path in files.results(full=True) if path not in files.results()]
     full = [path for path in full if (root / path).exists()]

@@ -7,7 +7,6 @@ cannot be right, as a spine ten times too large, is a problem unless cohort.yaml
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 from spinepipe.cli.find import cohort_names, study_names, unknown
@@ -19,7 +18,7 @@ from spinepipe.studies import read as studies
 from spinepipe.studies.free import unmeasured
 from spinepipe.studies.plausibility import doubts, refusals
 from spinepipe.studies.read import ReadCohort
-from spinepipe.studies.registry import PACKAGE, every_form, files_of, kind_of
+from spinepipe.studies.registry import every_form, files_of, function_at, kind_of
 from spinepipe.studies.study import COHORTS, Study
 
 
@@ -164,10 +163,7 @@ def _told_by_kind(study: Study, cohort: Cohort, root: Path) -> tuple[str, tuple[
     place = kind_of(study.kind).told_by_check
     if place is None:
         return "", ()
-    module, _, function = place.partition(":")
-    told: tuple[str, tuple[InputProblem, ...]] = getattr(
-        import_module(f"{PACKAGE}.{study.kind}.{module}"), function
-    )(study, cohort, root)
+    told: tuple[str, tuple[InputProblem, ...]] = function_at(study.kind, place)(study, cohort, root)
     return told
 
 

@@ -1,10 +1,9 @@
 """`spinepipe export`: a specimen's model as an OpenSim file, or the tables of a study as CSV."""
 
 import argparse
-from importlib import import_module
 from pathlib import Path
 
-from spinepipe.cli.find import specimen_of, study_names, unknown
+from spinepipe.cli.find import known_study, specimen_of
 from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
 from spinepipe.jobs.report import descriptor_of
@@ -14,7 +13,7 @@ from spinepipe.schema.datapackage import FILE
 from spinepipe.studies import read as studies
 from spinepipe.studies.exports import Exported, problem
 from spinepipe.studies.kind import WantedFiles
-from spinepipe.studies.registry import PACKAGE, every_kind, files_of, kind_of
+from spinepipe.studies.registry import every_kind, files_of, function_at, kind_of
 from spinepipe.studies.study import Study
 from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import read_frame
@@ -69,9 +68,7 @@ def run(options: argparse.Namespace) -> int:
     ending = ".osim" if options.matrix is None else ".csv"
     if options.output is not None and options.output.suffix != ending:
         raise InputError([problem("-o", options.output.name, f"FILE{ending}", "rename it")])
-    if options.study not in study_names(options.root):
-        raise InputError([unknown("study", options.study, study_names(options.root))])
-    study, cohort = studies.check(options.root, options.study)
+    study, cohort = studies.check(options.root, known_study(options.study, options.root))
     if options.tables is not None:
         return _write_tables(study, cohort, options)
     kind = kind_of(study.kind)
@@ -89,9 +86,7 @@ def run(options: argparse.Namespace) -> int:
         point_mm=None if options.matrix is None else tuple(options.matrix),
         test=options.test,
     )
-    module, _, function = kind.exports.partition(":")
-    exported = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)
-    made: Exported = exported(study, cohort, wanted)
+    made: Exported = function_at(study.kind, kind.exports)(study, cohort, wanted)
     for path, text in (
         (options.output, made.document),
         (options.output.with_suffix(".mot"), made.motion),

@@ -39,6 +39,19 @@ def study_or_cohort(name: str, root: Path) -> tuple[Study | None, Cohort]:
     raise InputError([unknown("name", name, [*study_names(root), *cohort_names(root)])])
 
 
+def known_study(name: str, root: Path) -> str:
+    """The name of a study, if there is one.
+
+    Raises
+    ------
+    InputError
+        When there is none.
+    """
+    if name not in study_names(root):
+        raise InputError([unknown("study", name, study_names(root))])
+    return name
+
+
 def unknown(what: str, name: str, known: Sequence[str]) -> InputProblem:
     """A name on the command line that nothing has."""
     remedy = did_you_mean(name, known, "correct the name, or the folder with --root")

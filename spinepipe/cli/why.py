@@ -1,12 +1,12 @@
 """`spinepipe why STUDY EFFECT`: why an effect is named, or why not."""
 
 import argparse
-from importlib import import_module
 
-from spinepipe.cli.find import study_names, unknown
-from spinepipe.problems import InputError, InputProblem, one_of
+from spinepipe.cli.find import known_study
+from spinepipe.problems import InputError, one_of
 from spinepipe.studies import read as studies
-from spinepipe.studies.registry import PACKAGE, every_kind, kind_of
+from spinepipe.studies.exports import problem
+from spinepipe.studies.registry import every_kind, function_at, kind_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,15 +17,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print what its results say of the effect."""
-    if options.study not in study_names(options.root):
-        raise InputError([unknown("study", options.study, study_names(options.root))])
-    study, _ = studies.check(options.root, options.study)
-    kind = kind_of(study.kind)
-    if kind.explains is None:
-        able = one_of([name for name, other in every_kind().items() if other.explains])
-        place = ("command line", None, "STUDY", f"kind {study.kind}")
-        raise InputError([InputProblem(*place, f"a study of kind {able}", "choose such a study")])
-    module, _, function = kind.explains.partition(":")
-    why = getattr(import_module(f"{PACKAGE}.{study.kind}.{module}"), function)
-    print("\n".join(why(options.root / "results" / study.study, options.effect)))
+    study, _ = studies.check(options.root, known_study(options.study, options.root))
+    place = kind_of(study.kind).explains
+    if place is None:
+        able = f"a study of kind {one_of([n for n, kind in every_kind().items() if kind.explains])}"
+        raise InputError([problem("STUDY", f"kind {study.kind}", able, "choose such a study")])
+    lines = function_at(study.kind, place)(options.root / "results" / study.study, options.effect)
+    print("\n".join(lines))
     return 0

@@ -142,7 +142,9 @@ class CohortHeader(BaseModel):
     accuracy: Accuracy | None = Field(
         default=None,
         description="accuracy of the instrument beside its repeatability, which `measurement_sd` "
-        "is: of each coordinate the larger counts as the SD of a reading; may be left out",
+        "is: of each coordinate the larger counts as the SD of a reading; a search for missing "
+        "effects takes it for an error that all cycles of a test share, a usual one where it is "
+        "left out",
     )
     acknowledged_warnings: Annotated[tuple[Group, ...], Field(strict=False)] = Field(
         default=(),

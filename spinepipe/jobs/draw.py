@@ -1,11 +1,9 @@
 """Job: one figure of a study of any kind, as SVG, PDF and PNG."""
 
-from importlib import import_module
-
 from spinepipe.jobs.digest import figure_digest, mark_of
 from spinepipe.jobs.inputs import study_of
 from spinepipe.marks import write_marked
-from spinepipe.studies.registry import PACKAGE, kind_of
+from spinepipe.studies.registry import function_at, kind_of
 from spinepipe.tables import StudyTables
 
 
@@ -21,8 +19,7 @@ def run(
 ) -> None:
     """Draw a figure that the kind declares, from the files of its tables and ``others``."""
     settings, cohort = study_of(root, study)
-    module, _, function = kind_of(settings.kind).figure(figure).at.partition(":")
-    draw = getattr(import_module(f"{PACKAGE}.{settings.kind}.{module}"), function)
+    draw = function_at(settings.kind, kind_of(settings.kind).figure(figure).at)
     digest = figure_digest(
         figure, settings, cohort, [mark_of(path) for path in [*tables, *others.values()]]
     )

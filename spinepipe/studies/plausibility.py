@@ -4,7 +4,6 @@ Each kind judges its own files (`Kind.doubts`), whatever study is asked for.
 """
 
 from collections.abc import Iterator
-from importlib import import_module
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import memoize_per_cohort
@@ -13,7 +12,7 @@ from spinepipe.plausibility.warnings.bodies import person
 from spinepipe.plausibility.warnings.judge import of_cohort
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell
 from spinepipe.problems import InputProblem
-from spinepipe.studies.registry import PACKAGE, every_kind
+from spinepipe.studies.registry import every_kind, function_at
 from spinepipe.studies.subjects import SUBJECTS
 
 
@@ -23,8 +22,7 @@ def suspicions(cohort: Cohort) -> tuple[PlausibilityWarning, ...]:
     found = list(of_cohort(cohort))
     for name, kind in every_kind().items():
         if kind.doubts is not None and any(form.stem in cohort.further for form in kind.forms):
-            module, _, function = kind.doubts.partition(":")
-            found += getattr(import_module(f"{PACKAGE}.{name}.{module}"), function)(cohort)
+            found += function_at(name, kind.doubts)(cohort)
     return tuple(dict.fromkeys(found))
 
 

@@ -4,11 +4,12 @@ Nothing is imported here by a written name, so that the digest of a job that ask
 does not follow all kinds.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.form import TableForm
@@ -57,6 +58,13 @@ def every_form(complete: bool = False) -> tuple[TableForm, ...]:
 def files_of(study: Study, cohort: Cohort) -> StudyFiles:
     """The result files of a study of a cohort."""
     return kind_of(study.kind).files.of(study, cohort)
+
+
+def function_at(kind: str, place: str) -> Callable[..., Any]:
+    """What a kind declares as ``file:function``, the file in its folder."""
+    module, _, function = place.partition(":")
+    found: Callable[..., Any] = getattr(import_module(f"{PACKAGE}.{kind}.{module}"), function)
+    return found
 
 
 def place_of(kind: str, job: str) -> str:

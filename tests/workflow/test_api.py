@@ -12,6 +12,7 @@ import straight_chains
 from small_project import Project
 
 import spinepipe as sp
+from spinepipe.cli import main
 from spinepipe.cohort import Cohort
 
 ROOT = Path(__file__).parents[2]
@@ -87,6 +88,24 @@ def test_missing_effects_are_those_of_a_run(eight: Project) -> None:
     fit = sp.calibrate(cohort_of(eight, "chains"), base=found.model, leave_out=None)
     plain = sp.calibrate(cohort_of(eight, "chains"), leave_out=None)
     assert fit.quality["cost"].sum() < 0.5 * plain.quality["cost"].sum()
+
+
+def test_why_an_effect_is_named_or_not_is_told(
+    eight: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the command line, from the files of the run; a wrong name with those that there are."""
+    asked = ["--root", str(eight.folder), "why", "discrepancy"]
+    for effect, words in (
+        ("nonlinear_stiffening", "in the most probable set"),
+        ("hysteresis", "not fitted"),
+    ):
+        assert main([*asked, effect]) == 0
+        told = capsys.readouterr().out
+        assert told.startswith("Verdict: NAMED. nonlinear_stiffening")
+        assert "a name needs 0.95" in told
+        assert words in told
+    assert main([*asked, "histeresis"]) == 1
+    assert "did you mean 'hysteresis'?" in capsys.readouterr().err
 
 
 def test_indices_are_those_of_a_run(eight: Project) -> None:

@@ -74,19 +74,23 @@ def _errors(verdict: Verdict) -> Conclusion:
     return Conclusion("errors", "stop", names={**first, "errors": count(len(errors), "such error")})
 
 
+def _sds(deg: float | None, mm: float | None, source: str) -> list[Value]:
+    """Of rotations and translations, as far as they are known."""
+    pairs = ((deg, "°"), (mm, "mm"))
+    return [Value(size, unit, source=source) for size, unit in pairs if size is not None]
+
+
 def _accuracy(verdict: Verdict) -> Conclusion:
     """Of an accuracy that nobody told."""
     noise, how = verdict.noise, "verdict: noise, accuracy"
-    sizes = ((noise.accuracy_rotation_deg, "°"), (noise.accuracy_translation_mm, "mm"))
-    known = [Value(size, unit, source=how) for size, unit in sizes if size is not None]
+    known = _sds(noise.accuracy_rotation_deg, noise.accuracy_translation_mm, how)
     names = {"accuracy": listed(f"{one:unit}" for one in known)}
     return Conclusion("accuracy", "check", {"value": known[0]}, names)
 
 
 def _noise(verdict: Verdict) -> Conclusion:
     noise = verdict.noise
-    sizes = ((noise.rotation_sd_deg, "°"), (noise.translation_sd_mm, "mm"))
-    known = [Value(size, unit, source="verdict: noise") for size, unit in sizes if size is not None]
+    known = _sds(noise.rotation_sd_deg, noise.translation_sd_mm, "verdict: noise")
     if not noise.source or not known:
         return Conclusion("noise", "stop_none")
     names = {"noise": listed(f"{one:unit}" for one in known)}

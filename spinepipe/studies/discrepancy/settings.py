@@ -118,13 +118,15 @@ class Discrepancy(Study):
     bootstrap: int = Field(
         default=500, ge=20, le=100_000, description="read by versions before; does nothing now"
     )
-    most_effects: int = Field(default=3, ge=1, le=10, description="most effects that are named")
+    most_effects: int = Field(
+        default=3, ge=1, le=10, description="most effects that are named; three at most"
+    )
     margin: float = Field(
         default=3.0,
         ge=0,
         le=1e3,
-        description="log evidence by which a name must beat its runner-up; with less both form a "
-        "set",
+        description="log evidence within which names of a set are listed, and from which a further "
+        "test has told two apart",
     )
     effort: Literal["quick", "standard", "full"] = Field(
         default="quick",

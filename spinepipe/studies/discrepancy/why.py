@@ -5,11 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
+from spinepipe.problems import InputError, did_you_mean, one_of
 from spinepipe.studies.discrepancy.alternatives import USEFUL, run_in_words
 from spinepipe.studies.discrepancy.tables import CANDIDATES, NEXT_TESTS
 from spinepipe.studies.discrepancy.verdict import LEAST_PROBABLE, SURE, Verdict, read_verdict
 from spinepipe.studies.discrepancy.words import general
+from spinepipe.studies.exports import problem, required_result
 from spinepipe.tables import read
 
 Row = Mapping[str, Any]
@@ -27,21 +28,15 @@ def why(results: Path, effect: str) -> Iterator[str]:
         Where the study has no results, or none of an effect of that name.
     """
     folder = results / FOLDER
-    if not (folder / "verdict.json").is_file():
-        raise InputError([_problem(results.name, "a study that was computed", "run it first")])
-    verdict = read_verdict(folder / "verdict.json")
+    verdict = read_verdict(required_result(folder / "verdict.json", "name another study"))
     tried, next_tests = (
         read(folder / f"{name}.parquet").to_pylist() for name in (CANDIDATES.name, NEXT_TESTS.name)
     )
     names = sorted({row["effect"] for row in tried} | {one.name for one in verdict.not_testable})
     if effect not in names:
         remedy = did_you_mean(effect, names, "choose one of them")
-        raise InputError([_problem(effect, one_of(names), remedy)])
+        raise InputError([problem("EFFECT", f"'{effect}'", one_of(names), remedy)])
     yield from _lines(verdict, effect, tried, next_tests)
-
-
-def _problem(found: str, allowed: str, remedy: str) -> InputProblem:
-    return InputProblem("command line", None, None, f"'{found}'", allowed, remedy)
 
 
 def _lines(

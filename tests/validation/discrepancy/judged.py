@@ -75,6 +75,16 @@ class Judged:
         return bool(set(self.named) - set(self.truth))
 
     @property
+    def answer(self) -> str:
+        """Yes, set (the truth is among the names), no, or WRONG: a name that is not true."""
+        if self.wrong_name:
+            return "WRONG"
+        right = self.top1 or (not self.truth and self.verdict == "NULL")
+        if self.kind in ("alien", "mistake"):
+            right = self.verdict in ("UNKNOWN", "REFUSED")
+        return "yes" if right else "set" if self.truth_in_set else "no"
+
+    @property
     def above(self) -> bool:
         """Testable and above the effect's own detection limit, as spinepipe judges both."""
         return self.shown and self.testable is True and self.below_limit is False

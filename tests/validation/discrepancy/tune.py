@@ -100,15 +100,7 @@ def _formulas(row: Row) -> str:
 
 
 def _right(one: Judged | None) -> str:
-    """Yes, set (the truth is among the names), no, or WRONG: a name that is not true."""
-    if one is None:
-        return "fail"
-    if one.wrong_name:
-        return "WRONG"
-    right = one.top1 or (not one.truth and one.verdict == "NULL")
-    if one.kind in ("alien", "mistake"):
-        right = one.verdict in ("UNKNOWN", "REFUSED")
-    return "yes" if right else "set" if one.truth_in_set else "no"
+    return "fail" if one is None else one.answer
 
 
 def _told(answers: Counter[str]) -> list[str]:

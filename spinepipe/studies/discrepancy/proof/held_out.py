@@ -174,7 +174,7 @@ def to_first_order(base: BaselineFit, final: BaselineFit, asked: Asked) -> HeldO
     return _proof(FoldModels(base, final, False, at_once), asked)
 
 
-def proof_of_terms(before: BaselineFit, after: BaselineFit) -> HeldOut:
+def proof_between(before: BaselineFit, after: BaselineFit) -> HeldOut:
     """Two fits on each test and specimen left out; the second one has more terms."""
     return _proof(FoldModels(before, after, False, at_once, with_surrogate=False), Asked())
 

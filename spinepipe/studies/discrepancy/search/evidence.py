@@ -1,14 +1,14 @@
 """Evidence for all effects of a fit together, against the base alone.
 
 Laplace's method (Kass and Raftery 1995, doi 10.2307/2291091): chi2 / 2 of the effects' parameters,
-everything else fitted anew, is taken for a parabola about the fit: curvature A, slope g (at a bound
-that of the readings, elsewhere what the fit's own prior holds in balance). With the prior
-N(off, S), off at a distance a,
+everything else fitted anew, is taken for a parabola about the fit: curvature A, slope g (what the
+fit's own prior holds in balance). With the prior N(off, S), off at a distance a,
 
     log evidence = gain / 2 - log det(I + A S) / 2 - a' S^-1 a / 2 + h' (A + S^-1)^-1 h / 2,
 
 h = g + S^-1 a. Where bounds cut a strength's prior, the evidence is multiplied by the posterior's
 mass between them over the prior's (encompassing prior, Klugkist and Hoijtink 2007), by marginals.
+A parameter that ended at its bound has half a parabola, inwards from there, the others as they are.
 A strength's SD is its declared prior SD times one of a few sizes, over which evidence is averaged.
 
 No formula is that of nature: each effect may be off by a share of what it does, a smooth function
@@ -166,6 +166,8 @@ def formula_error(baseline: BaselineFit) -> float:
     of_shared = []
     for name, one in baseline.readings.items():
         rows = []
+        # a function of its own for each coordinate that was read
+        read = [c for c in range(6) if any(t.count[..., c].any() for t in one.tests)]
         for number in range(len(one.tests)):
             predicted = fit.predicted[name][number]
             steps, joints, _ = predicted.shape
@@ -177,8 +179,6 @@ def formula_error(baseline: BaselineFit) -> float:
             done = [predicted - other[name][number] for other in without]
             effects = np.stack(done, axis=-1)[..., None]  # (T, J, 6, effects, 1)
             moves = (effects * smooth).reshape(steps, joints, 6, -1)
-            # a function of its own for each coordinate that was read
-            read = [c for c in range(6) if any(t.count[..., c].any() for t in one.tests)]
             apart = np.zeros((steps, joints, 6, len(read), moves.shape[-1]))
             for place, coordinate in enumerate(read):
                 apart[:, :, coordinate, place] = moves[:, :, coordinate]

@@ -7,7 +7,7 @@ where most probability rests on a first-order look alone, and end where that is 
 """
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
@@ -49,11 +49,18 @@ MOST_FORMS, MOST_TABLES = 6, 3
 SECONDS = 60.0
 
 Forms = frozenset[CandidateForm]
+Odds = dict[tuple[frozenset[str], bool], float]
+"""Logarithms, by names and whether something else is there."""
 
 
 def names_of(forms: Forms) -> frozenset[str]:
     """Of the effects that have one."""
     return frozenset(form.name for form in forms if form.name != TABLE)
+
+
+def has_table(forms: Forms) -> bool:
+    """Whether something else is among them."""
+    return any(form.name == TABLE for form in forms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,20 +153,23 @@ class Posterior:
             assert best.start.baseline is not None
             term = starting_term(best.added)
             tried = run(refit, self.base.fit, best.start.baseline, term, best.instead)
-            shares = sum(self.trials[form.name].log_share(form) for form in best.forms)
             usable = np.isfinite(tried.log_evidence)
             at = best.start.baseline.at(tried.fit) if usable else None
             entered = {**best.start.entered, best.added.form: (best.beside, best.added)}
             entered = {form: entered[form] for form in best.forms}
-            evidence = tried.log_evidence + shares
+            evidence = tried.log_evidence + self._log_shares(best.forms)
             reformed = best.instead is not None and best.instead.name == best.added.form.name
             one = FittedSet(best.forms, at, evidence, entered, tried, reformed=reformed)
             self._take(one, run)
 
     def log_evidence_of(self, at: BaselineFit) -> float:
         """Of all effects of a fit, against the base alone."""
-        shares = sum(self.trials[o.form.name].log_share(o.form) for o in at.fit.hypothesis.supposed)
+        shares = self._log_shares(one.form for one in at.fit.hypothesis.supposed)
         return joint_log_evidence(self.base.fit, at.fit) + formula_error(at) + shares
+
+    def _log_shares(self, forms: Iterable[CandidateForm]) -> float:
+        """Of forms, each of its effect."""
+        return sum(self.trials[form.name].log_share(form) for form in forms)
 
     def _next(self) -> SeenSet | None:
         """The set whose fit may matter most; None where no fit does."""
@@ -191,8 +201,7 @@ class Posterior:
 
     def log_prior(self, forms: Forms) -> float:
         """Of a set of effects, before any reading."""
-        names = names_of(forms)
-        other = any(form.name == TABLE for form in forms)
+        names, other = names_of(forms), has_table(forms)
         ways = max(comb(len(self.rules.trials), len(names)), 1)
         more = len(forms) - len(names) - other
         prior = PRIOR[len(names)] / ways * (ELSE if other else 1.0 - ELSE) * FURTHER_FORM**more
@@ -256,7 +265,7 @@ class Posterior:
                 yield SeenSet(one, beside, tried, form, one.log_evidence - lead, most)
 
     @property
-    def log_odds(self) -> dict[tuple[frozenset[str], bool], float]:
+    def log_odds(self) -> Odds:
         """Of each set of names, with and without something else; less what all sets share.
 
         Something else counts by its fits or by the first-order look, whichever has more.
@@ -265,8 +274,7 @@ class Posterior:
         looks: dict[frozenset[str], list[float]] = {}
         every: tuple[FittedSet | SeenSet, ...] = (*self.fitted.values(), *self.seen.values())
         for one in every:
-            names = names_of(one.forms)
-            other = any(form.name == TABLE for form in one.forms)
+            names, other = names_of(one.forms), has_table(one.forms)
             if np.isfinite(one.log_evidence):
                 groups.setdefault((names, other), []).append(self.log_odds_of(one))
             if isinstance(one, FittedSet) and one.lack is not None and not other:

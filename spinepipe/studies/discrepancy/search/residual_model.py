@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.tabulated_law import ITSELF
-from spinepipe.studies.discrepancy.proof.held_out import proof_of_terms
+from spinepipe.studies.discrepancy.proof.held_out import proof_between
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
@@ -32,15 +32,15 @@ def model_residual(found: SearchResult, run: PieceRunner) -> ResidualModel:
     after = found.with_tables
     if after is None:
         return ResidualModel(None, found.final)
-    proof = run(proof_of_terms, found.final, after)
+    proof = run(proof_between, found.final, after)
     if proof.tells and not proof.beats_base:
         return ResidualModel(None, found.final)
     forms = [o.form for o in after.fit.hypothesis.supposed if o.form.name == TABLE]
-    place = "; ".join(_where(after, form) for form in forms)
+    place = "; ".join(_where(form) for form in forms)
     return ResidualModel(Tabulated(place, whole_gap(after, after.fit).gap, proof.closed), after)
 
 
-def _where(baseline: BaselineFit, form: CandidateForm) -> str:
+def _where(form: CandidateForm) -> str:
     """In words: what is tabulated over what, and where."""
     options = dict(form.variant.options)
     over = "" if options["over"] == ITSELF else f" over {options['over']}"

@@ -12,7 +12,13 @@ from spinepipe.studies.discrepancy.search.gaps import gaps_at, whole_gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm
 from spinepipe.studies.discrepancy.search.joint_fit import joint_fit
 from spinepipe.studies.discrepancy.search.lack_of_fit import lack_of_fit
-from spinepipe.studies.discrepancy.search.posterior import FittedSet, Posterior, names_of
+from spinepipe.studies.discrepancy.search.posterior import (
+    FittedSet,
+    Odds,
+    Posterior,
+    has_table,
+    names_of,
+)
 from spinepipe.studies.discrepancy.search.refit import standing
 from spinepipe.studies.discrepancy.search.search_state import (
     Rival,
@@ -58,7 +64,7 @@ def search(
     return SearchResult(
         base=base,
         final=final,
-        standing=tuple(_standing(final, posterior, probabilities)),
+        standing=tuple(_standing(final, posterior, odds, probabilities)),
         stages=tuple(_stages(posterior)),
         probabilities=probabilities,
         sets=tuple(one for one in sets if one[2] > LEAST_TOLD),
@@ -96,27 +102,32 @@ def _likeliest(names: frozenset[str], posterior: Posterior, *, tables: bool) -> 
         for one in posterior.fitted.values()
         if one.baseline is not None
         and names_of(one.forms) == names
-        and any(form.name == TABLE for form in one.forms) == tables
+        and has_table(one.forms) == tables
     ]
     return max(having, key=lambda o: (o.log_evidence, sorted(map(repr, o.forms))), default=None)
 
 
 def _standing(
-    final: BaselineFit, posterior: Posterior, probabilities: dict[str, float]
+    final: BaselineFit,
+    posterior: Posterior,
+    odds: Odds,
+    probabilities: dict[str, float],
 ) -> Iterable[SelectedTerm]:
     """What stands in the final model."""
     supposed = standing(final.fit)
     names = frozenset(one.form.name for one in supposed)
-    odds, evidence = posterior.log_odds, posterior.log_evidence_of(final)
+    evidence = posterior.log_evidence_of(final)
     for one in supposed:
         name = one.form.name
         # the others alone, or as many of them as were fitted; with no table in the name's place
         without = [
             s
             for s in posterior.fitted.values()
-            if (of := names_of(s.forms)) < names and name not in of and s.baseline is not None
+            if (of := names_of(s.forms)) < names
+            and name not in of
+            and s.baseline is not None
+            and not has_table(s.forms)
         ]
-        without = [s for s in without if all(form.name != TABLE for form in s.forms)]
         best = max(without, key=lambda s: (len(s.forms), s.log_evidence))
         assert best.baseline is not None
         yield SelectedTerm(
@@ -131,7 +142,7 @@ def _standing(
 def _rivals(
     one: ActiveTerm,
     standing: frozenset[str],
-    odds: dict[tuple[frozenset[str], bool], float],
+    odds: Odds,
     posterior: Posterior,
 ) -> tuple[Rival, ...]:
     """Others than stand in the place of one, by the odds of all sets that have the one or other."""
