@@ -136,8 +136,8 @@ NAMES = tuple(
 
 def stretches(u: Array) -> tuple[Array, Array]:
     """(J, 8) how far each stretch is passed at u (J,) of the reach, from zero on, and its slope."""
-    (passed, inside), (at_rest, _) = _passed(u), _passed(np.zeros(1))
-    return passed - at_rest, inside
+    passed, inside = _passed(u)
+    return passed - _AT_REST, inside
 
 
 def _passed(u: Array) -> tuple[Array, Array]:
@@ -147,3 +147,6 @@ def _passed(u: Array) -> tuple[Array, Array]:
     over = np.hstack([u[:, None], over, 0.0 * ones])
     slope = np.hstack([ones, slope, 0.0 * ones])
     return over[:, :-1] - over[:, 1:], slope[:, :-1] - slope[:, 1:]
+
+
+_AT_REST, _ = _passed(np.zeros(1))

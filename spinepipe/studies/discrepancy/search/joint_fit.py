@@ -21,7 +21,7 @@ from spinepipe.studies.discrepancy.search.prediction import (
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
 from spinepipe.studies.discrepancy.search.whitening import Whitening
 
-SETTLED = DescentTolerances(cost=1e-5, step=1e-6, slope=1e-10, evaluations=40)
+SETTLED = DescentTolerances(cost=1e-5, step=1e-6, slope=1e-10, evaluations=20)
 """Chi2 settles to a share at which a log evidence is right to 0.01 or so."""
 
 
