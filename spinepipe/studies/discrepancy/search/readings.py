@@ -67,7 +67,7 @@ class SpecimenReadings:
             np.nan_to_num(one - test.mean) for one, test in zip(predicted, self.tests, strict=True)
         ]
 
-    @property
+    @cached_property
     def applied(self) -> tuple[Array, ...]:
         """(T, J, 6) N and N m of each test: what its loads do at each joint, weight not counted."""
         return tuple(joint_loads(self.frames, case) for case in self.cases)
