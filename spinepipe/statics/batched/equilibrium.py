@@ -29,7 +29,6 @@ from spinepipe.statics.equilibrium import (
     OVERSHOT,
     SMALLEST_FRACTION,
     STEP_TOLERANCE,
-    decays,
     places_between,
 )
 
@@ -140,13 +139,16 @@ def stands(chains: Chains, loads: Loads, q: Array, tangents: Array) -> Flags:
     seen = forward_kinematics(chains, loads, q, tangents)
     _, signs = eliminate(seen, Changes(np.empty((*q.shape, 0))), asked=True)
     found: Flags = signs == POSITIVE
-    for lane in np.flatnonzero(signs == 1):
-        scale = 1.0 / np.sqrt(chains.damping[loads.chain[lane]].ravel())
-        tangent = tangents_of(seen.part(np.array([lane])))[0] * scale[:, None] * scale
+    doubt = np.flatnonzero(signs == 1)
+    if len(doubt):
+        scale = chains.damping[loads.chain[doubt]].reshape(len(doubt), -1) ** -0.5
+        tangent = tangents_of(seen.part(doubt)) * scale[:, :, None] * scale[:, None]
         if len(seen.fixed):
-            free = ~seen.fixed[lane].ravel()
-            tangent = tangent[free][:, free]
-        found[lane] = decays(np.zeros_like(tangent), tangent)
+            # a held coordinate stands apart from the others, with an eigenvalue of one
+            held = seen.fixed[doubt].reshape(len(doubt), -1)
+            tangent[held[:, :, None] | held[:, None]] = 0.0
+            tangent += held[:, None] * np.eye(held.shape[1])
+        found[doubt] = np.linalg.eigvals(tangent).real.min(axis=1) > 0.0
     return found
 
 

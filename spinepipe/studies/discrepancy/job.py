@@ -211,7 +211,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     stays = _beyond(ended, run)
     table = None if stays.table is None else stays.grounds.fit
     hidden = hidden_effects(found, outcome, rules, run)
-    gap = gap_rows(found, joints, ended.proof, table)
+    gap = gap_rows(found, joints, table)
 
     # what a tester reads off the curves that effects which stand, named or tied, change
     names = {one.name for one in outcome.named} | set(outcome.tied)

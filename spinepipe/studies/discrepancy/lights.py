@@ -121,9 +121,9 @@ def _predicted(held_out: pd.DataFrame, every: int) -> Conclusion:
         "told": Value(told, source="held_out: readings of tests"),
         "readings": Value(every, source="gap: rows"),
     }
-    names = {"folds": count(folds, "test or specimen", "tests and specimens")}
+    names = {"folds": count(folds, "part")}
     light = "check_none" if not scored else "ok" if scored == folds else "check_some"
-    light = "ok_specimens" if light == "ok" and tests.empty else light
+    light = "ok_steps" if light == "ok" and tests.empty else light
     light = "check_few" if light == "ok" and len(tests) and 2 * told < every else light
     return Conclusion("predicted", light, values, names)
 
@@ -204,6 +204,4 @@ def _sample(
         "needed": Value(SURE, source="a name is said from here on"),
     }
     yield Conclusion("methods", "searched", values, names)
-    asked = (study.held_out.tests, study.held_out.specimens and specimens > 1)
-    left_out = {(True, True): "both", (True, False): "tests", (False, True): "specimens"}
-    yield Conclusion("method_left_out", left_out.get(asked, "neither"))
+    yield Conclusion("method_left_out", "tests")

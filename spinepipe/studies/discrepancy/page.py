@@ -53,7 +53,7 @@ _SHOWN: Mapping[str, tuple[str, str, str]] = {
         "model joint coordinate number load value unit low high",
     ),
     "held_out": (
-        "Left-out tests and specimens",
+        "Readings left out of the fit",
         HELD_OUT.about,
         "fold kind readings gap_base gap_base_low gap_base_high gap_with_effects "
         "gap_with_effects_low gap_with_effects_high worse message",
@@ -209,10 +209,6 @@ def _chosen(name: str, rows: pd.DataFrame) -> pd.DataFrame:
 
 def left_out(study: Discrepancy) -> Iterator[str]:
     """Parts that the settings leave out, each with the setting that does."""
-    # `refit` is no part: it says how left-out readings are predicted
-    for part, done in study.held_out:
-        if part != "refit" and not done:
-            yield f"prediction of left-out {part} (held_out: {part}: false)"
     if study.effects is not None:
         yield f"all effects but {', '.join(study.effects)} (effects)"
     # an error of the set-up that is given as an SD of 0 is not allowed for

@@ -37,7 +37,8 @@ Row = dict[str, Any]
 MOST_FORMS_SHOWN = 5
 """Forms of one effect on a screen that get a row; the others are far behind."""
 
-HELD_OUT_MODELS = ("held_out_base", "held_out_with_effects")
+GIVEN_UP: Row = {"held_out_fold": "", "held_out_base": None, "held_out_with_effects": None}
+"""Columns of ``gap`` that versions before filled."""
 """Columns of motion as predicted by fits that did not see it."""
 
 NOT_FITTED = "the linear problem, no fit"
@@ -53,7 +54,6 @@ DEGENERATE = "a shape ran to its bound: no more what its name says"
 def gap_rows(
     found: SearchResult,
     joints: Sequence[str],
-    proof: HeldOut,
     tabulated: JointFit | None = None,
 ) -> list[Row]:
     """Every reading, mean over cycles, with what both models say.
@@ -67,7 +67,7 @@ def gap_rows(
     """
     collected: dict[tuple[Any, ...], list[Row]] = {}
     for name in found.base.readings:
-        for key, row in _rows_of(found, name, joints, proof, tabulated):
+        for key, row in _rows_of(found, name, joints, tabulated):
             collected.setdefault(key, []).append(row)
     return [_averaged(key, rows) for key, rows in collected.items()]
 
@@ -76,7 +76,6 @@ def _rows_of(
     found: SearchResult,
     name: str,
     joints: Sequence[str],
-    proof: HeldOut,
     tabulated: JointFit | None,
 ) -> Iterator[tuple[tuple[Any, ...], Row]]:
     """Place (values of `KEYS`) and row of each reading of a specimen, in display units.
@@ -87,7 +86,6 @@ def _rows_of(
     readings, noise = found.base.readings[name], found.base.noise
     fits = {"base": found.base.fit, "with_effects": found.final.fit, "with_table": tabulated}
     modelled = {model: None if fit is None else fit.predicted[name] for model, fit in fits.items()}
-    held_out = proof.motion.get(name)
     for number, test in enumerate(readings.tests):
         # (T,) SD of each step's reading over that of a raw one: zeroing adds the error of step 0
         size = np.sqrt(np.diagonal(noise.correlations(len(test.count))))
@@ -101,18 +99,10 @@ def _rows_of(
                 "measured": float(test.mean[t, j, c] * factor),
                 "readings": count,
                 "noise_sd": float(sd[t, c] / np.sqrt(count)),
-                "held_out_fold": "",
-                "held_out_base": None,
-                "held_out_with_effects": None,
+                **GIVEN_UP,
             }
             for model, motion in modelled.items():
                 row[model] = None if motion is None else float(motion[number][t, j, c] * factor)
-            if held_out is not None and held_out.fold[number][t, j, c] >= 0:
-                row["held_out_fold"] = proof.folds[held_out.fold[number][t, j, c]].name
-                row["held_out_base"] = float(held_out.base[number][t, j, c] * factor)
-                row["held_out_with_effects"] = float(
-                    held_out.with_effects[number][t, j, c] * factor
-                )
             step = test.case.steps[t]
             rig = next((one for one in step.supports if one.place == 6 * j + c), None)
             key = (name, test.case.test, step.step, joints[j], COORDINATES[c])
@@ -132,7 +122,7 @@ def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
     held_at = rig.value * float(DISPLAY_PER_SI[coordinate])
     found = row | {"unit": LOAD_UNITS[COORDINATES[coordinate]], "held_at": held_at}
     found["noise_sd"] = row["noise_sd"] / per
-    for name in (*("measured", "base", "with_effects", "with_table"), *HELD_OUT_MODELS):
+    for name in ("measured", "base", "with_effects", "with_table"):
         found[name] = None if row[name] is None else load + row[name] / per
     return found
 
@@ -140,14 +130,13 @@ def _as_load(rig: Support, row: Row, coordinate: int) -> Row:
 def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
     """One row of those that several load histories of a test have at a place.
 
-    Means are weighted by the number of readings; a model has one only where it has all rows. What
-    was held out is told where all rows were held out in the same fold.
+    Means are weighted by the number of readings; a model has one only where it has all rows.
     """
     at = dict(zip(KEYS, key, strict=True))
     if len(rows) == 1:
         return at | rows[0]
     readings = sum(row["readings"] for row in rows)
-    found: Row = {"readings": readings, "unit": rows[0]["unit"]}
+    found: Row = {"readings": readings, "unit": rows[0]["unit"], **GIVEN_UP}
     held = [row["held_at"] for row in rows]
     found["held_at"] = None if None in held else sum(held) / len(held)
     for name in ("load", "measured", "base", "with_effects", "with_table"):
@@ -155,11 +144,6 @@ def _averaged(key: tuple[Any, ...], rows: Sequence[Row]) -> Row:
         found[name] = sum(told) / readings if len(told) == len(rows) else None
     # of a mean of n readings it is as 1 / sqrt(n)
     found["noise_sd"] = rows[0]["noise_sd"] * float(np.sqrt(rows[0]["readings"] / readings))
-    same = len({row["held_out_fold"] for row in rows}) == 1 and rows[0]["held_out_fold"]
-    found["held_out_fold"] = rows[0]["held_out_fold"] if same else ""
-    for name in HELD_OUT_MODELS:
-        values = [row[name] * row["readings"] for row in rows] if same else []
-        found[name] = sum(values) / readings if values else None
     return at | found
 
 
@@ -383,23 +367,20 @@ def held_out_rows(proof: HeldOut) -> list[Row]:
     """One row per fold, a set of readings that was held out at once.
 
     ``rms_*`` : root of chi2 over what a right model would leave; ``gap_*`` : what is beyond, noise
-    SD, with its 95 % interval. ``surrogate`` : a generic model without physics.
+    SD, with its 95 % interval. ``surrogate`` : of a model that versions before had, empty.
     """
     rows = []
     for one in proof.folds:
         models = {
             "base": one.base,
             "with_effects": one.with_effects,
-            "surrogate": one.surrogate,
+            "surrogate": None,
         }
         row: Row = {"fold": one.name, "kind": one.kind, "readings": one.readings}
         for model, gap in models.items():
-            # chi2 beside what a right model leaves: noise, and nuisances that training left open
-            beyond = None if gap is None else gap.against(one.expected)
-            row[f"rms_{model}"] = None if beyond is None else beyond.rms
-            sized = None if one.expected <= 0.0 else beyond
-            row[f"gap_{model}"] = None if sized is None else sized.gap
-            ends = (None, None) if sized is None else sized.interval
+            row[f"rms_{model}"] = None if gap is None else gap.rms
+            row[f"gap_{model}"] = None if gap is None else gap.gap
+            ends = (None, None) if gap is None else gap.interval
             row[f"gap_{model}_low"], row[f"gap_{model}_high"] = ends
         row |= {
             "closed": one.closed,

@@ -1,6 +1,6 @@
 """The study kind that asks which effect a model lacks, where, and how sure that is."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
@@ -8,7 +8,7 @@ from spinepipe.cohort.cohort import MeasurementSd
 from spinepipe.studies.parts import FORM, Coordinates, EachOnce, PublishedStiffness, Tests
 from spinepipe.studies.study import Study
 
-__all__ = ["Discrepancy", "DiscrepancyBase", "HeldOutSettings", "Nuisance"]
+__all__ = ["Discrepancy", "DiscrepancyBase", "Nuisance"]
 
 _Name = Annotated[str, StringConstraints(min_length=1)]
 
@@ -36,19 +36,6 @@ class DiscrepancyBase(BaseModel):
                 "{model: path of a model file}"
             )
         return self
-
-
-class HeldOutSettings(BaseModel):
-    """What is left out of the fits, one at a time, to see whether a named effect carries over."""
-
-    model_config = FORM
-
-    specimens: bool = Field(default=True, description="leave one specimen out")
-    tests: bool = Field(default=True, description="leave one test out")
-    refit: bool = Field(
-        default=False,
-        description="fit again without what is left out by the full simulator, not to first order",
-    )
 
 
 class Nuisance(BaseModel):
@@ -96,8 +83,19 @@ MOST_FITS = {"quick": 10, "standard": 40, "full": 100}
 """Of a search, by its effort."""
 
 
+GIVEN_UP = ("false_alarm", "bootstrap", "held_out")
+"""Settings of versions before: they are accepted, and do nothing."""
+
+
 class Discrepancy(Study):
     """Find which effect the base model lacks, and prove it on motion that was held out."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_given_up(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        return {key: value for key, value in given.items() if key not in GIVEN_UP}
 
     kind: Literal["discrepancy"] = Field(description="kind of study")
     base: DiscrepancyBase = Field(description="the model that is asked what it lacks")
@@ -108,15 +106,6 @@ class Discrepancy(Study):
     )
     effects: EachOnce[_Name] | None = Field(
         default=None, description="effects that are tried; null: all that can be"
-    )
-    false_alarm: float = Field(
-        default=0.01,
-        gt=0,
-        lt=1,
-        description="read by versions before; does nothing now",
-    )
-    bootstrap: int = Field(
-        default=500, ge=20, le=100_000, description="read by versions before; does nothing now"
     )
     most_effects: int = Field(
         default=3, ge=1, le=10, description="most effects that are named; three at most"
@@ -138,9 +127,6 @@ class Discrepancy(Study):
         gt=0,
         le=10_000,
         description="ends the search by the clock: its answer then hangs on the computer",
-    )
-    held_out: HeldOutSettings = Field(
-        default_factory=HeldOutSettings, description="what is held out"
     )
     measurement_sd: MeasurementSd | None = Field(
         default=None,

@@ -86,8 +86,8 @@ def summarise(
     gaps = {
         "base": found.base_gap,
         "with_effects": found.final_gap,
-        "held_out_base": proof.base and proof.base.against(proof.expected),
-        "held_out_with_effects": proof.with_effects and proof.with_effects.against(proof.expected),
+        "held_out_base": proof.base,
+        "held_out_with_effects": proof.with_effects,
     }
     final = places(residual_frame(investigation.grounds, found.final.fit, cohort.joint_names))
     largest = "; ".join(
@@ -143,13 +143,13 @@ def summarise(
 
 def _left_out(proof: HeldOut) -> Iterator[LeftOut]:
     for kind, folds in proof.by_kind().items():
-        if folds.base is None or folds.with_effects is None or folds.expected <= 0.0:
-            continue
+        assert folds.base is not None
+        assert folds.with_effects is not None
         yield LeftOut(
             kind,
             len(folds.folds),
-            folds.base.against(folds.expected).gap,
-            folds.with_effects.against(folds.expected).gap,
+            folds.base.gap,
+            folds.with_effects.gap,
             folds.closed,
             None if folds.closed is None else share_of_gap(folds.closed),
         )

@@ -13,6 +13,7 @@ from sweeps import sweep
 from spinepipe.cohort import read
 from spinepipe.model import LoadStep
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit, suspected_errors
+from spinepipe.studies.discrepancy.mistakes.swapped_specimens import swapped_pairs
 from spinepipe.studies.discrepancy.search.baseline import (
     BaselineFit,
     BaselineModels,
@@ -102,7 +103,7 @@ def test_nothing_is_suspected_of_clean_data_whatever_the_physics(
 @sweep("law", [chains.linear, neutral_zone_of_one, laxity, stop])
 def test_nothing_is_suspected_beside_a_fit_without_repeats(law: Yield) -> None:
     given = readings(4, law, cycles=1)
-    assert suspected_errors(grounds(given), given, at_once) == ()
+    assert suspected_errors(grounds(given), given) == ()
 
 
 # Signs ---------------------------------------------------------------------------------------
@@ -148,7 +149,7 @@ def again(case):  # type: ignore[no-untyped-def]
 def test_a_flipped_reading_is_told_even_where_a_free_base_hides_it() -> None:
     """With stiffness free per joint the fit ends at a bound; the sign is told without it."""
     given = changed(readings(2), flip("b", 4, 4))
-    (error,) = suspected_errors(grounds(given, "per_joint"), given, at_once)
+    (error,) = suspected_errors(grounds(given, "per_joint"), given)
     assert error.where == "b, L1L2 right_bending"
 
 
@@ -258,7 +259,7 @@ def test_a_joint_that_is_half_as_noisy_again_is_not_suspected() -> None:
 
 def test_loose_markers_are_found_without_repeats() -> None:
     given = changed(readings(3, cycles=1), shaken("b", 2, 12.0))
-    (error,) = suspected_errors(grounds(given), given, at_once)
+    (error,) = suspected_errors(grounds(given), given)
     assert (error.where, error.what) == ("b, L3L4", "markers of the joint")
 
 
@@ -282,7 +283,7 @@ def test_an_exchange_that_stiffness_can_hide_is_not_reported() -> None:
     """Upright chains in the same moments: the motion of a is as good for b."""
     a, b, c = readings(2)
     given = [replace(a, tests=b.tests), replace(b, tests=a.tests), c]
-    assert suspected_errors(grounds(given), given, at_once) == ()
+    assert swapped_pairs(grounds(given), at_once) == []
 
 
 @sweep("exchanged", [False, True])
@@ -292,7 +293,8 @@ def test_specimens_of_their_own_shape_are_known_again(tmp_path: Path, exchanged:
     make(Recipe(seed=8, errors=mistakes), tmp_path)
     there = grounds_of_folder(tmp_path)
     given = list(there.readings.values())
-    found = suspected_errors(there, given, at_once)
+    assert suspected_errors(there, given) == ()
+    found = swapped_pairs(there, at_once)
     assert [(e.where, e.what) for e in found] == [("s01 and s02", "motion exchanged")] * exchanged
 
 
@@ -304,5 +306,5 @@ def test_an_exchange_is_told_beside_a_real_effect(tmp_path: Path) -> None:
     there = grounds_of_folder(tmp_path)
     tried = trials(("nonlinear_stiffening", "marker_bias"), ROTATIONS, list(there.readings), 6)
     assert look(there, tried).effects[0].log_evidence > 100.0
-    found = suspected_errors(there, list(there.readings.values()), at_once, tried)
+    found = swapped_pairs(there, at_once, tried)
     assert [(e.where, e.what) for e in found] == [("s01 and s02", "motion exchanged")]

@@ -11,7 +11,7 @@ from sweeps import sweep
 from spinepipe.effects import PlaceSpread, Wrench
 from spinepipe.effects.registry import registered
 from spinepipe.model import LoadCase, LoadStep
-from spinepipe.studies.discrepancy.proof.held_out import HeldOut
+from spinepipe.studies.discrepancy.proof.held_out import TEST, FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search import outcome as outcomes
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
@@ -102,7 +102,9 @@ ERROR = SuspectedError("specimen b, L3L4", "sign flipped", "slope -1")
 
 
 def proof(over_base: float | None) -> HeldOut:
-    return HeldOut((), {}, None, None, 0.0, over_base)
+    if over_base is None:
+        return HeldOut((FoldRow("a", TEST, 10, None, None),))
+    return HeldOut((FoldRow("a", TEST, 10, Gap(50.0, 10.0, 10), Gap(50.0 - over_base, 10.0, 10)),))
 
 
 def names(result: Outcome) -> list[str]:

@@ -11,8 +11,7 @@ import numpy as np
 
 from spinepipe.studies.discrepancy.design.fisher_information import specimen_signatures
 from spinepipe.studies.discrepancy.design.testable import judgements
-from spinepipe.studies.discrepancy.proof.folds import SPECIMEN, TEST
-from spinepipe.studies.discrepancy.proof.held_out import FoldRow, HeldOut
+from spinepipe.studies.discrepancy.proof.held_out import STEPS, TEST, FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.investigation import Investigation
@@ -45,30 +44,29 @@ def _told(ask: Callable[..., Told]) -> Callable[..., Told]:
 
 @_told
 def held_out_told(proof: HeldOut) -> Told:
-    """Of tests and specimens left out: share of the excess misfit (chi2) taken away, and rms."""
+    """Of tests and load steps left out: share of the excess misfit (chi2) taken away, and rms."""
     return {
         "tests": _of_folds([row for row in proof.folds if row.kind == TEST]),
-        "specimens": _of_folds([row for row in proof.folds if row.kind == SPECIMEN]),
+        "steps": _of_folds([row for row in proof.folds if row.kind == STEPS]),
         "all_closed": proof.closed,
         "beats_base": proof.beats_base,
     }
 
 
 def _of_folds(rows: Sequence[FoldRow]) -> Told:
-    """Sums over folds; ``expected`` is the chi2 of a model that is right."""
+    """Sums over folds; as many readings are the chi2 of a model that is right."""
     pairs = [(row.base, row.with_effects, row) for row in rows]
     scored = [(base, new, row) for base, new, row in pairs if base is not None and new is not None]
     base = sum(one.chi2 for one, _, _ in scored)
     new = sum(one.chi2 for _, one, _ in scored)
-    expected = sum(row.expected for *_, row in scored)
-    readings = sum(row.readings for *_, row in scored)
+    expected = sum(row.readings for *_, row in scored)
     clear = base - expected > CLEAR * np.sqrt(2.0 * expected) if expected else False
     return {
         "folds": len(scored),
         "closed": min((base - new) / (base - expected), 1.0) if clear else None,
         "base_rms": np.sqrt(base / expected) if expected else None,
         "rms": np.sqrt(new / expected) if expected else None,
-        "readings": readings,
+        "readings": expected,
         "worse": [row.name for *_, row in scored if row.worse],
     }
 

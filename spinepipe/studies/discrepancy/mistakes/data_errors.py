@@ -1,7 +1,8 @@
 """Suspected mistakes in the files: they are no physics, and no effect should explain them.
 
-Signs and units come from how joints answer their loads, without any model; scatter from repeats;
-exchanged specimens from fits of the base. What cannot be told is not reported.
+Signs and units come from how joints answer their loads, without any model; scatter from repeats,
+or from what the base leaves. Exchanged specimens: `swapped_specimens`. What cannot be told is not
+reported.
 
 Signs. A spring yields to its load. Where a joint answers as much as the others do, but the other
 way, its readings have the wrong sign; where most joints of a test do so, the sign of the load (or
@@ -34,13 +35,8 @@ from spinepipe.studies.discrepancy.mistakes.bad_markers import (
     beside_the_curve,
     between_cycles,
 )
-from spinepipe.studies.discrepancy.mistakes.swapped_specimens import swapped_pairs
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
-from spinepipe.studies.discrepancy.search.hypothesis import Trials
-from spinepipe.studies.discrepancy.search.outcome import MUCH, left_of
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings
-from spinepipe.studies.discrepancy.search.search_state import SearchResult
-from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import SuspectedError
 from spinepipe.units import COORDINATES, MM_PER_M, ROTATIONS, TRANSLATIONS
 
@@ -52,28 +48,17 @@ APART = 30.0
 
 
 def suspected_errors(
-    baseline: BaselineFit,
-    measured: Sequence[SpecimenReadings],
-    run: PieceRunner,
-    trials: Sequence[Trials] = (),
-    search: SearchResult | None = None,
+    baseline: BaselineFit, measured: Sequence[SpecimenReadings]
 ) -> tuple[SuspectedError, ...]:
-    """All suspected mistakes, where the base has a fit.
+    """What can be told before effects are looked for: signs, units and scatter.
 
-    Parameters
-    ----------
-    measured : the readings before outliers were left out; loose markers look like outliers.
-    trials, search : effects that may be missing, and where the search for them ended: an exchange
-        must explain the readings better.
+    ``measured`` : the readings before outliers were left out; loose markers look like outliers.
     """
     joints = next(iter(baseline.fit.models.values())).joints
     found = [*before_a_fit(measured, joints, baseline.noise.sd, zeroed=baseline.noise.zeroed)]
     if not _is_repeated(measured):
         scatter = beside_the_curve(measured, baseline.fit.predicted)
         found += bad_markers(scatter, list(baseline.readings), joints, in_every=True)
-    # a model of the wrong shape says nothing of specimens that changed places
-    if not found and (search is None or left_of(search) <= MUCH):
-        found += swapped_pairs(baseline, run, trials, search)
     return tuple(found)
 
 

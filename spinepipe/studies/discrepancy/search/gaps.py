@@ -1,7 +1,7 @@
 """How large a discrepancy is, in noise SD, over all readings or pooled by place."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -64,10 +64,6 @@ class Gap:
     def excess(self) -> float:
         """chi2 beyond what noise makes."""
         return self.chi2 - self.dof
-
-    def against(self, expected: float) -> "Gap":
-        """Held out: beside what a right model leaves, noise and nuisances left open."""
-        return replace(self, dof=expected)
 
     def _of(self, excess: float) -> float:
         return float(np.sqrt(max(0.0, excess / self.dof))) if self.dof > 0.0 else 0.0

@@ -11,7 +11,8 @@ from spinepipe.effects.contract import Array
 from spinepipe.model.file import ModelFile
 from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.mistakes.data_errors import suspected_errors
-from spinepipe.studies.discrepancy.proof.held_out import Asked, HeldOut, held_out
+from spinepipe.studies.discrepancy.mistakes.swapped_specimens import swapped_pairs
+from spinepipe.studies.discrepancy.proof.held_out import HeldOut, held_out
 from spinepipe.studies.discrepancy.search.baseline import (
     PER_SPECIMEN,
     BaselineFit,
@@ -34,6 +35,7 @@ from spinepipe.studies.discrepancy.search.outcome import (
     MUCH,
     Outcome,
     cannot_be_excluded,
+    left_of,
     outcome,
 )
 from spinepipe.studies.discrepancy.search.prediction import solve_on_record
@@ -128,21 +130,24 @@ def investigate(
     """
     study, cohort = ready.study, ready.cohort
     specimens, joints = sorted(cohort.specimen_names), len(cohort.joint_names)
+    baseline = fit_base(ready, run)
+    errors = suspected_errors(baseline, ready.measured)
     rules = Rules(
         trials(study.effects, ready.coordinates, specimens, joints),
         ready.coordinates,
         study.margin,
         study.most_effects,
         study.seed,
-        MOST_FITS[study.effort],
+        # data that look wrong are no physics: nothing will be named, and a fit may take for ever
+        0 if errors else MOST_FITS[study.effort],
         study.minutes,
     )
-    baseline = fit_base(ready, run)
     found = search(baseline, rules, run, progress)
     on_record([found.base.fit, found.final.fit], baseline.readings, run)
-    errors = suspected_errors(baseline, ready.measured, run, rules.trials, found)
-    asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
-    proof = held_out(found, asked, run)
+    # a model of the wrong shape says nothing of specimens that changed places
+    if not errors and left_of(found) <= MUCH:
+        errors = tuple(swapped_pairs(baseline, run, rules.trials, found))
+    proof = run(held_out, found.base, found.final)
     # by each standing effect, others that what was recorded cannot exclude, if they are tried
     cases = {name: one.cases for name, one in found.base.readings.items()}
     not_excluded = {
@@ -155,10 +160,10 @@ def investigate(
     }
     ended = outcome(found, proof, errors, not_excluded)
     told = Investigation(baseline, rules, found, errors, proof, ended)
-    return _with_sure_effects(told, asked, run)
+    return _with_sure_effects(told, run)
 
 
-def _with_sure_effects(one: Investigation, asked: Asked, run: PieceRunner) -> Investigation:
+def _with_sure_effects(one: Investigation, run: PieceRunner) -> Investigation:
     """Fitted and held out again without effects that stood and are doubted beside sure ones."""
     # what the verdict stands for, for certain or in a set of names that cannot be told apart
     sure = {id(effect) for effect in one.ended.named}
@@ -179,7 +184,7 @@ def _with_sure_effects(one: Investigation, asked: Asked, run: PieceRunner) -> In
     standing = tuple(kept)
     found = replace(one.found, final=final, standing=standing, final_gap=gap, final_at=at)
     on_record([fit], one.grounds.readings, run)
-    return replace(one, found=found, proof=held_out(found, asked, run))
+    return replace(one, found=found, proof=run(held_out, found.base, final))
 
 
 def on_record(

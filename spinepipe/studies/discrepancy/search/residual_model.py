@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.effects.tabulated_law import ITSELF
-from spinepipe.studies.discrepancy.proof.held_out import proof_between
+from spinepipe.studies.discrepancy.proof.held_out import held_out
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import whole_gap
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
@@ -32,7 +32,7 @@ def model_residual(found: SearchResult, run: PieceRunner) -> ResidualModel:
     after = found.with_tables
     if after is None:
         return ResidualModel(None, found.final)
-    proof = run(proof_between, found.final, after)
+    proof = run(held_out, found.final, after)
     if proof.tells and not proof.beats_base:
         return ResidualModel(None, found.final)
     forms = [o.form for o in after.fit.hypothesis.supposed if o.form.name == TABLE]
