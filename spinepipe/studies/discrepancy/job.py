@@ -4,6 +4,7 @@ A base that cannot be fitted is a verdict too: why, and what looks wrong in the 
 """
 
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -154,9 +155,11 @@ def searched(
     ----------
     file : the model that the study starts from, where it is a file. run : of the pieces of work.
     """
+    # the base's fit counts too: a laboratory asks when it will have an answer
+    until = None if study.minutes is None else time.monotonic() + 60.0 * study.minutes
     ready = prepare(study, cohort, file)
     try:
-        ended = investigate(ready, run, progress)
+        ended = investigate(ready, run, progress, until)
     except NoBase as trouble:
         return _without_base(ready, trouble)
     return _with_base(ready, ended, run)

@@ -137,7 +137,8 @@ class Discrepancy(Study):
         default=None,
         gt=0,
         le=10_000,
-        description="ends the search by the clock: its answer then hangs on the computer",
+        description="ends the search by the clock, so long after the start of its job: its answer "
+        "then hangs on the computer",
     )
     held_out: HeldOutSettings = Field(
         default_factory=HeldOutSettings, description="what is held out"

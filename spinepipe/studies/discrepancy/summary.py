@@ -126,7 +126,7 @@ def summarise(
         smallest_detectable=told.smallest_detectable,
         unknown=None
         if ended.reason is None
-        else UnnamedMisfit(left_where, shape, ended.reason, coordinate),
+        else UnnamedMisfit(left_where, shape, ended.reason, coordinate, stays=ended.stays),
         part=UnnamedRest(found.final_gap.gap, left_where, shape, ended.left, coordinate)
         if ended.left
         else None,
@@ -138,6 +138,7 @@ def summarise(
         withheld=tuple(withheld),
         left_out=tuple(_left_out(proof)),
         probabilities={n: p for n, p in found.probabilities.items() if p >= LEAST_PROBABLE},
+        search=found.extent,
     )
 
 

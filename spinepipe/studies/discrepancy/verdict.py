@@ -11,7 +11,7 @@ logarithm of a ratio of marginal likelihoods. *Base* is the model without the ef
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from math import sqrt
@@ -46,6 +46,8 @@ EVEN = 0.5
 
 LEAST_PROBABLE = 0.005
 
+NOT_LISTED = "something that is in no list"
+
 UNIT = "noise sd"
 """Of `MisfitSizes`, as the file has it: SDs of the noise of one reading."""
 
@@ -64,6 +66,42 @@ class VerdictKind(StrEnum):
     SET = "SET"
     NULL = "NULL"
     UNKNOWN = "UNKNOWN"
+
+
+def likeliest_beside(
+    probabilities: Mapping[str, float], told: Collection[str]
+) -> tuple[str, float]:
+    """What is likeliest of all that is not told, and its probability; nothing among it."""
+    others = {name: p for name, p in probabilities.items() if name not in told}
+    return max(others.items(), key=lambda one: (one[1], one[0]), default=(NOTHING, 0.0))
+
+
+class SearchEnd(StrEnum):
+    """What ended a search: that no fit mattered any more, its number of fits, or the clock."""
+
+    DONE = "done"
+    FITS = "fits"
+    MINUTES = "minutes"
+
+
+@dataclass(frozen=True)
+class SearchExtent:
+    """How far a search came.
+
+    Attributes
+    ----------
+    ended : by what. A search that the clock ended hangs on the computer, so that its answer is
+        compared with no other.
+    fits : how many were made. open : probability that may lie in sets of effects that were not
+        fitted, at most.
+    not_fitted : the likeliest of these sets, each as the names of its effects, `SOMETHING_ELSE`
+        among them; none where no fit mattered any more.
+    """
+
+    ended: SearchEnd = SearchEnd.DONE
+    fits: int = 0
+    open: float = 0.0
+    not_fitted: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -426,6 +464,7 @@ class Verdict:
     left_out : held-out gaps by what was left out, tests and specimens apart.
     probabilities : that each effect is missing, `SOMETHING_ELSE` is, and `NOTHING`; those below
         `LEAST_PROBABLE` are not told. Empty in files written before the key existed.
+    search : how far the search came; None in such files, and where the base has no fit.
     """
 
     cohort: str
@@ -449,6 +488,7 @@ class Verdict:
     withheld: tuple[WithheldEffect, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     probabilities: Mapping[str, float] = field(default_factory=dict)
+    search: SearchExtent | None = None
 
     @property
     def named(self) -> tuple[str, ...]:

@@ -86,6 +86,7 @@ class UnnamedMisfit:
     ----------
     where : the largest gaps, in words. shape : as generic shapes see it, None without evidence.
     reason : why there is no name. coordinate : of the shape; None without one.
+    stays : noise SD (RMS) that stay whatever is added, where that is why; else None.
     formula : of files written by versions before.
     """
 
@@ -94,6 +95,7 @@ class UnnamedMisfit:
     reason: Reason
     coordinate: str | None = None
     formula: Formula | None = None
+    stays: float | None = None
 
 
 @dataclass(frozen=True)

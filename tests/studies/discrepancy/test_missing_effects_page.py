@@ -234,6 +234,8 @@ ASSUMED = {"source": "declared", "rotation_sd_deg": 0.2, "translation_sd_mm": 0.
 WRONG = VERDICTS["SET"]["suspected_data_errors"]
 NO_BASE = reason(Reason.NO_BASE, noise={"source": ""}, imperfections=None)
 NEXT = (f"{UNNAMED}: own, shared", "load_offset")
+FAR = {"fits": 10, "open": 0.31}
+FAR |= {"not_fitted": [["creep", "neutral_zone"], ["level_dependence", "something_else"]]}
 # fmt: off
 CASES: tuple[Case, ...] = (
     Case("NAMED", "verdict named; misfit_after named; misfit_base told; errors ok; sample ok; "
@@ -246,6 +248,10 @@ CASES: tuple[Case, ...] = (
          {"effects": [EFFECT, SECOND]}),
     Case("NAMED", "verdict part; remainder check", after(1.7, 1.6, 1.8)),
     Case("PART", "verdict part_open; shape unseen", None, {"part": PART | {"left_shape": None}}),
+    Case("SET", "verdict set_one", None, {"candidates_in_set": ["level_dependence"],
+         "probabilities": {"level_dependence": 0.92, "something_else": 0.08}}),
+    Case("SET", "verdict set_beside_one", None, {"effects": [SECOND], "candidates": TIED[:1],
+         "probabilities": {"hysteresis": 0.97, "neutral_zone": 0.7}}),
     Case("SET", "verdict set; misfit_after likeliest; alternatives set_silent; next separate"),
     Case("SET", "verdict set_beside; alternatives set; alternatives alone", None,
          {"effects": [SECOND], "candidates": TIED}),
@@ -254,13 +260,23 @@ CASES: tuple[Case, ...] = (
          whole(0.2, 0.0)),
     Case("NULL", "verdict null", whole(0.2, 0.0), {
         "smallest_detectable": VERDICTS["NULL"]["smallest_detectable"][:1]}),
+    Case("NULL", "verdict null_open", whole(0.2, 0.0), {
+        "probabilities": {"nothing": 0.06, "neutral_zone": 0.9}}),
     Case("NULL", "verdict null_misfit; power all; tests ok; by_test base", whole(1.0, 0.8),
          {"not_testable": []}),
     Case("NULL", "verdict null_blind; power stop_blind; tests stop", None,
          {"smallest_detectable": []}),
     Case("UNKNOWN", "verdict unknown_shape; unexplained place; alternatives nearest; shape seen"),
     Case("UNKNOWN", "verdict unknown_shape", None, reason(Reason.IMITATED_TOGETHER)),
-    Case("UNKNOWN", "verdict unknown_much", None, reason(Reason.MOST_STAYS)),
+    Case("UNKNOWN", "verdict unknown_part; alternatives nearest", None, {
+        **reason(Reason.A_PART_STAYS),
+        "probabilities": {"something_else": 1.0, "nonlinear_stiffening": 0.99}}),
+    Case("UNKNOWN", "verdict unknown_much", None, {
+        "unknown": UNKNOWN | {"reason": "most_stays", "stays": 4.2}}),
+    # how far the search came
+    Case("NAMED", "ended ok", None, {"search": {"ended": "done", "fits": 3, "open": 0.01}}),
+    Case("NAMED", "ended check_fits", None, {"search": FAR | {"ended": "fits"}}),
+    Case("NAMED", "ended check_minutes", None, {"search": FAR | {"ended": "minutes"}}),
     Case("NAMED", "accuracy check", None, {"noise": NOISE | {
         "accuracy_assumed": True, "accuracy_rotation_deg": 0.1}}),
     Case("UNKNOWN", "verdict unknown_left_out", None, reason(Reason.NOT_PROVEN)),
@@ -311,6 +327,7 @@ CASES: tuple[Case, ...] = (
     Case("NAMED", "noise check_assumed", None, {"noise": ASSUMED}),
     Case("NAMED", "outliers check", None, {"noise": NOISE | {"outliers_left_out": 4}}),
     Case("NAMED", "set_up stop", set_up(9.0)),
+    Case("NAMED", "set_up stop", set_up(-15.0)),
     Case("NAMED", "set_up check", set_up(1.0, common=True)),
     Case("NAMED", "set_up ok", set_up(1.0), taken(0.15)),
     Case("NAMED", "set_up ok_more", set_up(1.0), taken(0.9)),
@@ -375,6 +392,14 @@ def test_left_out_is_always_a_test_a_specimen_or_its_load_steps(row: Sentence) -
     if row.rule == "carries" and row.figure and row.verdict != "steps":
         assert "predicted from the others" in row.note
         assert "half of its own load steps" in row.note
+
+
+def test_a_set_of_one_says_what_holds_the_rest(root: Path) -> None:
+    one = {"candidates_in_set": ["level_dependence"]}
+    one |= {"probabilities": {"level_dependence": 0.92, "something_else": 0.08}}
+    *_, shown = made(root, Case("SET", "", None, one))
+    told = "level dependence is missing, or something that is in no list (0.92; 0.080)"
+    assert told in shown.at("answer")[0].text
 
 
 def said(shown: Page, rule: str, place: str = "finding") -> Told:

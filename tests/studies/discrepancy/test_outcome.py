@@ -266,6 +266,14 @@ def test_a_name_is_sure_from_nineteen_in_twenty(p: float, verdict: str) -> None:
         assert result.why.endswith("cannot tell which: creep or hysteresis")
 
 
+def test_a_set_of_one_name_tells_what_holds_the_rest() -> None:
+    result = outcome(ended({("creep",): 0.92}, {(): 0.08}))
+    assert (result.verdict, result.tied) == (VerdictKind.SET, ("creep",))
+    assert result.why == "creep or something that is in no list (0.92; 0.08)"
+    untried = outcome(ended({("creep",): 0.97, ("hysteresis",): 0.03}, unfitted=0.6))
+    assert "what was not fitted holds 0.60" in untried.why
+
+
 @sweep("least, told", [(0.021, True), (0.019, False)])
 def test_a_set_lists_no_name_that_is_hardly_probable(least: float, told: bool) -> None:
     sets = {(): 0.04, ("hysteresis",): 0.86, ("creep",): 0.03, ("load_offset",): least}

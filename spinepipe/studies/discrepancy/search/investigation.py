@@ -120,9 +120,16 @@ def prepare(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepa
 
 
 def investigate(
-    ready: Prepared, run: PieceRunner, progress: Progress | None = None
+    ready: Prepared,
+    run: PieceRunner,
+    progress: Progress | None = None,
+    until: float | None = None,
 ) -> Investigation:
     """All that decides the verdict of a study.
+
+    Parameters
+    ----------
+    until : when the clock ends the search, see `Posterior.explore`.
 
     Raises
     ------
@@ -138,10 +145,9 @@ def investigate(
         study.most_effects,
         study.seed,
         MOST_FITS[study.effort],
-        study.minutes,
     )
     baseline = fit_base(ready, run)
-    found = search(baseline, rules, run, progress)
+    found = search(baseline, rules, run, progress, until)
     on_record([found.base.fit, found.final.fit], baseline.readings, run)
     errors = suspected_errors(baseline, ready.measured, run, rules.trials, found)
     asked = Asked(study.held_out.tests, study.held_out.specimens, study.held_out.refit)
