@@ -31,7 +31,6 @@ from spinepipe.studies.discrepancy.rows import (
     advice_rows,
     candidate_rows,
     confusion_rows,
-    design_rows,
     gap_rows,
     held_out_rows,
     imperfection_rows,
@@ -221,10 +220,10 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     forms = [one.supposed.form for one in found.standing if one.name in names]
     numbers = field_number_rows(base, final, forms, reaches(gap)) if forms else []
     return DiscrepancyResults(
-        verdict=summarise(ready, ended, told, stays, numbers, taken["with_effects"], hidden, run),
+        verdict=summarise(ready, ended, told, stays, taken["with_effects"], hidden, run),
         rows={
             "gap": gap,
-            "candidates": [*design_rows(told), *candidate_rows(found, rules.needed, joints)],
+            "candidates": candidate_rows(found, rules.needed, joints),
             "where": where_rows(found, joints),
             "confusions": confusion_rows(told),
             "held_out": held_out_rows(ended.proof),

@@ -125,8 +125,7 @@ class Discrepancy(Study):
         default=3.0,
         ge=0,
         le=1e3,
-        description="log evidence within which names of a set are listed, and from which a further "
-        "test has told two apart",
+        description="log evidence from which a further test has told two names apart",
     )
     effort: Literal["quick", "standard", "full"] = Field(
         default="quick",
