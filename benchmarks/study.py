@@ -1,6 +1,7 @@
 """The main study as a user runs it: cold, again, and after losing a file; wall time and memory."""
 
 import contextlib
+import os
 import shutil
 import subprocess
 import sys
@@ -71,12 +72,12 @@ def whole_runs() -> Iterator[Run]:
 
 
 @contextlib.contextmanager
-def copy_of_project() -> Iterator[str]:
-    """A copy of the project without results."""
+def copy_of_project(root: Path = ROOT) -> Iterator[str]:
+    """A copy of the project, or of another tree of it, without results."""
     with tempfile.TemporaryDirectory(prefix="spinepipe-bench-") as folder:
         for part in PARTS:
-            copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy
-            copy(ROOT / part, Path(folder) / part)
+            copy = shutil.copytree if (root / part).is_dir() else shutil.copy
+            copy(root / part, Path(folder) / part)
         yield folder
 
 
@@ -99,6 +100,8 @@ def run_workflow(what: str, folder: str, wanted: Sequence[str], goal: str) -> Ru
     process = subprocess.Popen(
         [sys.executable, "-m", "snakemake", "-j2", *wanted],
         cwd=folder,
+        # the copy's own code, whatever is installed
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([folder, f"{folder}/workflow/plugins"])},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )

@@ -438,12 +438,15 @@ def test_a_notebook_says_what_the_page_says(root: Path) -> None:
     model = ModelFile.model_validate(
         {"model": "m", "cohort": "c", "effects": [{"effect": "linear_bushing"}]}
     )
-    for case in CASES[:12]:
+    for case in (*CASES[:12], Case("NAMED", "", None, {"search": FAR | {"ended": "minutes"}})):
         if case.tables is None:
             verdict = verdict_of(VERDICTS[case.answer] | case.changed)
             rows = {name: rows.to_dict("records") for name, rows in frames(case.answer).items()}
             found = _result(DiscrepancyResults(verdict, rows, model, model), "linear model")
-            assert found.headline == made(root, case)[3].at("answer")[0].text
+            shown = made(root, case)[3]
+            assert found.headline == shown.at("answer")[0].text
+            of_search = [one.text for one in shown.at("light") if one.rule == "ended"]
+            assert [found.search] == (of_search or [""])
 
 
 def chart(name: str, root: Path, case: Case) -> Chart:
