@@ -122,19 +122,15 @@ def beside(old: str, slopes: Path | None) -> Iterator[Beside]:
     for work in works(slopes):
         with tempfile.TemporaryDirectory() as cohorts:
             texts = work.texts(Path(cohorts))
-            (new, cpu_s, said), (_, old_cpu_s, _) = (_cold(r, work, texts) for r in (ROOT, tree))
-        yield Beside(work.about, new.wall_s, cpu_s, old_cpu_s, work.goal, said)
+            (new, said), (was, _) = (_cold(root, work, texts) for root in (ROOT, tree))
+        yield Beside(work.about, new.wall_s, new.cpu_s, was.cpu_s, work.goal, said)
 
 
-def _cold(root: Path, work: Work, texts: Texts) -> tuple[Run, float, str]:
-    """A run from nothing, its CPU seconds, and what it said."""
+def _cold(root: Path, work: Work, texts: Texts) -> tuple[Run, str]:
+    """A run from nothing, and what it said."""
     with _project(root, texts) as folder:
-        before = os.times()
         run = run_workflow(work.about, folder, _verdicts(texts), work.goal)
-        now = os.times()
-        cpu_s = now.children_user + now.children_system
-        cpu_s -= before.children_user + before.children_system
-        return run, cpu_s, "; ".join(_said(Path(folder, one)) for one in _verdicts(texts))
+        return run, "; ".join(_said(Path(folder, one)) for one in _verdicts(texts))
 
 
 def again() -> Iterator[Run]:

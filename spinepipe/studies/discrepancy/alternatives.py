@@ -115,12 +115,9 @@ def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterato
         values = {"allowed": Value(factor * one.allowed, unit, source="verdict: withheld")}
         if one.known_to is not None:
             values["known"] = Value(factor * one.known_to, unit, source="verdict: withheld")
-        names = {"effect": general(one.name), "imperfection": _set_up(one.imperfection)}
+        imperfection = SET_UP.get(one.imperfection, plain(one.imperfection))
+        names = {"effect": general(one.name), "imperfection": imperfection}
         yield Conclusion("hidden", "known" if "known" in values else "unknown", values, names)
-
-
-def _set_up(kind: str) -> str:
-    return SET_UP.get(kind, plain(kind))
 
 
 def next_test(verdict: Verdict, next_tests: pd.DataFrame) -> Iterator[Conclusion]:

@@ -26,7 +26,6 @@ from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, Nuis
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import display_value, fitted_values
 from spinepipe.studies.discrepancy.search.refit import Refit
-from spinepipe.studies.discrepancy.search.screen import ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SearchStage
 from spinepipe.studies.discrepancy.tables import NEXT_TESTS
 from spinepipe.studies.discrepancy.verdict import share_of_gap
@@ -213,7 +212,9 @@ def _screened(
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
             scope = _scope(tried.form, joints)
             row = _form_row(f"screen {stage.name}", stage.beside, tried.form, scope)
-            row |= _of_screen(tried) | {
+            row |= {
+                "parameters": len(tried.estimate) + len(tried.form.variant.shapes),
+                "delta_chi2": tried.explained,
                 # the effect's evidence is that of all its forms: on the row of the best
                 "log_evidence": one.log_evidence if not place else tried.log_evidence,
                 "gap_share": _share(tried.explained, excess),
@@ -264,12 +265,6 @@ def _decision(one: Refit, behind: float) -> str:
     if behind <= 0.0:
         return MOST_PROBABLE
     return f"with it all are {behind:.1f} log odds behind the most probable set"
-
-
-def _of_screen(tried: ScreenedVariant) -> Row:
-    """Numbers of a form on the screen. ``delta_chi2`` : by how much chi2 falls."""
-    count = len(tried.estimate) + len(tried.form.variant.shapes)
-    return {"parameters": count, "delta_chi2": tried.explained}
 
 
 def _share(drop: float, excess: float) -> float | None:
