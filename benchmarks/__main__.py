@@ -48,7 +48,7 @@ def main() -> None:
         "whole_study": whole_study,
         "cohort": cohort_parts,
         "digests": lambda: print(digests.sizes(), flush=True),
-        "discrepancy": lambda: discrepancy_parts(options.small),
+        "discrepancy": lambda: discrepancy_parts(options.old, options.slopes),
         "films": films_part,
         "many_spines": many_spines_part,
         "memory": memory_part,
@@ -67,8 +67,10 @@ def main() -> None:
     )
     given = os.environ.get(real_geometry.COHORT_VARIABLE)
     parser.add_argument("--cohort", default=given, help="folder of a cohort, for real_geometry")
-    small = "discrepancy: the small cohort alone, and no file is written"
-    parser.add_argument("--small", action="store_true", help=small)
+    older = "discrepancy: the commit beside which HEAD is measured"
+    parser.add_argument("--old", default="HEAD~1", help=older)
+    slopes = os.environ.get(discrepancy.SLOPES_VARIABLE)
+    parser.add_argument("--slopes", default=slopes, help="file of slopes in shear, for discrepancy")
     options = parser.parse_args()
     if options.part[:1] == ["commands"]:
         commands_part(*options.part[1:])
@@ -199,19 +201,23 @@ def cohort_parts() -> None:
     _write("cohort", lines, {**data, "study": rows})
 
 
-def discrepancy_parts(small: bool) -> None:
-    """Search for missing effects in a small cohort and in one of full size."""
+def discrepancy_parts(old: str, slopes: str | None) -> None:
+    """Searches for missing effects at HEAD and at an older commit, in turn."""
     about = _about()
     lines = _head("Search for missing effects", about)
-    found = []
-    for case in [discrepancy.SMALL] if small else [discrepancy.SMALL, discrepancy.FULL]:
-        said, runs = discrepancy.measure(case)
-        rows = _study_rows(lines, runs, discrepancy.STUDY)
-        lines += ["", discrepancy.in_words(said)]
-        print(lines[-1], flush=True)
-        found.append({"recipe": case.recipe.as_dict(), "said": asdict(said), "runs": rows})
-    if not small:
-        _write("discrepancy", lines, {"machine": about, "cohorts": found})
+    lines += ["", f"Verdicts from nothing, on two cores, HEAD beside {old}.", ""]
+    lines += ["| cohort | wall s | goal | CPU s | older CPU s | ratio | verdict |"]
+    lines += ["|---|---|---|---|---|---|---|"]
+    rows = _told(
+        lines,
+        discrepancy.beside(old, Path(slopes) if slopes else None),
+        lambda one: (
+            f"| {one.about} | {one.new_s:.1f} | {one.goal} | {one.new_cpu_s:.1f} "
+            f"| {one.old_cpu_s:.1f} | {one.new_cpu_s / one.old_cpu_s:.2f} | {one.said} |"
+        ),
+    )
+    runs = _study_rows(lines, discrepancy.again(), "small")
+    _write("discrepancy", lines, {"machine": about, "older": old, "works": rows, "again": runs})
 
 
 def films_part() -> None:

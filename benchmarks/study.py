@@ -1,6 +1,7 @@
 """The main study as a user runs it: cold, again, and after losing a file; wall time and memory."""
 
 import contextlib
+import os
 import shutil
 import subprocess
 import sys
@@ -30,7 +31,7 @@ class Run:
     Attributes
     ----------
     peak_mib : largest memory of all its processes together (shared pages counted once).
-    engine_s : CPU seconds of Snakemake itself, without its workers.
+    engine_s : CPU seconds of Snakemake itself, without its workers. cpu_s : of all its processes.
     """
 
     what: str
@@ -38,6 +39,7 @@ class Run:
     peak_mib: float
     engine_s: float
     goal: str
+    cpu_s: float
 
 
 FOUNDATION = (
@@ -71,12 +73,12 @@ def whole_runs() -> Iterator[Run]:
 
 
 @contextlib.contextmanager
-def copy_of_project() -> Iterator[str]:
-    """A copy of the project without results."""
+def copy_of_project(root: Path = ROOT) -> Iterator[str]:
+    """A copy of the project, or of another tree of it, without results."""
     with tempfile.TemporaryDirectory(prefix="spinepipe-bench-") as folder:
         for part in PARTS:
-            copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy
-            copy(ROOT / part, Path(folder) / part)
+            copy = shutil.copytree if (root / part).is_dir() else shutil.copy
+            copy(root / part, Path(folder) / part)
         yield folder
 
 
@@ -99,6 +101,8 @@ def run_workflow(what: str, folder: str, wanted: Sequence[str], goal: str) -> Ru
     process = subprocess.Popen(
         [sys.executable, "-m", "snakemake", "-j2", *wanted],
         cwd=folder,
+        # the copy's own code, whatever is installed
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([folder, f"{folder}/workflow/plugins"])},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
@@ -108,7 +112,7 @@ def run_workflow(what: str, folder: str, wanted: Sequence[str], goal: str) -> Ru
     wall = time.perf_counter() - start
     if process.returncode:
         raise RuntimeError(f"{what}: {errors.decode()[-2000:]}")
-    return Run(what, wall, watch.peak_mib, watch.engine_s, goal)
+    return Run(what, wall, watch.peak_mib, watch.engine_s, goal, sum(watch.cpu_s.values()))
 
 
 class Watch(threading.Thread):
@@ -117,6 +121,7 @@ class Watch(threading.Thread):
     def __init__(self, pid: int) -> None:
         super().__init__(daemon=True)
         self.pid, self.peak_mib, self.engine_s = pid, 0.0, 0.0
+        self.cpu_s: dict[int, float] = {}  # by process, when it was last seen
 
     def run(self) -> None:
         while psutil.pid_exists(self.pid):
@@ -128,5 +133,9 @@ class Watch(threading.Thread):
         times = root.cpu_times()
         self.engine_s = max(self.engine_s, times.user + times.system)
         processes = (root, *root.children(recursive=True))
+        for one in processes:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                spent = one.cpu_times()
+                self.cpu_s[one.pid] = spent.user + spent.system
         total = sum(process.memory_full_info().pss for process in processes)
         self.peak_mib = max(self.peak_mib, total / 2**20)

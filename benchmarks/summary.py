@@ -102,6 +102,9 @@ def _workflows(parts: dict[str, Data]) -> Iterator[str]:
         goal = f" (goal {run['goal']})" if run["goal"] else ""
         took = f"{run['wall_s']:.1f} s, {run['peak_mib']:.0f} MiB"
         yield f"| {name}: {run['what']}{goal} | {took} | | | | {_link(name)} |"
+    for one in parts["discrepancy"]["works"]:
+        what = f"missing effects, {one['about']} (goal {one['goal']})"
+        yield f"| {what} | {one['new_s']:.1f} s | | | | {_link('discrepancy')} |"
     ours, theirs = parts["memory"]["processes"]
     yield (
         f"| largest memory of a process that solves T12-S1 | {ours['peak_mib']:.0f} MiB | OpenSim "
@@ -114,8 +117,7 @@ def _runs(parts: dict[str, Data]) -> Iterator[tuple[str, Data]]:
     """Every run of a workflow with its part."""
     for name in ("foundation", "whole_study", "cohort"):
         yield from ((name, run) for run in parts[name]["study"])
-    for cohort in parts["discrepancy"]["cohorts"]:
-        yield from (("discrepancy", run) for run in cohort["runs"])
+    yield from (("discrepancy", run) for run in parts["discrepancy"]["again"])
     sobol, targets = parts["sensitivity"]["sobol"], parts["sensitivity"]["targets"]
     for row in sobol:
         yield from (("sensitivity", row[key]) for key in ("responses", "indices", "rest"))

@@ -15,6 +15,7 @@ from spinepipe.progress import Progress, silent
 from spinepipe.report.conclusions import sentences_of, told
 from spinepipe.studies.discrepancy.conclusions import answer
 from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
+from spinepipe.studies.discrepancy.lights import extent
 from spinepipe.studies.discrepancy.misfits import model_name
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
@@ -32,6 +33,7 @@ class MissingEffects(Result):
     table : the effects that are missing for certain: ``name``, ``log_evidence``, coordinates.
     headline : the answer as the page of a study has it.
     quality : what the verdict depends on: noise, threshold, and residuals with and without.
+    search : how the search ended and what was not tried, in a sentence.
     verdict : ``NAMED``, ``PART``, ``SET``, ``NULL`` or ``UNKNOWN``; ``why`` in a sentence.
     probabilities : that each effect is missing, something else is, nothing is; likeliest first.
     alternatives : effects that the data cannot exclude. not_testable : effects that these tests
@@ -42,6 +44,7 @@ class MissingEffects(Result):
     model : the base with its effects; it can be the ``base`` of `spinepipe.calibration`.
     """
 
+    search: str
     verdict: str
     why: str
     probabilities: pd.DataFrame
@@ -122,11 +125,14 @@ def _result(found: DiscrepancyResults, model: str) -> MissingEffects:
     ]
     ranked = sorted(verdict.probabilities.items(), key=lambda one: -one[1])
     ended = answer(verdict, model, tables[WHERE.name], tables[GAP.name])
-    (said,) = told([ended], sentences_of(PACKAGE))
+    said, *of_search = told([ended, *extent(verdict)], sentences_of(PACKAGE))
+    # of the places where a page has it, the one that names what was not tried
+    lights = [one.text for one in of_search if one.place == "light"]
     return MissingEffects(
         headline=said.text,
         table=pd.DataFrame(named, columns=None if named else ["name", "log_evidence", "spread"]),
         quality=pd.DataFrame(quality, columns=["quantity", "value", "unit"]),
+        search="".join(lights),
         verdict=verdict.verdict.value,
         why=verdict.why,
         probabilities=pd.DataFrame(ranked, columns=["name", "probability"]),

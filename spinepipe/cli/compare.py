@@ -33,6 +33,9 @@ from spinepipe.tables import read_metadata
 LEVELS = {VERDICT: "stop", APART: "stop", VALUE: "check", ONE: "check"}
 """How urgent each difference of conclusions is."""
 
+BY_THE_CLOCK = "ended", "check_minutes"
+"""The conclusion, rule and verdict, of a result that is compared with nothing."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which two studies, and where to."""
@@ -83,12 +86,19 @@ def side_by_side(a: Path, b: Path) -> SideBySide:
 
     Raises
     ------
+    InputError
+        Where the clock ended one of them.
     FileNotFoundError
         Where one of them has no tables.
     DamagedFile
         For a table that is not as it was written.
     """
-    sides = Results(a), Results(b)
+    sides, concluded = (Results(a), Results(b)), (stored_conclusions(a), stored_conclusions(b))
+    for folder, those in zip((a, b), concluded, strict=True):
+        if BY_THE_CLOCK in {(one.rule, one.verdict) for one in those}:
+            found = "a search that the clock ended, so that its answer hangs on the computer"
+            allowed, remedy = "results that any computer comes to", "search again without minutes"
+            raise InputError([InputProblem(folder.name, None, "minutes", found, allowed, remedy)])
     kinds = tuple(one.provenance["kind"] for one in sides)
     tables, left_out = _tables(*sides)
     settings, note = _settings(a, b, kinds[0] == kinds[1])
@@ -98,7 +108,7 @@ def side_by_side(a: Path, b: Path) -> SideBySide:
         kinds=(kinds[0], kinds[1]),
         settings=settings,
         settings_note=note,
-        conclusions=paired(stored_conclusions(a), stored_conclusions(b), kinds[0] == kinds[1]),
+        conclusions=paired(*concluded, kinds[0] == kinds[1]),
         origin=origins_that_differ(*told),
         tables=tables,
         left_out=left_out,

@@ -21,6 +21,7 @@ from sweeps import sweep
 from spinepipe.api.results import open_results
 from spinepipe.cli import main
 from spinepipe.cli.compare import side_by_side
+from spinepipe.problems import InputError
 from spinepipe.report.conclusions import Told, Value
 from spinepipe.report.overview.side_by_side import (
     APART,
@@ -72,6 +73,18 @@ def test_of_a_study_and_itself_nothing_changed(compare: Compare, tmp_path: Path)
     shown = page.read_text()
     assert '<h1 id="answer">Nothing changed.</h1>' in shown
     assert re.findall(r"<td>range_of_motion</td>.*?<td>([^<]+)</td></tr>", shown) == ["equal"]
+
+
+@sweep("side", [FIRST, SECOND])
+def test_a_result_that_the_clock_ended_is_compared_with_nothing(side: str, tmp_path: Path) -> None:
+    """Another computer would have come to another one."""
+    root = cases.project(tmp_path / "project")
+    by_clock = cases.conclusion("light", "ended", "check_minutes", "The clock ended it.")
+    for name in (FIRST, SECOND):
+        ended = [by_clock] if name == side else []
+        cases.store(root, name, [*cases.conclusions(), *ended])
+    with pytest.raises(InputError, match=f"{side}.*the clock ended"):
+        side_by_side(root / "results" / FIRST, root / "results" / SECOND)
 
 
 def test_equal_results_of_two_studies_differ_by_their_settings_alone(compare: Compare) -> None:

@@ -33,8 +33,6 @@ UNNAMED = "what no effect explains"
 WITHHELD = "withheld"
 """How a message begins that tells what an error of the set-up would have to be known to."""
 
-NO_NAMES = (SOMETHING_ELSE, NOTHING)
-
 _MOST_WORDS_OF_CURVE = 7
 
 USEFUL = ("advised", "offered")
@@ -67,19 +65,21 @@ def alternatives(verdict: Verdict) -> Iterator[Conclusion]:
         yield Conclusion("alternatives", "alone", {"own": probable(first.name)}, names)
     if verdict.verdict is Ended.SET:
         best, *others = sorted(verdict.in_set, key=lambda one: (one.behind is None, one.behind))
-        other = next((one for one in others if one.name != best.name), best)
-        names = {
-            "first": name_at(best.name, best.coordinates),
-            "second": name_at(other.name, other.coordinates),
-        }
+        names = {"first": name_at(best.name, best.coordinates)}
+        other = next((one for one in others if one.name != best.name), None)
+        if other is None:  # the answer has told both
+            return
+        names["second"] = name_at(other.name, other.coordinates)
         if other.behind is None or best.behind is None:
             yield Conclusion("alternatives", "set_silent", names=names)
         else:
             needed = Value(SURE, source="a name is said from here on")
             values = {"own": probable(best.name), "other": probable(other.name), "needed": needed}
             yield Conclusion("alternatives", "set", values, names)
-    if verdict.reason is Reason.NO_KNOWN_EFFECT:
-        known = {n: p for n, p in verdict.probabilities.items() if n not in NO_NAMES}
+    if verdict.reason in (Reason.NO_KNOWN_EFFECT, Reason.A_PART_STAYS):
+        known = {
+            n: p for n, p in verdict.probabilities.items() if n not in (SOMETHING_ELSE, NOTHING)
+        }
         if known:
             nearest = max(known, key=lambda name: (known[name], name))
             values = {"own": probable(nearest), "other": probable(SOMETHING_ELSE)}
@@ -115,12 +115,9 @@ def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterato
         values = {"allowed": Value(factor * one.allowed, unit, source="verdict: withheld")}
         if one.known_to is not None:
             values["known"] = Value(factor * one.known_to, unit, source="verdict: withheld")
-        names = {"effect": general(one.name), "imperfection": _set_up(one.imperfection)}
+        imperfection = SET_UP.get(one.imperfection, plain(one.imperfection))
+        names = {"effect": general(one.name), "imperfection": imperfection}
         yield Conclusion("hidden", "known" if "known" in values else "unknown", values, names)
-
-
-def _set_up(kind: str) -> str:
-    return SET_UP.get(kind, plain(kind))
 
 
 def next_test(verdict: Verdict, next_tests: pd.DataFrame) -> Iterator[Conclusion]:

@@ -35,9 +35,25 @@ from spinepipe.studies.discrepancy.misfits import (
 from spinepipe.studies.discrepancy.quantities import DOUBLING, UNITS, quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.tables import MODELS
-from spinepipe.studies.discrepancy.verdict import EVERY, Missing, Verdict, read_verdict
+from spinepipe.studies.discrepancy.verdict import (
+    EVEN,
+    EVERY,
+    NOTHING,
+    SOMETHING_ELSE,
+    SURE,
+    Missing,
+    Verdict,
+    likeliest_beside,
+    read_verdict,
+)
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
-from spinepipe.studies.discrepancy.words import effects_in_words, general, in_words, name_at
+from spinepipe.studies.discrepancy.words import (
+    effects_in_words,
+    general,
+    in_words,
+    name_at,
+    words_of,
+)
 from spinepipe.units import LOAD_UNITS
 
 _MOST_WORDS_OF_SET = 12
@@ -81,7 +97,8 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
     """
     sizes = {"before": misfit(where, BASE), "after": misfit(where, WITH_EFFECTS)}
     values = {name: bare(value) for name, value in sizes.items() if value is not None}
-    named = effects_in_words(verdict.effects, MOST_WORDS)
+    named, probable = effects_in_words(verdict.effects, MOST_WORDS), verdict.probabilities
+    how = "verdict: probabilities"
     names = {"model": model, "effects": named, "place": place_of_most(where, gap, BASE)[0]}
     match verdict.verdict:
         case found.VerdictKind.NAMED | found.VerdictKind.PART:
@@ -95,24 +112,51 @@ def answer(verdict: Verdict, model: str, where: pd.DataFrame, gap: pd.DataFrame)
                 told = "part_open"
         case found.VerdictKind.SET:
             every = list(dict.fromkeys(name_at(c.name, c.coordinates) for c in verdict.in_set))
-            names["names"] = in_words([every], _MOST_WORDS_OF_SET, "or")
             values["many"] = Value(len(every), source="verdict: candidates")
             told = "set_beside" if verdict.effects else "set"
+            if len(every) == 1 and probable:  # what holds the rest is no name of a set
+                told = f"{told}_one"
+                own = verdict.in_set[0].name
+                rest, share = likeliest_beside(probable, {own, *verdict.named})
+                names |= {"name": every[0], "rest": words_of(rest)}
+                values["own"] = Value(probable.get(own, 0.0), source=how)
+                values["other"] = Value(share, source=how)
+            elif probable.get(SOMETHING_ELSE, 0.0) > 1.0 - SURE:
+                every = [*every, words_of(SOMETHING_ELSE)]
+            names["names"] = in_words([every], _MOST_WORDS_OF_SET, "or")
             told = told if names["names"] else "set_many"
         case found.VerdictKind.NULL:
+            nothing = probable.get(NOTHING, 1.0)
             sizes_found = [one.gap for one in verdict.smallest_detectable]
             told = "null" if sizes_found else "null_blind"
             if sizes["before"] is not None and (sizes["before"].low or 0.0) > SMALL:
                 told = "null_misfit"
+            if nothing < EVEN:
+                told = "null_open"
+                likeliest, share = likeliest_beside(probable, {NOTHING})
+                names["effect"] = words_of(likeliest)
+                values["nothing"] = Value(nothing, source=how)
+                values["own"] = Value(share, source=how)
             if sizes_found:
-                how = "verdict: smallest_detectable, largest"
-                values["hardest"] = Value(max(sizes_found), source=how)
+                of_largest = "verdict: smallest_detectable, largest"
+                values["hardest"] = Value(max(sizes_found), source=of_largest)
             n = len(sizes_found)
             names["shown"] = f"any of {n} effects" if n > 1 else "the one testable effect"
         case found.VerdictKind.UNKNOWN:
             told = (
                 f"unknown_{_WITHOUT_A_NAME.get(verdict.reason or Reason.NO_KNOWN_EFFECT, 'shape')}"
             )
+            known = [
+                n for n, p in probable.items() if p >= EVEN and n not in (NOTHING, SOMETHING_ELSE)
+            ]
+            if told == "unknown_shape" and known:  # likely, and not all
+                told = "unknown_part"
+                names["names"] = in_words([[general(name) for name in known]], MOST_WORDS)
+                names["names"] = names["names"] or f"{len(known)} effects"
+            if verdict.unknown is not None and verdict.unknown.stays is not None:
+                values["stays"] = Value(verdict.unknown.stays, NOISE, source="verdict: unknown")
+            elif told == "unknown_much":
+                told = "unknown_shape"  # in files of versions before
             names["errors"] = count(len(verdict.suspected_data_errors), "respect")
     return Conclusion("verdict", told, values, names)
 

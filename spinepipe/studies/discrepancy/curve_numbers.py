@@ -21,7 +21,7 @@ from spinepipe.statics import with_parameters
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import covariance
-from spinepipe.studies.discrepancy.verdict import EVERY, FieldNumber
+from spinepipe.studies.discrepancy.verdict import EVERY
 from spinepipe.units import (
     COORDINATE_UNITS,
     COORDINATES,
@@ -200,29 +200,6 @@ def field_number_rows(
             place = {"model": model, "joint": joint, "coordinate": coordinate, "load": load}
             rows += _of_place(place, fit, acting, tested[joint, coordinate])
     return rows
-
-
-def numbers_at(
-    rows: Sequence[Row], form: CandidateForm, joints: Sequence[str]
-) -> tuple[FieldNumber, ...]:
-    """Means over specimens, with the effects, where a form acts."""
-    own = joints if form.joint is None else (joints[form.joint],)
-    on = form.variant.acts_on or COORDINATES
-    return tuple(
-        FieldNumber(
-            row["number"],
-            row["joint"],
-            row["coordinate"],
-            row["specimens"],
-            row["load"],
-            row["value"],
-            row["unit"],
-            None if row["low"] is None else (row["low"], row["high"]),
-        )
-        for row in rows
-        if row["model"] == "with_effects" and row["specimen"] == EVERY[0]
-        if row["joint"] in own and row["coordinate"] in on
-    )
 
 
 def _places(

@@ -4,6 +4,7 @@ A base that cannot be fitted is a verdict too: why, and what looks wrong in the 
 """
 
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,6 @@ from spinepipe.studies.discrepancy.rows import (
     advice_rows,
     candidate_rows,
     confusion_rows,
-    design_rows,
     gap_rows,
     held_out_rows,
     imperfection_rows,
@@ -154,9 +154,11 @@ def searched(
     ----------
     file : the model that the study starts from, where it is a file. run : of the pieces of work.
     """
+    # the base's fit counts too: a laboratory asks when it will have an answer
+    until = None if study.minutes is None else time.monotonic() + 60.0 * study.minutes
     ready = prepare(study, cohort, file)
     try:
-        ended = investigate(ready, run, progress)
+        ended = investigate(ready, run, progress, until)
     except NoBase as trouble:
         return _without_base(ready, trouble)
     return _with_base(ready, ended, run)
@@ -218,10 +220,10 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     forms = [one.supposed.form for one in found.standing if one.name in names]
     numbers = field_number_rows(base, final, forms, reaches(gap)) if forms else []
     return DiscrepancyResults(
-        verdict=summarise(ready, ended, told, stays, numbers, taken["with_effects"], hidden, run),
+        verdict=summarise(ready, ended, told, stays, taken["with_effects"], hidden, run),
         rows={
             "gap": gap,
-            "candidates": [*design_rows(told), *candidate_rows(found, rules.needed, joints)],
+            "candidates": candidate_rows(found, rules.needed, joints),
             "where": where_rows(found, joints),
             "confusions": confusion_rows(told),
             "held_out": held_out_rows(ended.proof),

@@ -12,9 +12,9 @@ from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.discrepancy.misfits import LARGE, SMALL, WITH_EFFECTS, bare, largest
 from spinepipe.studies.discrepancy.quantities import quantities
 from spinepipe.studies.discrepancy.settings import Discrepancy
-from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, SURE, Verdict
+from spinepipe.studies.discrepancy.verdict import EVERY, REPEATS, SURE, SearchEnd, Verdict
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
-from spinepipe.studies.discrepancy.words import SET_UP, general, readable
+from spinepipe.studies.discrepancy.words import SET_UP, general, readable, words_of
 
 FEW_SPECIMENS = 3
 LITTLE = 0.1
@@ -44,6 +44,7 @@ def lights(
     if verdict.noise.accuracy_assumed:
         yield _accuracy(verdict)
     yield _noise(verdict)
+    yield from extent(verdict)
     if after is not None:
         light = "stop" if after.number > LARGE else "check"
         light = "ok" if (after.low or 0.0) <= SMALL and light == "check" else light
@@ -64,6 +65,17 @@ def lights(
         }
         yield Conclusion("values", "check" if numbers["open"].number else "ok", numbers)
     yield from _sample(study, cohort, verdict, results)
+
+
+def extent(verdict: Verdict) -> Iterator[Conclusion]:
+    """Whether all that mattered was fitted, and else what was not; also of a result in Python."""
+    if (search := verdict.search) is None:
+        return
+    light = "ok" if search.ended is SearchEnd.DONE else f"check_{search.ended}"
+    sets = [" with ".join(map(words_of, one)) for one in search.not_fitted]
+    how = "verdict: search"
+    values = {"fits": Value(search.fits, source=how), "open": Value(search.open, source=how)}
+    yield Conclusion("ended", light, values, {"sets": listed(sets, len(sets), "or")})
 
 
 def _errors(verdict: Verdict) -> Conclusion:

@@ -21,14 +21,13 @@ from spinepipe.studies.discrepancy.design.advice import Advice
 from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import KEYS, places, residual_frame
-from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, shape_at
+from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm
 from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap, NuisancePlace
 from spinepipe.studies.discrepancy.search.joint_fit import JointFit
 from spinepipe.studies.discrepancy.search.model_files import display_value, fitted_values
 from spinepipe.studies.discrepancy.search.refit import Refit
-from spinepipe.studies.discrepancy.search.screen import ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import SearchResult, SearchStage
-from spinepipe.studies.discrepancy.tables import NEXT_TESTS, NOT_TESTABLE
+from spinepipe.studies.discrepancy.tables import NEXT_TESTS
 from spinepipe.studies.discrepancy.verdict import share_of_gap
 from spinepipe.units import COORDINATE_UNITS, COORDINATES, DISPLAY_PER_SI, LOAD_UNITS
 
@@ -197,7 +196,9 @@ def _screened(
         for place, tried in enumerate(one.forms[:MOST_FORMS_SHOWN]):
             scope = _scope(tried.form, joints)
             row = _form_row(f"screen {stage.name}", stage.beside, tried.form, scope)
-            row |= _of_screen(tried) | {
+            row |= {
+                "parameters": len(tried.estimate) + len(tried.form.variant.shapes),
+                "delta_chi2": tried.explained,
                 # the effect's evidence is that of all its forms: on the row of the best
                 "log_evidence": one.log_evidence if not place else tried.log_evidence,
                 "gap_share": _share(tried.explained, excess),
@@ -250,36 +251,6 @@ def _decision(one: Refit, behind: float) -> str:
     return f"with it all are {behind:.1f} log odds behind the most probable set"
 
 
-def _of_screen(tried: ScreenedVariant) -> Row:
-    """Numbers of a form on the screen, in display units.
-
-    ``sds``, of the shapes, are prior SDs from the default; ``estimate``, of the strengths, prior
-    SDs from off. ``delta_chi2`` : by how much chi2 falls.
-    """
-    effect = tried.form.variant.create()
-    shapes = {
-        effect.parameters[column].name: display_value(
-            effect.parameters[column].unit, shape_at(effect.parameters[column], sds)
-        )[0]
-        for column, sds in zip(tried.form.variant.shapes, tried.sds, strict=True)
-    }
-    estimate, unit = None, ""
-    if len(tried.estimate) == 1:  # a single strength, in the unit of tables
-        p = effect.parameters[tried.strengths[0]]
-        assert p.off is not None
-        away = float(tried.estimate[0]) * p.prior_scale  # in its logarithm where it is logarithmic
-        # the clip keeps exp finite for estimates of the linear problem that are absurdly large
-        value = p.off * float(np.exp(np.clip(away, -50.0, 50.0))) if p.logarithmic else p.off + away
-        estimate, unit = display_value(p.unit, value)
-    return {
-        "shape": json.dumps({name: round(size, 6) for name, size in shapes.items()}),
-        "parameters": len(tried.estimate) + len(shapes),
-        "estimate": estimate,
-        "unit": unit,
-        "delta_chi2": tried.explained,
-    }
-
-
 def _share(drop: float, excess: float) -> float | None:
     """A drop of chi2 over the base's excess; None where that is no more than 1, mere noise.
 
@@ -326,24 +297,6 @@ def _of_refit(one: Refit, excess: float) -> Row:
     if len(strengths) == 1:
         row |= {"estimate": strengths[0].value, "unit": strengths[0].unit}
     return row
-
-
-def design_rows(told: Distinguishability) -> list[Row]:
-    """Rows of the table candidates: what the tests could tell of each effect, whatever was read.
-
-    ``absorbed`` : share of its squared signature that base and nuisances can make as well.
-    ``detectable_gap`` : noise SD, that it must make to be found in nine data sets of ten.
-    """
-    rows = []
-    for one in told.judgements:
-        row = _form_row("design", (), one.best.form, "*") | {
-            "parameters": len(one.best.mean),
-            "absorbed": float(np.clip(one.absorbed, 0.0, 1.0)),
-            "detectable_gap": one.detectable.gap if one.detectable else None,
-            "message": one.why,
-        }
-        rows.append(row if one.testable else row | {"status": NOT_TESTABLE})
-    return rows
 
 
 def confusion_rows(told: Distinguishability) -> list[Row]:

@@ -114,8 +114,7 @@ class Discrepancy(Study):
         default=3.0,
         ge=0,
         le=1e3,
-        description="log evidence within which names of a set are listed, and from which a further "
-        "test has told two apart",
+        description="log evidence from which a further test has told two names apart",
     )
     effort: Literal["quick", "standard", "full"] = Field(
         default="quick",
@@ -126,7 +125,8 @@ class Discrepancy(Study):
         default=None,
         gt=0,
         le=10_000,
-        description="ends the search by the clock: its answer then hangs on the computer",
+        description="ends the search by the clock, so long after the start of its job: its answer "
+        "then hangs on the computer",
     )
     measurement_sd: MeasurementSd | None = Field(
         default=None,

@@ -1,22 +1,16 @@
 """The verdict, from what a search found: names, sets, what stays, and where."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.curve_numbers import numbers_at
 from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
 from spinepipe.studies.discrepancy.design.masked_effects import MaskedEffects
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
-from spinepipe.studies.discrepancy.search.imperfections import (
-    EVERYWHERE,
-    AbsorbedGap,
-    NuisancePlace,
-)
+from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap
 from spinepipe.studies.discrepancy.search.investigation import Investigation, Prepared
 from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
@@ -31,12 +25,9 @@ from spinepipe.studies.discrepancy.verdict import (
     LEAST_PROBABLE,
     SOMETHING_ELSE,
     Candidate,
-    CommonImperfection,
     Estimate,
     Gaps,
     Imperfections,
-    KindOfImperfection,
-    LargeImperfection,
     LeftOut,
     MisfitSizes,
     Missing,
@@ -51,16 +42,7 @@ from spinepipe.studies.discrepancy.verdict import (
 from spinepipe.studies.discrepancy.verdict_unnamed import UnnamedMisfit, UnnamedRest
 from spinepipe.units import DISPLAY_PER_SI
 
-Row = dict[str, Any]
-
 MOST_RIVALS, MOST_PLACES = 5, 3
-
-MOST_IMPERFECTIONS = 5
-LEAST_SHARE = 0.05
-"""Kinds that take up less of what all take up are not listed in the sentence."""
-
-SMALL_GAP = 0.1
-"""A gap that imperfections change by less is as good as the same."""
 
 
 def summarise(
@@ -68,7 +50,6 @@ def summarise(
     investigation: Investigation,
     told: Distinguishability,
     stays: ResidualModel,
-    numbers: Sequence[Row],
     taken: AbsorbedGap,
     hidden: Sequence[MaskedEffects],
     run: PieceRunner,
@@ -78,7 +59,6 @@ def summarise(
     Parameters
     ----------
     told : what these tests can tell. stays : what describes what has no name.
-    numbers : rows of the field's numbers.
     taken : what imperfections take up beside the final model. hidden : effects that they hide.
     """
     cohort = ready.cohort
@@ -112,9 +92,9 @@ def summarise(
         cohort=cohort.name,
         verdict=ended.verdict,
         why=ended.why,
-        effects=tuple(_missing(found, one, cohort, numbers, run) for one in ended.named),
+        effects=tuple(_missing(found, one, cohort, run) for one in ended.named),
         candidates_in_set=ended.tied,
-        candidates=nearest_candidates(_in_set(found, ended), ready.study.margin),
+        candidates=tuple(dict.fromkeys(_in_set(found, ended))),
         not_testable=told.not_testable,
         noise=noise_summary(found.base.noise),
         rms_residual=MisfitSizes(**{name: gap.rms if gap else None for name, gap in gaps.items()}),
@@ -126,18 +106,20 @@ def summarise(
         smallest_detectable=told.smallest_detectable,
         unknown=None
         if ended.reason is None
-        else UnnamedMisfit(left_where, shape, ended.reason, coordinate),
+        else UnnamedMisfit(left_where, shape, ended.reason, coordinate, stays=ended.stays),
         part=UnnamedRest(found.final_gap.gap, left_where, shape, ended.left, coordinate)
         if ended.left
         else None,
         suspected_data_errors=investigation.errors,
         threshold=Threshold(investigation.rules.needed),
-        families=told.families,
-        imperfections=imperfection_summary(taken),
+        imperfections=Imperfections(
+            None if taken.without is None else taken.without.gap, taken.beside.gap
+        ),
         tabulated=stays.table,
         withheld=tuple(withheld),
         left_out=tuple(_left_out(proof)),
         probabilities={n: p for n, p in found.probabilities.items() if p >= LEAST_PROBABLE},
+        search=found.extent,
     )
 
 
@@ -155,36 +137,22 @@ def _left_out(proof: HeldOut) -> Iterator[LeftOut]:
         )
 
 
-def nearest_candidates(candidates: Iterable[Candidate], margin: float) -> tuple[Candidate, ...]:
-    """Each name once per place, where it is near: within the margin, else where it is nearest."""
-    every = tuple(dict.fromkeys(candidates))
-    nearest: dict[str, float] = {}
-    for one in every:
-        if one.behind is not None:
-            nearest[one.name] = min(one.behind, nearest.get(one.name, one.behind))
-    return tuple(
-        one for one in every if one.behind is None or one.behind <= max(margin, nearest[one.name])
-    )
-
-
 def _in_set(found: SearchResult, ended: Outcome) -> Iterator[Candidate]:
-    """Names of the set: what stands there, then its rivals, wherever they are."""
-    for one in found.standing:
-        if one.name not in ended.tied or any(one is named for named in ended.named):
-            continue
-        own = one.supposed.form.variant.acts_on or EVERY
-        near = {rival.name: rival for rival in one.rivals}
-        yield Candidate(one.name, own, 0.0)
-        for name in ended.tied:
-            if name in near:
-                yield Candidate(name, near[name].on or EVERY, near[name].margin)
-            elif name != one.name:
-                yield Candidate(name, own, None)
+    """Names of the set, where they act: those that stand, then each rival where it is nearest."""
+    named = set(map(id, ended.named))
+    tied = [one for one in found.standing if one.name in ended.tied and id(one) not in named]
+    for one in tied:
+        yield Candidate(one.name, one.supposed.form.variant.acts_on or EVERY, 0.0)
+    for name in (name for name in ended.tied if name not in {one.name for one in tied}):
+        near = [rival for one in tied for rival in one.rivals if rival.name == name]
+        best = min(near, key=lambda rival: rival.margin, default=None)
+        if best is not None:
+            yield Candidate(name, best.on or EVERY, best.margin)
+        elif tied:  # nothing recorded speaks for it or against it
+            yield Candidate(name, tied[0].supposed.form.variant.acts_on or EVERY, None)
 
 
-def _missing(
-    found: SearchResult, one: SelectedTerm, cohort: Cohort, numbers: Sequence[Row], run: PieceRunner
-) -> Missing:
+def _missing(found: SearchResult, one: SelectedTerm, cohort: Cohort, run: PieceRunner) -> Missing:
     number = next(k for k, standing in enumerate(found.standing) if standing is one)
     form = one.supposed.form
     return Missing(
@@ -215,7 +183,6 @@ def _missing(
             RivalName(other.name, other.margin, other.on or EVERY)
             for other in one.rivals[:MOST_RIVALS]
         ),
-        field_numbers=numbers_at(numbers, form, cohort.joint_names),
     )
 
 
@@ -239,70 +206,3 @@ def _rms(sd: Array) -> float | None:
     """Of what was read; None where nothing was."""
     read = sd[np.isfinite(sd)]
     return float(np.sqrt(np.mean(read**2))) if len(read) else None
-
-
-def imperfection_summary(taken: AbsorbedGap) -> Imperfections:
-    """What imperfections took up, in a few words and numbers."""
-    common = []
-    for one in taken.common:
-        if one.certain:
-            value, unit = display_value(one.at.unit, one.size * one.at.sd)
-            common.append(
-                CommonImperfection(one.at.kind, place_of(one.at), one.size, one.sd, value, unit)
-            )
-    largest = []
-    for big in taken.largest[:MOST_IMPERFECTIONS]:
-        value, unit = display_value(big.at.unit, big.size * big.at.sd)
-        largest.append(LargeImperfection(big.at.kind, place_of(big.at), big.size, value, unit))
-    kinds = tuple(KindOfImperfection(kind, chi2) for kind, chi2 in taken.by_kind.items())
-    without, beside = None if taken.without is None else taken.without.gap, taken.beside.gap
-    parts = [_change_of_gap(taken)]
-    for mean in common:
-        parts.append(
-            f"Off alike: {mean.kind} ({mean.where}), {_size(mean.value, mean.unit)}, that is "
-            f"{mean.mean_in_prior_sds:.2f} ± {max(mean.se, 0.01):.2f} of its prior SD. A shift in "
-            "common is no random error: look at how it was measured or told."
-        )
-    if not common and largest and kinds and abs(largest[0].in_prior_sds) > 1.0:
-        first = largest[0]
-        parts.append(
-            f"Largest: {first.kind} ({first.where}), {_size(first.value, first.unit)}, "
-            f"{first.in_prior_sds:.1f} of its prior SD."
-        )
-    return Imperfections(without, beside, kinds, tuple(largest), tuple(common), " ".join(parts))
-
-
-def place_of(at: NuisancePlace) -> str:
-    """``anterior, L4L5, specimen s01``; of a mean: ``anterior, all joints, all specimens``."""
-    if at.kind in ("load_axis", "load_gain"):
-        local = "all tests" if at.test == EVERYWHERE else f"test {at.test}"
-    else:
-        local = "all joints" if at.joint == EVERYWHERE else at.joint
-    of = "all specimens" if at.specimen == EVERYWHERE else f"specimen {at.specimen}"
-    return f"{at.component}, {local}, {of}"
-
-
-def _change_of_gap(taken: AbsorbedGap) -> str:
-    """How they change the gap, and which kinds took up much, where that is much."""
-    if taken.without is None:
-        return "Without the small imperfections allowed for the model has no fit to compare with."
-    without, beside = taken.without.gap, taken.beside.gap
-    if abs(without - beside) < SMALL_GAP:
-        return (
-            f"The small imperfections allowed for change little: the gap is {beside:.2f} noise SD "
-            f"with them and {without:.2f} without."
-        )
-    shares = [
-        f"{kind} {100.0 * chi2 / taken.linear_chi2:.0f} %"
-        for kind, chi2 in taken.by_kind.items()
-        if chi2 > LEAST_SHARE * taken.linear_chi2
-    ]
-    by_kind = f" What took it up: {', '.join(shares)}." if shares else ""
-    return (
-        f"Without the small imperfections allowed for the gap would be {without:.2f} noise SD; "
-        f"with them it is {beside:.2f}.{by_kind}"
-    )
-
-
-def _size(value: float, unit: str) -> str:
-    return f"{100.0 * value:.2g} %" if unit == "1" else f"{value:.2g} {unit}"

@@ -11,7 +11,7 @@ logarithm of a ratio of marginal likelihoods. *Base* is the model without the ef
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from math import sqrt
@@ -46,6 +46,8 @@ EVEN = 0.5
 
 LEAST_PROBABLE = 0.005
 
+NOT_LISTED = "something that is in no list"
+
 UNIT = "noise sd"
 """Of `MisfitSizes`, as the file has it: SDs of the noise of one reading."""
 
@@ -64,6 +66,42 @@ class VerdictKind(StrEnum):
     SET = "SET"
     NULL = "NULL"
     UNKNOWN = "UNKNOWN"
+
+
+def likeliest_beside(
+    probabilities: Mapping[str, float], told: Collection[str]
+) -> tuple[str, float]:
+    """What is likeliest of all that is not told, and its probability; nothing among it."""
+    others = {name: p for name, p in probabilities.items() if name not in told}
+    return max(others.items(), key=lambda one: (one[1], one[0]), default=(NOTHING, 0.0))
+
+
+class SearchEnd(StrEnum):
+    """What ended a search: that no fit mattered any more, its number of fits, or the clock."""
+
+    DONE = "done"
+    FITS = "fits"
+    MINUTES = "minutes"
+
+
+@dataclass(frozen=True)
+class SearchExtent:
+    """How far a search came.
+
+    Attributes
+    ----------
+    ended : by what. A search that the clock ended hangs on the computer, so that its answer is
+        compared with no other.
+    fits : how many were made. open : probability that may lie in sets of effects that were not
+        fitted, at most.
+    not_fitted : the likeliest of these sets, each as the names of its effects, `SOMETHING_ELSE`
+        among them; none where no fit mattered any more.
+    """
+
+    ended: SearchEnd = SearchEnd.DONE
+    fits: int = 0
+    open: float = 0.0
+    not_fitted: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -131,31 +169,6 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class FieldNumber:
-    """A number that a tester reads off the curve of a joint, whatever the formula of its law.
-
-    Attributes
-    ----------
-    name : of `spinepipe.effects.field_numbers.NUMBERS`; minus and plus are the sides of the load.
-    specimens : how many the value is the mean of.
-    load : size at which it is told, on both sides; N m for a rotation, N for a translation.
-    unit : of stiffness N m/deg or N/mm, of motion deg or mm, of loop area N m deg or J (rotation or
-        translation); 1 for a share.
-    ci95 : propagated to first order from the covariance of all fitted values; None where the number
-        exists at some values within their errors and not at others.
-    """
-
-    name: str
-    joint: str
-    coordinate: str
-    specimens: int
-    load: float
-    value: float
-    unit: str
-    ci95: tuple[float, float] | None
-
-
-@dataclass(frozen=True)
 class Missing:
     """An effect that is missing.
 
@@ -165,8 +178,6 @@ class Missing:
     variant : its options. spread : between which places (joints, specimens, tests) its values may
         differ.
     log_evidence : against the model without it. rivals : best first.
-    field_numbers : of the joints it acts on, with all laws that the model has there; means over the
-        specimens. Those of each specimen are in field_numbers.parquet.
     """
 
     name: str
@@ -177,7 +188,6 @@ class Missing:
     parameters: tuple[Estimate, ...]
     log_evidence: float
     rivals: tuple[RivalName, ...]
-    field_numbers: tuple[FieldNumber, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -307,58 +317,9 @@ class SuspectedError:
 
 @dataclass(frozen=True)
 class Threshold:
-    """What an effect must exceed to be named.
-
-    Attributes
-    ----------
-    log_evidence : the threshold; None where the base has no fit.
-    false_alarm : share of data sets that lack nothing in which the best effect may exceed it.
-    draws : how many such data sets were drawn to find it.
-    """
+    """``log_evidence`` from which a single effect is sure; None where the base has no fit."""
 
     log_evidence: float | None = None
-    false_alarm: float | None = None
-    draws: int | None = None
-
-
-@dataclass(frozen=True)
-class KindOfImperfection:
-    """What a kind of imperfection takes up of chi2, all joints, tests and specimens together.
-
-    ``taken_chi2`` : how much larger chi2 would be without it, to first order.
-    """
-
-    kind: str
-    taken_chi2: float
-
-
-@dataclass(frozen=True)
-class LargeImperfection:
-    """The most likely size of one imperfection: in prior SDs, and as ``value`` in ``unit``."""
-
-    kind: str
-    where: str
-    in_prior_sds: float
-    value: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class CommonImperfection:
-    """An imperfection that is alike in so many places that it is no random error.
-
-    Attributes
-    ----------
-    mean_in_prior_sds, se : the mean, and its standard error by the scatter of the places, both in
-        prior SDs. value : the mean in ``unit``.
-    """
-
-    kind: str
-    where: str
-    mean_in_prior_sds: float
-    se: float
-    value: float
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -366,22 +327,17 @@ class Imperfections:
     """What the small imperfections took up that the study allows for.
 
     An imperfection is a small error of the set-up or its description (joint centre, axes, direction
-    or size of a load, ...), a nuisance of the fit with a prior SD of its own.
+    or size of a load, ...), a nuisance of the fit with a prior SD of its own. How large each is
+    stands in imperfections.parquet.
 
     Attributes
     ----------
     gap_with : noise SD, of the model that the verdict stands for. gap_without : the same model
         refitted with no imperfection allowed for; None where that has no fit.
-    by_kind, largest : most first. common : those that are no random errors.
-    message : all this in sentences.
     """
 
     gap_without: float | None
     gap_with: float
-    by_kind: tuple[KindOfImperfection, ...]
-    largest: tuple[LargeImperfection, ...]
-    common: tuple[CommonImperfection, ...]
-    message: str
 
 
 @dataclass(frozen=True)
@@ -416,8 +372,6 @@ class Verdict:
     effects : missing for certain.
     candidates_in_set : names that these data cannot tell apart.
     candidates : the same, each with the coordinates it would load.
-    families : by the design of the tests alone, before residuals are looked at, sets of effects
-        that cannot be told apart.
     unknown : why nothing is named, and what is missing; None where there is no such reason.
     part : of PART, what stays beside ``effects``.
     imperfections : what those allowed for took up; None where the base has no fit.
@@ -426,6 +380,7 @@ class Verdict:
     left_out : held-out gaps by what was left out, tests and specimens apart.
     probabilities : that each effect is missing, `SOMETHING_ELSE` is, and `NOTHING`; those below
         `LEAST_PROBABLE` are not told. Empty in files written before the key existed.
+    search : how far the search came; None in such files, and where the base has no fit.
     """
 
     cohort: str
@@ -443,12 +398,12 @@ class Verdict:
     part: UnnamedRest | None = None
     suspected_data_errors: tuple[SuspectedError, ...] = ()
     threshold: Threshold = field(default_factory=Threshold)
-    families: tuple[tuple[str, ...], ...] = ()
     imperfections: Imperfections | None = None
     tabulated: Tabulated | None = None
     withheld: tuple[WithheldEffect, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     probabilities: Mapping[str, float] = field(default_factory=dict)
+    search: SearchExtent | None = None
 
     @property
     def named(self) -> tuple[str, ...]:

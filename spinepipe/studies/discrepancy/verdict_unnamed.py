@@ -20,49 +20,6 @@ class Reason(StrEnum):
 
 
 @dataclass(frozen=True)
-class FormulaTerm:
-    """One term of a formula.
-
-    Attributes
-    ----------
-    joint, specimen : ``*`` for all. acts : load or reading. term : what the coefficient multiplies,
-        in words; of : the motions that it is a product of, empty for other terms.
-    explained : share of the excess misfit (chi2) that the term adds to those before it.
-    """
-
-    specimen: str
-    joint: str
-    coordinate: str
-    acts: str
-    term: str
-    coefficient: float
-    sd: float
-    unit: str
-    explained: float
-    of: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Formula:
-    """What would describe a discrepancy that has no name; it is no effect.
-
-    Written by versions before; nobody writes it now.
-
-    Attributes
-    ----------
-    terms : as they entered. text : a line for each place. explained : share of the excess misfit
-        (chi2), in the fit. held_out_closed : of that in readings left out; None where none tells.
-    threshold : drop of chi2 that noise alone seldom shows for the best of all terms.
-    """
-
-    terms: tuple[FormulaTerm, ...]
-    text: str
-    explained: float
-    held_out_closed: float | None
-    threshold: float
-
-
-@dataclass(frozen=True)
 class Tabulated:
     """Tables in the model file in the place of effects that have no name.
 
@@ -86,14 +43,14 @@ class UnnamedMisfit:
     ----------
     where : the largest gaps, in words. shape : as generic shapes see it, None without evidence.
     reason : why there is no name. coordinate : of the shape; None without one.
-    formula : of files written by versions before.
+    stays : noise SD (RMS) that stay whatever is added, where that is why; else None.
     """
 
     where: str
     shape: str | None
     reason: Reason
     coordinate: str | None = None
-    formula: Formula | None = None
+    stays: float | None = None
 
 
 @dataclass(frozen=True)
@@ -105,7 +62,7 @@ class UnnamedRest:
     left_gap : noise SD, with the effects; None where it was not told.
     left_where : the largest gaps that stay, in words. left_shape : None without evidence.
     reasons : why it is not said that nothing else is missing.
-    coordinate : of the shape; None without one. formula : of files written by versions before.
+    coordinate : of the shape; None without one.
     """
 
     left_gap: float | None
@@ -113,4 +70,3 @@ class UnnamedRest:
     left_shape: str | None
     reasons: tuple[str, ...] = ()
     coordinate: str | None = None
-    formula: Formula | None = None

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from spinepipe.report.words import AXIS, level, listed, plain
-from spinepipe.studies.discrepancy.verdict import EVERY, Missing
+from spinepipe.studies.discrepancy.verdict import EVERY, NOT_LISTED, SOMETHING_ELSE, Missing
 from spinepipe.units import COORDINATES, TRANSLATIONS
 
 ASYMMETRY = "flexion_extension_asymmetry"
@@ -92,6 +92,11 @@ def shape_in_words(shape: str) -> str:
 def general(name: str) -> str:
     """The name of an effect wherever it acts; other names without underscores."""
     return _GENERAL.get(name, plain(name))
+
+
+def words_of(name: str) -> str:
+    """What a probability is of: an effect wherever it acts, something else, or nothing."""
+    return NOT_LISTED if name == SOMETHING_ELSE else general(name)
 
 
 def name_at(name: str, coordinates: Sequence[str]) -> str:

@@ -171,16 +171,6 @@ EFFECT = VERDICTS["NAMED"]["effects"][0]
 SECOND = EFFECT | {"name": "hysteresis", "variant": {}, "scope": {"joints": ["*"]}, "rivals": []}
 KNOWN = {"name": "half_width", "value": 1.55, "unit": "deg", "ci95": [1.42, 1.69]}
 OPEN = KNOWN | {"ci95": [1.42, None], "open_above": True, "identifiable": False}
-TERM = {"specimen": "*", "joint": "L4L5", "coordinate": "right_bending", "acts": "load"}
-TERM |= {
-    "term": "extension^2",
-    "coefficient": 2.0,
-    "sd": 0.1,
-    "unit": "N m/rad^2",
-    "explained": 0.8,
-}
-FORMULA = {"terms": [TERM], "text": "", "explained": 0.84, "threshold": 20.0}
-FORMULA |= {"held_out_closed": 0.36}
 TABLE = {"place": "right bending over extension at L4L5", "gap": 0.3}
 PART, UNKNOWN = VERDICTS["PART"]["part"], VERDICTS["UNKNOWN"]["unknown"]
 HIDDEN = {"name": "load_offset", "imperfection": "load_gain", "allowed": 0.02, "unit": "1"}
@@ -234,6 +224,8 @@ ASSUMED = {"source": "declared", "rotation_sd_deg": 0.2, "translation_sd_mm": 0.
 WRONG = VERDICTS["SET"]["suspected_data_errors"]
 NO_BASE = reason(Reason.NO_BASE, noise={"source": ""}, imperfections=None)
 NEXT = (f"{UNNAMED}: own, shared", "load_offset")
+FAR = {"fits": 10, "open": 0.31}
+FAR |= {"not_fitted": [["creep", "neutral_zone"], ["level_dependence", "something_else"]]}
 # fmt: off
 CASES: tuple[Case, ...] = (
     Case("NAMED", "verdict named; misfit_after named; misfit_base told; errors ok; sample ok; "
@@ -246,6 +238,10 @@ CASES: tuple[Case, ...] = (
          {"effects": [EFFECT, SECOND]}),
     Case("NAMED", "verdict part; remainder check", after(1.7, 1.6, 1.8)),
     Case("PART", "verdict part_open; shape unseen", None, {"part": PART | {"left_shape": None}}),
+    Case("SET", "verdict set_one", None, {"candidates_in_set": ["level_dependence"],
+         "probabilities": {"level_dependence": 0.92, "something_else": 0.08}}),
+    Case("SET", "verdict set_beside_one", None, {"effects": [SECOND], "candidates": TIED[:1],
+         "probabilities": {"hysteresis": 0.97, "neutral_zone": 0.7}}),
     Case("SET", "verdict set; misfit_after likeliest; alternatives set_silent; next separate"),
     Case("SET", "verdict set_beside; alternatives set; alternatives alone", None,
          {"effects": [SECOND], "candidates": TIED}),
@@ -254,13 +250,23 @@ CASES: tuple[Case, ...] = (
          whole(0.2, 0.0)),
     Case("NULL", "verdict null", whole(0.2, 0.0), {
         "smallest_detectable": VERDICTS["NULL"]["smallest_detectable"][:1]}),
+    Case("NULL", "verdict null_open", whole(0.2, 0.0), {
+        "probabilities": {"nothing": 0.06, "neutral_zone": 0.9}}),
     Case("NULL", "verdict null_misfit; power all; tests ok; by_test base", whole(1.0, 0.8),
          {"not_testable": []}),
     Case("NULL", "verdict null_blind; power stop_blind; tests stop", None,
          {"smallest_detectable": []}),
     Case("UNKNOWN", "verdict unknown_shape; unexplained place; alternatives nearest; shape seen"),
     Case("UNKNOWN", "verdict unknown_shape", None, reason(Reason.IMITATED_TOGETHER)),
-    Case("UNKNOWN", "verdict unknown_much", None, reason(Reason.MOST_STAYS)),
+    Case("UNKNOWN", "verdict unknown_part; alternatives nearest", None, {
+        **reason(Reason.A_PART_STAYS),
+        "probabilities": {"something_else": 1.0, "nonlinear_stiffening": 0.99}}),
+    Case("UNKNOWN", "verdict unknown_much", None, {
+        "unknown": UNKNOWN | {"reason": "most_stays", "stays": 4.2}}),
+    # how far the search came
+    Case("NAMED", "ended ok", None, {"search": {"ended": "done", "fits": 3, "open": 0.01}}),
+    Case("NAMED", "ended check_fits", None, {"search": FAR | {"ended": "fits"}}),
+    Case("NAMED", "ended check_minutes", None, {"search": FAR | {"ended": "minutes"}}),
     Case("NAMED", "accuracy check", None, {"noise": NOISE | {
         "accuracy_assumed": True, "accuracy_rotation_deg": 0.1}}),
     Case("UNKNOWN", "verdict unknown_left_out", None, reason(Reason.NOT_PROVEN)),
@@ -295,7 +301,7 @@ CASES: tuple[Case, ...] = (
     # what has no name, and what to do
     Case("PART", "curve left_out", None, {"tabulated": TABLE | {"held_out_closed": -0.2}}),
     Case("UNKNOWN", "curve fit", None, {
-        "unknown": UNKNOWN | {"formula": FORMULA},  # of a file of versions before
+        "unknown": UNKNOWN | {"formula": {"terms": []}},  # of a file of versions before
         "tabulated": TABLE | {"held_out_closed": None}}),
     Case("PART", "next unnamed", advised(NEXT[0], "flexion: once more")),
     Case("NULL", "next show", advised(NEXT[1], "flexion: once more")),
@@ -306,6 +312,7 @@ CASES: tuple[Case, ...] = (
     Case("NAMED", "noise check_assumed", None, {"noise": ASSUMED}),
     Case("NAMED", "outliers check", None, {"noise": NOISE | {"outliers_left_out": 4}}),
     Case("NAMED", "set_up stop", set_up(9.0)),
+    Case("NAMED", "set_up stop", set_up(-15.0)),
     Case("NAMED", "set_up check", set_up(1.0, common=True)),
     Case("NAMED", "set_up ok", set_up(1.0), taken(0.15)),
     Case("NAMED", "set_up ok_more", set_up(1.0), taken(0.9)),
@@ -367,6 +374,14 @@ def test_left_out_is_always_a_test_or_load_steps(row: Sentence) -> None:
         assert "predicted from the others" in row.note
 
 
+def test_a_set_of_one_says_what_holds_the_rest(root: Path) -> None:
+    one = {"candidates_in_set": ["level_dependence"]}
+    one |= {"probabilities": {"level_dependence": 0.92, "something_else": 0.08}}
+    *_, shown = made(root, Case("SET", "", None, one))
+    told = "level dependence is missing, or something that is in no list (0.92; 0.080)"
+    assert told in shown.at("answer")[0].text
+
+
 def said(shown: Page, rule: str, place: str = "finding") -> Told:
     (one,) = [told for told in shown.at(place) if told.rule == rule]
     return one
@@ -413,12 +428,15 @@ def test_a_notebook_says_what_the_page_says(root: Path) -> None:
     model = ModelFile.model_validate(
         {"model": "m", "cohort": "c", "effects": [{"effect": "linear_bushing"}]}
     )
-    for case in CASES[:12]:
+    for case in (*CASES[:12], Case("NAMED", "", None, {"search": FAR | {"ended": "minutes"}})):
         if case.tables is None:
             verdict = verdict_of(VERDICTS[case.answer] | case.changed)
             rows = {name: rows.to_dict("records") for name, rows in frames(case.answer).items()}
             found = _result(DiscrepancyResults(verdict, rows, model, model), "linear model")
-            assert found.headline == made(root, case)[3].at("answer")[0].text
+            shown = made(root, case)[3]
+            assert found.headline == shown.at("answer")[0].text
+            of_search = [one.text for one in shown.at("light") if one.rule == "ended"]
+            assert [found.search] == (of_search or [""])
 
 
 def chart(name: str, root: Path, case: Case) -> Chart:

@@ -51,7 +51,7 @@ def test_the_verdict_says_that_nothing_is_known_and_why(verdict: Mapping[str, An
     assert verdict["verdict"] == "UNKNOWN"
     assert verdict["why"].startswith("the base model cannot be fitted: a, test flexion, step 2")
     assert verdict["effects"] == verdict["candidates_in_set"] == []
-    assert set(verdict["unknown"]) == {"where", "shape", "reason", "coordinate", "formula"}
+    assert set(verdict["unknown"]) == {"where", "shape", "reason", "coordinate", "stays"}
     assert verdict["imperfections"] is None
     assert "flexion" in verdict["unknown"]["where"]
     sizes = [v for key in ("gap", "rms_residual") for k, v in verdict[key].items() if k != "unit"]

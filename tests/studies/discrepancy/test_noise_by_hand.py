@@ -113,6 +113,14 @@ def test_thirty_differences_between_cycles_tell_the_noise(count: int, source: st
         assert estimated_noise([read(cycles)], None, False, 0) is None
 
 
+def test_an_accuracy_alone_is_the_whole_error_of_a_reading() -> None:
+    """Nobody says how much of it all readings of a test share: half of the variance."""
+    found = estimated_noise([read(np.zeros((1, 4, 1)))], np.full(6, np.nan), False, 0, np.ones(6))
+    assert found is not None
+    assert (found.sd[3] / 1.2) ** 2 + found.accuracy[3] ** 2 == pytest.approx(1.0)
+    assert found.accuracy[3] ** 2 == pytest.approx(0.5)
+
+
 @sweep("told, assumed", [(2.0, False), (np.nan, True)])
 def test_what_all_cycles_share_is_no_smaller_in_their_mean(told: float, assumed: bool) -> None:
     cycles = np.random.default_rng(20031).normal(size=(2, 40, 1))

@@ -1,6 +1,7 @@
 """The verdict read off the probabilities of a search: each verdict, each reason, each limit."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -18,8 +19,8 @@ from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.hypothesis import ActiveTerm, CandidateForm, Variant
 from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit
 from spinepipe.studies.discrepancy.search.outcome import Outcome, cannot_be_excluded, outcome
-from spinepipe.studies.discrepancy.search.search_state import SearchResult, SelectedTerm
-from spinepipe.studies.discrepancy.summary import nearest_candidates
+from spinepipe.studies.discrepancy.search.search_state import Rival, SearchResult, SelectedTerm
+from spinepipe.studies.discrepancy.summary import _in_set
 from spinepipe.studies.discrepancy.verdict import Candidate, SuspectedError, VerdictKind
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
@@ -268,6 +269,14 @@ def test_a_name_is_sure_from_nineteen_in_twenty(p: float, verdict: str) -> None:
         assert result.why.endswith("cannot tell which: creep or hysteresis")
 
 
+def test_a_set_of_one_name_tells_what_holds_the_rest() -> None:
+    result = outcome(ended({("creep",): 0.92}, {(): 0.08}))
+    assert (result.verdict, result.tied) == (VerdictKind.SET, ("creep",))
+    assert result.why == "creep or something that is in no list (0.92; 0.08)"
+    untried = outcome(ended({("creep",): 0.97, ("hysteresis",): 0.03}, unfitted=0.6))
+    assert "what was not fitted holds 0.60" in untried.why
+
+
 @sweep("least, told", [(0.021, True), (0.019, False)])
 def test_a_set_lists_no_name_that_is_hardly_probable(least: float, told: bool) -> None:
     sets = {(): 0.04, ("hysteresis",): 0.86, ("creep",): 0.03, ("load_offset",): least}
@@ -334,18 +343,24 @@ def test_a_set_and_nothing_need_no_proof() -> None:
     assert outcome(tie, proof(-9.0)).verdict is VerdictKind.SET
 
 
-# Candidates that are told
+# Where the names of a set act
 
 
-def test_a_set_is_told_where_its_names_are_near() -> None:
-    """Contact stands; stiffening is near in flexion and far in shear, creep is far wherever."""
-    stands = Candidate("facet_contact", ("extension",), 0.0)
-    near = Candidate("nonlinear_stiffening", ("extension",), 1.0)
-    far = Candidate("nonlinear_stiffening", ("anterior",), 7.9)
-    least, most = Candidate("creep", ("extension",), 4.0), Candidate("creep", ("anterior",), 9.0)
-    untold = Candidate("hysteresis", ("extension",), None)
-    told = nearest_candidates([stands, near, far, near, most, least, untold], margin=3.0)
-    assert told == (stands, near, least, untold)
+def test_names_of_a_set_act_where_they_stand_or_are_nearest() -> None:
+    """Creep is named beside; of what nothing recorded tells it is not known how far it is."""
+    rivals = [("load_offset", 4.0, ()), ("neutral_zone", 7.9, ("anterior",))]
+    rivals += [("neutral_zone", 1.0, ("extension",)), ("facet_contact", 2.0, ("extension",))]
+    found = ended({("hysteresis", "creep"): 1.0})
+    creep, loop = found.standing
+    loop = replace(loop, rivals=tuple(Rival(*one) for one in rivals))
+    tied = ("hysteresis", "neutral_zone", "load_offset", "preload_stiffening")
+    told = Outcome(VerdictKind.SET, "", (creep,), tied)
+    assert list(_in_set(replace(found, standing=(creep, loop)), told)) == [
+        Candidate("hysteresis", ("extension",), 0.0),
+        Candidate("neutral_zone", ("extension",), 1.0),
+        Candidate("load_offset", ("*",), 4.0),
+        Candidate("preload_stiffening", ("extension",), None),
+    ]
 
 
 # Names that what was recorded cannot exclude: without times, and without a second preload

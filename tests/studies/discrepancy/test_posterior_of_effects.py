@@ -336,6 +336,23 @@ def test_fits_go_where_most_may_be_and_the_rest_is_told_as_open() -> None:
     assert explored(world).open < 0.05
 
 
+@sweep("most, until, ended", [(10, None, "done"), (1, None, "fits"), (10, 0.0, "minutes")])
+def test_a_search_says_what_ended_it_and_what_it_left(
+    most: int, until: float | None, ended: str
+) -> None:
+    """The clock began long ago: nothing is fitted, and the likeliest by its look is told first."""
+    world = World([[ZONE], [STOP]], only(neutral_zone=50.0, facet_contact=40.0))
+    base: Any = Stands((), world.chi2(frozenset()))
+    found = Posterior(base, rules(world, most_fits=most))
+    found.explore(world, Progress(), until)  # type: ignore[arg-type]
+    told = found.extent
+    assert (told.ended, told.fits) == (ended, len(world.fitted()))
+    assert told.open == found.open
+    first = {"done": (), "fits": (("facet_contact", "neutral_zone"),), "minutes": ("neutral_zone",)}
+    assert told.not_fitted[:1] == (first[ended] if ended != "minutes" else (first[ended],))
+    assert (told.open < 0.05) is (ended == "done")
+
+
 def test_the_limit_of_fits_is_kept() -> None:
     world = World([[ZONE], [STOP], [LOOP], [STIFF]], only(neutral_zone=50.0, hysteresis=40.0))
     explored(world, most_fits=0)

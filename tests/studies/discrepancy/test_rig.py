@@ -13,6 +13,7 @@ from sweeps import sweep
 
 from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.cohort import Accuracy
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies import read as studies
@@ -104,6 +105,14 @@ def test_a_study_says_before_its_cohort_how_large_the_noise_is(tmp_path: Path) -
     assert (
         prepare(STUDY, replace(cohort, measurement_sd=None, accuracy=None), None).declared is None
     )
+
+
+def test_an_accuracy_beside_a_stated_scatter_counts_once(tmp_path: Path) -> None:
+    """A scatter that was made as large as it would count it in every reading once more."""
+    cohort = replace(written(tmp_path, 0.0)[0], accuracy=Accuracy(translation_mm=0.3))
+    noise = prepare(STUDY, cohort, None).noise
+    assert noise.sd[0] == pytest.approx(1.2 * 0.02e-3)  # the cohort's, doubted by a fifth
+    assert noise.accuracy[0] == pytest.approx(0.3e-3)
 
 
 def test_what_is_read_and_what_is_not(tmp_path: Path) -> None:

@@ -105,24 +105,6 @@ class AbsorbedGap:
     each: tuple[Imperfection, ...]
     common: tuple[InCommon, ...]
 
-    @property
-    def linear_chi2(self) -> float:
-        """By how much chi2 would be larger without them."""
-        return sum(one.chi2 for one in self.each)
-
-    @property
-    def by_kind(self) -> dict[str, float]:
-        """chi2 that each kind takes up, largest first."""
-        found: dict[str, float] = {}
-        for one in self.each:
-            found[one.at.kind] = found.get(one.at.kind, 0.0) + one.chi2
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-    @property
-    def largest(self) -> tuple[Imperfection, ...]:
-        """Largest first, in prior SDs."""
-        return tuple(sorted(self.each, key=lambda one: -abs(one.size)))
-
 
 def absorbed_gap(
     baseline: BaselineFit, fit: JointFit, joints: Sequence[str], run: PieceRunner

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.cohort.cohort import sd_of_reading
 from spinepipe.cohort.supports import motion_read
 from spinepipe.effects.contract import Array
 from spinepipe.model.file import ModelFile
@@ -103,15 +104,17 @@ def prepare(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepa
         for name, column in zip(COORDINATES, COORDINATE_COLUMNS, strict=True)
         if name in (study.coordinates or COORDINATES) and motion[column].notna().any()
     )
-    sd = cohort.reading_sd(study.measurement_sd)
+    sd, stated = cohort.reading_sd(study.measurement_sd), study.measurement_sd
     declared = None if sd is None else to_si(sd)
+    # what all cycles of a test share is an error of its own, so the scatter is told without it
+    scatter = None if sd is None else to_si(sd_of_reading(stated or cohort.measurement_sd, None))
     accuracy = to_si(cohort.accuracy_sd)
     # in an order of their own: how a cohort lists them says nothing, and changes no verdict
     tests, names = sorted(study.tests or cohort.tests), sorted(cohort.specimen_names)
     every = (specimen_readings(cohort, s, tests, coordinates) for s in names)
     measured = tuple(one for one in every if one.tests)
     readings, outliers = without_outliers(measured)
-    noise = estimated_noise(readings, declared, cohort.zeroed_at_step_0, outliers, accuracy)
+    noise = estimated_noise(readings, scatter, cohort.zeroed_at_step_0, outliers, accuracy)
     if noise is None:  # cycles of unequal loads may still tell, once the base is fitted
         noise = estimated_noise(readings, GUESSED_SD, cohort.zeroed_at_step_0, outliers, accuracy)
     assert noise is not None
@@ -119,9 +122,16 @@ def prepare(study: Discrepancy, cohort: Cohort, file: ModelFile | None) -> Prepa
 
 
 def investigate(
-    ready: Prepared, run: PieceRunner, progress: Progress | None = None
+    ready: Prepared,
+    run: PieceRunner,
+    progress: Progress | None = None,
+    until: float | None = None,
 ) -> Investigation:
     """All that decides the verdict of a study.
+
+    Parameters
+    ----------
+    until : when the clock ends the search, see `Posterior.explore`.
 
     Raises
     ------
@@ -140,9 +150,8 @@ def investigate(
         study.seed,
         # data that look wrong are no physics: nothing will be named, and a fit may take for ever
         0 if errors else MOST_FITS[study.effort],
-        study.minutes,
     )
-    found = search(baseline, rules, run, progress)
+    found = search(baseline, rules, run, progress, until)
     on_record([found.base.fit, found.final.fit], baseline.readings, run)
     # a model of the wrong shape says nothing of specimens that changed places
     if not errors and left_of(found) <= MUCH:

@@ -104,6 +104,7 @@ def estimated_noise(
     """Noise from the repeats; where these are too few, as ``declared`` (6,) and doubted.
 
     None when neither is there. ``accuracy`` (6,) NaN where it is not told: then it is the usual.
+    Of ``declared`` NaN where the accuracy alone is told: it then is all that a reading is off by.
     """
     told = np.full(6, np.nan) if accuracy is None else accuracy
     contrasts = _contrasts(specimens)
@@ -118,6 +119,9 @@ def estimated_noise(
         return Noise(sd, correlation, REPEATS, counts, outliers, zeroed, shared, assumed)
     if declared is None:
         return None
+    # nobody knows how much of it a test shares: half of the variance, so that it counts once
+    alone, half = np.isnan(declared), np.sqrt(0.5) * shared
+    declared, shared = np.where(alone, half, declared), np.where(alone, half, shared)
     sd = np.where(read, DECLARED_DOUBT * declared, np.nan)
     return Noise(sd, 0.0, DECLARED, counts, outliers, zeroed, shared, assumed)
 

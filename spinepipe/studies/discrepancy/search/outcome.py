@@ -17,11 +17,13 @@ from spinepipe.studies.discrepancy.search.search_state import (
 from spinepipe.studies.discrepancy.search.something_else import TABLE
 from spinepipe.studies.discrepancy.verdict import (
     EVEN,
+    NOT_LISTED,
     NOTHING,
     SOMETHING_ELSE,
     SURE,
     SuspectedError,
     VerdictKind,
+    likeliest_beside,
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
@@ -46,6 +48,7 @@ class Outcome:
     ----------
     named : effects that are sure. tied : names that cannot be told apart here.
     reason : why nothing is named though something is missing; None elsewhere.
+    stays : noise SD (RMS) that stay whatever is added, where that is why; else None.
     left : why what is named is not all, a sentence each.
     """
 
@@ -55,6 +58,7 @@ class Outcome:
     tied: tuple[str, ...] = ()
     reason: Reason | None = None
     left: tuple[str, ...] = ()
+    stays: float | None = None
 
 
 Cases = Mapping[str, Sequence[LoadCase]]
@@ -89,7 +93,7 @@ def outcome(
     shape = f"something else, with probability {p[SOMETHING_ELSE]:.2f} ({found.lack.shape})"
     if (rms := left_of(found)) > MUCH:
         why = f"the model's shape is wrong here: {rms:.1f} noise SD stay whatever is added"
-        return Outcome(VerdictKind.UNKNOWN, why, reason=Reason.MOST_STAYS)
+        return Outcome(VerdictKind.UNKNOWN, why, reason=Reason.MOST_STAYS, stays=rms)
     names = {one.name for one in sure}
     further = _further(found, names)
     if other or not (sure or further):
@@ -120,6 +124,12 @@ def outcome(
     tied = list(dict.fromkeys(tied))
     if tied:
         why = f"something is missing, but these tests cannot tell which: {_listed(tied, 'or')}"
+        if len(tied) == 1:  # what holds the rest is no name of a set
+            rest, q = likeliest_beside(p, {*names, *tied})
+            rest = NOT_LISTED if rest == SOMETHING_ELSE else rest
+            why = f"{tied[0]} or {rest} ({p[tied[0]]:.2f}; {q:.2f})"
+        if not done:
+            why += f"; what was not fitted holds {found.unfitted:.2f} of the probability"
         return Outcome(VerdictKind.SET, why, tuple(sure), tuple(tied))
     unproven = _unproven(found, proof)
     if unproven:

@@ -25,6 +25,7 @@ from spinepipe.studies.discrepancy.search.screen import Screen, ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import ELSE, PRIOR, Rules, look
 from spinepipe.studies.discrepancy.search.something_else import TABLE, tables
 from spinepipe.studies.discrepancy.store import PieceRunner
+from spinepipe.studies.discrepancy.verdict import SOMETHING_ELSE, SearchEnd, SearchExtent
 
 ENOUGH = 0.05
 """Probability that may rest on first-order looks alone."""
@@ -46,7 +47,8 @@ FURTHER_FORM = 0.5
 MOST_FORMS, MOST_TABLES = 6, 3
 """In one set; an effect may act in another way on each coordinate."""
 
-SECONDS = 60.0
+MOST_TOLD = 3
+"""Sets that were not fitted and are told by name."""
 
 Forms = frozenset[CandidateForm]
 Odds = dict[tuple[frozenset[str], bool], float]
@@ -120,14 +122,14 @@ class Posterior:
     Attributes
     ----------
     fitted : in the order in which they were. seen : those that were only looked at.
-    open : probability that may lie in sets that were only looked at, at most.
+    open : probability that may lie in sets that were only looked at, at most. ended : by what.
     """
 
     def __init__(self, base: BaselineFit, rules: Rules) -> None:
         self.base, self.rules = base, rules
         self.fitted: dict[Forms, FittedSet] = {}
         self.seen: dict[Forms, SeenSet] = {}
-        self.open = 1.0
+        self.open, self.ended = 1.0, SearchEnd.DONE
 
     @cached_property
     def trials(self) -> Mapping[str, Trials]:
@@ -135,13 +137,19 @@ class Posterior:
         every = (*self.rules.trials, tables(self.base, self.rules.coordinates))
         return {one.effect: one for one in every}
 
-    def explore(self, run: PieceRunner, progress: Progress) -> None:
-        """Fit sets while much probability rests on looks alone."""
-        begun, minutes = time.monotonic(), self.rules.minutes
+    def explore(self, run: PieceRunner, progress: Progress, until: float | None = None) -> None:
+        """Fit sets while much probability rests on looks alone.
+
+        ``until`` : by the clock that never goes back (`time.monotonic`), s; None for no end.
+        """
         self._take(FittedSet(frozenset(), self.base, 0.0, {}), run)
         number = 0
-        while (best := self._next()) is not None and number < self.rules.most_fits:
-            if minutes and time.monotonic() - begun > SECONDS * minutes:
+        while (best := self._next()) is not None:
+            if number >= self.rules.most_fits:
+                self.ended = SearchEnd.FITS
+                break
+            if until is not None and time.monotonic() > until:
+                self.ended = SearchEnd.MINUTES
                 break
             number += 1
             names = ", ".join(sorted(names_of(best.forms))) or "something else"
@@ -191,6 +199,18 @@ class Posterior:
                 sorted(map(repr, one.forms)),
             ),
         )
+
+    @property
+    def extent(self) -> SearchExtent:
+        """How far it came."""
+        strong = [one for one in self.seen.values() if not one.weak]
+        strong.sort(key=lambda s: (-s.most - self.log_prior(s.forms), sorted(map(repr, s.forms))))
+        sets = [
+            (*sorted(names_of(one.forms)), *[SOMETHING_ELSE] * has_table(one.forms))
+            for one in strong
+        ]
+        told = tuple(dict.fromkeys(sets))[:MOST_TOLD] if self.ended is not SearchEnd.DONE else ()
+        return SearchExtent(self.ended, len(self.fitted) - 1, self.open, told)
 
     @property
     def unfitted(self) -> float:

@@ -36,11 +36,18 @@ LEAST_TOLD = 1e-4
 
 
 def search(
-    base: BaselineFit, rules: Rules, run: PieceRunner, progress: Progress | None = None
+    base: BaselineFit,
+    rules: Rules,
+    run: PieceRunner,
+    progress: Progress | None = None,
+    until: float | None = None,
 ) -> SearchResult:
-    """Effects that the base lacks, each with its probability and its rivals."""
+    """Effects that the base lacks, each with its probability and its rivals.
+
+    ``until`` : when the clock ends it, see `Posterior.explore`.
+    """
     posterior = Posterior(base, rules)
-    posterior.explore(run, progress or Progress())
+    posterior.explore(run, progress or Progress(), until)
     odds = posterior.log_odds
     total = float(logsumexp(list(odds.values())))
     sets = [(names, other, float(np.exp(v - total))) for (names, other), v in odds.items()]
@@ -75,6 +82,7 @@ def search(
         final_gap=whole_gap(final, final.fit),
         base_at=gaps_at(base, base.fit),
         final_at=gaps_at(final, final.fit),
+        extent=posterior.extent,
     )
 
 

@@ -1,7 +1,7 @@
 """What a search may do, what it looks at, and where it ends."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import log
 
@@ -23,7 +23,7 @@ from spinepipe.studies.discrepancy.search.projected import (
 )
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.screen import EffectColumns, Screen, screened
-from spinepipe.studies.discrepancy.verdict import SURE
+from spinepipe.studies.discrepancy.verdict import SURE, SearchExtent
 
 PRIOR = (0.35, 0.45, 0.15, 0.05)
 """Probabilities before any reading that no, one, two or three effects are missing."""
@@ -36,7 +36,7 @@ ELSE = 0.05
 class Rules:
     """What a search may do. ``margin`` of log evidence within which a rival is told.
 
-    ``most_fits``, ``minutes`` : after which it ends with what it has; None for no clock.
+    ``most_fits`` : after which it ends with what it has.
     """
 
     trials: tuple[Trials, ...]
@@ -45,7 +45,6 @@ class Rules:
     most_effects: int
     seed: int
     most_fits: int = 10
-    minutes: float | None = None
 
     @property
     def needed(self) -> float:
@@ -118,6 +117,7 @@ class SearchResult:
         with and without something else.
     with_tables : the final model with what stands for something else; None where that has no fit.
     lack : the generic basis beside the final model. unfitted : probability that rests on looks.
+    extent : how far the search came.
     base_at, final_at : the gap at each coordinate that was read, by its name.
     """
 
@@ -134,6 +134,7 @@ class SearchResult:
     final_gap: Gap
     base_at: Mapping[str, Gap]
     final_at: Mapping[str, Gap]
+    extent: SearchExtent = field(default_factory=SearchExtent)
 
 
 def look(baseline: BaselineFit, trials: Sequence[Trials]) -> Screen:
