@@ -9,7 +9,6 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.curve_numbers import numbers_at
 from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
-from spinepipe.studies.discrepancy.design.masked_effects import MaskedEffects
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.imperfections import (
@@ -45,7 +44,6 @@ from spinepipe.studies.discrepancy.verdict import (
     Threshold,
     Verdict,
     VerdictScope,
-    WithheldEffect,
     share_of_gap,
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import UnnamedMisfit, UnnamedRest
@@ -70,7 +68,6 @@ def summarise(
     stays: ResidualModel,
     numbers: Sequence[Row],
     taken: AbsorbedGap,
-    hidden: Sequence[MaskedEffects],
     run: PieceRunner,
 ) -> Verdict:
     """What a search found, in a few words.
@@ -79,7 +76,7 @@ def summarise(
     ----------
     told : what these tests can tell. stays : what describes what has no name.
     numbers : rows of the field's numbers.
-    taken : what imperfections take up beside the final model. hidden : effects that they hide.
+    taken : what imperfections take up beside the final model.
     """
     cohort = ready.cohort
     found, proof, ended = investigation.found, investigation.proof, investigation.ended
@@ -100,14 +97,6 @@ def summarise(
     evident = found.probabilities[SOMETHING_ELSE] >= EVEN
     shape = found.lack.shape if evident else None
     coordinate = found.lack.coordinate if shape else None
-
-    withheld = []
-    for one in hidden:
-        allowed, unit = display_value(one.unit, one.prior)
-        known_to = None if one.needed is None else one.needed * allowed
-        withheld.append(
-            WithheldEffect(one.effect, one.kind, allowed, known_to, unit, one.now, one.at[0.0])
-        )
     return Verdict(
         cohort=cohort.name,
         verdict=ended.verdict,
@@ -132,10 +121,8 @@ def summarise(
         else None,
         suspected_data_errors=investigation.errors,
         threshold=Threshold(investigation.rules.needed),
-        families=told.families,
         imperfections=imperfection_summary(taken),
         tabulated=stays.table,
-        withheld=tuple(withheld),
         left_out=tuple(_left_out(proof)),
         probabilities={n: p for n, p in found.probabilities.items() if p >= LEAST_PROBABLE},
     )

@@ -131,9 +131,7 @@ def investigate(
     rules = Rules(
         trials(study.effects, ready.coordinates, specimens, joints),
         ready.coordinates,
-        study.margin,
         study.most_effects,
-        study.seed,
         MOST_FITS[study.effort],
         study.minutes,
     )

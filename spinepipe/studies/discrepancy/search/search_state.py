@@ -34,16 +34,14 @@ ELSE = 0.05
 
 @dataclass(frozen=True)
 class Rules:
-    """What a search may do. ``margin`` of log evidence within which a rival is told.
+    """What a search may do.
 
     ``most_fits``, ``minutes`` : after which it ends with what it has; None for no clock.
     """
 
     trials: tuple[Trials, ...]
     coordinates: tuple[str, ...]
-    margin: float
     most_effects: int
-    seed: int
     most_fits: int = 10
     minutes: float | None = None
 
