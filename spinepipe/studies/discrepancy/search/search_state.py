@@ -48,8 +48,13 @@ class Rules:
     @property
     def needed(self) -> float:
         """Log evidence from which a single effect is sure beside nothing else."""
-        odds = PRIOR[0] * len(self.trials) / PRIOR[1]
-        return log(SURE / (1.0 - SURE)) + log(max(odds, 1.0))
+        return needed_of(len(self.trials))
+
+
+def needed_of(effects: int) -> float:
+    """Log evidence from which one of so many effects is sure beside nothing else."""
+    odds = PRIOR[0] * effects / PRIOR[1]
+    return log(SURE / (1.0 - SURE)) + log(max(odds, 1.0))
 
 
 @dataclass(frozen=True)
