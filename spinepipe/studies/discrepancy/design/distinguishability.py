@@ -5,12 +5,13 @@ Of what base and nuisances leave of a typical effect A, the share that another e
 SD t. B has one variant and shape at a time, the best; its strengths may differ between joints, or
 it is where A is alone.
 
-An effect that makes G of chi2 is expected to lead over B by m = G (1 - share) / 2 of log evidence,
-which noise scatters by the root of 2 m. From it follows the gap at which A has its own name.
+By how much log evidence A is expected to lead over B, m, is that of A's strengths for what A makes
+less that of B's; noise scatters it by the root of 2 m. From it follows the gap at which A has its
+own name.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.stats import norm
@@ -26,18 +27,24 @@ from spinepipe.studies.discrepancy.design.signatures import (
 )
 from spinepipe.studies.discrepancy.design.testable import (
     LEAD,
-    NO_TRACE,
     OFTEN,
     Judgement,
     Typical,
+    expected_log_evidence,
     judgements,
     log_share,
 )
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, shape_grid
-from spinepipe.studies.discrepancy.search.screen import SIZES
+from spinepipe.studies.discrepancy.search.screen import SIZES, Group, sides
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import NotTestable, SmallestDetectable
+
+TIMES = np.geomspace(0.02, 20.0, 13)
+"""Times as strong as usual at which leads are known."""
+
+ENOUGH = 0.5 * (float(norm.ppf(OFTEN)) + float(np.sqrt(norm.ppf(OFTEN) ** 2 + 2.0 * LEAD))) ** 2
+"""Expected lead of which noise leaves more than `LEAD` with probability `OFTEN`."""
 
 FREE = (PlaceSpread.SHARED, PlaceSpread.BY_JOINT)
 """How the strengths of the explaining effect may differ, if its trial knows one of these."""
@@ -51,7 +58,7 @@ class Confusion:
     """Share (0..1) of what ``effect`` would do that ``other`` can explain.
 
     ``gap`` : noise SD from which the effect would lead by `LEAD` in nine data sets of ten, to
-    first order and with B's shapes on a grid; None where the other explains all of it.
+    first order and with B's shapes on a grid; None where it would not at `TIMES` as usual.
     """
 
     effect: str
@@ -62,43 +69,41 @@ class Confusion:
 
 @dataclass(frozen=True)
 class Target:
-    """A typical effect: what it makes in each specimen (M, d), its squared size, and its gap.
+    """A typical effect of one form, and what it makes in each specimen (M, d).
 
-    ``shares`` : of it, that each other effect explains.
+    Attributes
+    ----------
+    times : (S,) as strong as usual. own : (S,) its expected log evidence at these.
+    shares, rivals : of each other effect, the share that it explains, and its (S,) log evidence for
+        what this one makes.
     """
 
+    number: int
     typical: Typical
-    log_share: float
     made: Mapping[str, Array]
-    gap: float
-    shares: Mapping[str, float]
+    times: Array
+    own: Array
+    shares: dict[str, float] = field(default_factory=dict)
+    rivals: dict[str, Array] = field(default_factory=dict)
 
-    @property
-    def size(self) -> float:
-        """Squared, of what base and nuisances leave."""
-        return self.typical.squared(self.typical.left)
-
-    def leading_gap(self, share: float) -> float | None:
-        """Gap from which it leads over an effect that explains a share of it."""
-        left = self.size * (1.0 - share)
-        if left <= NO_TRACE:
+    def told_from(self, other: str) -> float | None:
+        """Times as strong as usual from which it leads over another effect, see `Confusion`."""
+        lead = self.own - self.rivals[other]
+        reached = np.flatnonzero(lead >= ENOUGH)
+        if not len(reached):
             return None
-        # s times this target leads by a normal number of mean s^2 L / 2 and SD s sqrt(L), L = left:
-        # with probability OFTEN beyond the lead from s sqrt(L) = z + sqrt(z^2 + 2 lead) on
-        often = float(norm.ppf(OFTEN))
-        return self.gap * (often + float(np.sqrt(often**2 + 2.0 * LEAD))) / float(np.sqrt(left))
+        near = slice(max(0, reached[0] - 1), reached[0] + 1)
+        # the root of the lead rises evenly with strength
+        return float(np.interp(ENOUGH**0.5, np.maximum(lead[near], 0.0) ** 0.5, self.times[near]))
 
-    def lead(self, times: float) -> tuple[float, str]:
-        """Expected log evidence over its nearest rival when so many times as strong, and which.
+    def leads(self) -> list[tuple[float, str]]:
+        """Expected log evidence over its nearest rival at each of `times`, and which that is.
 
-        The rival is nothing, named "", or the effect that explains most of it.
+        The rival is nothing, named "", or the effect that explains it best.
         """
-        leads = [(self.typical.log_evidence(times) + self.log_share, "")]
-        leads += [
-            (0.5 * times**2 * self.size * (1.0 - share), name)
-            for name, share in self.shares.items()
-        ]
-        return min(leads)
+        rivals = {"": np.zeros(len(self.times))} | self.rivals
+        ahead = {name: self.own - rival for name, rival in rivals.items()}
+        return [min((float(ahead[n][k]), n) for n in ahead) for k in range(len(self.times))]
 
 
 @dataclass(frozen=True)
@@ -147,7 +152,7 @@ def _told(
 ) -> tuple[tuple[Judgement, ...], tuple[Confusion, ...]]:
     design = cohort_signatures(grounds, trials)
     found = judgements(design, needed)
-    return found, confusions(targets(design, found))
+    return found, confusions(design, usual_targets(design, found))
 
 
 def not_testable(
@@ -175,58 +180,79 @@ def not_testable(
     )
 
 
-def targets(design: CohortSignatures, judged: Sequence[Judgement]) -> dict[str, Target]:
-    """Each effect that the tests can show, as strong as usual.
+def usual_targets(design: CohortSignatures, judged: Sequence[Judgement]) -> list[Target]:
+    """Each effect that the tests can show, in its best form, at `TIMES` as strong as usual.
 
     Parameters
     ----------
     judged : of all effects of the design, in their order.
     """
-    shown = [number for number, one in enumerate(judged) if one.testable]
-    alone = {number: _target(design, number, judged[number].best) for number in shown}
-    shares: dict[int, dict[str, float]] = {number: {} for number in shown}
-    for other in shown:
-        others = [number for number in shown if number != other]
-        told = _shares(design, other, [alone[number] for number in others])
-        for number, share in zip(others, told, strict=True):
-            shares[number][judged[other].effect] = share
-    return {
-        judged[number].effect: Target(one.typical, one.log_share, one.made, one.gap, shares[number])
-        for number, one in alone.items()
-    }
+    shown = [(number, one.best) for number, one in enumerate(judged) if one.testable]
+    return targets(design, judged, shown, [TIMES] * len(shown))
 
 
-def confusions(of: Mapping[str, Target]) -> tuple[Confusion, ...]:
+def targets(
+    design: CohortSignatures,
+    judged: Sequence[Judgement],
+    chosen: Sequence[tuple[int, Typical]],
+    times: Sequence[Array],
+) -> list[Target]:
+    """Forms of effects of these numbers beside all others that the tests can show.
+
+    Parameters
+    ----------
+    times : (S,) as strong as usual, of each.
+    """
+    found = [
+        _target(design, number, one, some)
+        for (number, one), some in zip(chosen, times, strict=True)
+    ]
+    for other, rival in enumerate(judged):
+        others = [one for one in found if one.number != other]
+        if rival.testable and others:
+            shares, evidence = _told_by(design, other, others)
+            for one, share, curve in zip(others, shares, evidence, strict=True):
+                one.shares[rival.effect], one.rivals[rival.effect] = float(share), curve
+    return found
+
+
+def confusions(design: CohortSignatures, found: Sequence[Target]) -> tuple[Confusion, ...]:
     """All ordered pairs of different effects that the tests can show."""
-    return tuple(
-        Confusion(name, other, of[name].shares[other], of[name].leading_gap(of[name].shares[other]))
-        for other in of
-        for name in of
-        if name != other
-    )
+    pairs = []
+    for one in found:
+        typical, name = one.typical, one.typical.form.name
+        gap = float(np.sqrt(typical.squared(typical.refitted) / design.freedom))
+        for other, share in one.shares.items():
+            times = one.told_from(other)
+            pairs.append(Confusion(name, other, share, None if times is None else gap * times))
+    return tuple(sorted(pairs, key=lambda pair: (pair.other, pair.effect)))
 
 
-def _target(design: CohortSignatures, number: int, one: Typical) -> Target:
+def _target(design: CohortSignatures, number: int, one: Typical, times: Array) -> Target:
     made = {}
     for specimen, columns, owners in one.places:
         onto = summation(owners, len(one.mean))
         made[specimen] = design.left(specimen)[:, columns] @ onto.T @ one.directions
-    gap = float(np.sqrt(one.squared(one.refitted) / design.freedom))
-    return Target(one, log_share(one.form, design.those.trials[number]), made, gap, {})
+    own = one.log_evidence(times) + log_share(one.form, design.those.trials[number])
+    return Target(number, one, made, times, own)
 
 
-def _shares(design: CohortSignatures, other: int, targets: Sequence[Target]) -> list[float]:
-    """Share of each target that effect ``other`` explains at its best."""
-    forms = design.those.trials[other].forms
-    best = np.zeros(len(targets))
-    for form in forms:
+def _told_by(
+    design: CohortSignatures, other: int, targets: Sequence[Target]
+) -> tuple[Array, Array]:
+    """(A,) share of each target that effect ``other`` explains, and (A, S) its log evidence."""
+    trials = design.those.trials[other]
+    shares = np.zeros(len(targets))
+    evidence = np.full((len(targets), len(targets[0].times)), -np.inf)
+    for form in trials.forms:
         # a form of one place competes only with targets of that very place
-        usual = form.spread in FREE or not any(one.spread in FREE for one in forms)
+        usual = form.spread in FREE or not any(one.spread in FREE for one in trials.forms)
         at = [n for n, o in enumerate(targets) if usual or _place(o.typical.form) == _place(form)]
         for sds in shape_grid(form.variant) if at else ():
-            told = _explained(design, other, form, sds, [targets[number] for number in at])
-            best[at] = np.maximum(best[at], told)
-    return [float(share) for share in np.clip(best, 0.0, 1.0)]
+            told, logs = _explained(design, other, form, sds, [targets[number] for number in at])
+            shares[at] = np.maximum(shares[at], told)
+            evidence[at] = np.maximum(evidence[at], logs + log_share(form, trials))
+    return np.clip(shares, 0.0, 1.0), evidence
 
 
 def _place(form: CandidateForm) -> tuple[PlaceSpread, int | None, str | None]:
@@ -239,28 +265,24 @@ def _explained(
     form: CandidateForm,
     sds: tuple[float, ...],
     targets: Sequence[Target],
-) -> Array:
-    """Share of each target that a form of effect ``other`` explains: ridge regression on it."""
+) -> tuple[Array, Array]:
+    """(A,) share of each target that a form of effect ``other`` explains, by ridge regression on
+    it, and (A, S) log evidence of its strengths at the targets' times.
+    """
     places, strengths = design.places(other, form, sds)
     count = len(strengths)
-
-    # F'F (k, k), and F'a (k, d) of each target
-    gram = np.zeros((count, count))
-    widths = [next(iter(target.made.values())).shape[1] for target in targets]
-    moments = [np.zeros((count, width)) for width in widths]
+    group = Group.of(design.summed(places, count)[2], sides(form, strengths))
+    # F'a (k, d) of each target
+    width = max(next(iter(target.made.values())).shape[1] for target in targets)
+    moments = np.zeros((len(targets), count, width))
     for specimen, columns, owners in places:
         onto = summation(owners, count)
-        gram += onto @ design.left(specimen)[np.ix_(columns, columns)] @ onto.T
         for moment, target in zip(moments, targets, strict=True):
             if specimen in target.made:
-                moment += onto @ target.made[specimen][columns]
-
-    prior = np.eye(len(gram)) / SIZES[-1] ** 2
-    solution = np.linalg.solve(gram + prior, np.concatenate(moments, axis=1))
-    ends = np.cumsum(widths)[:-1]
-    return np.array(
-        [
-            float(np.sum(m * x)) / target.size
-            for target, m, x in zip(targets, moments, np.split(solution, ends, axis=1), strict=True)
-        ]
-    )
+                made = target.made[specimen][columns]
+                moment[:, : made.shape[1]] += onto @ made
+    inverse = 1.0 / (group.eigenvalues + SIZES[-1] ** -2.0)
+    explained = np.einsum("k,akd->a", inverse, (group.vectors.T @ moments) ** 2)
+    sizes = np.array([one.typical.squared(one.typical.left) for one in targets])
+    times = np.stack([one.times for one in targets])
+    return explained / sizes, expected_log_evidence(group, moments, times)

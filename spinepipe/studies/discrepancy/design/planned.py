@@ -20,18 +20,18 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.discrepancy.design.distinguishability import Target, targets
 from spinepipe.studies.discrepancy.design.information import Bench
 from spinepipe.studies.discrepancy.design.signatures import (
-    CohortSignatures,
     cohort_signatures,
     with_each_run,
 )
 from spinepipe.studies.discrepancy.design.testable import (
     LEAD,
-    Judgement,
+    Typical,
+    best_spread,
     judgements,
     typical_form,
 )
-from spinepipe.studies.discrepancy.search.baseline import base_model
-from spinepipe.studies.discrepancy.search.hypothesis import Trials, trials
+from spinepipe.studies.discrepancy.search.baseline import BaselineFit, base_model
+from spinepipe.studies.discrepancy.search.hypothesis import trials
 from spinepipe.studies.discrepancy.search.investigation import Prepared, fit_base
 from spinepipe.studies.discrepancy.search.noise import USUAL_ACCURACY, Noise
 from spinepipe.studies.discrepancy.search.prediction import Simulated
@@ -42,6 +42,9 @@ from spinepipe.studies.discrepancy.store import at_once
 from spinepipe.studies.discrepancy.verdict import REPEATS
 from spinepipe.units import COORDINATES, ROTATIONS, to_si, without_step_0
 
+LARGEST = 10.0
+"""Times the typical strength: forms that make a misfit only beyond it are left out."""
+
 
 @dataclass(frozen=True)
 class Prospect:
@@ -49,11 +52,13 @@ class Prospect:
 
     Attributes
     ----------
-    gap : misfit that it makes, in SD of one reading. times : its typical strength; None where these
-        tests cannot show it. lead : expected log evidence over ``rival``, its nearest; the rival
-        is empty where that is the base alone.
-    probability : that it is named. further_run, with_run : the run of the menu, one cycle on each
-        specimen, that makes this most probable, and to how much. why : it cannot be shown.
+    gap : misfit that it makes, in SD of one reading.
+    lead : expected log evidence over ``rival``, the nearest to the form that is hardest to tell;
+        the rival is empty where that is the base alone. times : how many times as strong as usual
+        that form then is; None where these tests cannot show the effect.
+    probability : that it is named, mean over its forms.
+    further_run, with_run : the run of the menu, one cycle on each specimen, that makes this most
+        probable, and to how much. why : it cannot be shown.
     """
 
     effect: str
@@ -97,37 +102,51 @@ def planned_experiment(
     needed = needed_of(len(tried)) + LEAD
     design = cohort_signatures(grounds, tried)
     judged = judgements(design, needed)
-    made = _gaps_of_one_reading(ready, tried, judged)
-    # times its typical strength at each gap; as it is usual for effects that these tests do not show
-    strengths = [
-        {one.effect: gap / made[one.effect] if one.testable else 1.0 for one in judged}
-        for gap in gaps
-    ]
-    now = targets(design, judged)
-    with_runs = [
-        (run.words, targets(more, judgements(more, needed)))
-        for run, more in with_each_run(Bench.of(grounds, ready.declared), tried)
-    ]
+    # forms of each effect, one a variant, with the strengths that make the gaps; as usual in its
+    # best form where these tests do not show it
+    one_reading = cohort_signatures(_read_once(ready), tried)
+    chosen: list[tuple[int, Typical]] = []
+    times: list[Array] = []
+    for number, one in enumerate(judged):
+        for variant in tried[number].variants if one.testable else ():
+            form = best_spread(design, number, variant)
+            alone = typical_form(one_reading, number, form.form)
+            made = np.sqrt(alone.squared(alone.refitted) / one_reading.freedom)
+            if LARGEST * made >= min(gaps):
+                chosen.append((number, form))
+                times.append(np.array(gaps) / made)
+        if not one.testable:
+            chosen.append((number, one.best))
+            times.append(np.ones(len(gaps)))
+    now = targets(design, judged, chosen, times)
+    told = _probabilities(now, len(tried), len(gaps))
+    told[[not one.testable for one in judged]] = 0.0
+    with_runs: list[tuple[str, Array]] = []
+    for run, more in with_each_run(Bench.of(grounds, ready.declared), tried):
+        again = [(number, typical_form(more, number, one.form)) for number, one in chosen]
+        found = targets(more, judgements(more, needed), again, times)
+        with_runs.append((run.words, _probabilities(found, len(tried), len(gaps))))
     prospects = []
-    for gap, times in zip(gaps, strengths, strict=True):
-        for one in judged:
-            name = one.effect
-            lead, rival = now[name].lead(times[name]) if name in now else (0.0, "")
-            own = named_with(lead)
-            best, words = max(
-                ((_named(found, name, times[name]), words) for words, found in with_runs),
-                key=lambda pair: pair[0],
-                default=(own, ""),
-            )
-            words = words if best > own else ""
-            shown = times[name] if one.testable else None
+    for k, gap in enumerate(gaps):
+        for number, one in enumerate(judged):
+            own = [(target.leads()[k], target) for target in now if target.number == number]
+            (lead, rival), hardest = min(own, key=lambda pair: pair[0], default=((0.0, ""), None))
+            best = max(with_runs, key=lambda pair: pair[1][number, k], default=("", told))
+            gains = best[1][number, k] > told[number, k]
             prospects.append(
-                Prospect(name, gap, shown, lead, rival, own, words, max(own, best), one.why)
+                Prospect(
+                    effect=one.effect,
+                    gap=gap,
+                    times=float(hardest.times[k]) if hardest and one.testable else None,
+                    lead=lead,
+                    rival=rival,
+                    probability=float(told[number, k]),
+                    further_run=best[0] if gains else "",
+                    with_run=float(best[1][number, k] if gains else told[number, k]),
+                    why=one.why if hardest else f"it would be {LARGEST:g} times as strong as usual",
+                )
             )
-    means = [
-        (words, float(np.mean([_named(found, name, t[name]) for t in strengths for name in t])))
-        for words, found in with_runs
-    ]
+    means = [(words, float(np.mean(one))) for words, one in with_runs]
     return PlannedExperiment(tuple(prospects), tuple(sorted(means, key=lambda one: -one[1])))
 
 
@@ -136,31 +155,27 @@ def named_with(lead: float) -> float:
     return float(norm.cdf((lead - LEAD) / np.sqrt(2.0 * lead))) if lead > 0.0 else 0.0
 
 
-def _named(found: dict[str, Target], name: str, times: float) -> float:
-    return named_with(found[name].lead(times)[0]) if name in found else 0.0
+def _probabilities(found: Sequence[Target], effects: int, gaps: int) -> Array:
+    """(E, G) probability that each effect is named, mean over its forms."""
+    sums, counts = np.zeros((effects, gaps)), np.zeros((effects, 1))
+    for one in found:
+        sums[one.number] += [named_with(lead) for lead, _ in one.leads()]
+        counts[one.number] += 1.0
+    result: Array = sums / np.maximum(counts, 1.0)
+    return result
 
 
-def _gaps_of_one_reading(
-    ready: Prepared, tried: Sequence[Trials], judged: Sequence[Judgement]
-) -> dict[str, float]:
-    """Misfit of each typical effect in SD of one reading, with the base refitted to it."""
+def _read_once(ready: Prepared) -> BaselineFit:
+    """The base as one cycle of readings by an exact instrument tells it."""
     readings = tuple(
         replace(one, tests=tuple(replace(t, cycles=t.cycles[:1]) for t in one.tests))
         for one in ready.readings
     )
     exact = replace(ready.noise, accuracy=np.zeros(6))
-    grounds = fit_base(replace(ready, readings=readings, noise=exact), at_once)
-    design: CohortSignatures = cohort_signatures(grounds, tried)
-    found = {}
-    for number, one in enumerate(judged):
-        form = typical_form(design, number, one.best.form)
-        found[one.effect] = float(np.sqrt(form.squared(form.refitted) / design.freedom))
-    return found
+    return fit_base(replace(ready, readings=readings, noise=exact), at_once)
 
 
-def as_planned(
-    study: Discrepancy, cohort: Cohort, file: ModelFile | None, cycles: int
-) -> Prepared:
+def as_planned(study: Discrepancy, cohort: Cohort, file: ModelFile | None, cycles: int) -> Prepared:
     """The study as if its base had been read in each test of the cohort, without error.
 
     Rotations are read unless the study names other coordinates.
@@ -183,7 +198,8 @@ def as_planned(
         model = base_model(cohort, given, start, file)
         tests = []
         every = list(cases.values())
-        for case, q in zip(every, Simulated(model, every, zeroed, ()).at(np.zeros(0)).readings):
+        moved = Simulated(model, every, zeroed, ()).at(np.zeros(0)).readings
+        for case, q in zip(every, moved, strict=True):
             seen: Array = np.where(np.isin(np.arange(6), unread), np.nan, q)
             seen = without_step_0(seen, zeroed)
             tests.append(Repeats(case, np.repeat(seen[None], cycles, axis=0)))

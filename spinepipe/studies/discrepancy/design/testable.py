@@ -96,21 +96,28 @@ class Typical:
         """Its strengths as a group on the screen."""
         return Group.of(self.left, self.signs)
 
-    def log_evidence(self, times: float) -> float:
-        """Expected, of an effect that many times as strong as usual; its share not taken off."""
-        # mean square of each component of its moments G f, on the side of their mean
-        group = self.group
-        onto = group.vectors.T @ self.left
-        mean = onto @ self.mean
-        sizes = np.sqrt(mean**2 + onto**2 @ self.sd**2)
-        moments = group.vectors @ np.where(mean < 0.0, -sizes, sizes)
-        return float(group.log_evidence(times * moments))
+    def log_evidence(self, times: Array) -> Array:
+        """(S,) expected, that many times as strong as usual; the form's share not taken off."""
+        moments = self.left @ self.directions
+        return expected_log_evidence(self.group, moments[None], times[None])[0]
 
     @property
     def directions(self) -> Array:
         """(k, d) strengths whose squares add up to the expected one."""
         both = np.column_stack([self.mean, np.diag(self.sd)])
         return both[:, np.any(both != 0.0, axis=0)]
+
+
+def expected_log_evidence(group: Group, moments: Array, times: Array) -> Array:
+    """(A, S) log evidence of a group of strengths for effects A, times (A, S) as strong as usual.
+
+    ``moments`` : (A, k, d) of each, squares of its directions add up; the first gives the side.
+    """
+    onto = group.vectors.T @ moments
+    sizes = np.sqrt(np.sum(onto**2, axis=-1))
+    found = np.where(onto[..., 0] < 0.0, -sizes, sizes) @ group.vectors.T
+    result: Array = group.log_evidence(times[..., None] * found[:, None, :])
+    return result
 
 
 @dataclass(frozen=True)
@@ -157,7 +164,7 @@ def judgements(design: CohortSignatures, needed: float) -> tuple[Judgement, ...]
     judged = []
     for number, one in enumerate(design.those.trials):
         # of each effect by the variant that shows best
-        best_forms = [_best_spread(design, number, variant) for variant in one.variants]
+        best_forms = [best_spread(design, number, variant) for variant in one.variants]
         found = [(form, _detectable(form, one, design.freedom, needed)) for form in best_forms]
         # shown before not shown, then by how little is absorbed; a trace before none
         best, weakest = min(
@@ -173,7 +180,7 @@ def judgements(design: CohortSignatures, needed: float) -> tuple[Judgement, ...]
     return tuple(judged)
 
 
-def _best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typical:
+def best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typical:
     """The form of a variant of which least is absorbed (to 1 %, then as declared first); of places,
     the one that shows most.
     """
@@ -200,13 +207,17 @@ def log_share(form: CandidateForm, trials: Trials) -> float:
 def _least(one: Typical, needed: float) -> float | None:
     """Times the typical strength at which all but a few data sets have the evidence needed."""
     size = float(np.sqrt(one.squared(one.left)))
-    if size**2 <= NO_TRACE or one.log_evidence(STRONGEST) <= needed:
+
+    def beyond(log_times: float) -> float:
+        return float(one.log_evidence(np.exp([log_times]))[0]) - needed
+
+    ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
+    if size**2 <= NO_TRACE or beyond(ends[1]) <= 0.0:
         return None
     # noise moves the effect by a normal number of SD one along its own direction, whose length is
     # its size in noise SD: that much stronger than what has the evidence needed
-    ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
-    evident = brentq(lambda log: one.log_evidence(float(np.exp(log))) - needed, *ends, xtol=1e-3)
-    return float(np.exp(evident)) + float(norm.ppf(OFTEN)) / size
+    evident = float(np.exp(brentq(beyond, *ends, xtol=1e-3)))
+    return evident + float(norm.ppf(OFTEN)) / size
 
 
 def _shown(one: Typical, least: Detectable | None) -> bool:
