@@ -9,6 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.curve_numbers import numbers_at
 from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
+from spinepipe.studies.discrepancy.design.testable import LEAD
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.imperfections import (
@@ -103,7 +104,7 @@ def summarise(
         why=ended.why,
         effects=tuple(_missing(found, one, cohort, numbers, run) for one in ended.named),
         candidates_in_set=ended.tied,
-        candidates=nearest_candidates(_in_set(found, ended), ready.study.margin),
+        candidates=nearest_candidates(_in_set(found, ended), LEAD),
         not_testable=told.not_testable,
         noise=noise_summary(found.base.noise),
         rms_residual=MisfitSizes(**{name: gap.rms if gap else None for name, gap in gaps.items()}),
